@@ -40,7 +40,9 @@ class Decisions:
     def all_of(cls, several: "Sequence[Decisions]") -> "Decisions":
         """Return the account of several drives."""
         return cls(
-            sum(one.count for one in several), sum(one.slow for one in several), max((one.longest for one in several), default=0.0)
+            sum(one.count for one in several),
+            sum(one.slow for one in several),
+            max((one.longest for one in several), default=0.0),
         )
 
 

@@ -31,7 +31,9 @@ class Origin:
     copy_of: str = ""
 
 
-def origins(names: Sequence[str], scenarios: Sequence[Scenario], egos: Sequence[int | str], encounters: Sequence[str]) -> list[Origin]:
+def origins(
+    names: Sequence[str], scenarios: Sequence[Scenario], egos: Sequence[int | str], encounters: Sequence[str]
+) -> list[Origin]:
     """Return the origins of scenarios; each copy is named after the first of its kind."""
     known: dict[tuple[str, int, int], list[tuple[str, Floats]]] = {}
     result = []
@@ -76,5 +78,5 @@ def units_of(names: Sequence[str], several: Sequence[Origin]) -> tuple[Ints, int
         place = {name: k for k, name in enumerate(encounters)}
         return np.array([place[one.encounter] for one in several], dtype=np.int64), len(encounters)
     place = {name: k for k, name in enumerate(names)}
-    unit = [place[one.copy_of] if one.copy_of in place else k for k, one in enumerate(several)]
+    unit = [place.get(one.copy_of, k) for k, one in enumerate(several)]
     return np.array(unit, dtype=np.int64), len(encounters)

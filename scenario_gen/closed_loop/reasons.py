@@ -65,12 +65,12 @@ def reason_of(loop: ClosedLoop, drive: Drive, who: int, time: float, ran: Runner
         if _came_in(drive, who, time):
             return Reason.CUT_IN
         return Reason.REAR_END if ahead and ran is not Runner.OTHER else Reason.OTHER_RAN_INTO_EGO
-    if along < -SAME_WAY:
-        return Reason.OTHER_RAN_INTO_EGO if ran is Runner.OTHER else Reason.HEAD_ON
     conflict = conflict_of(loop.scenario, drive.ego, who)
     if conflict is not None and not conflict.following and conflict.second == drive.ego:
         return Reason.CROSSING_OUT_OF_ORDER
-    return Reason.OTHER_RAN_INTO_EGO if ran is Runner.OTHER else Reason.CROSSING
+    if ran is Runner.OTHER:
+        return Reason.OTHER_RAN_INTO_EGO
+    return Reason.HEAD_ON if along < -SAME_WAY else Reason.CROSSING
 
 
 def _came_in(drive: Drive, who: int, time: float) -> bool:

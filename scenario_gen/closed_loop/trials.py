@@ -30,7 +30,6 @@ from scenario_gen.closed_loop.origin import Origin, origins, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
 from scenario_gen.method.evaluation import clustered_wilson
-from scenario_gen.numerics import Bools, Ints
 from scenario_gen.types import Interval, join_ego, Road, Scenario, token
 
 MakePlanner = Callable[[], Planner]
@@ -70,8 +69,8 @@ class Outcome:
     name: str
     verdict: DriveVerdict
     drive: Drive
-    origin: Origin = Origin()
-    decisions: Decisions = Decisions()
+    origin: Origin = Origin()  # noqa: RUF009 - frozen
+    decisions: Decisions = Decisions()  # noqa: RUF009 - frozen
 
 
 @dataclass(frozen=True)
@@ -261,7 +260,8 @@ def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: 
             except BrokenProcessPool as error:
                 raise InputError(
                     f"a process that drove the planner has ended after {done} of {len(trials)} drives: it crashed, called "
-                    "os._exit, hung in compiled code for longer than drive_time, or was killed for want of memory; --workers 1 shows where"
+                    "os._exit, hung in compiled code for longer than drive_time, or was killed for want of memory; --workers 1 "
+                    "shows where"
                 ) from error
 
         yield run
@@ -310,7 +310,7 @@ class Rate:
 
 
 def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
-    """Return how often what happened: failures (of any kind), collisions, at_fault (the ego itself ran into another), …
+    """Return how often what happened: failures of any kind, collisions, at_fault (the ego itself ran into another), and so on.
 
     Drives of one encounter are alike, so intervals are for encounters that are drawn at random; with one encounter alone they
     hold for that one, and copies of one scenario count as one.
@@ -325,12 +325,18 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
         "goals": [not math.isnan(v.goal) for v in verdicts],
         "progress": [v.terms.making_progress > 0.0 for v in verdicts],
     }
+    return {name: _rate(outcomes, each) for name, each in flags.items()}
+
+
+def passed_of(outcomes: Sequence[Outcome]) -> Rate:
+    """Return how many drives passed."""
+    return _rate(outcomes, [outcome.verdict.passed for outcome in outcomes])
+
+
+def _rate(outcomes: Sequence[Outcome], flags: Sequence[bool]) -> Rate:
     unit, encounters = units_of([outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes])
-    return {name: _rate(np.array(each, dtype=np.bool_), unit, encounters) for name, each in flags.items()}
-
-
-def _rate(hits: Bools, unit: Ints, encounters: int) -> Rate:
-    return Rate(int(np.count_nonzero(hits)), len(hits), clustered_wilson(hits, unit, LEVEL), encounters)
+    hits = np.array(flags, dtype=np.bool_)
+    return Rate(sum(flags), len(flags), clustered_wilson(hits, unit, LEVEL), encounters)
 
 
 LEAST = ("goals", "progress")  # shares of which a bar asks for so many at least

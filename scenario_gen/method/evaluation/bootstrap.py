@@ -117,6 +117,26 @@ def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
     return _wilson(share, total / effect, student(level, units - 1))
 
 
+def paired_difference(differences: Floats, unit: Ints, level: float) -> Interval:
+    """Return the mean of differences (S,) of -1, 0 or 1 between pairs, with an interval for pairs that depend on each other.
+
+    Its variance is that between the totals of units (S,), its quantile Student's with a degree of freedom for each unit but one.
+    Where no pair differs the bounds are those of a share of 0 among as many units.
+    Source: Liang & Zeger 1986, for one mean.
+    """
+    _, member = np.unique(unit, return_inverse=True)
+    units, total = int(member.max(initial=-1)) + 1, len(differences)
+    if units < 2:
+        return Interval(float(np.sum(differences)) / total if total else float("nan"), -1.0, 1.0)
+    mean = float(np.sum(differences)) / total
+    if not differences.any():
+        high = _wilson(0.0, float(units), float(exact.ndtri(0.5 + 0.5 * level))).high
+        return Interval(0.0, -high, high)
+    apart = np.bincount(member, weights=differences - mean)
+    half = student(level, units - 1) * float(np.sqrt(np.sum(apart * apart) * units / (units - 1))) / total
+    return Interval(mean, max(mean - half, -1.0), min(mean + half, 1.0))
+
+
 def student(level: float, freedom: int) -> float:
     """Return the two-sided quantile of Student's distribution.
 
