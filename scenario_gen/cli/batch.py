@@ -6,6 +6,7 @@
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from scenario_gen.base.errors import InputError, RefusedError
@@ -15,6 +16,7 @@ from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_res
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types import Encounter, GenerationResult, Request
 
+Select = Callable[[GenerationResult], GenerationResult]
 Advance = Callable[[str, int, int], None]
 """Told how far a case is: its name, scenarios so far, scenarios wanted."""
 OPTIONS = {
@@ -36,6 +38,7 @@ class FolderRequest:
         title: heading of the report; the logs' names by default.
         encounters: names of those to take; all by default.
         request: a vehicle to be left out, and start and end states.
+        for_testing: keep only scenarios in which an ego that looks at nobody collides.
         also_read: what else is read, so that the folder may not hold it: maps, a parameter file.
     """
 
@@ -47,6 +50,7 @@ class FolderRequest:
     encounters: Sequence[str] = ()
     request: Request = Request()
     also_read: Sequence[Path] = ()
+    for_testing: bool = False
 
     @property
     def logs(self) -> list[Path]:
@@ -91,7 +95,9 @@ def generate_folder(
             for road in names
         ]
         with progress() as advance:
-            cases, refusals = generate_all(pairs, config, count=count, seed=seed, request=wanted.request, advance=advance)
+            cases, refusals = generate_all(
+                pairs, config, count=count, seed=seed, request=wanted.request, advance=advance, for_testing=wanted.for_testing
+            )
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         if record is not None:
@@ -115,8 +121,14 @@ def generate_all(
     seed: int,
     request: Request = Request(),
     advance: Advance = lambda *_: None,
+    for_testing: bool = False,
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
+    drawn, further = count, dict[str, Select]()
+    if for_testing:
+        from scenario_gen.closed_loop.reacting import reacting, TRIED
+
+        drawn, further = count * TRIED, {"select": partial(reacting, count=count)}
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:
@@ -127,14 +139,18 @@ def generate_all(
             advance(name, done, total)
 
         try:
-            case = generate(encounter, road, config, count=count, seed=seed, request=request, progress=told)
+            case = generate(encounter, road, config, count=drawn, seed=seed, request=request, progress=told, **further)
         except RefusedError as error:
             refusals.append(f"{encounter.name} on {road}: {as_options(str(error))}")
+            continue
+        if for_testing and not case.generated.scenarios:
+            refusals.append(f"{encounter.name} on {road}: none kept: {case.generated.adaptations[-1]}")
             continue
         cases.append(case)
         got, refused = len(case.generated.scenarios), case.generated.refused
         if got < count:
             causes = ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
+            causes = case.generated.adaptations[-1] if for_testing else causes
             refusals.append(f"{encounter.name} on {road}: only {got} of {count} scenarios: {causes}")
     return cases, refusals
 
