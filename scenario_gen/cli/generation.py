@@ -70,8 +70,7 @@ class Generate:
         bool,
         typer.Option(
             "--for-testing",
-            help="keep only scenarios in which the ego (--ego, or the first vehicle) has to react: planners that look at nobody "
-            "collide in closed loop",
+            help="keep only scenarios in which the --ego has to react: in closed loop, planners that look at nobody collide",
         ),
     ] = False
     order: Annotated[

@@ -1,32 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The scenarios in which the ego has to react: those in which planners that look at nobody collide, all of them."""
+"""The scenarios in which the ego has to react: those in which one that looks at nobody collides, at any usual speed."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.planners import ConstantSpeed, Unlooking, WitnessFollower
-from scenario_gen.closed_loop.simulation import ClosedLoop, Planner
+from scenario_gen.closed_loop.planners import ConstantSpeed, WitnessFollower
+from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.types import GenerationResult, join_ego, Scenario
 
 TRIED = 20  # valid scenarios that are tried at most for each one that is wanted
-LOOK_AT_NOBODY: tuple[Callable[[], Planner], ...] = (
-    partial(ConstantSpeed, speed=8.0),
-    Unlooking,
-    partial(Unlooking, speed=13.0),
-    partial(ConstantSpeed, speed=6.0),
-)
-"""Planners that look at nobody: at 6 to 13 m/s, with and without slowing down in bends."""
+SPEEDS = (8.0, 6.0, 10.0)  # m/s of planners that look at nobody, or those of their starts, if higher
 
 
 def needs_reaction(loop: ClosedLoop) -> bool:
-    """Whether every planner of LOOK_AT_NOBODY collides, and the witness passes."""
-    unlooking = all(judge(loop, loop.drive(make())).collision is not None for make in LOOK_AT_NOBODY)
-    return unlooking and judge(loop, loop.drive(WitnessFollower(loop))).passed
+    """Whether a planner that looks at nobody collides at each of SPEEDS, and the witness passes."""
+    drives = (loop.drive(ConstantSpeed(speed=speed)) for speed in SPEEDS)
+    return (
+        all(judge(loop, drive).collision is not None for drive in drives)
+        and judge(loop, loop.drive(WitnessFollower(loop))).passed
+    )
 
 
 def reacting(sampled: GenerationResult, count: int, config: ClosedLoopConfig = ClosedLoopConfig()) -> GenerationResult:
@@ -36,9 +32,15 @@ def reacting(sampled: GenerationResult, count: int, config: ClosedLoopConfig = C
         sampled: with as many scenarios as may be tried.
         count: how many are wanted.
         config: how the others react.
+
+    Raises:
+        InputError: no vehicle was left out for a planner.
     """
     drawn = sampled.generated
-    ego = drawn.ego.vehicle.id if drawn.ego is not None else sampled.encounter.vehicles[0].id
+    if drawn.ego is None:
+        ids = ", ".join(vehicle.id for vehicle in sampled.encounter.vehicles)
+        raise InputError(f"--for-testing: name the vehicle in whose place the planner drives by --ego; there are {ids}")
+    ego = drawn.ego.vehicle.id
     kept: list[Scenario] = []
     tried = 0
     for scenario in drawn.scenarios:
