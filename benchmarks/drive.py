@@ -67,7 +67,7 @@ def recorded(count: int) -> tuple[list[Trial], GenerationResult | None]:
         for scenario in found.scenarios:
             for ego in range(len(scenario.vehicles)):
                 name = f"{case.name} on {case.road_name} {scenario.index} {ego}"
-                trials += [Trial(name, scenario, ego, case.road)]
+                trials += [Trial(name, scenario, ego, case.road, case.name)]
     return trials, made
 
 
