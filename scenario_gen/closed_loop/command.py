@@ -11,14 +11,14 @@ from pathlib import Path
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.parameters import assigned
 from scenario_gen.closed_loop.bounded import Decisions
-from scenario_gen.closed_loop.comparison import compared, read_drives
+from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import Beside, DRIVEN, JSON, JUNIT, notes, PAGE, write_drives
 from scenario_gen.closed_loop.trials import (
     Bars,
     broken_bars,
+    origins_of,
     Outcome,
-    passed_of,
     Rate,
     rates,
     read_trials,
@@ -105,11 +105,14 @@ def drive_bag(
         config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
     earlier = read_drives(against) if against is not None else None
     trials = read_trials(bag, ego, count)
+    if earlier is not None:  # before there is work that could not be compared
+        digests = {trial.name: origin.digest for trial, origin in zip(trials, origins_of(trials), strict=True)}
+        refuse_others(digests, config.drive, earlier)
     with replaced_folder(out, DRIVEN, [bag]) as folder:  # before there is work that might not be kept
         outcomes = with_origins((run or in_processes())(trials, planner, config.drive, progress), trials)
         found = rates(outcomes)
         comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
-        beside = Beside(None if unlooking is None else _unlooking(trials, config.drive, unlooking), comparison)
+        beside = Beside(() if unlooking is None else _unlooking(trials, config.drive, unlooking), comparison)
         broken = broken_bars(found, config.bars)
         if comparison is not None and comparison.worse:
             broken.append(comparison.sentence())
@@ -121,8 +124,8 @@ def drive_bag(
     return DriveResult(found, broken, worst, written, notes(outcomes, beside), beside, decisions)
 
 
-def _unlooking(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> Rate:
-    """Return how many scenarios a planner that looks at nobody passes: of all, or of UNLOOKING spread over all."""
+def _unlooking(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:
+    """Return the drives of a planner that looks at nobody: in all scenarios, or in UNLOOKING at most, spread over all."""
     every = max(1, -(-len(trials) // UNLOOKING))
     chosen = trials[::every]
-    return passed_of(with_origins(run(chosen, BLIND, config, lambda *_: None), chosen))
+    return with_origins(run(chosen, BLIND, config, lambda *_: None), chosen)

@@ -3,7 +3,7 @@
 
 """Two planners, or two versions of one, on the same scenarios: the difference of their failures."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path
@@ -90,26 +90,34 @@ def read_drives(path: Path) -> Earlier:
         raise InputError(f"--against {file}: no drives.json of this version ({type(error).__name__}: {error})") from error
 
 
-def compared(outcomes: Sequence[Outcome], config: ClosedLoopConfig, earlier: Earlier) -> Comparison:
-    """Compare the outcomes of a planner with those of an earlier one, scenario by scenario.
+def refuse_others(digests: Mapping[str, str], config: ClosedLoopConfig, earlier: Earlier) -> None:
+    """Refuse to compare with drives of other scenarios (`digests` by name), or with other parameters.
 
     Raises:
-        InputError: they are not of the same scenarios, or were driven with other parameters; the message names the first.
+        InputError: they are; the message names the first.
     """
     own = {name: value for name, (_, value) in flatten(config).items()}
     names = (own.keys() | earlier.parameters.keys()) - OF_THE_MACHINE
     differ = sorted(name for name in names if own.get(name) != earlier.parameters.get(name))
     if differ:
         raise InputError(f"--against: driven with other parameters ({', '.join(differ)}); give the same, or drive it again")
-    other = {outcome.name: outcome.origin.digest for outcome in outcomes}
     known = {name: digest for name, (digest, _) in earlier.drives.items()}
-    if other != known:
-        both = other.keys() | known.keys()
-        wrong = sorted(name for name in both if other.get(name) != known.get(name))
+    if digests != known:
+        both = digests.keys() | known.keys()
+        wrong = sorted(name for name in both if digests.get(name) != known.get(name))
         raise InputError(
             f"--against: {len(wrong)} of {len(both)} scenarios are not the same (first: {wrong[0]}); compare drives of "
             "the same bag, ego and --count"
         )
+
+
+def compared(outcomes: Sequence[Outcome], config: ClosedLoopConfig, earlier: Earlier) -> Comparison:
+    """Compare the outcomes of a planner with those of an earlier one, scenario by scenario.
+
+    Raises:
+        InputError: as `refuse_others`.
+    """
+    refuse_others({outcome.name: outcome.origin.digest for outcome in outcomes}, config, earlier)
     before = [not earlier.drives[outcome.name][1] for outcome in outcomes]
     now = [not outcome.verdict.passed for outcome in outcomes]
     difference = np.array(now, dtype=np.float64) - np.array(before, dtype=np.float64)

@@ -19,12 +19,13 @@ from scenario_gen.base.folders.marker import Kind
 from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.trials import Outcome, Rate, rates, Trial
+from scenario_gen.closed_loop.trials import Outcome, passed_of, Rate, rates, Trial
 from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
 from scenario_gen.output.report.html import render_page
 
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
 DRIVEN = Kind("driven")
+NAMED = 12  # encounters up to which each is named
 MOST_DRAWN = 100
 """Drives that the page replays, the worst first; its table lists all."""
 
@@ -33,7 +34,7 @@ MOST_DRAWN = 100
 class Beside:
     """What stands beside a planner's own drives: how many one that looks at nobody passes, and an earlier planner."""
 
-    unlooking: Rate | None = None
+    unlooking: Sequence[Outcome] = ()
     comparison: Comparison | None = None
 
 
@@ -54,8 +55,11 @@ def notes(outcomes: Sequence[Outcome], beside: Beside = Beside()) -> list[str]:
         messages.append(f"intervals are for encounters drawn as these {len(encounters)} were: drives of one encounter are alike")
     if copies:
         messages.append(f"{copies} of {len(outcomes)} scenarios are copies: in another one of their encounter all move likewise")
-    if beside.unlooking is not None:
-        messages.append(f"a planner that looks at nobody passes {beside.unlooking}")
+    if beside.unlooking:
+        sets = {name: [one for one in beside.unlooking if one.origin.encounter == name] for name in encounters}
+        each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
+        parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
+        messages.append(f"a planner that looks at nobody passes {passed_of(beside.unlooking)}{parts}")
     if beside.comparison is not None:
         messages.append(beside.comparison.sentence())
     found = scores(outcomes)
@@ -84,7 +88,7 @@ def document(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig
         "parameters": {name: value for name, (_, value) in flatten(config).items()},
         "summary": {name: _rate(rate) for name, rate in rates(outcomes).items()},
         "scores": scores(outcomes),
-        "unlooking_pass": None if beside.unlooking is None else _rate(beside.unlooking),
+        "unlooking_pass": _rate(passed_of(beside.unlooking)) if beside.unlooking else None,
         "against": None if beside.comparison is None else beside.comparison.document(),
         "notes": notes(outcomes, beside),
         "drives": drives,

@@ -189,9 +189,13 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
 
 def with_origins(outcomes: Sequence[Outcome], trials: Sequence[Trial]) -> list[Outcome]:
     """Return the outcomes with the whole origin of their scenarios: encounter, digest, and which are copies."""
+    return [replace(outcome, origin=origin) for outcome, origin in zip(outcomes, origins_of(trials), strict=True)]
+
+
+def origins_of(trials: Sequence[Trial]) -> list[Origin]:
+    """Return where the scenarios of trials come from."""
     names, encounters = [trial.name for trial in trials], [trial.encounter for trial in trials]
-    found = origins(names, [trial.scenario for trial in trials], [trial.ego for trial in trials], encounters)
-    return [replace(outcome, origin=origin) for outcome, origin in zip(outcomes, found, strict=True)]
+    return origins(names, [trial.scenario for trial in trials], [trial.ego for trial in trials], encounters)
 
 
 RunTrials = Callable[[Sequence[Trial]], Iterator["Outcome"]]
