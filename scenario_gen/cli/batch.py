@@ -69,6 +69,7 @@ def generate_folder(
     *,
     record: Callable[[Path, Sequence[GenerationResult]], None] | None = None,
     progress: Callable[[], AbstractContextManager[Advance]] = lambda: nullcontext(lambda *_: None),
+    tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of all encounters of some logs; write bag, report and figures to `out`.
 
@@ -77,6 +78,7 @@ def generate_folder(
         wanted: what it is to hold.
         record: writes the bag (its path and the cases are given) instead of this process.
         progress: a context that gives what is told how far each case is.
+        tell: is told how many scenarios of each set a planner passes that looks at nobody, where a vehicle was left out for one.
 
     Returns:
         The cases, and a sentence for each encounter and road that was refused or came out short.
@@ -100,6 +102,9 @@ def generate_folder(
             )
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
+        unlooking = [] if not wanted.request.ego else unlooking_said(cases)
+        for sentence in unlooking:
+            tell(sentence)
         if record is not None:
             record(folder / BAG, cases)
         write_results(
@@ -107,10 +112,17 @@ def generate_folder(
             cases,
             seed=seed,
             title=wanted.title or ", ".join(path.stem for path in logs),
-            quality=[*(line for log in found for line in log.quality.lines()), *refusals],
+            quality=[*(line for log in found for line in log.quality.lines()), *refusals, *unlooking],
             provenance=provenance_of(logs, seed, count, roads, config, wanted.request),
         )
     return cases, refusals
+
+
+def unlooking_said(cases: Sequence[GenerationResult]) -> list[str]:
+    """Return a sentence for each set: how many of its scenarios a planner passes that looks at nobody."""
+    from scenario_gen.closed_loop.reacting import unlooking_pass
+
+    return [sentence for case in cases if (sentence := unlooking_pass(case))]
 
 
 def generate_all(

@@ -111,7 +111,7 @@ def generate(options: Generate) -> None:
         also_read=[options.parameter_file] if options.parameter_file else [],
         for_testing=options.for_testing,
     )
-    conclude(*generate_folder(options.out, request, progress=progress_bars), options.out)
+    conclude(*generate_folder(options.out, request, progress=progress_bars, tell=say), options.out)
 
 
 @commands.command()

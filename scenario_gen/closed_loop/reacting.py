@@ -7,12 +7,13 @@ from dataclasses import replace
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.planners import ConstantSpeed, WitnessFollower
+from scenario_gen.closed_loop.planners import ConstantSpeed, Unlooking, WitnessFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.types import GenerationResult, join_ego, Scenario
 
 TRIED = 20  # valid scenarios that are tried at most for each one that is wanted
+UNLOOKING = 50  # scenarios of a set that are driven to say how many need no reaction
 SPEEDS = (8.0, 6.0, 10.0)  # m/s of planners that look at nobody, or those of their starts, if higher
 
 
@@ -23,6 +24,18 @@ def needs_reaction(loop: ClosedLoop) -> bool:
         all(judge(loop, drive).collision is not None for drive in drives)
         and judge(loop, loop.drive(WitnessFollower(loop))).passed
     )
+
+
+def unlooking_pass(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
+    """Say how many scenarios of a set (UNLOOKING at most) one that looks at nobody passes; "" if no vehicle was left out."""
+    drawn = case.generated
+    if drawn.ego is None or not drawn.scenarios:
+        return ""
+    ego = drawn.ego.vehicle.id
+    loops = [ClosedLoop(join_ego(scenario), ego, case.road, config) for scenario in drawn.scenarios[:UNLOOKING]]
+    passed = sum(judge(loop, loop.drive(Unlooking())).passed for loop in loops)
+    road = case.road.name if case.road is not None else "its road"
+    return f"{case.encounter.name} on {road}: a planner that looks at nobody, in place of {ego}, passes {passed} of {len(loops)}"
 
 
 def reacting(sampled: GenerationResult, count: int, config: ClosedLoopConfig = ClosedLoopConfig()) -> GenerationResult:

@@ -37,6 +37,8 @@ def bag(tmp_path_factory):
     out = tmp_path_factory.mktemp("testing") / "out"
     done = generated(out, "--ego", "2")
     assert done.exit_code == 0 and "6/6 valid" in done.output, done.output
+    said = "synthetic_b on t_intersection: a planner that looks at nobody, in place of 2, passes"
+    assert said in " ".join(done.output.split()) and said in (out / "report.html").read_text()
     return out / "bag"
 
 
