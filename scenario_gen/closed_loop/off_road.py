@@ -82,7 +82,7 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
 
 
 def between(motion: Scenario, rows: list[int], k: int, u: Floats) -> tuple[Floats, Floats]:
-    """Return positions (R, U, 2) [m] and headings (R, U) [rad] of vehicles at parts `u` (U,) of step k, as `Scenario` has them."""
+    """Return positions (R, U, 2) [m] and headings (R, U) [rad] of vehicles at parts `u` (U,) of step k, as `Scenario` says."""
     step = float(motion.time[k + 1] - motion.time[k])
     u = u[:, None]
     v, w = 1.0 - u, 3.0 - 2.0 * u
