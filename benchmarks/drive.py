@@ -25,11 +25,12 @@ from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, REPLAY
 from scenario_gen.closed_loop.ego import Pose
+from scenario_gen.closed_loop.origin import units_of
 from scenario_gen.closed_loop.results import as_json
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, State
 from scenario_gen.closed_loop.trials import Outcome, rates, run_trials, Trial
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.method.evaluation.bootstrap import wilson
+from scenario_gen.method.evaluation.bootstrap import paired_difference, wilson
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.generation import GenerationResult
 
@@ -69,7 +70,7 @@ def recorded(count: int) -> tuple[list[Trial], GenerationResult | None]:
         for scenario in found.scenarios:
             for ego in range(len(scenario.vehicles)):
                 name = f"{case.name} on {case.road_name} {scenario.index} {ego}"
-                trials += [Trial(name, scenario, ego, case.road)]
+                trials += [Trial(name, scenario, ego, case.road, case.name)]
     return trials, made
 
 
@@ -92,8 +93,13 @@ def planners(trials: list[Trial]) -> tuple[list[Row], list[Outcome]]:
         for name, each in found.items()
         for what, rate in each.items()
     ]
-    apart = found["constant speed"]["collisions"].share.low - found["IDM follower"]["collisions"].share.high
-    rows.append(Row("collisions: constant speed's lower bound less IDM's upper", apart, "", "higher", 0.0))
+    unit, encounters = units_of([one.name for one in bad], [one.origin for one in bad])
+    more = [float(a.verdict.collision is not None) - (b.verdict.collision is not None) for a, b in zip(bad, good, strict=True)]
+    share = paired_difference(np.array(more), unit, 0.95)
+    said = f"{share.value:.3f}, {share.low:.3f} to {share.high:.3f}; {encounters} encounters"
+    rows.append(
+        Row("collisions: constant speed's less IDM's on the same scenarios, lower bound", share.low, "", "higher", 0.0, said)
+    )
     again = run_trials(trials[:40], GOOD, workers=2)
     config = ClosedLoopConfig()
     same = as_json(good[:40], GOOD, config) == as_json(again, GOOD, config)

@@ -3,6 +3,7 @@
 
 """The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from scenario_gen.method.attempt import with_references
@@ -29,6 +30,7 @@ def generate(
     seed: int = 0,
     request: Request = Request(),
     progress: Progress = lambda *_: None,
+    select: Callable[[GenerationResult], GenerationResult] = lambda sampled: sampled,
 ) -> GenerationResult:
     """Segment, fit, plan, sample (every candidate is checked) and evaluate.
 
@@ -41,6 +43,7 @@ def generate(
         seed: of all randomness.
         request: a vehicle to be left out for a planner under test, start and end states, a target, a choice, an order.
         progress: called with scenarios so far, scenarios wanted, candidates so far.
+        select: leaves out some of the `count` valid scenarios before the set is evaluated.
 
     Raises:
         InputError: a vehicle of the request does not exist.
@@ -55,6 +58,6 @@ def generate(
     sampled = sample_scenarios(
         planned, config.sampling, config.limits, request, count=count, callbacks=Callbacks(progress), measures=MEASURES
     )
-    result = with_references(sampled, config, request)
+    result = with_references(select(sampled), config, request)
     coverage = coverage_of(encounter, result.generated.scenarios)
     return replace(result, evaluation=evaluate(result, config.evaluation), coverage=coverage)

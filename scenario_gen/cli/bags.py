@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from scenario_gen.closed_loop.command import RunTrials
 
 commands = typer.Typer()
+NAMED = 12  # scenarios that the terminal names
+NAMED = 12  # scenarios that the terminal names
 
 
 @commands.command()
@@ -91,6 +93,13 @@ def drive(
     ] = False,
     count: Annotated[int, typer.Option(min=0, help="scenarios at most; 0: all")] = 0,
     workers: Annotated[int, typer.Option(min=0, help="processes; 0: one for each core")] = 0,
+    against: Annotated[
+        Path | None,
+        typer.Option(help="drives.json of another planner or version on the same bag: compare; exit code 1 if this one is worse"),
+    ] = None,
+    unlooking: Annotated[
+        bool, typer.Option(help="also drive a planner that looks at nobody: how many scenarios does it pass?")
+    ] = True,
     out: Annotated[Path, typer.Option(help="folder of drives.json, junit.xml and drives.html")] = Path("out/drives"),
     assignments: Annotated[
         list[str] | None,
@@ -114,11 +123,24 @@ def drive(
             assignments=assignments or [],
             progress=lambda done, total: advance(planner, done, total),
             run=_over_dds() if ros else in_processes(workers),
+            unlooking=in_processes(workers) if unlooking else None,
+            against=against,
         )
     table = Table("drives", planner)
     for name, rate in result.found.items():
         table.add_row(name, str(rate))
     say(table, wrap=True)
+    for note in result.notes:
+        say(note)
+    if comparison := result.beside.comparison:
+        for title, names in (("now fail", comparison.now_fail), ("now pass", comparison.now_pass)):
+            if names:
+                more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+                say(f"{title}: {', '.join(names[:NAMED])}{more}")
+    if result.decisions.count:
+        took = result.decisions
+        slow = f"{took.slow} of {took.count} slower than decision_time, the longest {took.longest:.3f} s"
+        say(f"decisions: {slow} (of this machine, so in no file)")
     for outcome in result.worst:
         say(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
     for path in result.written:

@@ -6,6 +6,7 @@
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from scenario_gen.base.errors import InputError, RefusedError
@@ -15,6 +16,7 @@ from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_res
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types import Encounter, GenerationResult, Request
 
+Select = Callable[[GenerationResult], GenerationResult]
 Advance = Callable[[str, int, int], None]
 """Called with the progress of a case: its name, scenarios so far, scenarios requested."""
 OPTIONS = {
@@ -36,6 +38,7 @@ class FolderRequest:
         title: heading of the report; the logs' names by default.
         encounters: names of those to take; all by default.
         request: a vehicle to be left out, and start and end states.
+        for_testing: keep only scenarios in which an ego that looks at nobody collides.
         also_read: what else is read, so that the folder may not hold it: maps, a parameter file.
     """
 
@@ -47,6 +50,7 @@ class FolderRequest:
     encounters: Sequence[str] = ()
     request: Request = Request()
     also_read: Sequence[Path] = ()
+    for_testing: bool = False
 
     @property
     def logs(self) -> list[Path]:
@@ -65,6 +69,7 @@ def generate_folder(
     *,
     record: Callable[[Path, Sequence[GenerationResult]], None] | None = None,
     progress: Callable[[], AbstractContextManager[Advance]] = lambda: nullcontext(lambda *_: None),
+    tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of all encounters of some logs; write bag, report and figures to `out`.
 
@@ -73,6 +78,7 @@ def generate_folder(
         requested: what it is to hold.
         record: writes the bag (its path and the cases are given) instead of this process.
         progress: a context whose value is called with the progress of each case.
+        tell: called with a sentence for each set with an ego slot: how many scenarios a planner passes that looks at nobody.
 
     Returns:
         The cases, and a sentence for each encounter and road that was refused or came out short.
@@ -91,9 +97,20 @@ def generate_folder(
             for road in names
         ]
         with progress() as advance:
-            cases, refusals = generate_all(pairs, config, count=count, seed=seed, request=requested.request, advance=advance)
+            cases, refusals = generate_all(
+                pairs,
+                config,
+                count=count,
+                seed=seed,
+                request=requested.request,
+                advance=advance,
+                for_testing=requested.for_testing,
+            )
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
+        unlooking = [] if not requested.request.ego else unlooking_said(cases)
+        for sentence in unlooking:
+            tell(sentence)
         if record is not None:
             record(folder / BAG, cases)
         write_results(
@@ -101,10 +118,17 @@ def generate_folder(
             cases,
             seed=seed,
             title=requested.title or ", ".join(path.stem for path in logs),
-            quality=[*(line for log in readings for line in log.quality.lines()), *refusals],
+            quality=[*(line for log in readings for line in log.quality.lines()), *refusals, *unlooking],
             provenance=provenance_of(logs, seed, count, roads, config, requested.request),
         )
     return cases, refusals
+
+
+def unlooking_said(cases: Sequence[GenerationResult]) -> list[str]:
+    """Return a sentence for each set: how many of its scenarios a planner passes that looks at nobody."""
+    from scenario_gen.closed_loop.reacting import unlooking_pass
+
+    return [sentence for case in cases if (sentence := unlooking_pass(case))]
 
 
 def generate_all(
@@ -115,8 +139,14 @@ def generate_all(
     seed: int,
     request: Request = Request(),
     advance: Advance = lambda *_: None,
+    for_testing: bool = False,
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
+    drawn, further = count, dict[str, Select]()
+    if for_testing:
+        from scenario_gen.closed_loop.reacting import reacting, TRIED
+
+        drawn, further = count * TRIED, {"select": partial(reacting, count=count)}
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:
@@ -127,14 +157,18 @@ def generate_all(
             advance(name, done, total)
 
         try:
-            case = generate(encounter, road, config, count=count, seed=seed, request=request, progress=report)
+            case = generate(encounter, road, config, count=drawn, seed=seed, request=request, progress=report, **further)
         except RefusedError as error:
             refusals.append(f"{encounter.name} on {road}: {as_options(str(error))}")
+            continue
+        if for_testing and not case.generated.scenarios:
+            refusals.append(f"{encounter.name} on {road}: none kept: {case.generated.adaptations[-1]}")
             continue
         cases.append(case)
         n_scenarios, refused = len(case.generated.scenarios), case.generated.refused
         if n_scenarios < count:
             causes = ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
+            causes = case.generated.adaptations[-1] if for_testing else causes
             refusals.append(f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}")
     return cases, refusals
 

@@ -66,6 +66,13 @@ class Generate:
     choose: Annotated[str, typer.Option(help="natural: as sampled; diverse: of many valid candidates those that cover best")] = (
         "natural"
     )
+    for_testing: Annotated[
+        bool,
+        typer.Option(
+            "--for-testing",
+            help="keep only scenarios in which the --ego has to react: in closed loop, planners that look at nobody collide",
+        ),
+    ] = False
     order: Annotated[
         str, typer.Option(help="who goes first: keep (as in the template), free, swap (the other one at the closest crossing)")
     ] = "keep"
@@ -102,8 +109,9 @@ def generate(options: Generate) -> None:
         encounters=options.encounter or [],
         request=Request(options.ego, starts, goals, targets, options.choose, options.order),
         also_read=[options.parameter_file] if options.parameter_file else [],
+        for_testing=options.for_testing,
     )
-    conclude(*generate_folder(options.out, request, progress=progress_bars), options.out)
+    conclude(*generate_folder(options.out, request, progress=progress_bars, tell=say), options.out)
 
 
 @commands.command()

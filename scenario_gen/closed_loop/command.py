@@ -10,13 +10,28 @@ from pathlib import Path
 
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.parameters import assigned
+from scenario_gen.closed_loop.bounded import Decisions
+from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.results import DRIVEN, JSON, JUNIT, PAGE, write_drives
-from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, Rate, rates, read_trials, run_trials, Trial
+from scenario_gen.closed_loop.results import Beside, DRIVEN, JSON, JUNIT, notes, PAGE, write_drives
+from scenario_gen.closed_loop.trials import (
+    Bars,
+    broken_bars,
+    origins_of,
+    Outcome,
+    Rate,
+    rates,
+    read_trials,
+    run_trials,
+    Trial,
+    with_origins,
+)
 
 Progress = Callable[[int, int], None]  # of drives done, of how many
 RunTrials = Callable[[Sequence[Trial], str, ClosedLoopConfig, Progress], list[Outcome]]
 WORST = 5  # drives that the terminal names
+UNLOOKING = 200  # drives of the planner that looks at nobody, at most
+BLIND = "scenario_gen.closed_loop.planners:Unlooking"
 
 
 @dataclass(frozen=True)
@@ -29,12 +44,25 @@ class DriveCommandConfig:
 
 @dataclass(frozen=True, eq=False)
 class DriveResult:
-    """What a planner came to: rates, the bars that were not kept, the worst drives that failed, and the files written."""
+    """What a planner came to.
+
+    Attributes:
+        found: rates.
+        broken: the bars that were not kept, and, if it is worse than the planner it is compared with, that.
+        worst: the worst drives that failed.
+        written: the files.
+        notes: what the figures are to be read with.
+        beside: a planner that looks at nobody, and an earlier one.
+        decisions: how long they took here; it is in no file.
+    """
 
     found: dict[str, Rate]
     broken: Sequence[str]
     worst: Sequence[Outcome]
     written: Sequence[Path]
+    notes: Sequence[str]
+    beside: Beside
+    decisions: Decisions
 
 
 def in_processes(workers: int = 0) -> RunTrials:
@@ -52,6 +80,8 @@ def drive_bag(
     assignments: Sequence[str] = (),
     progress: Progress = lambda *_: None,
     run: RunTrials | None = None,
+    unlooking: RunTrials | None = None,
+    against: Path | None = None,
 ) -> DriveResult:
     """Drive a planner through the scenarios of a bag and write what it came to.
 
@@ -64,19 +94,38 @@ def drive_bag(
         assignments: parameters as name=value; those of a drive without prefix, those of the bars as bars.name.
         progress: called with how many are done of how many.
         run: drives them; `in_processes()` if None, or over DDS, one after the other.
+        unlooking: drives the same scenarios, at most UNLOOKING of them, with a planner that looks at nobody; None: nobody does.
+        against: drives.json of an earlier planner on the same scenarios, or its folder.
 
     Raises:
-        InputError: bag, planner, folder or a parameter is wrong; the message names it.
+        InputError: bag, planner, folder, a parameter or the file to compare with is wrong; the message names it.
     """
     config = DriveCommandConfig()
     for assignment in assignments:
         config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
+    earlier = read_drives(against) if against is not None else None
     trials = read_trials(bag, ego, count)
+    if earlier is not None:  # before there is work that could not be compared
+        digests = {trial.name: origin.digest for trial, origin in zip(trials, origins_of(trials), strict=True)}
+        refuse_others(digests, config.drive, earlier)
     with replaced_folder(out, DRIVEN, [bag]) as folder:  # before there is work that might not be kept
-        outcomes = (run or in_processes())(trials, planner, config.drive, progress)
+        outcomes = with_origins((run or in_processes())(trials, planner, config.drive, progress), trials)
         found = rates(outcomes)
+        comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
+        beside = Beside(() if unlooking is None else _unlooking(trials, config.drive, unlooking), comparison)
         broken = broken_bars(found, config.bars)
-        write_drives(folder, outcomes, trials, planner, config.drive, broken)
+        if comparison is not None and comparison.worse:
+            broken.append(comparison.sentence())
+        write_drives(folder, outcomes, trials, planner, config.drive, broken, beside)
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     worst = sorted(failed, key=lambda outcome: outcome.verdict.severity, reverse=True)[:WORST]
-    return DriveResult(found, broken, worst, tuple(out / name for name in (JSON, JUNIT, PAGE)))
+    written = tuple(out / name for name in (JSON, JUNIT, PAGE))
+    decisions = Decisions.all_of([outcome.decisions for outcome in outcomes])
+    return DriveResult(found, broken, worst, written, notes(outcomes, beside), beside, decisions)
+
+
+def _unlooking(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:
+    """Return the drives of a planner that looks at nobody: in all scenarios, or in UNLOOKING at most, spread over all."""
+    every = max(1, -(-len(trials) // UNLOOKING))
+    chosen = trials[::every]
+    return with_origins(run(chosen, BLIND, config, lambda *_: None), chosen)

@@ -55,3 +55,12 @@ class ClosedLoopConfig(Parameters):
     goal_width: float = parameter(2.0, "the goal is passed within this distance beside it", unit="m", low=0.1, high=50.0)
     horizon: float = parameter(8.0, "longest time to collision that is counted", unit="s", low=0.1, high=60.0)
     hard_braking: float = parameter(4.0, "braking that is counted as hard", unit="m/s²", low=0.1, high=20.0)
+    off_road_depth: float = parameter(
+        0.1, "a footprint is off the road from this depth outside what is drivable", unit="m", low=0.0, high=5.0
+    )
+    decision_time: float = parameter(
+        1.0, "a planner's decision that takes longer is counted; that changes no verdict", unit="s", low=0.001, high=600.0
+    )
+    drive_time: float = parameter(
+        600.0, "a planner that takes longer for one drive has failed, and the command ends", unit="s", low=0.1, high=1e6
+    )

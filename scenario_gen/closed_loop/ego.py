@@ -57,6 +57,14 @@ FARTHEST = 1e8  # metres, and rad and m/s: beyond that a pose given from outside
 JUMP = 1.0  # metres beyond what the highest speed covers in one step, from which on a pose given from outside is called a jump
 
 
+JUMPED, NO_PLACE = "jumped", "pose is"  # how the faults of poses begin
+
+
+def misplaced(fault: str) -> bool:
+    """Whether a fault is that of a pose which no body can take after one step."""
+    return fault.startswith((JUMPED, NO_PLACE))
+
+
 def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig) -> Moved:
     """Return the ego one step later.
 
@@ -90,7 +98,7 @@ def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig) 
 def _placed(ego: EgoState, pose: Pose, config: ClosedLoopConfig) -> Moved:
     largest = np.abs(pose).max()
     if not largest <= FARTHEST:
-        fault = f"pose is {'out of range' if np.isfinite(largest) else 'not finite'}"
+        fault = f"{NO_PLACE} {'out of range' if np.isfinite(largest) else 'not finite'}"
         return Moved(EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / config.step), fault)
     way = exact.hypot(pose.x - ego.x, pose.y - ego.y)
     far = way > config.ego_speed * config.step + JUMP
@@ -98,7 +106,7 @@ def _placed(ego: EgoState, pose: Pose, config: ClosedLoopConfig) -> Moved:
     curvature = 0.0 if far or way < 0.01 else turn / way
     acceleration = (pose.speed - ego.speed) / config.step
     state = EgoState(pose.x, pose.y, ego.yaw + turn, max(pose.speed, 0.0), float(curvature), acceleration)
-    return Moved(state, f"jumped {way:.1f} m" if far else "")
+    return Moved(state, f"{JUMPED} {way:.1f} m" if far else "")
 
 
 @kernel(F1, F, F, F, F1, OUT1)

@@ -3,7 +3,7 @@
 
 """Planners of our own: one that keeps its distance, one that looks at nobody, and the witness, who knows the way."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -73,7 +73,7 @@ class IdmFollower(RouteFollower):
         """Steer, and brake for the nearest."""
         ego = observation.ego
         curvature, station = self.steer(ego)
-        wanted = self.speed
+        wanted = self.speed if self.route is not None else 0.0  # without a way it is where it is to be
         if self.route is not None:
             bend = np.diff(self.route.at(station + np.arange(0.0, 21.0, 4.0))[:, 2]) / 4.0
             sharpest = float(np.abs(bend).max())
@@ -114,6 +114,15 @@ class IdmFollower(RouteFollower):
                         nearest, speed = float(gap[k, m]), float(seen.others[k, 3]) * max(same_way, 0.0)
                     break
         return max(nearest, 0.0), speed
+
+
+@dataclass
+class Unlooking(IdmFollower):
+    """Drives as `IdmFollower` does, slows down in bends and stops at its goal, but looks at nobody."""
+
+    def act(self, observation: Observation) -> Command:
+        """Drive as if nobody else were there."""
+        return super().act(replace(observation, ids=(), others=observation.others[:0], sizes=observation.sizes[:0]))
 
 
 class WitnessFollower:

@@ -4,6 +4,7 @@
 """What a test of a planner leaves: JSON, JUnit's XML and a page, in one folder; the same drives give the same bytes."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 import json
 import math
 from pathlib import Path
@@ -16,39 +17,97 @@ from scenario_gen.base.errors import printable
 from scenario_gen.base.folders import write_text
 from scenario_gen.base.folders.marker import Kind
 from scenario_gen.base.parameters import flatten
+from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.trials import Outcome, Rate, rates, Trial
+from scenario_gen.closed_loop.trials import Outcome, passed_of, Rate, rates, Trial
 from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
 from scenario_gen.output.report.html import render_page
 
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
 DRIVEN = Kind("driven")
+NAMED = 12  # encounters up to which each is named
 MOST_DRAWN = 100
 """Drives that the page replays, the worst first; its table lists all."""
 
 
-def document(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Beside:
+    """What stands beside a planner's own drives: how many one that looks at nobody passes, and an earlier planner."""
+
+    unlooking: Sequence[Outcome] = ()
+    comparison: Comparison | None = None
+
+
+def scores(outcomes: Sequence[Outcome]) -> dict[str, float]:
+    """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""
+    terms = [outcome.verdict.document()["terms"] for outcome in outcomes]
+    return {name: math.fsum(each[name] for each in terms) / len(terms) for name in (terms[0] if terms else ())}
+
+
+def notes(outcomes: Sequence[Outcome], beside: Beside = Beside()) -> list[str]:
+    """Return what the figures of a set of drives are to be read with, in sentences."""
+    encounters = sorted({outcome.origin.encounter for outcome in outcomes} - {""})
+    copies = len([outcome for outcome in outcomes if outcome.origin.copy_of])
+    messages = []
+    if len(encounters) == 1:
+        messages.append(f"all scenarios are of one encounter ({encounters[0]}): the intervals hold for that encounter only")
+    elif encounters:
+        messages.append(f"intervals are for encounters drawn as these {len(encounters)} were: drives of one encounter are alike")
+    if copies:
+        messages.append(f"{copies} of {len(outcomes)} scenarios are copies: in another one of their encounter all move likewise")
+    if beside.unlooking:
+        sets = {name: [one for one in beside.unlooking if one.origin.encounter == name] for name in encounters}
+        each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
+        parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
+        messages.append(f"a planner that looks at nobody passes {passed_of(beside.unlooking)}{parts}")
+    if beside.comparison is not None:
+        messages.append(beside.comparison.sentence())
+    found = scores(outcomes)
+    if found:
+        parts = ", ".join(
+            f"{name.replace('_', ' ')} {value:.3f}" for name, value in found.items() if name not in ("nuplan", "pdms")
+        )
+        messages.append(f"nuPlan's score {found['nuplan']:.3f}, NAVSIM's PDMS {found['pdms']:.3f} (means; {parts})")
+    return messages
+
+
+def document(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig, beside: Beside = Beside()) -> dict[str, Any]:
     """Return all verdicts and their summary as JSON's types."""
+    drives = [
+        {
+            "name": outcome.name,
+            "encounter": outcome.origin.encounter,
+            "scenario": outcome.origin.digest,
+            "copy_of": outcome.origin.copy_of or None,
+            **outcome.verdict.document(),
+        }
+        for outcome in outcomes
+    ]
     return {
         "planner": planner,
         "parameters": {name: value for name, (_, value) in flatten(config).items()},
         "summary": {name: _rate(rate) for name, rate in rates(outcomes).items()},
-        "drives": [{"name": outcome.name} | outcome.verdict.document() for outcome in outcomes],
+        "scores": scores(outcomes),
+        "unlooking_pass": _rate(passed_of(beside.unlooking)) if beside.unlooking else None,
+        "against": None if beside.comparison is None else beside.comparison.document(),
+        "notes": notes(outcomes, beside),
+        "drives": drives,
     }
 
 
 def _rate(rate: Rate) -> dict[str, Any]:
     share = rate.share
-    return {"count": rate.count, "of": rate.of, "share": share.value, "low": share.low, "high": share.high}
+    shares = {"share": share.value, "low": share.low, "high": share.high}
+    return {"count": rate.count, "of": rate.of, **shares, "encounters": rate.encounters}
 
 
-def as_json(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig) -> str:
+def as_json(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig, beside: Beside = Beside()) -> str:
     """Return `document` as text; no time of day and no name of a machine is in it."""
-    return json.dumps(document(outcomes, planner, config), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(document(outcomes, planner, config, beside), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
-    """Return one test case per scenario, as JUnit's XML; a collision, leaving the road or missing the goal is a failure."""
+    """Return one test case per scenario, as JUnit's XML; collision, off_road, jump and goal are failures."""
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
     suite = ElementTree.Element(
@@ -60,8 +119,7 @@ def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
             suite, "testcase", classname=planner, name=f"scenario {outcome.name}", time=f"{verdict.duration:.3f}"
         )
         if not verdict.passed:
-            kind = "collision" if verdict.collision else "off_road" if not math.isnan(verdict.off_road) else "goal"
-            ElementTree.SubElement(case, "failure", type=kind, message=verdict.sentence())
+            ElementTree.SubElement(case, "failure", type=verdict.failure, message=verdict.sentence())
         message = ElementTree.SubElement(case, "system-out")
         message.text = json.dumps(verdict.document(), ensure_ascii=False)
     ElementTree.indent(suite)
@@ -72,7 +130,12 @@ def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
 
 
 def as_page(
-    outcomes: Sequence[Outcome], trials: Sequence[Trial], planner: str, config: ClosedLoopConfig, broken: Sequence[str] = ()
+    outcomes: Sequence[Outcome],
+    trials: Sequence[Trial],
+    planner: str,
+    config: ClosedLoopConfig,
+    broken: Sequence[str] = (),
+    beside: Beside = Beside(),
 ) -> str:
     """Return the page: the summary, all verdicts, the worst first, and replays of the worst."""
     order = sorted(range(len(outcomes)), key=lambda k: (*(-value for value in outcomes[k].verdict.severity), k))
@@ -88,6 +151,8 @@ def as_page(
         found=rates(outcomes),
         rows=rows,
         broken=broken,
+        notes=notes(outcomes, beside),
+        comparison=beside.comparison,
         parameters={name: value for name, (_, value) in flatten(config).items()},
     )
 
@@ -123,13 +188,15 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
     }
 
 
-def write_verdicts(folder: Path, outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig) -> None:
+def write_verdicts(
+    folder: Path, outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig, beside: Beside = Beside()
+) -> None:
     """Write JSON and JUnit's XML to a folder that is there.
 
     Raises:
         OSError: the disk is full, or the folder may not be written.
     """
-    write_text(folder / JSON, as_json(outcomes, planner, config))
+    write_text(folder / JSON, as_json(outcomes, planner, config, beside))
     write_text(folder / JUNIT, as_junit(outcomes, planner))
 
 
@@ -140,11 +207,12 @@ def write_drives(
     planner: str,
     config: ClosedLoopConfig,
     broken: Sequence[str] = (),
+    beside: Beside = Beside(),
 ) -> None:
     """Write JSON, JUnit's XML and the page to a folder that is there.
 
     Raises:
         OSError: the disk is full, or the folder may not be written.
     """
-    write_verdicts(folder, outcomes, planner, config)
-    write_text(folder / PAGE, as_page(outcomes, trials, planner, config, broken))
+    write_verdicts(folder, outcomes, planner, config, beside)
+    write_text(folder / PAGE, as_page(outcomes, trials, planner, config, broken, beside))

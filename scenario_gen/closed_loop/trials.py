@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 import importlib
 import math
 import multiprocessing
@@ -16,16 +16,20 @@ from pathlib import Path
 import sys
 from typing import Any
 
+import numpy as np
+
 from scenario_gen.bags.recordings.read import INFO, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.interrupts import end_with_parent, starting
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.closed_loop.bounded import bounded, Decisions, Timed, TooLongError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.origin import Origin, origins, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
-from scenario_gen.method.evaluation import wilson
+from scenario_gen.method.evaluation import clustered_wilson
 from scenario_gen.types import Interval, join_ego, Road, Scenario, token
 
 MakePlanner = Callable[[], Planner]
@@ -33,21 +37,40 @@ MakePlanner = Callable[[], Planner]
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One scenario to be driven: its name for people, the scenario with the witness of the ego in it, and the road if known."""
+    """One scenario to be driven.
+
+    Attributes:
+        name: for people.
+        scenario: the witness of the ego is in it.
+        ego: index or id of the witness.
+        road: if it is known.
+        encounter: names the recorded encounter that it was made of; "" if that is not known.
+    """
 
     name: str
     scenario: Scenario
     ego: int | str
     road: Road | None
+    encounter: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one trial came to."""
+    """What one trial came to.
+
+    Attributes:
+        name: of the trial.
+        verdict: on the drive.
+        drive: what was driven.
+        origin: where the scenario comes from.
+        decisions: how long the planner's decisions took here; nothing that is written hangs on it.
+    """
 
     name: str
     verdict: DriveVerdict
     drive: Drive
+    origin: Origin = Origin()  # noqa: RUF009 - frozen
+    decisions: Decisions = Decisions()  # noqa: RUF009 - frozen
 
 
 @dataclass(frozen=True)
@@ -58,6 +81,11 @@ class Bars(Parameters):
     off_road: float = parameter(0.0, "largest share of drives that leave the road", low=0.0, high=1.0)
     goals: float = parameter(0.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
     at_fault: float = parameter(0.0, "largest share of drives in which the ego itself ran into another", low=0.0, high=1.0)
+    jumps: float = parameter(0.0, "largest share of drives in which the ego jumps", low=0.0, high=1.0)
+    progress: float = parameter(
+        0.9, "smallest share of drives with progress: 20 % of the witness' way, as in nuPlan; who never moves has none",
+        low=0.0, high=1.0,
+    )  # fmt: skip
 
 
 def find_planner(name: str) -> MakePlanner:
@@ -106,7 +134,8 @@ def read_trials(bag: Path, ego: str = "", count: int = 0, config: BagConfig = Ba
                 entry = namespace.entry(k)
                 where = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
                 name = f"{namespace.name} {scenario.index}" if namespace.name else str(scenario.index)
-                trials.append(trial_of(name, scenario, entry, namespace.road_of(entry, stamp), ego, where))
+                trial = trial_of(name, scenario, entry, namespace.road_of(entry, stamp), ego, where)
+                trials.append(replace(trial, encounter=_encounter_of(entry)))
     if not trials:
         raise InputError(f"{bag}: no topic `scenarios` in any namespace; there is nothing to drive in")
     return trials
@@ -127,6 +156,12 @@ def trial_of(name: str, scenario: Scenario, entry: ScenarioEntry | None, road: R
         InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
     """
     return Trial(name, join_ego(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road)
+
+
+def _encounter_of(entry: ScenarioEntry | None) -> str:
+    """Return the name of the template of a scenario, and what tells it from others of that name; "" if it is not known."""
+    values = entry.status.values if entry is not None else {}
+    return f"{values.get('template', '')} {(entry.template_hash or '')[:8] if entry is not None else ''}".strip()
 
 
 def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
@@ -150,6 +185,17 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     if not wanted:
         raise InputError(f"{where}: no vehicle {asked!r} to be the ego; it has {', '.join(ids)}")
     return wanted
+
+
+def with_origins(outcomes: Sequence[Outcome], trials: Sequence[Trial]) -> list[Outcome]:
+    """Return the outcomes with the whole origin of their scenarios: encounter, digest, and which are copies."""
+    return [replace(outcome, origin=origin) for outcome, origin in zip(outcomes, origins_of(trials), strict=True)]
+
+
+def origins_of(trials: Sequence[Trial]) -> list[Origin]:
+    """Return where the scenarios of trials come from."""
+    names, encounters = [trial.name for trial in trials], [trial.encounter for trial in trials]
+    return origins(names, [trial.scenario for trial in trials], [trial.ego for trial in trials], encounters)
 
 
 RunTrials = Callable[[Sequence[Trial]], Iterator["Outcome"]]
@@ -176,9 +222,15 @@ def run_trials(
     """
     outcomes: list[Outcome] = []
     with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run:
-        for outcome in run(trials):
-            outcomes.append(outcome)
-            progress(len(outcomes), len(trials))
+        try:
+            for outcome in run(trials):
+                outcomes.append(outcome)
+                progress(len(outcomes), len(trials))
+        except InputError as error:
+            if not outcomes:
+                raise
+            found = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
+            raise InputError(f"{error}\nof the {len(outcomes)} drives before: {found}") from error
     return outcomes
 
 
@@ -212,7 +264,8 @@ def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: 
             except BrokenProcessPool as error:
                 raise InputError(
                     f"a process that drove the planner has ended after {done} of {len(trials)} drives: it crashed, called "
-                    "os._exit, or was killed for want of memory; --workers 1 shows where"
+                    "os._exit, hung in compiled code for longer than drive_time, or was killed for want of memory; --workers 1 "
+                    "shows where"
                 ) from error
 
         yield run
@@ -223,7 +276,14 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
     make = find_planner(planner) if isinstance(planner, str) else planner
     loop, process = ClosedLoop(trial.scenario, trial.ego, trial.road, config), os.getpid()
     try:
-        drive = loop.drive(make())
+        timed = Timed(make(), config.decision_time)
+        with bounded(config.drive_time):
+            drive = loop.drive(timed)
+    except TooLongError as error:
+        raise InputError(
+            f"scenario {trial.name}: the planner did not come to an end in {config.drive_time:g} s (drive_time): it hangs, or "
+            "needs more time for a drive"
+        ) from error
     except InputError as error:
         raise InputError(f"scenario {trial.name}: {error}") from error
     except ScenarioGenError:
@@ -233,7 +293,7 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
     finally:
         if os.getpid() != process:  # the planner has forked: there is one result of this drive
             os._exit(1)
-    return Outcome(trial.name, judge(loop, drive), drive)
+    return Outcome(trial.name, judge(loop, drive), drive, Origin(trial.encounter), timed.found)
 
 
 LEVEL = 0.95  # of the intervals
@@ -241,11 +301,12 @@ LEVEL = 0.95  # of the intervals
 
 @dataclass(frozen=True)
 class Rate:
-    """How many of the drives, and the share with its 95 % interval (Wilson 1927)."""
+    """How many of the drives, and the share with its 95 % interval (Wilson 1927), and how many encounters they are of."""
 
     count: int
     of: int
     share: Interval
+    encounters: int = 1
 
     def __str__(self) -> str:
         low, high = 100.0 * self.share.low, 100.0 * self.share.high
@@ -253,16 +314,36 @@ class Rate:
 
 
 def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
-    """Return how often what happened: collisions, at_fault (the ego itself ran into another), off_road, goals."""
+    """Return how often what happened: failures of any kind, collisions, at_fault (the ego itself ran into another), and so on.
+
+    Drives of one encounter are alike, so intervals are for encounters that are drawn at random; with one encounter alone they
+    hold for that one, and copies of one scenario count as one.
+    """
     verdicts = [outcome.verdict for outcome in outcomes]
-    hits = [v.collision for v in verdicts if v.collision is not None]
-    counts = {
-        "collisions": len(hits),
-        "at_fault": len([hit for hit in hits if hit.ran is not Runner.OTHER]),
-        "off_road": len([v for v in verdicts if not math.isnan(v.off_road)]),
-        "goals": len([v for v in verdicts if not math.isnan(v.goal)]),
+    flags = {
+        "failures": [not v.passed for v in verdicts],
+        "collisions": [v.collision is not None for v in verdicts],
+        "at_fault": [v.collision is not None and v.collision.ran is not Runner.OTHER for v in verdicts],
+        "off_road": [not math.isnan(v.off_road) for v in verdicts],
+        "jumps": [v.jumps > 0 for v in verdicts],
+        "goals": [not math.isnan(v.goal) for v in verdicts],
+        "progress": [v.terms.making_progress > 0.0 for v in verdicts],
     }
-    return {name: Rate(count, len(verdicts), wilson(count, len(verdicts), LEVEL)) for name, count in counts.items()}
+    return {name: _rate(outcomes, each) for name, each in flags.items()}
+
+
+def passed_of(outcomes: Sequence[Outcome]) -> Rate:
+    """Return how many drives passed."""
+    return _rate(outcomes, [outcome.verdict.passed for outcome in outcomes])
+
+
+def _rate(outcomes: Sequence[Outcome], flags: Sequence[bool]) -> Rate:
+    unit, encounters = units_of([outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes])
+    hits = np.array(flags, dtype=np.bool_)
+    return Rate(sum(flags), len(flags), clustered_wilson(hits, unit, LEVEL), encounters)
+
+
+LEAST = ("goals", "progress")  # shares of which a bar asks for so many at least
 
 
 def broken_bars(found: dict[str, Rate], bars: Bars) -> list[str]:
@@ -270,7 +351,7 @@ def broken_bars(found: dict[str, Rate], bars: Bars) -> list[str]:
     messages = []
     for name, wanted in asdict(bars).items():
         value = found[name].share.value
-        if (value < wanted) if name == "goals" else (value > wanted):
-            side = "at least" if name == "goals" else "at most"
+        if (value < wanted) if name in LEAST else (value > wanted):
+            side = "at least" if name in LEAST else "at most"
             messages.append(f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is asked")
     return messages

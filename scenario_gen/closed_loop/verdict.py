@@ -5,43 +5,37 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from enum import StrEnum
 import math
 from typing import Any
 
 import numpy as np
 
+from scenario_gen.closed_loop.ego import misplaced
+from scenario_gen.closed_loop.off_road import between, PARTS, RESOLUTION, road_use
+from scenario_gen.closed_loop.reasons import Reason, reason_of, Runner, STANDS, state_at
+from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.method.evaluation import footprint_distance, Motion, time_to_collision
 from scenario_gen.method.validity import collision as apart
-from scenario_gen.method.validity import containment as inside
 from scenario_gen.method.validity import control_points
 from scenario_gen.numerics import Bools, exact, Floats
-from scenario_gen.roads import clearance_in_cells, footprint_fits
 from scenario_gen.template import find_conflicts
-from scenario_gen.types import Road
 
-PARTS = 200  # of a step, to which the beginning of a contact is told
-RESOLUTION = 1e-6  # seconds; what cannot be told apart over such an interval counts as a contact
+__all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
+
 JERK_OVER = 0.5  # seconds over which the change of acceleration is taken
-
-
-class Runner(StrEnum):
-    """Who ran into whom: whose own motion closed the gap."""
-
-    EGO = "ego"
-    OTHER = "other"
-    BOTH = "both"
+STANDING = 5.0  # seconds at its end for which a drive has stood, if that is why the goal was missed
 
 
 @dataclass(frozen=True)
 class Collision:
-    """The first contact of the ego: when [s], with whom, at which relative speed [m/s], and who ran into whom."""
+    """The first contact of the ego: when [s], with whom, at which relative speed [m/s], who ran into whom, and why they met."""
 
     time: float
     vehicle: str
     speed: float
     ran: Runner
+    reason: Reason
 
 
 @dataclass(frozen=True)
@@ -52,7 +46,10 @@ class DriveVerdict:
         index: of the scenario; seed: of its request; ego: id of the vehicle in whose place the ego drove.
         duration: length of the drive.
         collision: first contact with another vehicle, None if there is none at any instant.
-        off_road: when the footprint first leaves drivable space, NaN if never, or if no road is known.
+        off_road: when the footprint was first as deep outside drivable space as counts, NaN if never, or if no road is known.
+        road_margin: least signed distance [m] of the footprint to what is not drivable: positive inside, negative the greatest
+            depth outside; at most 10 m either way; NaN if no road is known.
+        off_road_depth: depth [m] from which a footprint is off the road; off_road_area: greatest part of it outside [m²].
         goal: when the goal is reached; NaN if never.
         delay: by how much later than the witness.
         min_ttc: least time to collision, at most the horizon; min_gap: least distance of two footprints [m]; min_pet: least
@@ -60,6 +57,9 @@ class DriveVerdict:
         hardest_braking: m/s²; hard_braking: seconds of hard braking; jerk: largest change of acceleration over 0.5 s [m/s³].
         progress: share of the witness' way that was driven, by its path.
         faults: steps in which a command was missing, not finite, or a jump.
+        jumps: of these, poses that no vehicle can reach in a step, and those that are no place.
+        stood: seconds for which the ego stood at the end of the drive.
+        terms: those of nuPlan's and NAVSIM's scores.
         among_others: contacts of the others among themselves; there are none.
         forced: how many times one of the others braked harder than the strongest braking, to keep the order.
     """
@@ -82,12 +82,35 @@ class DriveVerdict:
     faults: int
     among_others: int
     forced: int
-    road_known: bool = True
+    road_known: bool
+    road_margin: float
+    off_road_depth: float
+    off_road_area: float
+    jumps: int
+    stood: float
+    terms: Terms
 
     @property
     def passed(self) -> bool:
-        """Whether the ego came to its goal on the road and without a collision."""
-        return self.collision is None and math.isnan(self.off_road) and not math.isnan(self.goal)
+        """Whether the ego came to its goal on the road, by driving there, and without a collision."""
+        return self.collision is None and math.isnan(self.off_road) and not math.isnan(self.goal) and not self.jumps
+
+    @property
+    def failure(self) -> str:
+        """The gravest thing that went wrong: collision, off_road, jump, goal; "" if it passed."""
+        if self.passed:
+            return ""
+        if self.collision is not None:
+            return "collision"
+        return "off_road" if not math.isnan(self.off_road) else "jump" if self.jumps else "goal"
+
+    @property
+    def fault(self) -> str:
+        """Why it failed: the reason of a collision, off_road, jump, standing, or goal (missed otherwise); "" if it passed."""
+        if self.collision is not None:
+            return self.collision.reason.value
+        stands = self.failure == "goal" and self.stood >= STANDING
+        return "standing" if stands else self.failure
 
     @property
     def severity(self) -> tuple[float, ...]:
@@ -104,11 +127,16 @@ class DriveVerdict:
                 Runner.OTHER: f"{hit.vehicle} ran into the ego",
                 Runner.BOTH: f"the ego and {hit.vehicle} ran into each other",
             }
-            messages.append(f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s")
+            why = hit.reason.value.replace("_", " ")
+            messages.append(f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({why})")
         if not math.isnan(self.off_road):
-            messages.append(f"left the road at {self.off_road:.2f} s")
+            depth = f"{-self.road_margin:.2f} m deep, {self.off_road_area:.1f} m² of its footprint"
+            messages.append(f"left the road at {self.off_road:.2f} s ({depth})")
+        if self.jumps:
+            messages.append(f"{self.jumps} jump(s): poses that cannot be reached in a step")
         if math.isnan(self.goal):
-            messages.append(f"did not reach its goal, {100.0 * self.progress:.0f} % of the way")
+            stands = ", stood at the end" if self.stood >= STANDING else ""
+            messages.append(f"did not reach its goal, {100.0 * self.progress:.0f} % of the way{stands}")
         elif not messages:
             messages.append(f"reached its goal at {self.goal:.1f} s")
         if self.faults:
@@ -117,7 +145,8 @@ class DriveVerdict:
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON's types; null for what there is not."""
-        plain = asdict(self) | {"passed": self.passed, "sentence": self.sentence()}
+        plain = asdict(self) | {"passed": self.passed, "fault": self.fault, "sentence": self.sentence()}
+        plain["terms"] |= {"nuplan": self.terms.nuplan, "pdms": self.terms.pdms}
         return {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in plain.items()}
 
 
@@ -137,18 +166,21 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     pieces = [(Motion(motion.vehicles, config.step, motion.position, motion.heading, motion.speed), i) for i in others]
     seen = [drive.here[i] for i in others]
     ttc = [np.where(here, time_to_collision(m, ego, i), np.inf).min() for (m, i), here in zip(pieces, seen, strict=True)]
+    close = [float(np.where(not_behind(drive, i) & drive.here[i], time_to_collision(m, ego, i), np.inf).min()) for m, i in pieces]
     gap = [np.where(here, footprint_distance(m, ego, i), np.inf).min() for (m, i), here in zip(pieces, seen, strict=True)]
     braking = np.maximum(-drive.accelerations, 0.0)
     way = known.cells[ego, :, 7]
     reached = float(np.interp(drive.clock[ego, -1], np.arange(len(way)) * 0.1, way))
     whole = float(way[-1])
+    progress = 1.0 if not math.isnan(goal) or whole <= 0.0 else min(reached / whole, 1.0)
+    road = road_use(drive, loop.road, config.off_road_depth)
     return DriveVerdict(
         index=motion.index,
         seed=motion.seed,
         ego=motion.vehicles[ego].id,
         duration=float(time[-1]),
-        collision=None if who < 0 else _collision(drive, first, who),
-        off_road=math.nan if loop.road is None else _off_road(drive, loop.road),
+        collision=None if who < 0 else _collision(loop, drive, first, who),
+        off_road=road.time,
         goal=goal,
         delay=goal - loop.duration,
         min_ttc=float(min((config.horizon, *ttc))),
@@ -157,12 +189,24 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         hardest_braking=float(braking.max()),
         hard_braking=round(int(np.count_nonzero(braking[1:] >= config.hard_braking)) * config.step, 9),
         jerk=_jerk(drive.accelerations, config.step),
-        progress=1.0 if not math.isnan(goal) or whole <= 0.0 else min(reached / whole, 1.0),
+        progress=progress,
         faults=len(drive.faults),
         among_others=len([1 for (i, j), at in contacts.items() if ego not in (i, j) and at is not None]),
         forced=drive.forced,
         road_known=loop.road is not None,
+        road_margin=road.margin,
+        off_road_depth=config.off_road_depth,
+        off_road_area=road.area,
+        jumps=len([1 for _, fault in drive.faults if misplaced(fault)]),
+        stood=_stood(motion.speed[ego], config.step),
+        terms=terms(drive, None if who < 0 else (who, first), road.margin, progress, min(close, default=math.inf)),
     )
+
+
+def _stood(speed: Floats, step: float) -> float:
+    """Return for how long [s] a vehicle stood at the end."""
+    moved = np.flatnonzero(speed >= STANDS)
+    return round((len(speed) - 1 - (int(moved[-1]) if len(moved) else 0)) * step, 9)
 
 
 def _contact(drive: Drive, i: int, j: int) -> float | None:
@@ -189,28 +233,20 @@ def _first(drive: Drive, rows: list[int], found: float, wrong: Callable[[Motion]
     motion, step = drive.motion, float(drive.motion.time[1])
     k = min(int(found / step + 1e-9), len(motion.time) - 2)
     start = float(motion.time[k])
-    u = np.linspace(0.0, max(found - start, 0.0) / step, PARTS + 1)[:, None]
-    v, w = 1.0 - u, 3.0 - 2.0 * u
-    position = []
-    for i in rows:
-        yaw, speed = motion.heading[i, k : k + 2], motion.speed[i, k : k + 2]
-        way = step * speed[:, None] * np.stack([exact.cos(yaw), exact.sin(yaw)], axis=1)
-        p, q = motion.position[i, k], motion.position[i, k + 1]
-        position.append((1.0 + 2.0 * u) * v * v * p + u * v * v * way[0] + u * u * w * q - u * u * v * way[1])
-    heading = motion.heading[rows, k, None] + u[:, 0] * (motion.heading[rows, k + 1] - motion.heading[rows, k])[:, None]
+    u = np.linspace(0.0, max(found - start, 0.0) / step, PARTS + 1)
+    position, heading = between(motion, rows, k, u)
     vehicles = tuple(motion.vehicles[i] for i in rows)
-    flags = wrong(Motion(vehicles, step / PARTS, np.stack(position), heading, np.zeros_like(heading)))
-    return start + float(u[np.argmax(flags), 0]) * step if flags.any() else found
+    flags = wrong(Motion(vehicles, step / PARTS, position, heading, np.zeros_like(heading)))
+    return start + float(u[np.argmax(flags)]) * step if flags.any() else found
 
 
-def _collision(drive: Drive, at: float, who: int) -> Collision:
+def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision:
     """Say how fast and by whom: the speeds of both towards each other, along the line of their centres."""
     motion = drive.motion
     state = []
     for i in (drive.ego, who):
-        x, y = (float(np.interp(at, motion.time, motion.position[i, :, axis])) for axis in range(2))
-        yaw, speed = (float(np.interp(at, motion.time, each[i])) for each in (motion.heading, motion.speed))
-        state.append((x, y, speed * exact.cos(yaw), speed * exact.sin(yaw)))
+        x, y, yaw, speed = state_at(drive, i, at)
+        state.append((x, y, speed * float(exact.cos(yaw)), speed * float(exact.sin(yaw))))
     (x, y, vx, vy), (ox, oy, wx, wy) = state
     away = max(float(exact.hypot(ox - x, oy - y)), 1e-9)
     dx, dy = (ox - x) / away, (oy - y) / away
@@ -221,34 +257,8 @@ def _collision(drive: Drive, at: float, who: int) -> Collision:
         ran = Runner.OTHER
     else:
         ran = Runner.BOTH
-    return Collision(at, motion.vehicles[who].id, float(exact.hypot(vx - wx, vy - wy)), ran)
-
-
-def _off_road(drive: Drive, road: Road) -> float:
-    """Time [s] at which the ego's footprint first leaves drivable cells, NaN if never."""
-    motion, ego = drive.motion, [drive.ego]
-    control, out = np.empty((1, len(motion.time) - 1, 4, 2)), np.empty((1, 2))
-    control_points(motion.time, motion.position[ego], motion.heading[ego], motion.speed[ego], control)
-    vehicle = motion.vehicles[drive.ego]
-    inside.first_exits(
-        motion.time,
-        control,
-        motion.heading[ego],
-        np.array([(0.5 * vehicle.length, 0.5 * vehicle.width)]),
-        clearance_in_cells(road),
-        inside.blocked_before(road.drivable),
-        np.array((*road.origin, road.resolution)),
-        RESOLUTION,
-        out,
-    )
-    if out[0, 0] == inside.PROVEN:
-        return math.nan
-
-    def off(fine: Motion) -> Bools:
-        poses = np.column_stack([fine.position[0], fine.heading[0]])
-        return ~footprint_fits(road, poses, vehicle.length, vehicle.width)
-
-    return _first(drive, ego, float(out[0, 1]), off)
+    speed = float(exact.hypot(vx - wx, vy - wy))
+    return Collision(at, motion.vehicles[who].id, speed, ran, reason_of(loop, drive, who, at, ran))
 
 
 def _goal_time(loop: ClosedLoop, drive: Drive) -> float:

@@ -3,6 +3,7 @@
 
 """The command `drive`: a bag and a planner in, verdicts and an exit code out."""
 
+from contextlib import suppress
 import json
 import os
 from pathlib import Path
@@ -85,6 +86,31 @@ class Forks(Still):
             os.fork()
 
 
+class Hangs(Still):
+    """Stands in the first scenario, and never answers in the second; it catches what it can."""
+
+    drives = 0
+
+    def reset(self, task):
+        Hangs.drives += 1
+
+    def act(self, seen):
+        while Hangs.drives > 1:
+            with suppress(Exception):
+                time.sleep(0.01)
+
+
+class HangsInCompiledCode(Still):
+    def act(self, seen):
+        sum(range(10**15))
+
+
+class Slow(Still):
+    def act(self, seen):
+        if seen.time == 0.0:
+            time.sleep(0.05)
+
+
 class Nowhere(Still):
     def act(self, seen):
         return Pose(1e300, 0.0, 0.0, 1e300)
@@ -104,6 +130,43 @@ def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, w
     with pytest.raises(InputError, match=said):
         drive_bag(bag, f"{__name__}:{planner}", count=2, run=in_processes(workers), out=tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
+    Hangs.drives = 0
+    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 3 s") as caught:
+        drive_bag(
+            bag,
+            f"{__name__}:Hangs",
+            count=2,
+            run=in_processes(1),
+            out=tmp_path / "out",
+            assignments=["drive_time=3", "overtime=1"],
+        )
+    assert "of the 1 drives before: failures 1, collisions" in str(caught.value) and not (tmp_path / "out").exists()
+
+
+def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
+    with pytest.raises(InputError, match=r"has ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time"):
+        drive_bag(
+            bag, f"{__name__}:HangsInCompiledCode", count=2, run=in_processes(2), out=tmp_path, assignments=["drive_time=0.5"]
+        )
+
+
+def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_path):
+    known = {}
+    for planner in ("Slow", "Still"):
+        sets = ["decision_time=0.04", "overtime=1.0"]
+        result = drive_bag(bag, f"{__name__}:{planner}", count=1, run=in_processes(1), out=tmp_path / planner, assignments=sets)
+        known[planner] = json.loads(result.written[0].read_text())
+        if planner == "Slow":
+            assert result.decisions.slow >= 1 and result.decisions.longest >= 0.05
+    assert known["Slow"] | {"planner": ""} == known["Still"] | {"planner": ""}
+
+
+def test_who_never_moves_breaks_a_bar_by_default(bag, tmp_path):
+    result = drive_bag(bag, f"{__name__}:Still", run=in_processes(1), out=tmp_path / "out")
+    assert any(line.startswith("progress: 0.0 %; at least 90.0 %") for line in result.broken)
 
 
 @pytest.mark.parametrize("planner", ["Forks", "Nowhere"])

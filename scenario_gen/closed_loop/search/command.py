@@ -161,8 +161,8 @@ class SearchResult:
             messages.append(f"natural drives alone: {self.plain}")
         if not math.isnan(self.equal_plain) and not self.worst:
             messages.append(f"plain sampling would need {self.equal_plain:,.0f} drives for an interval as narrow")
-        if e.first and not self.worst:
-            messages.append(f"failures unlike those found: at most {_share(e.unseen)} (95 %), by the natural drives")
+        if not math.isnan(e.unexpected) and not self.worst:
+            messages.append(f"of it, where the regression expects no failure: at most {_share(e.unexpected)} (95 %)")
         return messages
 
 
@@ -250,7 +250,8 @@ def _document(result: SearchResult, request: SearchRequest, identity: dict[str, 
         "drives": e.drives,
         "first_failure": e.first or None,
         "plain_drives_for_the_same_interval": None if request.worst else rounded(result.equal_plain),
-        "unlike_those_found_at_most": rounded(e.unseen),
+        "unexpected_at_most": rounded(e.unexpected),
+        "natural_scenarios": e.seen,
         "valid_share_of_candidates": rounded(e.valid),
         "shares": {kind: rounded(value) for kind, value in sorted(e.shares.items())},
         "kinds": [{"kind": kind, "kept": len(own), "likeliest": own[0].trial.name} for kind, own in result.kinds.items()],

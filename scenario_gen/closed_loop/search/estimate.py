@@ -90,6 +90,7 @@ class Estimate:
         plain: the same by natural drives alone: failures, drives.
         drives: how many; first: number of the first that failed, counted from 1, 0 if none did.
         seen: certified natural scenarios that the rate is of, driven or not; valid: their share of the candidates.
+        unexpected: upper end (95 %) of the rate of failures among scenarios in which the regression expects none.
         shares: of the rate, by kind of failure.
     """
 
@@ -99,6 +100,7 @@ class Estimate:
     first: int
     seen: int
     valid: float
+    unexpected: float
     shares: dict[str, float]
 
 
@@ -133,6 +135,8 @@ class Search:
     _seen: int = 0  # certified natural scenarios of the batches
     _drawn: int = 0  # numbers drawn for natural scenarios
     _certified: int = 0  # of these
+    _floor: list[int] = field(default_factory=list)  # drives of scenarios that were chosen evenly: no failure was expected
+    _calm: int = 0  # scenarios of the batches in which no failure was expected
     _explored: int = 0
     _runs: int = 0
     _batches: int = 0
@@ -286,6 +290,9 @@ class Search:
         self._sampled += driven
         if len(driven) == len(chosen):
             self._seen += len(rows)
+            calm = probability <= self._evenly
+            self._calm += int(calm.sum())
+            self._floor += [k for place, k in zip(chosen.tolist(), driven, strict=True) if calm[place]]
             for place, k in zip(chosen.tolist(), driven, strict=True):
                 if self.responses[k].failed:
                     self.weights[k] = float(1.0 / probability[place])
@@ -310,8 +317,21 @@ class Search:
             failures[0] + 1 if failures else 0,
             self._seen,
             self._certified / max(self._drawn, 1),
+            self._unexpected(),
             {kind: part / whole for kind, part in shares.items()},
         )
+
+    def _unexpected(self) -> float:
+        if not self._floor:
+            return math.nan
+        hits = sum(self.responses[k].failed for k in self._floor)
+        return wilson(hits, len(self._floor), LEVEL).high * self._calm / self._seen
+
+    def deviation(self, k: int) -> float:
+        """Return how far a drive's scenario is from the mean, in standard deviations along what the regression goes by."""
+        parts = self.responses[k].parts
+        slope = self._predictor().surrogates[int(np.argmin(parts)) if parts else 0].direction(self.problem.size)
+        return abs(float(exact.matmul(slope, self.z[k])))
 
     def _rate(self) -> Interval:
         """Return the rate over the batches with its interval, the gamma interval of a sum of weights (Tiwari, Clegg & Zou 2006).

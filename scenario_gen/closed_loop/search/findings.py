@@ -31,8 +31,8 @@ class Finding:
     Attributes:
         drive: its number in the search, from 0.
         kind: who, how and where.
-        weight: natural density over that of the proposal that drew it; None where the exploration drew it.
-        deviation: distance from the undisturbed drive, in standard deviations along the directions that matter.
+        weight: for how many natural scenarios it stands in the rate; None where the exploration found it.
+        deviation: from the mean scenario, in standard deviations along the direction that the regression goes by.
         trial: the scenario, of all vehicles.
         outcome: the drive.
         passed: whether the ego's witness passes it.
@@ -61,7 +61,7 @@ class Finding:
         """Return the scenario of all vehicles, with what the search says of it."""
         facts = {"search.kind": self.kind, "search.deviation": f"{self.deviation:.4g}"}
         if self.weight is not None:
-            facts["weight"] = repr(self.weight)
+            facts["search.weight"] = repr(self.weight)
         return replace(self.trial.scenario, facts=facts)
 
 

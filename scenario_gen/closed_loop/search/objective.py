@@ -57,7 +57,7 @@ class Objective:
             counts = hit is not None and (self.name == COLLISION or hit.ran is not Runner.OTHER)
             margin = contact if counts else max(nearest, LEAST)
         elif self.name == OFF_ROAD:
-            margin = 1.0 if math.isnan(verdict.off_road) else -1.0
+            margin = verdict.road_margin + verdict.off_road_depth
         elif self.name == GOAL:
             margin = verdict.progress - 1.0 - 1e-3 if math.isnan(verdict.goal) else 1.0 / (1.0 + max(verdict.delay, 0.0))
         elif self.name == TTC:
@@ -83,11 +83,12 @@ def _kind(outcome: Outcome, name: str) -> str:
     hit = outcome.verdict.collision
     if name in (AT_FAULT, COLLISION, TTC) and hit is not None:
         words = {Runner.EGO: "the ego runs into {}", Runner.OTHER: "{} runs into the ego", Runner.BOTH: "the ego and {} meet"}
-        return words[hit.ran].format(hit.vehicle)
+        return f"{words[hit.ran].format(hit.vehicle)}: {hit.reason.value.replace('_', ' ')}"
     if name == OFF_ROAD:
         return "the ego leaves the road"
     if name == GOAL:
-        return "the ego does not come to its goal" if hit is None else "the ego does not come to its goal after a collision"
+        why = " after a collision" if hit is not None else ": it stands" if outcome.verdict.fault == "standing" else ""
+        return f"the ego does not come to its goal{why}"
     others = [i for i in range(len(outcome.drive.motion.vehicles)) if i != outcome.drive.ego]
     nearest = others[int(np.argmin(_apart(outcome)))] if others else 0
     return f"{name} too short with {outcome.drive.motion.vehicles[nearest].id}"

@@ -14,10 +14,8 @@ RIDGES = (1.0, 10.0, 100.0)  # of which the one with the least error of predicti
 ENOUGH = 60  # natural drives that tell the error
 NEAR = 0.3  # share of the drives, those nearest to failure, by which the error is told
 TELLING = 10.0  # a feature may matter so many times as much as a number
-FAR, BEYOND = (
-    0.95,
-    0.02,
-)  # responses are cut at this quantile, and at so much of it below failure: what is farther is all the same
+FAR = 0.95  # responses are cut at this quantile: what is farther is all the same
+BEYOND = 0.02  # and at so much of it below failure
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +41,7 @@ class Surrogate:
 
         `natural` (n,) says which drives are of natural scenarios: by these, if there are enough, the error is told.
         """
-        high = max(float(np.quantile(figure, FAR)), 1e-9)
+        high = max(float(np.quantile(np.maximum(figure, 0.0), FAR)), 1e-9)
         y = np.clip(figure, -BEYOND * high, high)
         order = np.argsort(y, kind="stable")
         chosen = order[np.linspace(0, len(order) - 1, min(len(order), LEARNED)).astype(np.int64)]
@@ -70,3 +68,8 @@ class Surrogate:
     def predict(self, columns: Floats) -> Floats:
         """Return the figure (S,), in its own unit, for columns (S, q)."""
         return np.asarray(self.level + exact.matmul((columns - self.mean) / self.scale, self.slope))
+
+    def direction(self, size: int) -> Floats:
+        """Return the unit direction (size,) of the first columns along which the figure changes most."""
+        slope = np.asarray(self.slope[:size] / self.scale[:size])
+        return slope / max(float(np.sqrt(exact.matmul(slope, slope))), 1e-300)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Bools, exact, Floats, Ints
 from scenario_gen.types import Interval
 
 Statistic = Callable[[Floats], Floats]
@@ -92,8 +92,78 @@ def wilson(count: int, total: int, level: float) -> Interval:
     """Return the share count / total with Wilson's interval (1927), which stays in [0, 1] and is not empty at 0 or 1."""
     if total == 0:
         return Interval(float("nan"))
-    z = float(exact.ndtri(0.5 + 0.5 * level))
+    return _wilson(count / total, total, float(exact.ndtri(0.5 + 0.5 * level)))
+
+
+def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
+    """Return the share of hits (S,) with Wilson's interval for samples that depend on each other within units (S,).
+
+    The number of samples is divided by the design effect: the variance between the totals of units over that of independent
+    samples, at least 1. The quantile is Student's with a degree of freedom for each unit but one. Where nothing or everything
+    is a hit, no sample tells how much those of a unit are alike, and each unit counts as one sample.
+    Source: Korn & Graubard 1998; for Wilson's interval, Franco, Little, Louis & Slud 2019.
+    """
+    count, total = int(np.count_nonzero(hits)), len(hits)
+    _, member = np.unique(unit, return_inverse=True)
+    units = int(member.max(initial=-1)) + 1
+    if units < 2:
+        return wilson(count, total, level)
     share = count / total
+    if count in (0, total):
+        return _wilson(share, float(units), float(exact.ndtri(0.5 + 0.5 * level)))
+    apart = np.bincount(member, weights=hits - share)
+    between = float(np.sum(apart * apart)) * units / (units - 1)
+    effect = max(between / (total * share * (1.0 - share)), 1.0)
+    return _wilson(share, total / effect, student(level, units - 1))
+
+
+def paired_difference(differences: Floats, unit: Ints, level: float) -> Interval:
+    """Return the mean of differences (S,) of -1, 0 or 1 between pairs, with an interval for pairs that depend on each other.
+
+    Its variance is that between the totals of units (S,), its quantile Student's with a degree of freedom for each unit but one.
+    Where no pair differs the bounds are those of a share of 0 among as many units.
+    Source: Liang & Zeger 1986, for one mean.
+    """
+    _, member = np.unique(unit, return_inverse=True)
+    units, total = int(member.max(initial=-1)) + 1, len(differences)
+    if units < 2:
+        return Interval(float(np.sum(differences)) / total if total else float("nan"), -1.0, 1.0)
+    mean = float(np.sum(differences)) / total
+    if not differences.any():
+        high = _wilson(0.0, float(units), float(exact.ndtri(0.5 + 0.5 * level))).high
+        return Interval(0.0, -high, high)
+    apart = np.bincount(member, weights=differences - mean)
+    half = student(level, units - 1) * float(np.sqrt(np.sum(apart * apart) * units / (units - 1))) / total
+    return Interval(mean, max(mean - half, -1.0), min(mean + half, 1.0))
+
+
+def student(level: float, freedom: int) -> float:
+    """Return the two-sided quantile of Student's distribution.
+
+    Source: exact for 1 and 2 degrees of freedom, else the expansion of Abramowitz & Stegun 26.7.5 (0.4 % at 3 and 95 %).
+    """
+    tail = 0.5 + 0.5 * level
+    if freedom == 1:
+        angle = np.pi * (tail - 0.5)
+        return float(exact.sin(angle) / exact.cos(angle))
+    if freedom == 2:
+        return float((2.0 * tail - 1.0) / np.sqrt(2.0 * tail * (1.0 - tail)))
+    z = float(exact.ndtri(tail))
+    s = z * z
+    terms = (
+        (s + 1.0) / 4.0,
+        ((5.0 * s + 16.0) * s + 3.0) / 96.0,
+        (((3.0 * s + 19.0) * s + 17.0) * s - 15.0) / 384.0,
+        ((((79.0 * s + 776.0) * s + 1482.0) * s - 1920.0) * s - 945.0) / 92160.0,
+    )
+    result, power = 1.0, 1.0
+    for term in terms:
+        power *= freedom
+        result += term / power
+    return z * result
+
+
+def _wilson(share: float, total: float, z: float) -> Interval:
     centre = (share + z * z / (2 * total)) / (1 + z * z / total)
     half = z / (1 + z * z / total) * float(np.sqrt(share * (1 - share) / total + z * z / (4 * total * total)))
     return Interval(share, max(0.0, centre - half), min(1.0, centre + half))

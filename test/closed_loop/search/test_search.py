@@ -47,6 +47,13 @@ class Stands(IdmFollower):
         return Command(-9.0, 0.0)
 
 
+class Strays(IdmFollower):
+    """Drives in a circle."""
+
+    def act(self, observation):
+        return Command(super().act(observation).acceleration, 0.1)
+
+
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
     """A bag of one request."""
@@ -162,6 +169,15 @@ def test_margins_are_zero_or_less_in_failures_alone(bag):
                 "pet": not math.isnan(verdict.min_pet) and verdict.min_pet <= 1.0,
             }[text.split("<")[0]]
             assert response.failed == failed and bool(response.kind) == failed and len(response.guides) == 1
+
+
+def test_the_margin_of_leaving_the_road_is_its_depth(bag):
+    objective = Objective("off_road")
+    for planner in ("Strays", "Blind"):
+        for outcome in run_trials(read_trials(bag, "2"), f"{__name__}:{planner}"):
+            response, verdict = objective.response(outcome), outcome.verdict
+            assert response.margin == verdict.road_margin + 0.1 and response.failed == (not math.isnan(verdict.off_road))
+            assert response.failed == (planner == "Strays")
 
 
 def test_the_command_says_what_it_found(bag, tmp_path):

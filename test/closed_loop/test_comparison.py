@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Two planners on the same scenarios: nothing for one against itself, and no more false alarms than said."""
+
+from dataclasses import dataclass, replace
+
+from bag_examples import hand_made_run
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.base.errors import InputError
+from scenario_gen.cli.commands import app
+from scenario_gen.closed_loop.comparison import compared, Earlier, read_drives
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.origin import Origin
+from scenario_gen.closed_loop.results import document
+from scenario_gen.closed_loop.trials import read_trials, run_trials, with_origins
+
+PLANNERS = "scenario_gen.closed_loop.planners"
+PARAMETERS = document([], "", ClosedLoopConfig())["parameters"]
+
+
+@dataclass
+class Said:
+    passed: bool
+
+
+@dataclass
+class Driven:
+    """As much of an outcome as a comparison asks for."""
+
+    name: str
+    verdict: Said
+    origin: Origin
+
+
+def driven(failed, encounters):
+    return [
+        Driven(str(k), Said(not bad), Origin(f"encounter {k % encounters}", f"digest {k}"))
+        for k, bad in enumerate(failed.tolist())
+    ]
+
+
+def earlier(failed):
+    return Earlier("before", PARAMETERS, {str(k): (f"digest {k}", not bad) for k, bad in enumerate(failed.tolist())})
+
+
+def test_the_same_verdicts_give_exactly_nothing():
+    failed = np.arange(1000) % 7 == 0
+    found = compared(driven(failed, 20), ClosedLoopConfig(), earlier(failed))
+    assert found.difference.value == 0.0 and found.difference.low < 0.0 < found.difference.high
+    assert (found.now_fail, found.now_pass, found.worse) == ((), (), False)
+
+
+@pytest.mark.parametrize("encounters", [1, 25])
+def test_false_alarms_are_as_rare_as_said(encounters):
+    """Labels of both are permuted in each scenario, so neither is better; 200 pairs, either side counts."""
+    rng = np.random.default_rng(11)
+    alarms = 0
+    for _ in range(200):
+        alike = rng.random(encounters) < 0.3  # some encounters are harder
+        rate = np.where(alike[np.arange(400) % encounters], 0.4, 0.1)
+        one, two = rng.random(400) < rate, rng.random(400) < rate + 0.1
+        swap = rng.random(400) < 0.5
+        a, b = np.where(swap, two, one), np.where(swap, one, two)
+        found = compared(driven(a, encounters), ClosedLoopConfig(), earlier(b))
+        alarms += not found.difference.low <= 0.0 <= found.difference.high
+    assert 6 <= alarms <= 16
+
+
+def test_a_worse_planner_is_found_and_named():
+    before = np.arange(300) % 10 == 0
+    now = before | (np.arange(300) % 10 == 1)
+    found = compared(driven(now, 13), ClosedLoopConfig(), earlier(before))
+    assert found.worse and found.difference.value == pytest.approx(0.1) and len(found.now_fail) == 30 and not found.now_pass
+    better = compared(driven(before, 13), ClosedLoopConfig(), earlier(now))
+    assert not better.worse and better.difference.high < 0.0 and len(better.now_pass) == 30
+
+
+def test_other_scenarios_or_parameters_are_refused():
+    failed = np.zeros(4, dtype=np.bool_)
+    known = earlier(failed)
+    with pytest.raises(InputError, match=r"1 of 4 scenarios are not the same \(first: 2\)"):
+        compared(driven(failed, 1), ClosedLoopConfig(), replace(known, drives=known.drives | {"2": ("other", True)}))
+    with pytest.raises(InputError, match=r"1 of 4 scenarios are not the same \(first: 3\)"):
+        compared(driven(failed[:3], 1), ClosedLoopConfig(), known)
+    with pytest.raises(InputError, match=r"other parameters \(step\)"):
+        compared(driven(failed, 1), ClosedLoopConfig(step=0.05), known)
+    assert not compared(driven(failed, 1), ClosedLoopConfig(decision_time=3.0), known).worse
+
+
+def test_what_is_no_list_of_drives_is_refused(tmp_path):
+    (tmp_path / "drives.json").write_text('{"planner": "p", "drives": [{"name": "1"}]}')
+    with pytest.raises(InputError, match=r"no drives\.json of this version \(KeyError"):
+        read_drives(tmp_path)
+    with pytest.raises(InputError, match="nothing"):
+        read_drives(tmp_path / "nothing.json")
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    return write_recording(tmp_path_factory.mktemp("compared") / "bag", hand_made_run())
+
+
+def test_the_command_compares_and_says_what_a_planner_that_looks_at_nobody_passes(bag, tmp_path):
+    def drive(planner, *more):
+        words = ["drive", str(bag), "--planner", f"{PLANNERS}:{planner}", "--workers", "1", "--set", "overtime=1.0"]
+        loose = [f"bars.{name}=1.0" for name in ("collisions", "at_fault", "off_road")] + ["bars.progress=0.0"]
+        return CliRunner().invoke(app, [*words, *(word for one in loose for word in ("--set", one)), *more])
+
+    first = drive("IdmFollower", "--out", str(tmp_path / "one"))
+    assert first.exit_code == 0 and "a planner that looks at nobody passes" in first.output, first.output
+    again = drive("IdmFollower", "--out", str(tmp_path / "two"), "--against", str(tmp_path / "one"), "--no-unlooking")
+    assert again.exit_code == 0 and "failures +0.0 %" in again.output and "looks at nobody" not in again.output
+    said = (tmp_path / "two" / "drives.html").read_text()
+    assert "Scenarios that changed sides" in said and "failures +0.0 %" in said
+    trials = read_trials(bag)
+    outcomes = with_origins(run_trials(trials, f"{PLANNERS}:IdmFollower", ClosedLoopConfig(overtime=1.0)), trials)
+    assert document(outcomes, "", ClosedLoopConfig())["drives"][0]["scenario"] == outcomes[0].origin.digest

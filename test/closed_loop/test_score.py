@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The terms of nuPlan's and NAVSIM's scores, and the reasons of contacts, in drives made by hand."""
+
+import numpy as np
+import pytest
+from scipy.signal import savgol_filter
+from test_verdict import go_on, straight, verdict_of
+
+from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.score import smoothed
+from scenario_gen.types.road import Road
+
+
+def test_a_drive_that_is_as_its_witness_has_the_full_score():
+    verdict, _ = verdict_of([straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)], go_on)
+    assert verdict.terms.nuplan == verdict.terms.pdms == 1.0 and verdict.fault == ""
+    assert verdict.document()["terms"]["pdms"] == 1.0
+
+
+def test_who_stands_has_no_progress_and_who_brakes_hard_no_comfort():
+    motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
+    verdict, _ = verdict_of(motions, lambda _: Command(-3.0, 0.0))
+    assert verdict.terms.making_progress == 0.0 == verdict.terms.nuplan and verdict.fault == "standing"
+    assert 0.5 < verdict.terms.pdms < 0.65  # (5 TTC + 2 comfort) / 12 and little progress
+    verdict, _ = verdict_of(motions, lambda seen: Command(-8.0 * (1.0 < seen.time < 2.0), 0.0))
+    assert verdict.terms.comfort == 0.0 and verdict.terms.making_progress == 1.0
+
+
+def test_at_fault_is_the_one_who_hits_with_the_front_or_what_stands():
+    """As nuPlan has it: not the one that stands, nor the one that is hit from behind."""
+    stands, comes = straight(40.0, 0, 0, 0.0), straight(0, 0, 0, 10.0)
+    hit, _ = verdict_of([comes, stands], go_on)
+    assert hit.terms.no_at_fault_collision == 0.0 and hit.terms.ttc == 0.0 and hit.fault == "rear_end"
+    hit, _ = verdict_of([stands, comes], go_on)
+    assert hit.terms.no_at_fault_collision == 1.0 == hit.terms.ttc and hit.fault == "standing"
+    hit, _ = verdict_of([straight(30.0, 0, 0, 4.0), comes], go_on)
+    assert hit.terms.no_at_fault_collision == 1.0 and hit.fault == "other_ran_into_ego"
+    hit, _ = verdict_of([comes, straight(80.0, 0, np.pi, 9.0)], go_on)
+    assert hit.fault == "head_on" and hit.terms.no_at_fault_collision == 0.0
+
+
+def test_who_goes_first_where_its_witness_goes_second_crosses_out_of_order():
+    first, second = straight(0.0, -20.0, np.pi / 2, 5.0), straight(-60.0, 0, 0, 10.0)  # it is there 2 s after the first
+    verdict, _ = verdict_of([second, first], lambda seen: Command(4.0 * (seen.time < 3.0), 0.0))
+    assert verdict.fault == "crossing_out_of_order" and verdict.failure == "collision"
+    assert "(crossing out of order)" in verdict.sentence()
+
+
+def test_who_swerves_in_front_of_another_cuts_in():
+    def swerve(seen):
+        time = seen.time + 0.1
+        return Pose(20.0 + 6.0 * time, max(4.0 - max(time - 1.0, 0.0) * 4.0, 0.0), 0.0, 6.0)
+
+    verdict, _ = verdict_of([straight(20.0, 4.0, 0, 6.0), straight(0, 0, 0, 14.0)], swerve)
+    assert verdict.fault == "cut_in" and verdict.collision.ran == "other"
+
+
+def test_a_jump_fails_whatever_the_goal_says():
+    verdict, _ = verdict_of([straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)], lambda _: Pose(149.0, 0.0, 0.0, 10.0))
+    assert verdict.goal == pytest.approx(0.1) and verdict.jumps == 1
+    assert not verdict.passed and verdict.fault == verdict.failure == "jump" and "1 jump(s)" in verdict.sentence()
+
+
+@pytest.mark.parametrize(("aside", "counted"), [(0.02, False), (0.3, True)])
+def test_off_the_road_counts_from_a_depth(aside, counted):
+    drivable = np.zeros((100, 1000), dtype=np.bool_)
+    drivable[40:60] = True  # y from -2 to 2 m
+    road = Road("strip", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3)))
+    motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
+
+    def beside(seen):
+        time = seen.time + 0.1
+        return Pose(10.0 * time, min(time, 1.1 + aside), 0.0, 10.0)
+
+    verdict, drive = verdict_of(motions, beside, road=road)
+    assert verdict.road_margin == pytest.approx(-aside, abs=1e-6) and np.isfinite(verdict.off_road) == counted
+    assert verdict.passed != counted and (f"{aside:.2f} m deep" in verdict.sentence()) == counted
+    assert verdict.off_road_area == pytest.approx(4.0 * aside, abs=0.4) and drive.motion.position[0, -1, 1] > 1.1
+    verdict, _ = verdict_of(motions, beside, road=road, off_road_depth=0.0)
+    assert np.isfinite(verdict.off_road)
+    verdict, _ = verdict_of(motions, go_on, road=road)
+    assert verdict.road_margin == pytest.approx(1.1)
+
+
+def test_smoothing_is_savitzky_and_golays():
+    values = np.random.default_rng(0).standard_normal(60).cumsum()
+    for derivative in (0, 1, 2):
+        expected = savgol_filter(values, 15, 2, deriv=derivative, delta=0.1)
+        assert smoothed(values, 0.1, 0.7, derivative)[7:-7] == pytest.approx(expected[7:-7])
