@@ -74,9 +74,9 @@ class GenerationResult:
 
     def best(self, metric: str) -> str:
         """Return the compared row with the least figure, that of `generated` where they are equal; "" if there is none."""
-        found = {row: self.evaluation.value(row, metric) for row in self.compared}
-        known = [row for row, value in found.items() if math.isfinite(value)]
-        return min(known, key=found.__getitem__) if len(known) > 1 else ""
+        values = {row: self.evaluation.value(row, metric) for row in self.compared}
+        known = [row for row, value in values.items() if math.isfinite(value)]
+        return min(known, key=values.__getitem__) if len(known) > 1 else ""
 
     def outdone(self) -> tuple[str, ...]:
         """Return a sentence for each reference that is more like the template than what was generated, by a thousandth."""

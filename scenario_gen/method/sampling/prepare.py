@@ -55,7 +55,7 @@ _TIME_SHARE = 1.0 / 3.0  # of the duration, at most: what varies more slowly bet
 _EARLY = 0.3  # s, by which a vehicle leaves a stand before its lines do, for they are rounded
 _LEAST_REST = SHORTEST_WAIT - 0.2  # s: behind it a vehicle is still too slow to be seen moving for a while
 _FREE_SLIDE = 1.5  # m, by which changepoints may be passed from their place before the clock is stretched
-_SAID_PACE, _SAID_SLIDE, _SAID_JERK = 0.02, 0.3, 0.2  # slowing, m and m/s³ from which on they are said
+_REPORTED_PACE, _REPORTED_SHIFT, _REPORTED_JERK = 0.02, 0.3, 0.2  # slowing, m and m/s³ from which on they are reported
 
 
 _Mean = tuple[Floats, Motion, Bounds]  # coefficients of a mean speed, and what it keeps to
@@ -153,15 +153,15 @@ class _Drive:
             return 0.0
         return float(np.abs(exact.matmul(self.spline.driven(self.times), mean) - self.anchor).max())
 
-    def need(self, mean: Floats, grid: Floats) -> Floats:
+    def slowdown(self, mean: Floats, grid: Floats) -> Floats:
         """By how much the clock must be slowed at template times (G,) [s], so that bends are driven at ease."""
         if len(self.path.node) == 1:
             return np.ones(len(grid))
         there = (grid >= self.times[0]) & (grid <= self.times[-1])
         s, v = (exact.matmul(rows, mean) for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there])))
-        need = np.ones(len(grid))
-        need[there] = v / self._bend_speed(s, np.maximum(self._own_sideways(grid[there]), self.bend))
-        return need
+        slowdown = np.ones(len(grid))
+        slowdown[there] = v / self._bend_speed(s, np.maximum(self._own_sideways(grid[there]), self.bend))
+        return slowdown
 
     def _own_sideways(self, at: Floats) -> Floats:
         """Lateral acceleration [m/s²] that the template drives at template times (q,) [s], and a little more."""
@@ -186,7 +186,7 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
     Raises:
         InputError: routes, segmentation and encounter disagree in their numbers.
     """
-    encounter, road, routes, requested = plan.encounter, plan.road, plan.routes, plan.asked
+    encounter, road, routes, requested = plan.encounter, plan.road, plan.routes, plan.requested
     times = encounter.time[np.concatenate([[0], plan.segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
@@ -246,7 +246,7 @@ def _freedom(
     gap: float,
     config: SamplingConfig,
 ) -> Freedom:
-    """What preset `wide` frees of a vehicle, that came so near [m] to others in the template."""
+    """What preset `wide` relaxes for a vehicle that came so near [m] to others in the template."""
     fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * config.max_acceleration * FADES
     ahead = road_ahead(drive.path, drive.vehicle, road, MOST_ONWARD * fastest)
     clock = OwnClock.of(nominal, drive.rests, (bool(tied[0]), bool(tied[1])), config)
@@ -254,16 +254,16 @@ def _freedom(
 
 
 def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:
-    """The nominal clock on template times (G,) [s], and what is said of it."""
+    """The nominal clock on template times (G,) [s], and the notes on it."""
     plain = clock_of(grid, np.ones(len(grid)))
-    needs = []
+    slowdowns = []
     for drive in drives:
         mean = drive.mean(plain, _without_bends(config))
-        needs.append(np.ones(len(grid)) if isinstance(mean, str) else drive.need(mean[0], grid))
-    clock = slowed_clock(grid, needs, 1.0 + config.max_stretch)
-    if clock.rate.max() < 1.0 + _SAID_PACE:
+        slowdowns.append(np.ones(len(grid)) if isinstance(mean, str) else drive.slowdown(mean[0], grid))
+    clock = slowed_clock(grid, slowdowns, 1.0 + config.max_stretch)
+    if clock.rate.max() < 1.0 + _REPORTED_PACE:
         return plain, []
-    worst, k = divmod(int(np.argmax(needs)), len(grid))
+    worst, k = divmod(int(np.argmax(slowdowns)), len(grid))
     return clock, [
         f"the pace is lowered by up to {100.0 * (1.0 - 1.0 / clock.rate.max()):.0f} % ahead of bends, most for vehicle "
         f"{drives[worst].vehicle.id} at {grid[k]:.1f} s; in all the clock is {clock.time[-1] - grid[-1]:.1f} s longer"
@@ -271,7 +271,7 @@ def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> t
 
 
 def _without_bends(config: SamplingConfig) -> SamplingConfig:
-    """The parameters of a drive that takes bends at any speed: it tells where the vehicle is when."""
+    """The parameters of a drive that takes bends at any speed, which is enough to know where the vehicle is when."""
     return replace(config, max_lateral_acceleration=1e6)
 
 
@@ -280,11 +280,11 @@ def _drive(
     encounter: Encounter,
     times: Floats,
     route: Route,
-    asked: BoundaryStates,
+    requested: BoundaryStates,
     waits: Sequence[Wait],
     config: SamplingConfig,
 ) -> _Drive:
-    """Vehicle n on its route; one without length stands throughout, whatever speed is asked."""
+    """Vehicle n on its route; one without length stands throughout, whatever speed is requested."""
     first, last = encounter.present[n].tolist()
     here = slice(first, last + 1)
     time, speed = encounter.time[here], encounter.speed[n, here]
@@ -293,7 +293,7 @@ def _drive(
     dwells = anchor[:-1] == anchor[1:]
     path = BasePath.of(route)
     stands, moves_slowly = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
-    ends = (float(asked.start[n, 3]), float(asked.end[n, 3]))
+    ends = (float(requested.start[n, 3]), float(requested.end[n, 3]))
     if dwells.all():
         ends = (0.0, 0.0)
     driven = float(0.5 * encounter.dt * (speed[1:] + speed[:-1]).sum())
@@ -376,11 +376,11 @@ def _model(
     """The vehicle's model; what was changed for it is added to the sentences."""
     name, path, spline = f"vehicle {drive.vehicle.id}", drive.path, drive.spline
     slid = drive.slid(mean)
-    if slid > _SAID_SLIDE:
+    if slid > _REPORTED_SHIFT:
         sentences.append(f"{name} passes changepoints up to {slid:.2f} m from their place")
     jerk = float(np.abs(exact.matmul(motion.jerk, mean)).max())
-    if jerk > bounds.jerk + _SAID_JERK:
-        sentences.append(f"{name} needs a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth")
+    if jerk > bounds.jerk + _REPORTED_JERK:
+        sentences.append(f"{name} slowdowns a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth")
     room = lateral_room(path, drive.vehicle, road, MAX_ROOM_SIGMAS * config.lateral_sigma)
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:

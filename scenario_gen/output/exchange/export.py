@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`scenario-gen export`: a folder of files for other software, and what is said of them."""
+"""`scenario-gen export`: a folder of files for other software, with notes on them."""
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Export:
 
 @dataclass(frozen=True)
 class Written:
-    """Names of the files of one scenario, in the folder of the export, and what is to be said of it."""
+    """Names of the files of one scenario, in the folder of the export, with notes on it."""
 
     names: tuple[str, ...]
     notes: tuple[str, ...] = ()
@@ -95,14 +95,14 @@ def export_bag(
             notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, to)}")
             for name, data in to.shared(case).items():
                 _write(folder, name, data)
-            for one in case.scenarios:
+            for exported in case.scenarios:
                 try:
-                    message = to.write(folder, case, one, export)
+                    message = to.write(folder, case, exported, export)
                 except RefusedError as error:
                     notes.append(f"{about}: left out: {error}")
                     continue
-                notes += [f"{about}, scenario {one.index}: {sentence}" for sentence in message.notes]
-                entries.append(_entry(case, one, message.names, to))
+                notes += [f"{about}, scenario {exported.index}: {sentence}" for sentence in message.notes]
+                entries.append(_entry(case, exported, message.names, to))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
         digests = {str(p.relative_to(folder)): _digest(p) for p in sorted(folder.rglob("*")) if p.is_file()}
@@ -128,24 +128,24 @@ def _write(folder: Path, name: str, data: bytes) -> None:
     (folder / name).write_bytes(data)
 
 
-def _entry(case: Case, one: Exported, names: tuple[str, ...], to: ExportFormat) -> dict[str, object]:
+def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFormat) -> dict[str, object]:
     """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
     return {
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
         "lanes": "derived" if case.lane_map.derived and not _has_own_lanes(case, to) else "true",
-        "index": one.index,
-        "seed": one.seed,
-        "sha256": one.sha256,
-        "vehicles": [vehicle.id for vehicle in one.others.vehicles],
-        "ego": None if one.ego is None else one.ego.vehicles[0].id,
+        "index": exported.index,
+        "seed": exported.seed,
+        "sha256": exported.sha256,
+        "vehicles": [vehicle.id for vehicle in exported.others.vehicles],
+        "ego": None if exported.ego is None else exported.ego.vehicles[0].id,
     }
 
 
-def _to_commonroad(folder: Path, case: Case, one: Exported, export: ExportConfig) -> Written:
-    data, notes = write_commonroad(case, one, export)
-    name = f"{benchmark_id(case, one)}.xml"
+def _to_commonroad(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
+    data, notes = write_commonroad(case, exported, export)
+    name = f"{benchmark_id(case, exported)}.xml"
     _write(folder, name, data)
     return Written((name,), notes)
 
@@ -154,17 +154,17 @@ def _road_file(case: Case) -> str:
     return f"case_{case.number}.xodr"
 
 
-def _to_openscenario(folder: Path, case: Case, one: Exported, export: ExportConfig) -> Written:
-    name = f"case_{case.number}_{one.index}.xosc"
-    _write(folder, name, write_openscenario(case, one, _road_file(case), export))
+def _to_openscenario(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
+    name = f"case_{case.number}_{exported.index}.xosc"
+    _write(folder, name, write_openscenario(case, exported, _road_file(case), export))
     return Written((name, _road_file(case)))
 
 
-def _to_autoware(folder: Path, case: Case, one: Exported, _: ExportConfig) -> Written:
-    name = f"case_{case.number}_{one.index}"
+def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Written:
+    name = f"case_{case.number}_{exported.index}"
     with BagWriter(folder / name) as bag:
-        add_autoware(bag, one.others, one.ego, case.start_ns)
-    notes = () if one.ego is not None else ("there is no ego, so no /localization/kinematic_state; name one with --ego",)
+        add_autoware(bag, exported.others, exported.ego, case.start_ns)
+    notes = () if exported.ego is not None else ("there is no ego, so no /localization/kinematic_state; name one with --ego",)
     return Written((name,), notes)
 
 

@@ -120,7 +120,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
             for v, f, r in vehicles
         ],
         "remarks": [message for v, r in zip(case.encounter.vehicles, case.routes, strict=False) for message in r.remarks(v.id)],
-        "lost": [loss.said for loss in case.fit.lost] if case.fit else [],
+        "lost": [loss.message for loss in case.fit.lost] if case.fit else [],
         "planned": routes_in_words(case.routes),
     }
 
@@ -129,18 +129,19 @@ def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
     """E of the delivered set, and what stands below it: each with its words and whether it is the best of what is compared."""
     best = case.best(metric)
     words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", ORACLE: "replayed"}
-    found = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
+    errors = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
     return {
         "own": formatted(Interval(case.evaluation.value(case.row, metric)), ""),
         "kind": "" if not best else "good" if best == case.row else "bad",
-        "beside": [(f"{value} {words[row]}", row == best) for row, value in found.items() if value != "–"],
+        "beside": [(f"{value} {words[row]}", row == best) for row, value in errors.items() if value != "–"],
     }
 
 
-def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
+def _causes(generated: ScenarioSet) -> list[tuple[str, int]]:
     """Return the causes of refusal, the most frequent first."""
     return sorted(
-        ((cause.value.replace("_", " "), count) for cause, count in made.refused.items() if count), key=lambda c: (-c[1], c[0])
+        ((cause.value.replace("_", " "), count) for cause, count in generated.refused.items() if count),
+        key=lambda c: (-c[1], c[0]),
     )
 
 
@@ -151,7 +152,7 @@ def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         cases = [view["case"] for view in views if row in view["case"].compared]
         for key, what in ERRORS.items():
             pairs = [(case.evaluation.value(case.row, key), case.evaluation.value(row, key)) for case in cases]
-            known = [one < other for one, other in pairs if other >= SIGNIFICANT]
+            known = [value < other for value, other in pairs if other >= SIGNIFICANT]
             if known:
                 better.setdefault(words, {})[what] = (sum(known), len(known))
     sets = [view["case"].generated for view in views]

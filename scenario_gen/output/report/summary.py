@@ -48,28 +48,28 @@ def summary(cases: Sequence[GenerationResult]) -> RenderableType:
 
 
 def _case(case: GenerationResult) -> list[Text]:
-    """The name of a case, its figures, and what is to be said of its segmentation."""
-    result, found = case.generated, case.evaluation.row(WITH)
-    order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
+    """The name of a case, its figures, and the notes on its segmentation."""
+    result, row = case.generated, case.evaluation.row(WITH)
+    order = formatted(row.values.get("order_kept"), "%", bounds=False) if row else "–"
     title = Text(printable(case.title), style="bold")
     title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
     complete = len(result.scenarios) >= result.requested
-    measured = f" (of {found.samples:,}, evenly spaced)" if found and found.samples < len(result.scenarios) else ""
+    measured = f" (of {row.samples:,}, evenly spaced)" if row and row.samples < len(result.scenarios) else ""
     figures = Text.assemble(
         "  ",
         (f"{len(result.scenarios)}/{result.requested} valid", "green" if complete else "red"),
         f" of {result.candidates}  K {len(case.segmentation.changepoints)}"
         f"  order {order if order == '–' else order + ' %'}{measured}",
     )
-    kept = [] if found is None else _not_kept(found.values)
+    kept = [] if row is None else _not_kept(row.values)
     remark = case.segmentation.remark(case.encounter.duration)
-    lost = [f"lost on this road: {loss.said}" for loss in case.fit.lost] if case.fit else []
+    lost = [f"lost on this road: {loss.message}" for loss in case.fit.lost] if case.fit else []
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
     routes = [message for vehicle, route in vehicles for message in route.remarks(vehicle.id)]
     planned = routes_in_words(case.routes)
     if planned:
         figures.append(f"  routes: {planned}")
-    similar = [_errors(case, metric) for metric in ERRORS if found and metric in found.values]
+    similar = [_errors(case, metric) for metric in ERRORS if row and metric in row.values]
     kept += case.similarity()["said"]
     kept += [message for message in result.adaptations if message.startswith(NOT_KEPT)]
     reactions = case.reacting["sentences"]
