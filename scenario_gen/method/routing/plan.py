@@ -23,7 +23,7 @@ from scenario_gen.method.routing.search.planner import (  # fmt: skip
     Planner,
     Query,
 )
-from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, Wishes
+from scenario_gen.method.routing.search.pose_planner import PlansPoses, PoseQuery, Wishes
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
 from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
@@ -281,11 +281,10 @@ def _leg(task: _Task, a: int, b: int, poses: Floats, *, last: bool) -> _Leg:
     curve = direct(task.road, task.vehicle, start, end, config.max_curvature)
     if curve is not None:
         return _Leg(Guess(curve[:, :2], np.full(len(curve), DIRECT_HOLD)), searched=False)
-    points = (
-        _searched_poses(task, a, b, start, end, PATIENCE if last else 1)[:, :2]
-        if config.planner == "rrt_star_connect"
-        else _searched(task, a, b)
-    )
+    if isinstance(task.planner, PlansPoses):
+        points = _searched_poses(task, task.planner, (a, b), (start, end), PATIENCE if last else 1)[:, :2]
+    else:
+        points = _searched(task, a, b)
     return _Leg(Guess(points, np.full(len(points), PATH_HOLD)), searched=True)
 
 
@@ -308,12 +307,14 @@ def _fitted_piece(task: _Task, start: Floats, end: Floats) -> Floats | None:
     return poses if free.all() else None
 
 
-def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, patience: int) -> Floats:
-    """A path (P, 3) from anchor a to anchor b, at `start` and `end` (3,), in the vehicle's own space.
+def _searched_poses(
+    task: _Task, planner: PlansPoses, anchors: tuple[int, int], ends: tuple[Floats, Floats], patience: int
+) -> Floats:
+    """A path (P, 3) between two anchors, whose poses (3,) are `ends`, for the vehicle itself.
 
-    First with a little more room than it needs, which the smoothing can use; else with what there is.
+    First with more room than the footprint, which the smoothing can use; then with the footprint alone.
     """
-    config, vehicle = task.config, task.vehicle
+    (a, b), (start, end), config, vehicle = anchors, ends, task.config, task.vehicle
     guide = next(candidates(start, end, config.max_curvature))[::GUIDE_STRIDE]
     free = Wishes(config.margin, LACK, guide, *_sides(config, config.keep_side * AGAINST, config.keep_side))
     most_left, most_right = _sides(config, HALF_LANE, np.inf)
@@ -322,7 +323,6 @@ def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, pat
     attempts = [(free, ROOMY, config.iterations), (free, 0.0, config.iterations)]
     if config.keep_side > 0.0:
         attempts.insert(0, (own, ROOMY, own_iterations))
-    planner = PoseRrtStarConnect(config.pose)
     where = f"between {task.name(a)} and {task.name(b)}"
     limit = task.tightest * config.max_curvature
     error: RefusedError | None = None
@@ -330,12 +330,12 @@ def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, pat
         query = PoseQuery(start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit)
         try:
             try:
-                return planner.plan(task.road, query, Budget(iterations), task.seed + a, wishes).poses
+                return planner.plan_poses(task.road, query, Budget(iterations), task.seed + a, wishes).poses
             except BudgetSpentError:
                 if extra or patience == 1:
                     raise
                 budget = Budget(patience * config.iterations, first=True)
-                return planner.plan(task.road, query, budget, task.seed + a, wishes).poses
+                return planner.plan_poses(task.road, query, budget, task.seed + a, wishes).poses
         except NoWayError as reason:
             error = RefusedError(f"{where}: {reason}")
         except BudgetSpentError:

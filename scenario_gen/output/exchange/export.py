@@ -5,7 +5,6 @@
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-import hashlib
 import json
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from scenario_gen.bags.recordings.autoware import add_autoware
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.base.folders import Kind, replaced_folder, write_text
+from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
 from scenario_gen.base.registry import Registry
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
@@ -94,7 +93,7 @@ def export_bag(
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
             notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, to)}")
             for name, data in to.shared(case).items():
-                _write(folder, name, data)
+                (folder / name).write_bytes(data)
             for exported in case.scenarios:
                 try:
                     message = to.write(folder, case, exported, export)
@@ -105,7 +104,7 @@ def export_bag(
                 entries.append(_entry(case, exported, message.names, to))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
-        digests = {str(p.relative_to(folder)): _digest(p) for p in sorted(folder.rglob("*")) if p.is_file()}
+        digests = {str(p.relative_to(folder)): sha256_of(p) for p in sorted(folder.rglob("*")) if p.is_file()}
         document = {"format": target, "notes": notes, "scenarios": entries, "sha256": digests}
         write_text(folder / MANIFEST, json.dumps(document, indent=2) + "\n")
     return Export(len(entries), tuple(notes))
@@ -118,14 +117,6 @@ def _has_own_lanes(case: Case, to: ExportFormat) -> bool:
 
 def _origin(case: Case, to: ExportFormat) -> str:
     return case.lane_map.network_origin if _has_own_lanes(case, to) else case.lane_map.origin
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _write(folder: Path, name: str, data: bytes) -> None:
-    (folder / name).write_bytes(data)
 
 
 def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFormat) -> dict[str, object]:
@@ -146,7 +137,7 @@ def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFor
 def _to_commonroad(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
     data, notes = write_commonroad(case, exported, export)
     name = f"{benchmark_id(case, exported)}.xml"
-    _write(folder, name, data)
+    (folder / name).write_bytes(data)
     return Written((name,), notes)
 
 
@@ -156,7 +147,7 @@ def _road_file(case: Case) -> str:
 
 def _to_openscenario(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
     name = f"case_{case.number}_{exported.index}.xosc"
-    _write(folder, name, write_openscenario(case, exported, _road_file(case), export))
+    (folder / name).write_bytes(write_openscenario(case, exported, _road_file(case), export))
     return Written((name, _road_file(case)))
 
 

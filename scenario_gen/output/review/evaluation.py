@@ -16,8 +16,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.output.review.validation import kept_reactions, Reference
-from scenario_gen.template import find_conflicts, find_waits, reactions_of, required_orders
-from scenario_gen.types import at_ends, CheckCounts, EgoSlot, GenerationResult, join_ego, Scenario, ScenarioSet, Verdict, WITHOUT
+from scenario_gen.template import reactions_of
+from scenario_gen.types import CheckCounts, EgoSlot, GenerationResult, join_ego, Scenario, ScenarioSet, Verdict, WITHOUT
 
 
 def bag_results(
@@ -92,25 +92,18 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
 def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Limits | None) -> list[Verdict]:
     """Check every scenario; an ego may have been left out of one, and its map be another than the newest."""
     encounter = namespace.encounter
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-    waits = find_waits(encounter) if namespace.segmentation.changepoints.size else ()
-    names = tuple(vehicle.id for vehicle in encounter.vehicles)
     checkers: dict[tuple[object, ...], Checker] = {}
     verdicts: list[Verdict] = []
     for k, recorded in enumerate(scenarios):
-        entry = namespace.entry(k)
-        map_hash = entry.map_hash if entry else None
-        scenario = join_ego(recorded)
-        order = entry.order if entry else "keep"
-        reactions = kept_reactions(encounter, entry)
-        key = (map_hash or "", order, *reactions, *(vehicle.id for vehicle in scenario.vehicles))
+        entry, scenario = namespace.entry(k), join_ego(recorded)
+        map_hash, order = (entry.map_hash, entry.order) if entry else (None, "keep")
+        ids = tuple(vehicle.id for vehicle in scenario.vehicles)
+        key = (map_hash or "", order, kept_reactions(encounter, entry), ids)
         if key not in checkers:
             road = namespace.road
             if namespace.roads_differ:
                 road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
-            first, ends = required_orders(conflicts, order), at_ends(encounter.present, len(encounter.time))
-            reference = Reference(road, names, tuple(conflicts), waits, first, reactions, ends=ends)
-            checkers[key] = reference.checker(scenario, limits, None)
+            checkers[key] = Reference.of(encounter, namespace.segmentation, road, entry).checker(scenario, limits, None)
         verdicts += checkers[key].check([scenario])
     return verdicts
 

@@ -23,7 +23,19 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.numerics import Bools
 from scenario_gen.template import Conflict, find_conflicts, find_waits, reactions_of, required_orders, Wait
-from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, join_ego, Reaction, Road, Scenario, split_pieces, tokens
+from scenario_gen.types import (
+    at_ends,
+    BoundaryStates,
+    Cause,
+    Encounter,
+    join_ego,
+    Reaction,
+    Road,
+    Scenario,
+    Segmentation,
+    split_pieces,
+    tokens,
+)
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
 NO_WITNESS = f"the ego: its witness is not on {WITNESS}"
@@ -83,6 +95,25 @@ class Reference:
     first: tuple[int | None, ...] = ()
     reactions: tuple[Reaction, ...] = ()
     ends: Bools | None = None
+
+    @classmethod
+    def of(
+        cls, encounter: Encounter, segmentation: Segmentation | None, road: Road | None, entry: ScenarioEntry | None
+    ) -> "Reference":
+        """Return what a scenario with this entry is held against; without a segmentation its waits are not known."""
+        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+        waits: tuple[Wait, ...] | None = None
+        if segmentation is not None:
+            waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
+        return cls(
+            road,
+            tokens(vehicle.id for vehicle in encounter.vehicles),
+            tuple(conflicts),
+            waits,
+            required_orders(conflicts, entry.order if entry else "keep"),
+            kept_reactions(encounter, entry),
+            at_ends(encounter.present, len(encounter.time)),
+        )
 
     def checker(self, scenario: Scenario, limits: Limits | None, requested: BoundaryStates | None) -> Checker:
         """Return the checker of scenarios with the same vehicles as this one, which must meet the states `requested`."""
@@ -191,13 +222,4 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     encounter = namespace.tracks_of(entry, stamp)
     if encounter is None:
         return Reference(road, None, (), None)
-    segmentation = namespace.segmentation_of(encounter)
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-    waits = None  # without changepoints there is no dwell to hold: waits are not asked for
-    if segmentation is not None:
-        waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
-    names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    reactions = kept_reactions(encounter, entry)
-    first = required_orders(conflicts, entry.order if entry else "keep")
-    ends = at_ends(encounter.present, len(encounter.time))
-    return Reference(road, names, tuple(conflicts), waits, first, reactions, ends)
+    return Reference.of(encounter, namespace.segmentation_of(encounter), road, entry)
