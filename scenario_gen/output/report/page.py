@@ -12,16 +12,15 @@ from scenario_gen.base.folders import write_text
 from scenario_gen.output.report.data import case_data
 from scenario_gen.output.report.html import render_page
 from scenario_gen.types import (
+    causes_in_words,
     ERRORS,
     formatted,
     GenerationResult,
     Interval,
     NARROW,
-    NOT_KEPT,
     ORACLE,
     Route,
     routes_in_words,
-    ScenarioSet,
     UNIFORM,
     WITHOUT,
 )
@@ -89,7 +88,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "title": case.title,
         "without": case.references.get(WITHOUT),
         "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
-        "arms": [(name, result, _causes(result)) for name, result in arms if result is not None],
+        "arms": [(name, result, causes_in_words(result.refused)) for name, result in arms if result is not None],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
         "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
@@ -99,7 +98,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "errors": {key: _errors(case, key) for key in ERRORS},
         "best": {key: case.best(key) for key in ERRORS},
         "reactions": case.reacting,
-        "not_kept": [message for message in case.generated.adaptations if message.startswith(NOT_KEPT)],
+        "not_kept": case.lost_reactions,
         "outdone": case.similarity()["said"],
         "segments": [
             {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
@@ -119,8 +118,8 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
             }
             for v, f, r in vehicles
         ],
-        "remarks": [message for v, r in zip(case.encounter.vehicles, case.routes, strict=False) for message in r.remarks(v.id)],
-        "lost": [loss.message for loss in case.fit.lost] if case.fit else [],
+        "remarks": case.route_remarks,
+        "lost": case.lost,
         "planned": routes_in_words(case.routes),
     }
 
@@ -135,14 +134,6 @@ def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
         "kind": "" if not best else "good" if best == case.row else "bad",
         "beside": [(f"{value} {words[row]}", row == best) for row, value in errors.items() if value != "–"],
     }
-
-
-def _causes(generated: ScenarioSet) -> list[tuple[str, int]]:
-    """Return the causes of refusal, the most frequent first."""
-    return sorted(
-        ((cause.value.replace("_", " "), count) for cause, count in generated.refused.items() if count),
-        key=lambda c: (-c[1], c[0]),
-    )
 
 
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
