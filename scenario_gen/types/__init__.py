@@ -44,6 +44,6 @@ __all__ = [
     "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "Sample", "Scenario", "ScenarioSet", "Segmentation",
     "Spread", "State", "Target", "Tracks", "Vehicle", "Verdict", "Violation", "always", "as_markdown", "at_ends",
     "canonical_presence", "causes_in_words", "cut", "formatted", "height", "is_truck", "join_ego", "join_pieces", "mask",
-    "once_per_object", "read_numbers", "read_states", "rear_axle", "routes_in_words", "shifted", "split_off", "split_pieces", "together",
-    "token", "tokens", "vehicle_index", "with_witness", "yielders_of",
+    "once_per_object", "read_numbers", "read_states", "rear_axle", "routes_in_words", "shifted", "split_off", "split_pieces",
+    "together", "token", "tokens", "vehicle_index", "with_witness", "yielders_of",
 ]  # fmt: skip

@@ -380,7 +380,7 @@ def _model(
         sentences.append(f"{name} passes changepoints up to {slid:.2f} m from their place")
     jerk = float(np.abs(exact.matmul(motion.jerk, mean)).max())
     if jerk > bounds.jerk + _REPORTED_JERK:
-        sentences.append(f"{name} slowdowns a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth")
+        sentences.append(f"{name} needs a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth")
     room = lateral_room(path, drive.vehicle, road, MAX_ROOM_SIGMAS * config.lateral_sigma)
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:

@@ -74,10 +74,7 @@ def _case(case: GenerationResult) -> list[Text]:
         figures,
         *(Text(f"  {printable(line)}") for line in reactions),
         *similar,
-        *(
-            Text(f"  {printable(line)}", style="yellow")
-            for line in (*lost, *kept, *case.route_remarks, *([remark] if remark else []))
-        ),
+        *(Text(f"  {printable(line)}", style="yellow") for line in warnings),
     ]
 
 
