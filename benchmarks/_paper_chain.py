@@ -104,7 +104,7 @@ class _Lanes:
         lanes = len(metric.entries) // len(road.entries)
         centre = metric.entries[: 2 * lanes, :2].mean(axis=0)
         found = []
-        for side in (fit.asked.start, fit.asked.end):
+        for side in (fit.requested.start, fit.requested.end):
             poses = [_on_lane(metric, pose, centre) for pose in side[:, :3]]
             found.append([(leaves, lane // lanes, distance) for leaves, lane, distance in poses])
         junction = 0.0 if road.name == "straight" else 3.5 * lanes

@@ -328,7 +328,7 @@ def recheck_published(count: int) -> tuple[Account, int]:
     share = np.array([1.0 / (case.encounter.duration * len(case.encounter.vehicles)) for case in planned])
     account = Account()
     for case, wanted in zip(planned, np.ceil(count * share / share.sum()).astype(int).tolist(), strict=True):
-        recheck = Recheck(case.encounter, case.road, case.fit.asked, bool(case.segmentation.changepoints.size))
+        recheck = Recheck(case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size))
         for batch in batches(case.sample(wanted).scenarios):
             recheck.check(batch, account)
         told = f"{case.name} on {case.road_name}: {wanted}, {account.scenarios} in all, {dict(account.found)}"

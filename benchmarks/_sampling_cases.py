@@ -54,9 +54,9 @@ class Prepared:
         self, count: int, seed: int = 0, config: SamplingConfig = SamplingConfig(variety="narrow"), *, checked: bool = True
     ) -> ScenarioSet:
         """Sample `count` scenarios; unchecked, every candidate counts as valid."""
-        checker = Checker(self.road, self.fit.asked, self.conflicts, self.waits)
+        checker = Checker(self.road, self.fit.requested, self.conflicts, self.waits)
         check = checker.check if checked else lambda scenarios: [Verdict() for _ in scenarios]
-        plan = Plan(self.encounter, self.segmentation, self.road, self.routes, self.fit.asked, self.waits)
+        plan = Plan(self.encounter, self.segmentation, self.road, self.routes, self.fit.requested, self.waits)
         return draw_scenarios(plan, check, config, count=count, seed=seed)
 
 

@@ -73,7 +73,7 @@ class Case:
         fit = fit_template(encounter, segmentation, road)
         routes = plan_routes(road, fit)
         given = (encounter, segmentation, road, routes)
-        return cls(f"{name} on {road_name}", given, waits_to_keep(encounter, segmentation), fit.asked)
+        return cls(f"{name} on {road_name}", given, waits_to_keep(encounter, segmentation), fit.requested)
 
     def sample(
         self, request: Request = Request(), count: int = COUNT, config: SamplingConfig = SamplingConfig(), **more: Any

@@ -33,7 +33,7 @@ def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
     """Return the anchors as CDR bytes; `frame_id` is the road's."""
     poses = np.stack([vehicle.anchors for vehicle in fit.fitted])
     speed = encounter.speed[:, fit.anchor_index] * np.array([[vehicle.scale] for vehicle in fit.fitted])
-    for k, state in ((0, fit.asked.start), (-1, fit.asked.end)):
+    for k, state in ((0, fit.requested.start), (-1, fit.requested.end)):
         poses[:, k], speed[:, k] = state[:, :3], state[:, 3]
     return trajectory.encode(
         Trajectory(
@@ -85,7 +85,7 @@ def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None, rou
     )
     sentences = (*fit.notes, *(remark for each in remarks for remark in each))
     notes = {f"note.{k}": note for k, note in enumerate(sentences)}
-    lost = {f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.said]) for k, loss in enumerate(fit.lost)}
+    lost = {f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.message]) for k, loss in enumerate(fit.lost)}
     message = f"template fitted to the road, {len(lost)} things of it are lost" if lost else "template fitted to the road"
     level = Level.WARN if any(loss.kind != "arm" for loss in fit.lost) else Level.OK
     return (*per_vehicle, Status(f"{node}: fit", level, message, notes | lost | dict(more or {})))

@@ -92,7 +92,7 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     assert all(a.position.tobytes() == b.position.tobytes() for a, b in zip(plain.scenarios, beyond.scenarios, strict=True))
     last = beyond.scenarios[-1]
     placed, waits = answer(chain, Request(), count=1), waits_to_keep(chain.encounter, chain.segmentation)
-    plan = Plan(chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.asked, waits)
+    plan = Plan(chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.requested, waits)
     assert same(regenerate(plan, chain.sampling, seed=chain.seed, index=last.index), last)
 
 

@@ -122,7 +122,7 @@ def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path
     """A follower that is asked to start much nearer to its leader than it ever drove."""
     leader = wander(np.random.default_rng(3), 200)
     lane, config = lane_encounter(leader, answering(leader, 1.2, 0.9)), PipelineConfig(evaluation=QUICK)
-    x, y, yaw, _ = generate(lane, "corridor", config, count=1, seed=3).fit.asked.start[1].tolist()
+    x, y, yaw, _ = generate(lane, "corridor", config, count=1, seed=3).fit.requested.start[1].tolist()
     asked = Request(starts=f"2: {x + 13.0:.2f} {y:.2f} {yaw:.3f}")
     made = generate(lane, "corridor", config, count=2, seed=3, request=asked)
     (sentence,) = [said for said in made.generated.adaptations if "reaction" in said]

@@ -36,7 +36,7 @@ def recheck(case: GenerationResult) -> list[str]:
     return [
         f"scenario {scenario.index}: {violation}"
         for scenario in case.generated.scenarios
-        for violation in oracle_violations(scenario, case.road, case.fit.asked, conflicts, waits, CONFIG.limits, dt=0.05)
+        for violation in oracle_violations(scenario, case.road, case.fit.requested, conflicts, waits, CONFIG.limits, dt=0.05)
     ]
 
 

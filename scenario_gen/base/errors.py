@@ -103,7 +103,7 @@ def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[N
     except ScenarioGenError:
         raise
     except turned as error:
-        raise InputError(f"{where}: {said(error)}" + (f"; {remedy}" if remedy else "")) from error
+        raise InputError(f"{where}: {describe(error)}" + (f"; {remedy}" if remedy else "")) from error
 
 
 @contextmanager
@@ -120,10 +120,12 @@ def reading(path: object) -> Iterator[None]:
     except (ScenarioGenError, OSError, MemoryError):
         raise
     except Exception as error:
-        raise UnforeseenError(f"{path} cannot be read: {said(error)}; it is damaged, or of a kind that is not known") from error
+        raise UnforeseenError(
+            f"{path} cannot be read: {describe(error)}; it is damaged, or of a kind that is not known"
+        ) from error
 
 
-def said(error: Exception) -> str:
+def describe(error: Exception) -> str:
     """Return the message of an error in one line, with its class where the message is a single word or empty."""
     if isinstance(error, MemoryError):
         return "asks for more memory than there is"

@@ -51,10 +51,10 @@ class Element:
         Raises:
             InputError: there is none.
         """
-        found = self.first(tag)
-        if found is None:
+        element = self.first(tag)
+        if element is None:
             raise InputError(f"{self.place} has no <{tag}>")
-        return found
+        return element
 
     def get(self, name: str) -> str:
         """Return an attribute.

@@ -59,19 +59,19 @@ class Parameters:
 
 def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
     """Raise InputError naming `name` if `value` does not suit the declaration `entry`."""
-    wanted: type[Any] = type(entry.default)
+    kind: type[Any] = type(entry.default)
     if isinstance(value, int) and not -WHOLE <= value < WHOLE:
         raise InputError(f"parameter {name} is an integer of more than 64 bits")
-    if wanted is float and isinstance(value, int) and not isinstance(value, bool):
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
-    if not isinstance(value, wanted) or (wanted is int and isinstance(value, bool)):
-        raise InputError(f"parameter {name} must be of type {wanted.__name__}, not {type(value).__name__} ({shown(value)})")
+    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+        raise InputError(f"parameter {name} must be of type {kind.__name__}, not {type(value).__name__} ({shown(value)})")
     meta = entry.metadata
     if meta["choices"] and value not in meta["choices"]:
         plugins = installed(meta["group"]) if meta["group"] else {}
         if value not in plugins:
             raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {', '.join((*meta['choices'], *plugins))}")
-    if wanted in (int, float):
+    if kind in (int, float):
         if not math.isfinite(value):
             raise InputError(f"parameter {name} is {value}, not a number that can be reckoned with")
         if meta["low"] is not None and value < meta["low"]:

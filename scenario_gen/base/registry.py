@@ -8,7 +8,7 @@ from functools import cache
 from importlib.metadata import entry_points, EntryPoint
 from typing import cast, Generic, TypeVar
 
-from scenario_gen.base.errors import InputError, said
+from scenario_gen.base.errors import describe, InputError
 
 T = TypeVar("T")
 
@@ -80,7 +80,7 @@ class Registry(Generic[T]):
         try:
             loaded = entry.load()
         except Exception as error:
-            raise InputError(f"plugin {name!r} of {_source(entry)} cannot be loaded: {said(error)}") from error
+            raise InputError(f"plugin {name!r} of {_source(entry)} cannot be loaded: {describe(error)}") from error
         if not (callable(loaded) if self.kind is None else isinstance(loaded, self.kind)):
             kind = "function" if self.kind is None else self.kind.__name__
             raise InputError(f"plugin {name!r} of {_source(entry)} is no {kind}: {entry.value}")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The terminal: names of files, vehicles and encounters are shown literally, whatever characters they have."""
+"""Output to the terminal: names of files, vehicles and encounters are shown literally, whatever characters they have."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,19 +15,19 @@ from scenario_gen.base.errors import printable
 
 
 class Terminal(Console):
-    """A console that interprets no markup and prints no control characters of texts; styles come with Text objects only."""
+    """A console that interprets no markup in texts and prints no control characters; only Text objects have styles."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, highlight=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Render a plain text; rich calls this for all of them, also in a table's cells."""
+        """Render a plain text; rich calls this for every text, also for a table's cells."""
         return super().render_str(printable(text), **options)
 
 
 @contextmanager
 def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
-    """Show progress bars on standard error if it is a terminal; yield the function that takes name, done and total of each."""
+    """Show progress bars on standard error if it is a terminal; yield a function that takes name, done and total of a bar."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     tasks: dict[str, TaskID] = {}
     with Progress(*columns, console=Terminal(stderr=True), transient=True) as bars:
@@ -42,6 +42,6 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 @contextmanager
 def status_line() -> Iterator[Callable[[str], None]]:
-    """Show a changing line if this is a terminal; yield the function that takes its text."""
+    """Show a changing line if this is a terminal; yield a function that sets its text."""
     with Terminal().status("starting") as status:
         yield lambda text: status.update(Text(printable(text)))

@@ -138,16 +138,16 @@ def spread(workers: Workers) -> Iterator[Spread]:
 
 def _guarded(function: Callable[[Any], Any], task: Any) -> str:
     """Run one task; an error of its own input is a sentence, and does not end the others."""
-    from scenario_gen.base.errors import said, ScenarioGenError
+    from scenario_gen.base.errors import describe, ScenarioGenError
 
     try:
         function(task)
     except (ScenarioGenError, OSError, MemoryError) as error:
-        return f"{getattr(task, 'name', task)}: {said(error)}"
+        return f"{getattr(task, 'name', task)}: {describe(error)}"
     except Exception as error:  # a fault of ours, or of a library: of this case, and its place is said for who mends it
         *_, (frame, line) = traceback.walk_tb(error.__traceback__)
         place = f"{Path(frame.f_code.co_filename).name}:{line}"
-        return f"{getattr(task, 'name', task)}: {type(error).__name__} at {place}: {said(error)}"
+        return f"{getattr(task, 'name', task)}: {type(error).__name__} at {place}: {describe(error)}"
     return ""
 
 

@@ -59,38 +59,38 @@ def read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     Raises:
         InputError: a file is damaged or too large, or no topic can be used.
     """
-    wanted = listed(config.topics)
+    listed_topics = listed(config.topics)
     label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
-    found: dict[str, Topic] = {}
+    topics: dict[str, Topic] = {}
     seen: dict[str, str] = {}
     bounds = BagConfig(most_bytes=config.size_limit << 20)
     rows = 0
     for path in paths:
         with open_bag(path, bounds, "log.size_limit") as bag:
             seen |= {topic.name: topic.type for topic in bag.topics()}
-            for message in bag.messages(lambda name, kind: is_used(name, kind, wanted)):
+            for message in bag.messages(lambda name, kind: is_used(name, kind, listed_topics)):
                 rows += 1
                 check_size(str(path), 0, rows, config)
-                topic = found.setdefault(message.topic, Topic(message.topic, message.type, label))
+                topic = topics.setdefault(message.topic, Topic(message.topic, message.type, label))
                 topic.stamps.append(message.stamp_ns)
                 topic.data.append(message.data)
-    for name in wanted:
+    for name in listed_topics:
         if name not in seen:
             raise InputError(f"parameter topics: {paths[0]} has no topic {name!r}; it has {listing(seen)}")
         if seen[name] not in USED:
             raise InputError(f"{paths[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}")
-    if not found:
+    if not topics:
         raise InputError(
             f"{paths[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
             f"vehicle, or a topic named tracks of {TRACKS}, or {TRACKED}; the parameter topics chooses by name"
         )
-    return [found[name] for name in sorted(found)]
+    return [topics[name] for name in sorted(topics)]
 
 
-def is_used(topic: str, kind: str, wanted: list[str]) -> bool:
-    """Return whether a topic is read; of trajectories only those called tracks, unless `wanted` names topics."""
-    if wanted:
-        return topic in wanted and kind in USED
+def is_used(topic: str, kind: str, topics: list[str]) -> bool:
+    """Return whether a topic is read; of trajectories only those called tracks, unless `topics` names some."""
+    if topics:
+        return topic in topics and kind in USED
     return kind in USED and (kind != TRACKS or topic.rpartition("/")[2] == "tracks")
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed
 
-# Names a quantity goes by, the preferred one first; a clock that all files share is preferred to one that starts with the file.
+# Column names of each quantity, the preferred first. Clocks that all files share come before those that start with the file.
 NAMES: dict[str, tuple[str, ...]] = {
     "time": ("utc", "stamp", "unix", "gentime", "clock", "t", "time", "timestamp", "global_time"),
     "vehicle": ("vehicle", "vehicle_id", "vehicle_name", "txdevice", "track_id", "id", "name", "agent_id", "object_id"),
@@ -24,7 +24,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "length": ("length", "len", "vehicle_length"),
     "width": ("width", "vehicle_width"),
 }
-# Factor to seconds, metres, m/s, radians or degrees (positions); a name without a suffix has the first unit.
+# Factors to seconds, metres, m/s, radians, or degrees (lat, lon); a column without a unit suffix has the first unit.
 PLACES = {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01}
 SIZES = {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001}
 DEGREES = {"deg": 1.0, "rad": math.degrees(1.0)}
@@ -43,7 +43,7 @@ CLOCKWISE = ("course", "bearing")  # by convention degrees clockwise from north
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table, the factor to our unit, and whether it is a heading clockwise from north."""
+    """A column of the table, the factor to the unit used here, and whether it is a heading clockwise from north."""
 
     name: str
     factor: float = 1.0
@@ -51,13 +51,13 @@ class Column:
 
 
 def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Column]:
-    """Return which column holds which quantity, by option first and by name otherwise.
+    """Return the column of each quantity: as the parameter `columns` says, else by name.
 
     Raises:
-        InputError: a needed column is missing, or the option names one that is not there.
+        InputError: a required column is missing, or the parameter names a column that is not there.
     """
     names = {name.strip().lower(): name for name in header}
-    found: dict[str, Column] = {}
+    columns: dict[str, Column] = {}
     without: set[str] = set()
     for part in listed(option):
         quantity, _, name = (p.strip() for p in part.partition("="))
@@ -72,44 +72,44 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
             raise InputError(f"{path} has no column {requested!r} (asked for as {quantity}); it has {', '.join(names.values())}")
         if unit and unit not in UNITS[quantity]:
             raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
-        found[quantity] = as_column(quantity, names[name.lower()], unit)
+        columns[quantity] = as_column(quantity, names[name.lower()], unit)
     for quantity, aliases in NAMES.items():
-        if quantity in found or quantity in without:
+        if quantity in columns or quantity in without:
             continue
         suffixes = ("", *(f"_{unit}" for unit in UNITS[quantity]))
         candidates = (f"{alias}{suffix}" for alias in aliases for suffix in suffixes)
         match = next((names[candidate] for candidate in candidates if candidate in names), None)
         if match is not None:
-            found[quantity] = as_column(quantity, match)
-    if "heading" in found and "time" in found and found["time"].name.strip().lower() == "gentime":  # basic safety messages
-        found["heading"] = Column(found["heading"].name, math.pi / 180.0, clockwise=True)
-    return complete(found, without, path, names)
+            columns[quantity] = as_column(quantity, match)
+    if "heading" in columns and "time" in columns and columns["time"].name.strip().lower() == "gentime":  # basic safety messages
+        columns["heading"] = Column(columns["heading"].name, math.pi / 180.0, clockwise=True)
+    return complete(columns, without, path, names)
 
 
-def complete(found: dict[str, Column], without: set[str], path: Path, names: dict[str, str]) -> dict[str, Column]:
-    """Return the columns that are read: latitude and longitude are preferred to x and y.
+def complete(columns: dict[str, Column], without: set[str], path: Path, names: dict[str, str]) -> dict[str, Column]:
+    """Check that all required columns are there; leave out x and y where there are latitude and longitude.
 
     Raises:
         InputError: a needed column is missing.
     """
     missing = None
-    if not ({"lat", "lon"} <= found.keys() or {"x", "y"} <= found.keys()):
+    if not ({"lat", "lon"} <= columns.keys() or {"x", "y"} <= columns.keys()):
         missing = ("position (lat and lon, or x and y)", "x=…,y=…")
-    elif "time" not in found:
+    elif "time" not in columns:
         missing = ("time", "time=…")
-    elif "speed" not in found and "speed" not in without:
+    elif "speed" not in columns and "speed" not in without:
         missing = ("speed", "speed=… or speed=none to take it from the positions")
     if missing:
-        there = ", ".join(names.values())
+        present = ", ".join(names.values())
         raise InputError(
-            f"{path} has no column for {missing[0]}; it has {there}. Name it with the parameter columns, {missing[1]}"
+            f"{path} has no column for {missing[0]}; it has {present}. Name it with the parameter columns, {missing[1]}"
         )
-    unused = ("x", "y") if {"lat", "lon"} <= found.keys() else ("lat", "lon")
-    return {quantity: column for quantity, column in found.items() if quantity not in unused}
+    unused = ("x", "y") if {"lat", "lon"} <= columns.keys() else ("lat", "lon")
+    return {quantity: column for quantity, column in columns.items() if quantity not in unused}
 
 
 def as_column(quantity: str, name: str, unit: str = "") -> Column:
-    """Return the column with the given unit, by default that of its suffix."""
+    """Return the column in the given unit; by default its suffix names the unit."""
     lower = name.strip().lower()
     unit = unit or max((unit for unit in UNITS[quantity] if lower.endswith("_" + unit)), key=len, default="")
     if quantity == "heading":

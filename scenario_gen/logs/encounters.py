@@ -153,10 +153,10 @@ def departure(fix: Floats) -> Floats | None:
 def parts(track: Observations, cuts: Bools) -> list[Observations]:
     """Split a track after each True of `cuts` (F-1,); parts of one fix are left out."""
     edges = [0, *(np.flatnonzero(cuts) + 1).tolist(), len(track.fix_ns)]
-    found = []
+    pieces = []
     for begin, end in pairwise(edges):
         if end - begin < 2:
             continue
         during = (track.speed_ns >= track.fix_ns[begin]) & (track.speed_ns <= track.fix_ns[end - 1])
-        found.append(select(track, np.arange(begin, end), during))
-    return found
+        pieces.append(select(track, np.arange(begin, end), during))
+    return pieces

@@ -91,7 +91,7 @@ def find_groups(pieces: Sequence[Piece], config: LogConfig) -> tuple[tuple[Group
 
 def find_pair_intervals(pieces: Sequence[Piece], config: LogConfig, *, small: bool) -> list[PairInterval]:
     """Return all pair intervals of two different vehicles; in a `small` log each has gap 0."""
-    found = []
+    intervals = []
     order = sorted(range(len(pieces)), key=lambda i: pieces[i].first)
     least = shortest(config)
     for a, i in enumerate(order):
@@ -105,8 +105,8 @@ def find_pair_intervals(pieces: Sequence[Piece], config: LogConfig, *, small: bo
                 for first, last in windows(begin + low, begin + high, config):
                     gap = 0.0 if small else space_time_gap(pieces[i], pieces[j], first, last, config)
                     if last - first >= least and gap <= INTERACTS:
-                        found.append(PairInterval(min(i, j), max(i, j), first, last, gap))
-    return found
+                        intervals.append(PairInterval(min(i, j), max(i, j), first, last, gap))
+    return intervals
 
 
 def windows(first: int, last: int, config: LogConfig) -> list[tuple[int, int]]:
@@ -180,14 +180,14 @@ def joining(
 ) -> dict[int, list[float]]:
     """Return the pieces that meet a member while the group lasts, with the gaps to those that they meet [m]."""
     ids = {pieces[m].track.id for m in group.spans}
-    found: dict[int, list[float]] = {}
+    ends: dict[int, list[float]] = {}
     for pair in pairs:
         if not small and (pair.first >= group.last or pair.last <= group.first):
             continue
         for inside, other in ((pair.i, pair.j), (pair.j, pair.i)):
             if inside in group.spans and other not in refused and pieces[other].track.id not in ids:
-                found.setdefault(other, []).append(pair.gap)
-    return found
+                ends.setdefault(other, []).append(pair.gap)
+    return ends
 
 
 def meets_enough(other: int, span: tuple[int, int], met: int, group: Growing) -> bool:
@@ -269,7 +269,7 @@ def split(group: Group, pieces: Sequence[Piece], config: LogConfig) -> tuple[lis
     for begin, end in runs(stands):
         if end - begin > ticks(config.standstill, config):
             busy[begin + rest : end - rest] = False
-    found, notes = [], []
+    groups, notes = [], []
     for begin, end in runs(busy):
         parts = max(int(np.ceil((end - begin - 1) * config.period / config.max_duration - 1e-9)), 1)
         edges = np.linspace(begin, end - 1, parts + 1).round().astype(int)
@@ -279,13 +279,13 @@ def split(group: Group, pieces: Sequence[Piece], config: LogConfig) -> tuple[lis
                 continue
             spans = zip(part.members, part.spans, strict=True)
             if max(driven(pieces[m], *span, config) for m, span in spans) >= config.travel:
-                found.append(part)
+                groups.append(part)
                 notes += [
                     f"vehicle {pieces[m].track.id} is left out of a part of {seconds(part.first, part.last, config)} s: "
                     f"there for {seconds(*span, config)} s (min_presence)"
                     for m, span in left
                 ]
-    return found, notes
+    return groups, notes
 
 
 def part_of(group: Group, first: int, last: int, config: LogConfig) -> tuple[Group, list[tuple[int, tuple[int, int]]]]:

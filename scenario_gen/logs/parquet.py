@@ -66,10 +66,10 @@ def read_table(path: Path, names: list[str], before: int, config: LogConfig) -> 
         InputError: the file is damaged or too large.
     """
     schema = read_schema(path)
-    there = [name for name in names if name in schema.names]
-    batches = read_batches(path, schema, there, before, config)
+    present = [name for name in names if name in schema.names]
+    batches = read_batches(path, schema, present, before, config)
     frame = {}
-    for name in there:
+    for name in present:
         with guarded(f"{path}, column {name!r} cannot be read"):
             frame[name] = to_series(pa.chunked_array([batch.column(name) for batch in batches]))
     return pd.DataFrame(frame)
@@ -89,7 +89,7 @@ def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, c
         declared = sum(max(part.total_uncompressed_size, 0) for part in parts if part.path_in_schema.split(".")[0] in names)
         rows, source = file.metadata.num_rows, file.iter_batches(BATCH, columns=names, use_threads=False)
     check_size(str(path), declared, before + rows, config)
-    found: list[Any] = []
+    batches: list[Any] = []
     rows = size = 0
     while True:
         with guarded(f"{path} cannot be read as a Parquet table, after row {rows}"):
@@ -98,10 +98,10 @@ def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, c
                 break
             rows, size = rows + batch.num_rows, size + batch.nbytes
         check_size(str(path), size, before + rows, config)
-        found.append(batch)
+        batches.append(batch)
     if not rows:
         raise InputError(f"{path} has a header but no rows")
-    return found
+    return batches
 
 
 def is_text(kind: pa.DataType) -> bool:

@@ -160,11 +160,11 @@ def footprints(encounter: Encounter, vehicle: int) -> Floats:
 def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
     """Return the pairs whose footprints overlap at some sample, with the share of their common samples and the largest area."""
     polygons = [shapely.polygons(footprints(encounter, n)) for n in range(len(encounter.vehicles))]
-    found = []
+    overlaps = []
     for a, b in combinations(range(len(polygons)), 2):
         area = shapely.area(shapely.intersection(polygons[a], polygons[b]))
         area = area[together(encounter.present, a, b)]
         share = float((area > 0.0).mean()) if len(area) else 0.0
         if share > 0.0:
-            found.append(Overlap(encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())))
-    return tuple(found)
+            overlaps.append(Overlap(encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())))
+    return tuple(overlaps)

@@ -130,9 +130,9 @@ def notes_on_vehicles(
 
 def as_recorded(log: RawLog, config: LogConfig) -> LogResult:
     """Return encounters that were recorded as such, unchanged but for the chosen window and vehicles."""
-    found = [between(encounter, config) for encounter in log.encounters]
-    encounters = tuple(encounter for encounter, _ in found)
-    notes = (*log.notes, *(note for _, notes in found for note in notes))
+    cut = [between(encounter, config) for encounter in log.encounters]
+    encounters = tuple(encounter for encounter, _ in cut)
+    notes = (*log.notes, *(note for _, notes in cut for note in notes))
     return LogResult(encounters, Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), notes))
 
 

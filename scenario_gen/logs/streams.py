@@ -113,7 +113,7 @@ class Streams:
         except InputError:
             self._recent, self._next = {}, last + 1
             raise
-        found: list[Sample] = []
+        samples: list[Sample] = []
         while self._next <= last:
             tick = self._next * self._dt_ns
             if any(self._awaited(track, tick) for track in tracks):
@@ -125,9 +125,9 @@ class Streams:
                 self.origin = self._place(sample.vehicles[0].id)
                 self._next -= 1
                 return self.samples()
-            found.append(sample)
+            samples.append(sample)
         self._forget(self._next * self._dt_ns - WINDOW_NS)
-        return found
+        return samples
 
     def _tracks(self) -> tuple[Observations, ...]:
         """Clean the last seconds."""

@@ -49,11 +49,11 @@ def moved(state: State, pose: Floats) -> State:
     return (*np.round(pose[:2], 2).tolist(), round(float(pose[2]), 4), *state[3:])
 
 
-def _with_room(road: Road, vehicle: Vehicle, pose: Floats, asked: Floats) -> State:
+def _with_room(road: Road, vehicle: Vehicle, pose: Floats, requested: Floats) -> State:
     """The pose in whole centimetres, as little beyond the nearest one as its footprint then needs."""
-    away = (pose - asked)[:2] / exact.hypot(*(pose - asked)[:2])
+    away = (pose - requested)[:2] / exact.hypot(*(pose - requested)[:2])
     for margin in _MARGINS:
-        tried = np.array([*np.round(pose[:2] + margin * away, 2), asked[2]])
+        tried = np.array([*np.round(pose[:2] + margin * away, 2), requested[2]])
         if footprint_fits(road, tried[None], vehicle.length, vehicle.width)[0]:
             return tuple(tried.tolist())
     return tuple(pose.tolist())
@@ -67,15 +67,15 @@ class Suggestion:
     """A request that is possible, the stretch of the clock it needs (None: the one in effect), and the change in words."""
 
     request: Request
-    said: str
+    message: str
     max_stretch: float | None = None
 
 
 class ImpossibleError(RefusedError):
-    """What was asked cannot be had; `suggestions` can."""
+    """The request is impossible; `suggestions` are possible."""
 
     def __init__(self, reason: str, suggestions: tuple[Suggestion, ...]) -> None:
-        offers = "; or ".join(one.said for one in suggestions)
+        offers = "; or ".join(suggestion.message for suggestion in suggestions)
         super().__init__(f"{reason}. " + (f"Nearest possible: {offers}" if offers else "No nearby request was found possible"))
         self.suggestions = suggestions
 
@@ -120,22 +120,22 @@ def nearest_if_impossible(requested: Attempt, cancelled: Cancelled = lambda: Fal
                 raise
             kept = " or ".join(f"road {name}" for name in roads_that_keep(requested))
             raise LostConflictError(f"{error}. Nearest possible: {kept}") from error
-        found = tuple(_Search(replace(requested, count=min(requested.count, ENOUGH)), cancelled).run())
-        raise ImpossibleError(str(error), () if cancelled() else found) from error
+        suggestions = tuple(_Search(replace(requested, count=min(requested.count, ENOUGH)), cancelled).run())
+        raise ImpossibleError(str(error), () if cancelled() else suggestions) from error
 
 
 def roads_that_keep(requested: Attempt) -> list[str]:
     """Names of the built-in roads that the template fits with all its conflicts, two at most; else `corridor`, its own road."""
     encounter, config = requested.encounter, requested.config
-    found: list[str] = []
+    roads: list[str] = []
     for name in BUILT_IN:
         with suppress(RefusedError):
             road = build_road(name, encounter, config.road)
             fit_template(encounter, requested.segmentation, road, replace(config.fitting, allow=""))
-            found.append(name)
-        if len(found) == _NAMED:
+            roads.append(name)
+        if len(roads) == _NAMED:
             break
-    return found or ["corridor"]
+    return roads or ["corridor"]
 
 
 class _Search:
@@ -147,12 +147,12 @@ class _Search:
 
     @cached_property
     def base(self) -> dict[str, Floats]:
-        """Start and end states of the fitting without any asked, (N, 4) by end; nothing where that is not possible either."""
+        """Start and end states of the fitting without any requested, (N, 4) by end; nothing where that is not possible either."""
         try:
             _, fit = replace(self.requested, request=Request()).plan().placed()
         except ScenarioGenError:
             return {}
-        return {"starts": fit.asked.start, "goals": fit.asked.end}
+        return {"starts": fit.requested.start, "goals": fit.requested.end}
 
     def possible(self, request: Request, stretch: float | None = None) -> bool:
         """Whether scenarios of the request can be had within its budget."""
@@ -185,18 +185,18 @@ class _Search:
         if start != self.requested.request and self.possible(start):
             yield Suggestion(start, self._difference(start))
             return
-        found = False
+        improved = False
         for end, name in elements(start):
             for path in self._paths(start, end, name):
                 near = self._bisected(path)
                 if near is not None:
-                    found = True
+                    improved = True
                     yield Suggestion(near, self._difference(near))
                     break
         stretched = self._stretched(start)
         if stretched is not None:
             yield stretched
-        elif not found and self.base:
+        elif not improved and self.base:
             near = self._bisected(lambda share: self._all_towards_base(start, share))
             if near is not None:
                 yield Suggestion(near, self._difference(near))

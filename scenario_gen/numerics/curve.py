@@ -71,7 +71,7 @@ class Curve:
         edge = np.diff(line, axis=0)
         size = exact.hypot(edge[:, 0], edge[:, 1])
         along = edge / size[:, None]
-        found = [np.zeros((2, 0))]
+        candidates = [np.zeros((2, 0))]
         for part in (xy[first : first + TOGETHER] for first in range(0, len(xy), TOGETHER)):
             near = _near(part, line, size)
             way, length = along[near], size[near]
@@ -81,8 +81,8 @@ class Curve:
             best = np.argmin(gap, axis=1)
             row = np.arange(len(part))
             side = way[best, 0] * rel[row, best, 1] - way[best, 1] * rel[row, best, 0]
-            found.append(np.array([at[near][best] + t[row, best], np.sign(side) * gap[row, best]]))
-        station, offset = np.concatenate(found, axis=1)
+            candidates.append(np.array([at[near][best] + t[row, best], np.sign(side) * gap[row, best]]))
+        station, offset = np.concatenate(candidates, axis=1)
         return station, offset
 
     def reversed(self) -> "Curve":

@@ -47,11 +47,11 @@ def _is_ours(place: Path) -> bool:
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         place.mkdir(mode=0o700, exist_ok=True)
-        found = place.lstat() if not numba.config.CACHE_DIR else place.stat()
+        status = place.lstat() if not numba.config.CACHE_DIR else place.stat()
         tempfile.TemporaryFile(dir=place).close()
     except (OSError, RuntimeError):  # the latter: the user has no home
         return False
-    own = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
+    own = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o022
     return own or bool(numba.config.CACHE_DIR)
 
 
@@ -120,29 +120,29 @@ def description(function: FunctionType) -> frozenset[str]:
     """Return what a compiled function is made from: source files of it and of what it calls, and the constants that they use."""
     if function not in _described:
         _described[function] = frozenset()  # for one that calls itself
-        found = {f"{function.__module__} {_source(function.__code__.co_filename)}"}
+        parts = {f"{function.__module__} {_source(function.__code__.co_filename)}"}
         for name, value in _globals_of(function):
             inner = _inner(value)
             if inner is not None:
-                found |= description(inner)
+                parts |= description(inner)
             elif isinstance(value, np.ndarray):
-                found.add(f"{name} {value.dtype} {value.shape} {sha256(value.tobytes()).hexdigest()}")
+                parts.add(f"{name} {value.dtype} {value.shape} {sha256(value.tobytes()).hexdigest()}")
             elif isinstance(value, EnumType):
-                found.add(f"{name} {list(value)}")
+                parts.add(f"{name} {list(value)}")
             elif isinstance(value, (bool, int, float, str, tuple)):
-                found.add(f"{name} {value!r}")
-        _described[function] = frozenset(found)
+                parts.add(f"{name} {value!r}")
+        _described[function] = frozenset(parts)
     return _described[function]
 
 
 def size(function: FunctionType) -> int:
     """Return the bytes of a function's code and of what it calls, a measure of how long it takes to be compiled."""
-    found, new = {function}, [function]
+    functions, new = {function}, [function]
     while new:
         called = {inner for _, value in _globals_of(new.pop()) if (inner := _inner(value)) is not None}
-        new += called - found
-        found |= called
-    return len(b"".join(each.__code__.co_code for each in found))
+        new += called - functions
+        functions |= called
+    return len(b"".join(each.__code__.co_code for each in functions))
 
 
 def _inner(value: Any) -> FunctionType | None:

@@ -91,7 +91,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         self._compiled: Callable[..., Any] | None = None
 
     def compile(self, _types: Any = None) -> Any:
-        """Make or load the declared form, whatever is asked for; calls from other kernels come here, too."""
+        """Make or load the declared form, whatever signature is requested; calls from other kernels come here, too."""
         keep(self)
         entry = super().compile(self._declared)
         self._compiled = entry

@@ -64,7 +64,9 @@ def _figures(case: GenerationResult) -> dict[str, Any]:
     fit = {} if case.fit is None else case.fit.figures()
     coverage = {} if case.coverage is None else case.coverage.document()
     reached = {} if case.generated.reached is None else case.generated.reached.figures()
-    weights = {str(one.index): one.facts["weight"] for one in case.generated.scenarios if "weight" in one.facts}
+    weights = {
+        str(scenario.index): scenario.facts["weight"] for scenario in case.generated.scenarios if "weight" in scenario.facts
+    }
     figures |= {"coverage": coverage, "target": {**reached, "weights": weights} if reached else {}}
     return figures | {"fit": fit, "routes": {vehicle.id: route.figures() for vehicle, route in vehicles}}
 

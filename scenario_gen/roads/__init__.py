@@ -27,7 +27,6 @@ from scenario_gen.roads.vector.ground import along_lanes, drives_against, own_gr
 from scenario_gen.roads.vector.match import Course
 from scenario_gen.roads.vector.place import placements, tracks_on
 from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, flare_begins, line_between, relative
-from scenario_gen.types import Road
 
 __all__ = [
     "BUILT_IN",
@@ -35,7 +34,6 @@ __all__ = [
     "Arm",
     "Course",
     "DrawRoad",
-    "Road",
     "RoadConfig",
     "along_lanes",
     "arms_of",

@@ -108,10 +108,10 @@ def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) 
 
 def junction_centre(tracks: tuple[Track, ...]) -> Floats:
     """(2,) [m] the middle of where paths cross and where they turn; of where vehicles are nearest if they do neither."""
-    found = list(pair_crossings(tracks))
+    crossings = list(pair_crossings(tracks))
     points: list[Floats] = []
     for i, a in enumerate(tracks):
-        points += [a.curve.at(crossing.first)[:2] for k, _, crossing in found if k == i]
+        points += [a.curve.at(crossing.first)[:2] for k, _, crossing in crossings if k == i]
         if a.turns and not points:
             yaw = a.curve.points[:, 2]
             middle = int(np.argmin(np.abs(yaw - (yaw[0] + yaw[-1]) / 2.0)))
@@ -126,13 +126,13 @@ def _at_a_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
     poses = np.concatenate([track.poses[[0, -1]] for track in tracks])
     half = np.repeat([track.vehicle.length / 2.0 for track in tracks], 2)
     away = exact.hypot(poses[:, 0] - centre[0], poses[:, 1] - centre[1])
-    need = away + half + ROOM + SLACK
-    across = np.abs(exact.sin(wrap_angle(poses[:, 2] - poses[np.argmax(need), 2])))
-    side = float(need[across > exact.sin(np.radians(30.0))].max(initial=SHORTEST))
+    required = away + half + ROOM + SLACK
+    across = np.abs(exact.sin(wrap_angle(poses[:, 2] - poses[np.argmax(required), 2])))
+    side = float(required[across > exact.sin(np.radians(30.0))].max(initial=SHORTEST))
     lanes = _parallel_lanes(tracks, config.lane_width)
     if any(track.makes_u_turn for track in tracks):  # from one outermost lane to the other in a half circle
         lanes = max(lanes, int(np.ceil((_U_TURN / config.lane_width + 1.0) / 2.0)))
-    return Layout(max(float(need.max()), SHORTEST), side, lanes)
+    return Layout(max(float(required.max()), SHORTEST), side, lanes)
 
 
 def _parallel_lanes(tracks: tuple[Track, ...], lane_width: float) -> int:

@@ -169,7 +169,7 @@ def _sweep(sketch: Sketch, way: Curve, length: float, width: float) -> None:
 def _ends(i: int, track: Track, centre: Floats) -> list[_End]:
     s = np.arange(0.0, max(track.travelled, 0.5) + 0.25, 0.5)
     poses = track.curve.at(s) - np.array([*centre, 0.0])
-    found = []
+    ends = []
     turn = turn_of(track)
     goes_on = 0.0 if abs(turn) < _THROUGH else float(np.sign(turn))
     for inward in (True, False):
@@ -180,49 +180,49 @@ def _ends(i: int, track: Track, centre: Floats) -> list[_End]:
         yaw = float(np.median(along[: last + 1, 2])) + (np.pi if inward else 0.0)
         away = float((along[0, :2] * unit(yaw)).sum())
         at = along[nearest if abs(turn) < _THROUGH else last, :2]
-        found.append(_End(i, inward, yaw, at, away, last * 0.5, goes_on * (-1.0 if inward else 1.0)))
+        ends.append(_End(i, inward, yaw, at, away, last * 0.5, goes_on * (-1.0 if inward else 1.0)))
     if track.still:
-        return [max(found, key=lambda end: end.away)]  # it stands on the arm on which it is
-    return found
+        return [max(ends, key=lambda end: end.away)]  # it stands on the arm on which it is
+    return ends
 
 
 def _directions(name: str, tracks: tuple[Track, ...]) -> list[_Direction]:
     """Directions of the arms with their members, as many as the road has."""
     count, centre = ARM_COUNT[name], junction_centre(tracks)
     ends = [end for i, track in enumerate(tracks) for end in _ends(i, track, centre)]
-    found: list[_Direction] = []
+    directions: list[_Direction] = []
     reached = [end for end in ends if end.away > 0.0]
     for end in sorted(reached, key=lambda end: (-min(end.steady, 20.0), end.vehicle, end.inward)):
-        nearest = _nearest(end, found)
+        nearest = _nearest(end, directions)
         if nearest is None:
-            found.append(_Direction(end.yaw, [end]))
+            directions.append(_Direction(end.yaw, [end]))
         else:
             nearest.members.append(end)
             nearest.yaw = _mean([m for m in nearest.members if m.steady >= _SURE] or nearest.members)
-    while len(found) > count:
-        pairs = [(abs(angle_between(a.yaw, b.yaw)), j, k) for j, a in enumerate(found) for k, b in enumerate(found[:j])]
+    while len(directions) > count:
+        pairs = [(abs(angle_between(a.yaw, b.yaw)), j, k) for j, a in enumerate(directions) for k, b in enumerate(directions[:j])]
         apart, j, k = min(pairs)
         if apart > _MERGED:
-            who = ", ".join(tracks[direction.members[0].vehicle].vehicle.id for direction in found)
+            who = ", ".join(tracks[direction.members[0].vehicle].vehicle.id for direction in directions)
             raise RefusedError(
-                f"road {name} has {count} arms, and the template comes and goes by {len(found)} (one each: vehicles "
+                f"road {name} has {count} arms, and the template comes and goes by {len(directions)} (one each: vehicles "
                 f"{who}); choose another road"
             )
-        found[k].members += found[j].members
-        found[k].yaw = _mean(found[k].members)
-        del found[j]
+        directions[k].members += directions[j].members
+        directions[k].yaw = _mean(directions[k].members)
+        del directions[j]
     for end in ends:
         if end.away <= 0.0:  # not reached: any arm ahead will do
-            nearest = _nearest(end, found)
+            nearest = _nearest(end, directions)
             if nearest is not None:
                 nearest.members.append(end)
-            elif len(found) < count and not any(abs(angle_between(other.yaw, end.yaw)) < _MERGED for other in found):
-                found.append(_Direction(end.yaw, [end]))
-    while len(found) < count:
-        wanted = [direction.yaw + k * np.pi / 2.0 for direction in found for k in (2, 1, 3)]
-        free = [min(abs(angle_between(yaw, direction.yaw)) for direction in found) for yaw in wanted]
-        found.append(_Direction(wanted[int(np.argmax(np.round(np.minimum(free, np.pi / 2.0), 6)))], []))
-    return found
+            elif len(directions) < count and not any(abs(angle_between(other.yaw, end.yaw)) < _MERGED for other in directions):
+                directions.append(_Direction(end.yaw, [end]))
+    while len(directions) < count:
+        yaws = [direction.yaw + k * np.pi / 2.0 for direction in directions for k in (2, 1, 3)]
+        free = [min(abs(angle_between(yaw, direction.yaw)) for direction in directions) for yaw in yaws]
+        directions.append(_Direction(yaws[int(np.argmax(np.round(np.minimum(free, np.pi / 2.0), 6)))], []))
+    return directions
 
 
 def _nearest(end: _End, directions: list[_Direction]) -> _Direction | None:
@@ -293,15 +293,15 @@ def _draw_arms(sketch: Sketch, arms: list[PlannedArm], config: RoadConfig) -> No
         inner.append((start, float(-rights * width), float(lefts * width)))
     middle = []
     for (pose, right, high), (other, low, _) in zip(inner, inner[1:] + inner[:1], strict=True):
-        one, two = pose[2], other[2]
-        a, b = pose[:2] + high * unit_left(one), other[:2] + low * unit_left(two)
-        middle += [a, pose[:2] + right * unit_left(one)]
-        turn = float((two - one) % (2.0 * np.pi))
+        yaw, other_yaw = pose[2], other[2]
+        a, b = pose[:2] + high * unit_left(yaw), other[:2] + low * unit_left(other_yaw)
+        middle += [a, pose[:2] + right * unit_left(yaw)]
+        turn = float((other_yaw - yaw) % (2.0 * np.pi))
         if 0.05 < turn < np.radians(165.0):
             gap = b - a
-            along = float(gap[0] * exact.sin(two) - gap[1] * exact.cos(two)) / exact.sin(turn)
-            corner = a + along * unit(one)
-            sketch.corner(corner, one, two, config.corner_radius)
+            along = float(gap[0] * exact.sin(other_yaw) - gap[1] * exact.cos(other_yaw)) / exact.sin(turn)
+            corner = a + along * unit(yaw)
+            sketch.corner(corner, yaw, other_yaw, config.corner_radius)
             if abs(along) < _WIDE_JUNCTION:
                 middle.append(corner)
     hull = shapely.convex_hull(shapely.multipoints(middle))

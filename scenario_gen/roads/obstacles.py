@@ -35,7 +35,7 @@ def read_obstacles(text: str, what: str = "obstacles") -> tuple[Obstacle, ...]:
     Raises:
         InputError: it is not of that form, a value is not finite, or a size is not positive; the message names the piece.
     """
-    found = []
+    obstacles = []
     for piece in split_pieces(text):
         values = read_numbers(piece)
         if len(values) != 5:
@@ -44,8 +44,8 @@ def read_obstacles(text: str, what: str = "obstacles") -> tuple[Obstacle, ...]:
             raise InputError(
                 f"{what}: {piece!r} has length {values[3]:g} m and width {values[4]:g} m; above 0 to {_LARGEST:g} m are drawn"
             )
-        found.append(Obstacle(*values))
-    return tuple(found)
+        obstacles.append(Obstacle(*values))
+    return tuple(obstacles)
 
 
 def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...]) -> Road:

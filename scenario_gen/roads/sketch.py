@@ -58,11 +58,11 @@ class Sketch:
     def strip(self, line: Curve, right: float, left: float) -> None:
         """Add what lies between `right` and `left` metres to the left of a line (right < left)."""
         s = np.linspace(0.0, line.length, max(int(np.ceil(line.length / _STEP)), 1) + 1)
-        one, other = (line.beside(s, np.full(len(s), offset))[:, :2] for offset in (right, left))
+        right_edge, left_edge = (line.beside(s, np.full(len(s), offset))[:, :2] for offset in (right, left))
         if abs(line.points[-1, 2] - line.points[0, 2]) < 1e-9 and len(line.points) == 2:
-            self.drivable.append(np.array([one[0], one[-1], other[-1], other[0]]))
+            self.drivable.append(np.array([right_edge[0], right_edge[-1], left_edge[-1], left_edge[0]]))
         else:
-            self.drivable.extend(np.stack((one[:-1], one[1:], other[1:], other[:-1]), axis=1))
+            self.drivable.extend(np.stack((right_edge[:-1], right_edge[1:], left_edge[1:], left_edge[:-1]), axis=1))
 
     def sweep(self, line: Curve, length: float, width: float) -> None:
         """Add what a footprint of `length` and `width` [m] covers on its way along a line."""

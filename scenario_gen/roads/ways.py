@@ -52,8 +52,8 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits, sharpness: float | None
         return None  # a U-turn: the template says where along the road, see draw_u_turn
     along_exit = left / exact.sin(turn)  # from the lines' intersection to the exit
     along_entry = ahead - along_exit * exact.cos(turn)
-    wanted = sharpness or _PLAIN
-    for curvature, ramp in (*((factor * wanted, _RAMP) for factor in _LADDER), *((last, _SHORT_RAMP) for last in _LAST)):
+    sharp = sharpness or _PLAIN
+    for curvature, ramp in (*((factor * sharp, _RAMP) for factor in _LADDER), *((last, _SHORT_RAMP) for last in _LAST)):
         if curvature > _TIGHTEST:
             continue
         bend = _bend(round(turn, 9), round(curvature, 9), ramp)

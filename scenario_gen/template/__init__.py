@@ -18,7 +18,7 @@ from scenario_gen.template.interaction import (
     waits_to_keep,
 )
 from scenario_gen.template.manoeuvre import in_words, keeps, manoeuvre_of, MOST_CHANGE, sharpness_of, turn_of, turns_to_keep
-from scenario_gen.template.path_crossing import pair_crossings, path_crossing, PathCrossing
+from scenario_gen.template.path_crossing import pair_crossings, path_crossing
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.template.separation import footprint_gap, least_gap, least_gaps, own_paths, separate, smallest_gaps
 from scenario_gen.template.side import mirrored, traffic_side
@@ -35,7 +35,6 @@ __all__ = [
     "FrenetTracks",
     "MainLine",
     "Motion",
-    "PathCrossing",
     "Track",
     "Wait",
     "clean_tracks",

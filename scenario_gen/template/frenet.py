@@ -118,7 +118,7 @@ def to_frenet(tracks: tuple[Track, ...]) -> FrenetTracks:
                 f"that is a junction's manoeuvre, not one along a road"
             )
     lines = [_reference_line(tracks, base) for base in _reference_candidates(tracks)]
-    line, direction = min(lines, key=lambda found: _cost_of_line(tracks, *found))
+    line, direction = min(lines, key=lambda line_and_direction: _cost_of_line(tracks, *line_and_direction))
     station, offset = np.empty((len(tracks), len(tracks[0].progress))), np.empty((len(tracks), len(tracks[0].progress)))
     for i, track in enumerate(tracks):
         poses = track.poses

@@ -122,8 +122,8 @@ def find_conflicts(
     """
     time, position, heading = (np.ascontiguousarray(array, dtype=np.float64) for array in (time, position, heading))
     pairs = combinations(range(len(vehicles)), 2)
-    found = (pair_conflict(vehicles, time, position, heading, a, b, present) for a, b in pairs)
-    return tuple(conflict for conflict in found if conflict is not None)
+    conflicts = (pair_conflict(vehicles, time, position, heading, a, b, present) for a, b in pairs)
+    return tuple(conflict for conflict in conflicts if conflict is not None)
 
 
 def required_orders(conflicts: Sequence[Conflict], order: str) -> tuple[int | None, ...]:
@@ -135,7 +135,7 @@ def required_orders(conflicts: Sequence[Conflict], order: str) -> tuple[int | No
             post-encroachment time), anyone at other ones, and who follows still follows.
 
     Raises:
-        RefusedError: "swap" is asked for and nobody crosses anybody's path.
+        RefusedError: "swap" is requested and nobody crosses anybody's path.
     """
     if order == "keep":
         return tuple(conflict.first for conflict in conflicts)

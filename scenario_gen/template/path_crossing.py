@@ -35,16 +35,16 @@ class PathCrossing:
 def path_crossing(a: Track, b: Track) -> PathCrossing | None:
     """The crossing that both come nearest to reaching (of several, the squarest and nearest in time), or None."""
     first, second = (track.curve.cut(-_BEYOND, track.travelled + _BEYOND) for track in (a, b))
-    found = crossings(first, second, _ANGLE) - _BEYOND
-    angle = a.curve.at(found[:, 0])[:, 2] - b.curve.at(found[:, 1])[:, 2]
+    places = crossings(first, second, _ANGLE) - _BEYOND
+    angle = a.curve.at(places[:, 0])[:, 2] - b.curve.at(places[:, 1])[:, 2]
     aslant = exact.cos(angle) > -exact.cos(_HEAD_ON)
-    found, angle = found[aslant], angle[aslant]
-    if len(found) == 0:
+    places, angle = places[aslant], angle[aslant]
+    if len(places) == 0:
         return None
-    short = _outside(found[:, 0], a.travelled) + _outside(found[:, 1], b.travelled)
-    lag = np.abs(_sample(a, found[:, 0]) - _sample(b, found[:, 1]))
+    short = _outside(places[:, 0], a.travelled) + _outside(places[:, 1], b.travelled)
+    lag = np.abs(_sample(a, places[:, 0]) - _sample(b, places[:, 1]))
     best = int(np.argmin(short * 10.0 + lag * 0.05 + 25.0 * (1.0 - np.abs(exact.sin(angle)))))
-    return PathCrossing(float(found[best, 0]), float(found[best, 1]), bool(short[best] == 0.0))
+    return PathCrossing(float(places[best, 0]), float(places[best, 1]), bool(short[best] == 0.0))
 
 
 def pair_crossings(tracks: Sequence[Track]) -> Iterator[tuple[int, int, PathCrossing]]:

@@ -79,7 +79,7 @@ def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:
 def _nearest_leaders(encounter: Encounter) -> list[Reaction]:
     """At most one edge per follower: to the nearest one ahead."""
     n = len(encounter.vehicles)
-    found = []
+    leaders = []
     for who in range(n):
         ahead = {whom: is_behind(encounter, who, whom) for whom in range(n) if whom != who}
         apart = {whom: _apart(encounter, who, whom) for whom in ahead}
@@ -87,8 +87,8 @@ def _nearest_leaders(encounter: Encounter) -> list[Reaction]:
         edges = [_follows(encounter, who, whom, ahead[whom] & (apart[whom] <= nearest), apart[whom]) for whom in ahead]
         sure = [edge for edge in edges if edge is not None]
         if sure:
-            found.append(max(sure, key=lambda edge: (edge.until - edge.since) * edge.confidence))
-    return found
+            leaders.append(max(sure, key=lambda edge: (edge.until - edge.since) * edge.confidence))
+    return leaders
 
 
 def is_behind(encounter: Encounter, who: int, whom: int) -> Bools:
@@ -101,14 +101,14 @@ def is_behind(encounter: Encounter, who: int, whom: int) -> Bools:
     alike = np.abs(wrap_angle(yaw_b - yaw_a)) < _ALIKE
     straight = (along > 0.0) & (np.abs(across) < _LANE) & alike
     step = max(round(0.5 / encounter.dt), 1)
-    now, found = np.arange(len(a)), straight
+    now, behind = np.arange(len(a)), straight
     for mine, yaw, path, path_yaw, sign in ((a, yaw_a, b, yaw_b, -1), (b, yaw_b, a, yaw_a, 1)):
         rows = np.arange(0, len(path), step)  # where the other was before; where this one will be
         square = np.square(mine[:, None] - path[None, rows]).sum(axis=-1)
         nearest = np.argmin(square, axis=1)
         near = (np.sqrt(square[now, nearest]) < _LANE) & (np.abs(wrap_angle(path_yaw[rows[nearest]] - yaw)) < _ALIKE)
-        found = found | (near & (sign * (rows[nearest] - now) > step))
-    return np.asarray(found & both & (np.sqrt(np.square(between).sum(axis=1)) < FAR))
+        behind = behind | (near & (sign * (rows[nearest] - now) > step))
+    return np.asarray(behind & both & (np.sqrt(np.square(between).sum(axis=1)) < FAR))
 
 
 def _apart(encounter: Encounter, who: int, whom: int) -> Floats:
@@ -159,13 +159,13 @@ def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, apart: Fl
 
 def _starts_behind(encounter: Encounter, who: int, whom: int, behind: Bools) -> tuple[float, float] | None:
     """By how much [s] a vehicle drives off later than the one it stands behind, and how sure it is that it waited for that."""
-    found = []
+    pairs = []
     leaders = [wait.end for wait in find_waits(encounter) if wait.vehicle == whom]
     for wait in find_waits(encounter):
         lags = [wait.end - end for end in leaders if 0.0 < wait.end - end <= LAGS[1]]
         if wait.vehicle == who and lags and behind[int(np.searchsorted(encounter.time, wait.end - 1e-9))]:
-            found.append((min(lags), _soon(min(lags), encounter.duration)))
-    return max(found, key=lambda start: start[1], default=None)
+            pairs.append((min(lags), _soon(min(lags), encounter.duration)))
+    return max(pairs, key=lambda start: start[1], default=None)
 
 
 def _soon(lag: float, duration: float) -> float:
@@ -195,9 +195,9 @@ def _best_lag(own: Floats, other: Floats, behind: Bools, dt: float) -> tuple[flo
             break
         a, b = own[rows] - own[rows].mean(), other[rows - steps] - other[rows - steps].mean()
         size = float(np.sqrt(np.square(a).mean() * np.square(b).mean()))
-        found = float((a * b).mean()) / size if size > 1e-4 else 0.0
-        if found > best[0]:
-            best, error = (found, steps * dt), _standard_error(a, b)
+        correlation = float((a * b).mean()) / size if size > 1e-4 else 0.0
+        if correlation > best[0]:
+            best, error = (correlation, steps * dt), _standard_error(a, b)
     explained, lag = best
     if explained <= _SIGNIFICANT * error:
         return _STANDARD_LAG, 0.0

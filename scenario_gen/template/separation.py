@@ -134,14 +134,14 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
 def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -> list[tuple[int, int]]:
     """Pairs (i, j), j < i, that are there together, and whose footprints come within `room` [m] of each other at most."""
     diagonal = [float(exact.hypot(track.vehicle.length, track.vehicle.width)) for track in tracks]
-    found = []
+    pairs = []
     for i in range(len(tracks)):
         for j in range(i):
             both = tracks[i].there & tracks[j].there
             reach = (diagonal[i] + diagonal[j]) / 2.0
             if both.any() and exact.hypot(*(poses[i] - poses[j])[both, :2].T).min() < room + reach:
-                found.append((i, j))
-    return found
+                pairs.append((i, j))
+    return pairs
 
 
 class _Gap(NamedTuple):

@@ -22,7 +22,17 @@ from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
 from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.sample import Sample
-from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, FACTS, Scenario, ScenarioSet, Verdict, Violation
+from scenario_gen.types.scenario import (
+    BoundaryStates,
+    Cause,
+    causes_in_words,
+    EgoSlot,
+    FACTS,
+    Scenario,
+    ScenarioSet,
+    Verdict,
+    Violation,
+)
 from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 from scenario_gen.types.target import Pair, Reached, Target, UNITS
 
@@ -33,7 +43,7 @@ __all__ = [
     "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality", "Reached",
     "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "Sample", "Scenario", "ScenarioSet", "Segmentation",
     "Spread", "State", "Target", "Tracks", "Vehicle", "Verdict", "Violation", "always", "as_markdown", "at_ends",
-    "canonical_presence", "cut", "formatted", "height", "is_truck", "join_ego", "join_pieces", "mask", "once_per_object",
-    "read_numbers", "read_states", "rear_axle", "routes_in_words", "shifted", "split_off", "split_pieces", "together", "token",
-    "tokens", "vehicle_index", "with_witness", "yielders_of",
+    "canonical_presence", "causes_in_words", "cut", "formatted", "height", "is_truck", "join_ego", "join_pieces", "mask",
+    "once_per_object", "read_numbers", "read_states", "rear_axle", "routes_in_words", "shifted", "split_off", "split_pieces",
+    "together", "token", "tokens", "vehicle_index", "with_witness", "yielders_of",
 ]  # fmt: skip

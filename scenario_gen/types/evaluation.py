@@ -164,8 +164,8 @@ class Evaluation:
 
     def value(self, row: str, metric: str) -> float:
         """Return one figure; NaN if there is none."""
-        found = self.row(row)
-        return found.values[metric].value if found and metric in found.values else math.nan
+        entry = self.row(row)
+        return entry.values[metric].value if entry and metric in entry.values else math.nan
 
     def to_json(self, indent: int | None = 2) -> str:
         """Return JSON; what is not a number is null, figures have six significant digits."""

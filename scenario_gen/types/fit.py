@@ -58,12 +58,12 @@ class Loss:
         kind: "turn", "conflict" (paths that cross or merge), "following", "new conflict", "order", "beside" or "arm" (an arm
             of the road that nobody uses).
         vehicles: ids of whom it concerns.
-        said: a sentence, with figures.
+        message: a sentence, with figures.
     """
 
     kind: str
     vehicles: tuple[str, ...]
-    said: str
+    message: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Fit:
         vehicles: N identities and footprints.
         fitted: N fitted vehicles; none where only the requested states are known.
         anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T - 1).
-        asked: start and end states requested of every scenario (after repair).
+        requested: start and end states requested of every scenario (after repair).
         notes: what was decided, in sentences (an entry chosen and why, an anchor moved by how much).
         lost: what of the template's turns, conflicts and neighbours is lost on this road; none where nothing is.
     """
@@ -82,13 +82,13 @@ class Fit:
     vehicles: tuple[Vehicle, ...]
     fitted: tuple[FittedVehicle, ...]
     anchor_index: Ints
-    asked: BoundaryStates
+    requested: BoundaryStates
     notes: tuple[str, ...]
     lost: tuple[Loss, ...] = ()
 
     def figures(self) -> dict[str, Any]:
         """Return what is lost, and by vehicle what was decided, ready for JSON."""
         return {
-            "lost": [{"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.said} for loss in self.lost],
+            "lost": [{"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.message} for loss in self.lost],
             "vehicles": {vehicle.id: fitted.figures() for vehicle, fitted in zip(self.vehicles, self.fitted, strict=False)},
         }

@@ -13,6 +13,7 @@ from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
 from scenario_gen.types.fit import Fit
+from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import Scenario, ScenarioSet
@@ -74,9 +75,9 @@ class GenerationResult:
 
     def best(self, metric: str) -> str:
         """Return the compared row with the least figure, that of `generated` where they are equal; "" if there is none."""
-        found = {row: self.evaluation.value(row, metric) for row in self.compared}
-        known = [row for row, value in found.items() if math.isfinite(value)]
-        return min(known, key=found.__getitem__) if len(known) > 1 else ""
+        values = {row: self.evaluation.value(row, metric) for row in self.compared}
+        known = [row for row, value in values.items() if math.isfinite(value)]
+        return min(known, key=values.__getitem__) if len(known) > 1 else ""
 
     def outdone(self) -> tuple[str, ...]:
         """Return a sentence for each reference that is more like the template than what was generated, by a thousandth."""
@@ -127,6 +128,22 @@ class GenerationResult:
         """Who reacts to whom in the template, and what the scenarios keep of it, as a document."""
         graph, ids = self.generated.graph, [vehicle.id for vehicle in self.encounter.vehicles]
         return {"edges": [], "cut": [], "sentences": []} if graph is None else graph.document(ids, self.generated.reactions)
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """What of the template the road does not allow, in sentences."""
+        return tuple(loss.message for loss in self.fit.lost) if self.fit else ()
+
+    @property
+    def route_remarks(self) -> tuple[str, ...]:
+        """What is unusual about the routes, in sentences."""
+        vehicles = zip(self.encounter.vehicles, self.routes, strict=True) if self.routes else ()
+        return tuple(remark for vehicle, route in vehicles for remark in route.remarks(vehicle.id))
+
+    @property
+    def lost_reactions(self) -> tuple[str, ...]:
+        """Which reactions of the template the scenarios could not keep, in sentences."""
+        return tuple(message for message in self.generated.adaptations if message.startswith(NOT_KEPT))
 
     @property
     def published(self) -> int:

@@ -103,7 +103,7 @@ def read_states(text: str, what: str) -> dict[str, State]:
     Raises:
         InputError: it is not of that form, a value is not finite, a speed is negative, or a vehicle comes twice.
     """
-    found: dict[str, State] = {}
+    states: dict[str, State] = {}
     for piece in split_pieces(text):
         name, _, numbers = piece.rpartition(":")
         name, state = name.strip(), read_numbers(numbers)
@@ -111,7 +111,7 @@ def read_states(text: str, what: str) -> dict[str, State]:
             raise InputError(f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, e.g. `1: 10.5 -1.75 0.0 8.0`")
         if len(state) == 4 and state[3] < 0.0:
             raise InputError(f"{what}: {piece!r} asks for a negative speed")
-        if name in found:
+        if name in states:
             raise InputError(f"{what}: vehicle {name!r} comes twice")
-        found[name] = state
-    return found
+        states[name] = state
+    return states

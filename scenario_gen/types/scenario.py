@@ -118,6 +118,12 @@ class Cause(StrEnum):
         return {"time_law": cls.SPEED_PROFILE, "moving_wait": cls.STOP_NOT_KEPT}.get(str(value))
 
 
+def causes_in_words(refused: Mapping[Cause, int]) -> list[tuple[str, int]]:
+    """Return causes of refusal with how many candidates each refused, the most frequent first."""
+    words = ((cause.value.replace("_", " "), count) for cause, count in refused.items() if count)
+    return sorted(words, key=lambda cause: (-cause[1], cause[0]))
+
+
 @dataclass(frozen=True)
 class Violation:
     """One thing wrong with a scenario: its cause, when [s], which vehicles (indices), and a sentence with the figures."""

@@ -106,7 +106,7 @@ def read_targets(text: str) -> tuple[Target, ...]:
     Raises:
         InputError: it is not of that form, a figure is unknown or comes twice, or a range is empty.
     """
-    found: list[Target] = []
+    targets: list[Target] = []
     for piece in split_pieces(text):
         head, _, bounds = piece.partition("=")
         name, bracket, inside = head.strip().partition("[")
@@ -123,7 +123,7 @@ def read_targets(text: str) -> tuple[Target, ...]:
         if not low < high or (math.isinf(low) and math.isinf(high)):
             raise InputError(f"target: {piece!r}: the lower bound must be below the upper one, and one of them finite")
         target = Target(name.strip(), low, high, ids)
-        if target.label in {other.label for other in found}:
+        if target.label in {other.label for other in targets}:
             raise InputError(f"target: {target.label} comes twice")
-        found.append(target)
-    return tuple(found)
+        targets.append(target)
+    return tuple(targets)

@@ -32,7 +32,7 @@ def case():
 def test_the_paper_grid_is_used_and_the_given_ends_are_met(case):
     assert case.road.name == "t_intersection" and case.road.drivable.shape == (1000, 1000) and case.road.resolution == 1.0
     for arm in case.arms.values():
-        asked = np.stack([arm.fit.asked.start[:, :2], arm.fit.asked.end[:, :2]])
+        asked = np.stack([arm.fit.requested.start[:, :2], arm.fit.requested.end[:, :2]])
         found = np.stack([arm.position[:, :, 0], arm.position[:, :, -1]])
         np.testing.assert_allclose(found, np.broadcast_to(asked[:, None], found.shape), atol=1e-6)
     spread = case.arms[WITH].position[:, 1].std(axis=0).max()

@@ -185,7 +185,7 @@ def test_fit():
     sent = _fit(template, at)
     stamp, frame, asked, anchors = fits.decode_fit(fits.encode_fit(template, sent, "map"))
     assert (stamp, frame) == (template.start_ns, "map")
-    assert_same(sent.asked, asked, "start", "end")
+    assert_same(sent.requested, asked, "start", "end")
     assert (canonical_angle(anchors[..., 2]) == np.stack([v.anchors for v in sent.fitted])[..., 2]).all()
     assert fits.anchor_stamps(template, at[1:-1]) == [template.start_ns + int(k) * template.dt_ns for k in at]
 

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.spread
 
 def achieved(outcome):
     """Largest distances [m] and [m/s] from the states asked of the scenarios."""
-    asked = outcome.fit.asked
+    asked = outcome.fit.requested
     far = [
         (np.hypot(*(s.position[:, k] - states[:, :2]).T).max(), np.abs(s.speed[:, k] - states[:, 3]).max())
         for s in outcome.generated.scenarios
@@ -33,7 +33,7 @@ def achieved(outcome):
 
 def state(plain, end, vehicle, ahead=0.0, left=0.0, speed=None):
     """A state of the plain fit, moved: as text."""
-    x, y, yaw, v = getattr(plain.fit.asked, end)[vehicle]
+    x, y, yaw, v = getattr(plain.fit.requested, end)[vehicle]
     x, y = x + ahead * np.cos(yaw) - left * np.sin(yaw), y + ahead * np.sin(yaw) + left * np.cos(yaw)
     return f"{vehicle + 1}: {x:.3f} {y:.3f} {yaw:.6f} {v if speed is None else speed:.3f}"
 
@@ -56,14 +56,14 @@ def test_what_is_asked_is_met(chain, plain, change):
     assert len(outcome.generated.scenarios) == COUNT
     assert (achieved(outcome) <= (0.1, 0.1)).all()
     for name, own in ends.items():
-        rows, met = request.rows(name, chain.encounter), getattr(outcome.fit.asked, own)
+        rows, met = request.rows(name, chain.encounter), getattr(outcome.fit.requested, own)
         asked = np.isfinite(rows)
         off = np.where(asked, met - rows, 0.0)
         off[:, 2] = wrap_angle(off[:, 2])
         assert np.abs(off).max() < 1e-6, "asked states are those of the checker"
         untouched = ~asked.any(axis=1) & ~np.isfinite(request.rows("starts", chain.encounter)).any(axis=1)
         untouched &= ~np.isfinite(request.rows("goals", chain.encounter)).any(axis=1)
-        assert np.array_equal(met[untouched], getattr(plain.fit.asked, own)[untouched]), "others are as they were"
+        assert np.array_equal(met[untouched], getattr(plain.fit.requested, own)[untouched]), "others are as they were"
 
 
 def refused(chain, **texts):
@@ -101,7 +101,7 @@ def test_a_goal_off_the_road(chain, plain, vehicle):
 def test_a_start_on_top_of_another_vehicle(following):
     """Two cars drive the same way: the nearest start without overlap lies behind or in front."""
     made = answer(following, Request(), count=1)
-    x, y, yaw, speed = made.fit.asked.start[0]
+    x, y, yaw, speed = made.fit.requested.start[0]
     texts = {"starts": f"2: {x + 1.0:.2f} {y:.2f} {yaw:.4f} {speed:.2f}"}
     error = refused(following, **texts)
     assert "at the start that is asked vehicles 1 and 2 overlap by" in str(error)

@@ -31,7 +31,7 @@ def test_of_two_vehicles_one_is_left(chain, plain, ego):
         assert one.index == all_of_it.index, "the model of all vehicles is drawn and checked, then parted"
         assert encode_scenario(join_ego(one), 0) == encode_scenario(join_ego(with_witness(all_of_it, index)), 0)
     assert [v.id for s in made.scenarios for v in s.vehicles] == ["2" if ego == "1" else "1"] * 5
-    asked = plain.fit.asked
+    asked = plain.fit.requested
     for s in made.scenarios:
         assert s.position[0, 0] == pytest.approx(asked.start[1 - index, :2], abs=1e-5)
         assert s.position[0, -1] == pytest.approx(asked.end[1 - index, :2], abs=1e-5)
@@ -84,10 +84,10 @@ def test_the_others_stay_valid_among_themselves(data, ego):
     conflicts = find_conflicts(vehicles, encounter.time, encounter.position[kept], encounter.heading[kept])
     kept_waits = waits_to_keep(chain.encounter, chain.segmentation)
     waits = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in kept_waits if wait.vehicle != ego]
-    asked = BoundaryStates(outcome.fit.asked.start[kept], outcome.fit.asked.end[kept])
+    asked = BoundaryStates(outcome.fit.requested.start[kept], outcome.fit.requested.end[kept])
     checker = Checker(chain.road, asked, conflicts, waits)
     assert all(verdict.valid for verdict in checker.check(outcome.generated.scenarios))
-    everybody = Checker.of_template(encounter, chain.road, outcome.fit.asked, kept_waits)
+    everybody = Checker.of_template(encounter, chain.road, outcome.fit.requested, kept_waits)
     order = [*kept, ego]
     place = np.argsort(order).tolist()
     for scenario in map(join_ego, outcome.generated.scenarios):

@@ -77,7 +77,7 @@ def test_a_range_that_cannot_be_had_is_refused_with_what_can(chain):
 def test_without_measures_a_target_is_refused(chain):
     with pytest.raises(InputError, match="measures"):
         made = answer(chain, Request(), count=1)
-        plan = Plan(made.encounter, made.segmentation, made.road, made.routes, made.fit.asked, ())
+        plan = Plan(made.encounter, made.segmentation, made.road, made.routes, made.fit.requested, ())
         draw_scenarios(plan, lambda _: [], count=1, request=Request(target="pet=0..1"))
 
 

@@ -72,7 +72,7 @@ def test_who_crosses_needs_four_arms_and_a_road_of_three_is_refused():
 
 def test_an_arm_that_nobody_uses_is_said():
     _, fit = fitted(made(motion(line(0.0), 8.0, 20.0), motion(line(0.0), 8.0)), "four_way")
-    assert [loss.said for loss in fit.lost] == [
+    assert [loss.message for loss in fit.lost] == [
         "2 of the 4 arms of road four_way are not used: nobody in the template comes or goes there"
     ]
 

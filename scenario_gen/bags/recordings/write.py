@@ -72,7 +72,7 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     messages = RequestMessages(encounter, request, "/gp_sampler", {"template": encounter.name, "road": road.name, **hashes})
     logged = stamp
     for scenario in result.generated.scenarios:
-        for topic, data in messages.of_scenario(scenario, fit.asked, ego):
+        for topic, data in messages.of_scenario(scenario, fit.requested, ego):
             yield topic, data, logged
         yield "markers", scenario_markers(scenario, stamp), logged
         logged += SCENARIO_STEP_NS

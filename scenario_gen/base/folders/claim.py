@@ -160,8 +160,8 @@ def settle(place: Path) -> None:
     Raises:
         InputError: a living process writes to `place`; the message says which.
     """
-    with os.scandir(place.parent) as found:
-        claims = [Path(entry.path) for entry in found if entry.name.startswith(PREFIX) and entry.is_dir(follow_symlinks=False)]
+    with os.scandir(place.parent) as listing:
+        claims = [Path(entry.path) for entry in listing if entry.name.startswith(PREFIX) and entry.is_dir(follow_symlinks=False)]
     for folder in claims:
         with suppress(OSError):  # another user's
             _settle(folder, place)

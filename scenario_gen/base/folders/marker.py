@@ -40,8 +40,8 @@ def finish(folder: Path, kind: Kind) -> None:
 
 def entries(folder: Path, above: str = "") -> Iterator[str]:
     """Yield the relative name of everything below a folder: files, links, and folders (with a slash) that are empty."""
-    with os.scandir(folder) as found:
-        listed = list(found)
+    with os.scandir(folder) as listing:
+        listed = list(listing)
     if above and not listed:
         yield above
     for entry in listed:
@@ -66,19 +66,19 @@ def objection(folder: Path, kind: Kind | None) -> str:
     Raises:
         OSError: it cannot be read.
     """
-    found = sorted(entries(folder))
-    if not found:
+    present = sorted(entries(folder))
+    if not present:
         return ""
     if not is_marked(folder):
         earlier = kind is not None and kind.unmarked(folder)
-        return "" if earlier else f"it holds {found[0]} and is not an earlier result"
+        return "" if earlier else f"it holds {present[0]} and is not an earlier result"
     marker = _read(folder / MARKER)
     if marker is None:
         return f"its {MARKER} is not one that this version writes, so it is not an earlier result"
     if kind is not None and marker["kind"] != kind.name:
         return f"it is a result of another kind ({marker['kind']}, not {kind.name})"
     emptied = {f"{above}/" for file in marker["files"] for above in PurePosixPath(file).parents}  # by a removal cut short
-    for name in found:
+    for name in present:
         if name == MARKER or name in emptied:
             continue
         if name not in marker["files"]:
@@ -99,13 +99,13 @@ def _digest(path: Path) -> str:
 def _read(path: Path) -> dict[str, Any] | None:
     """Return the marker, None if it is not as this version writes it."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError):
         return None
     shape = {"kind": str, "format": int, "files": dict}
-    if not isinstance(found, dict) or found.keys() != shape.keys() or found["format"] != FORMAT:
+    if not isinstance(document, dict) or document.keys() != shape.keys() or document["format"] != FORMAT:
         return None
-    return found if all(isinstance(found[key], of) for key, of in shape.items()) else None
+    return document if all(isinstance(document[key], of) for key, of in shape.items()) else None
 
 
 def sha256_of(path: Path) -> str:

@@ -108,7 +108,7 @@ def _all_of(given: Path) -> list[Path]:
 def _above(place: Path, path: Path) -> bool:
     """Return whether a path is a folder or lies in it, by its name or by the targets of its links."""
     with suppress(OSError, RuntimeError, ValueError):
-        return any(found.is_relative_to(place) for found in (path.resolve(), path.parent.resolve() / path.name))
+        return any(candidate.is_relative_to(place) for candidate in (path.resolve(), path.parent.resolve() / path.name))
     return False
 
 

@@ -56,8 +56,8 @@ def _claimed(place: Path) -> Claim:
 def sweep(folder: Path) -> None:
     """Remove the leftovers of killed processes in a folder, unless they cannot be removed or another process holds them."""
     with suppress(OSError, InputError):
-        with os.scandir(folder) as found:
-            left = any(entry.name.startswith(PREFIX) or entry.name == GUARD for entry in found)
+        with os.scandir(folder) as listing:
+            left = any(entry.name.startswith(PREFIX) or entry.name == GUARD for entry in listing)
         if left:
             with alone(folder, patience=0.0):
                 settle(folder / GUARD)

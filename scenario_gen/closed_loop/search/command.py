@@ -208,7 +208,7 @@ def search_failures(
             findings = findings_of(search, problem, config)
         names = (JSON, PAGE, JUNIT, *((BAG,) if findings else ()))
         result = SearchResult(estimate, findings, request.worst, (*(out / name for name in names), journal_path))
-        _write(folder, result, request, identity, plan.asked)
+        _write(folder, result, request, identity, plan.requested)
     return result
 
 
@@ -231,7 +231,7 @@ def _write(folder: Path, result: SearchResult, request: SearchRequest, identity:
             name: value if isinstance(value, str) else json.dumps(value, ensure_ascii=False) for name, value in identity.items()
         }
         provenance = {f"search.{name}": value for name, value in facts.items()} | versions()
-        delivered = replace(request.planned, fit=replace(fit, asked=asked), generated=drawn, provenance=provenance)
+        delivered = replace(request.planned, fit=replace(fit, requested=asked), generated=drawn, provenance=provenance)
         with BagWriter(folder / BAG) as bag:
             add_results(bag, {"": delivered})
 

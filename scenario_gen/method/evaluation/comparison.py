@@ -62,7 +62,7 @@ def compare(first: Sequence[Evaluation], second: Sequence[Evaluation], row: str 
         InputError: the sets have no case in common, or one has none of that row.
     """
     others = {(evaluation.encounter, evaluation.road): evaluation for evaluation in second}
-    found: list[Difference] = []
+    differences: list[Difference] = []
     for own in first:
         other = others.get((own.encounter, own.road))
         if other is None:
@@ -73,10 +73,10 @@ def compare(first: Sequence[Evaluation], second: Sequence[Evaluation], row: str 
         for metric in own.metrics:
             pair = mine.values.get(metric.id), theirs.values.get(metric.id)
             if any(pair):
-                found.append(Difference(own.encounter, own.road, metric, *pair, (own.changepoints, other.changepoints)))
-    if not found:
+                differences.append(Difference(own.encounter, own.road, metric, *pair, (own.changepoints, other.changepoints)))
+    if not differences:
         raise InputError("the two sets have no encounter on the same road in common")
-    return tuple(found)
+    return tuple(differences)
 
 
 def comparison_table(differences: Sequence[Difference], names: tuple[str, str] = ("A", "B")) -> str:

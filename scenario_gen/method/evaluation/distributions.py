@@ -51,20 +51,20 @@ def values_of(motion: Motion) -> dict[str, Floats]:
     there, a gap while both are.
     """
     width = max(1, round(SMOOTHING / motion.dt))
-    found: dict[str, list[Floats]] = {quantity.id: [np.zeros(0)] for quantity in QUANTITIES}
+    samples: dict[str, list[Floats]] = {quantity.id: [np.zeros(0)] for quantity in QUANTITIES}
     for n in range(len(motion.vehicles)):
         own = motion.own(n)
         speed, heading = motion.speed[n, own], motion.heading[n, own]
         acceleration = np.gradient(speed, motion.dt)
         sums = np.concatenate([np.zeros(1), np.cumsum(acceleration)])
         smooth = (sums[width:] - sums[:-width]) / width
-        found["speed"].append(speed)
-        found["acceleration"].append(acceleration)
-        found["jerk"].append(np.diff(smooth) / motion.dt)
-        found["yaw_rate"].append(np.gradient(heading, motion.dt))
+        samples["speed"].append(speed)
+        samples["acceleration"].append(acceleration)
+        samples["jerk"].append(np.diff(smooth) / motion.dt)
+        samples["yaw_rate"].append(np.gradient(heading, motion.dt))
     for a, b in combinations(range(len(motion.vehicles)), 2):
-        found["gap"].append(footprint_distance(motion, a, b)[motion.together(a, b)])
-    return {name: np.concatenate(values) for name, values in found.items()}
+        samples["gap"].append(footprint_distance(motion, a, b)[motion.together(a, b)])
+    return {name: np.concatenate(values) for name, values in samples.items()}
 
 
 @dataclass(frozen=True, eq=False)

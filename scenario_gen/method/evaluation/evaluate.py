@@ -97,7 +97,7 @@ def evaluate_scenarios(
     ids = shared_vehicles(encounter, rows)
     template = Template(encounter, ids, steps, next(iter(rows.get(oracle, ())), None), config, seed)
     own = _template_row(template)
-    found = [_row(name, sizes[name], Samples(scenarios, counts.get(name), template)) for name, scenarios in rows.items()]
+    evaluated = [_row(name, sizes[name], Samples(scenarios, counts.get(name), template)) for name, scenarios in rows.items()]
     return Evaluation(
         encounter=encounter.name,
         road=road,
@@ -108,7 +108,7 @@ def evaluate_scenarios(
         resamples=config.resamples,
         seed=seed,
         metrics=catalogue(),
-        rows=(own, *found),
+        rows=(own, *evaluated),
     )
 
 

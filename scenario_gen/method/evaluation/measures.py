@@ -67,7 +67,7 @@ def measure(scenario: Scenario | Encounter, name: str, pair: Pair | None = None)
 def figures_of(scenario: Scenario | Encounter) -> tuple[PairFigures, ...]:
     """Return all figures of every pair of vehicles that are there together; `arrival_gap` without sign."""
     motion = at_period(scenario, PERIOD)
-    found = []
+    figures = []
     for a, b in combinations(range(len(motion.vehicles)), 2):
         both = motion.together(a, b)
         if both.stop - both.start < 2:
@@ -78,8 +78,8 @@ def figures_of(scenario: Scenario | Encounter) -> tuple[PairFigures, ...]:
             first = conflict.first
             pet, arrival = conflict.encroachment, conflict.arrival_gap
         ttc, gap = _figure(motion, "ttc", a, b), _figure(motion, "gap", a, b)
-        found.append(PairFigures((a, b), first, pet, arrival, ttc, gap, _closing_speed(motion, a, b, conflict)))
-    return tuple(found)
+        figures.append(PairFigures((a, b), first, pet, arrival, ttc, gap, _closing_speed(motion, a, b, conflict)))
+    return tuple(figures)
 
 
 def most_critical(figures: Sequence[PairFigures]) -> PairFigures | None:

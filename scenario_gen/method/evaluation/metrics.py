@@ -175,13 +175,13 @@ DISTRIBUTIONS = MetricGroup(
 
 def _criticality(samples: Samples) -> Estimates:
     template, mean = samples.template.critical, samples.bootstrap.mean
-    found = [criticality(motion, samples.template.config.ttc_horizon) for motion in samples.periodic]
-    vanished = np.array([float(critical.vanished_of(template)) for critical in found])
+    per_scenario = [criticality(motion, samples.template.config.ttc_horizon) for motion in samples.periodic]
+    vanished = np.array([float(critical.vanished_of(template)) for critical in per_scenario])
     return {
-        "min_distance": mean(np.array([critical.min_distance for critical in found])),
-        "min_ttc": mean(np.array([critical.min_ttc for critical in found])),
-        "pet": mean(np.array([critical.pet for critical in found])),
-        "order_kept": mean(np.array([critical.keeps_order_of(template) for critical in found])),
+        "min_distance": mean(np.array([critical.min_distance for critical in per_scenario])),
+        "min_ttc": mean(np.array([critical.min_ttc for critical in per_scenario])),
+        "pet": mean(np.array([critical.pet for critical in per_scenario])),
+        "order_kept": mean(np.array([critical.keeps_order_of(template) for critical in per_scenario])),
         "conflicts": mean(len(template.order) - vanished),
         "vanished_conflicts": mean(vanished),
     }

@@ -112,20 +112,20 @@ class Samples:
         template, steps = self.template.motion, self.template.steps
         throughout = all(motion.always for motion in (template, *self.motions))
         whole = stacked(self.motions)
-        found = []
+        pairs = []
         for a, b in combinations(range(len(template.vehicles)), 2):
             if throughout:
                 rows = [a, b]
                 own = template.position[rows], template.speed[rows], template.heading[rows]
-                found.append(VehiclePair(own, tuple(values[:, rows] for values in whole)))
+                pairs.append(VehiclePair(own, tuple(values[:, rows] for values in whole)))
                 continue
             names = template.vehicles[a].id, template.vehicles[b].id
             sources: list[Encounter | Scenario] = [self.template.encounter, *self.scenarios]
             common = [motion for source in sources if (motion := at_common(source, names, steps)) is not None]
             if len(common) == len(sources):
                 own = common[0].position, common[0].speed, common[0].heading
-                found.append(VehiclePair(own, stacked(common[1:])))
-        return tuple(found)
+                pairs.append(VehiclePair(own, stacked(common[1:])))
+        return tuple(pairs)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,7 @@
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.fit import fit_template
 from scenario_gen.method.fitting.kept import LostConflictError
-from scenario_gen.types import Fit, FittedVehicle
 
 __all__ = [
-    "Fit", "FittedVehicle", "FittingConfig", "LostConflictError", "fit_template",
+    "FittingConfig", "LostConflictError", "fit_template",
 ]  # fmt: skip

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""From a placement to a fit: anchors at the changepoints, repaired where they have no room, and the states asked for."""
+"""From a placement to a fit: anchors at the changepoints, repaired where they have no room, and the requested states."""
 
 from itertools import pairwise
 
@@ -44,10 +44,10 @@ def finish(
         stands = _stands(track, index)
         progress = _snapped(track, index, stands)
         anchors = track.curve.at(progress)
-        wanted = np.zeros(2, dtype=np.bool_) if given is None else np.isfinite(given[i, :, 0])
-        if given is not None and wanted[0]:
+        given_ends = np.zeros(2, dtype=np.bool_) if given is None else np.isfinite(given[i, :, 0])
+        if given is not None and given_ends[0]:
             anchors[progress == progress[0]] = given[i, 0, :3]
-        if given is not None and wanted[1] and not track.still:
+        if given is not None and given_ends[1] and not track.still:
             anchors[progress == progress[-1]] = given[i, 1, :3]
         anchors, moved, sentences = _repaired(road, track, anchors, progress, [float(t) for t in index * encounter.dt], config)
         notes += sentences
@@ -63,7 +63,7 @@ def finish(
         ends = encounter.speed[i, [0, last]] * placement.scale[i]
         ends = np.where(ends < STAND_SPEED, 0.0, ends)
         if given is not None:
-            ends = np.where(wanted, given[i, :, 3], ends)
+            ends = np.where(given_ends, given[i, :, 3], ends)
         ends = np.where(track.still, 0.0, ends)
         states.append(np.column_stack((anchors[[0, -1]], ends)))
     requested = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))

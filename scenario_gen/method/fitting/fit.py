@@ -49,17 +49,17 @@ def fit_template(
         config: which way, and how far things may be scaled and moved.
         starts: (N, 3) or (N, 4) given start poses x [m], y [m], yaw [rad], and speeds [m/s] of all vehicles; with `goals`.
         goals: likewise the end.
-        request: the start and end states that are asked for, of some vehicles; the others are the road's own placement.
+        request: the start and end states that are requested, of some vehicles; the others are the road's own placement.
         max_speed: [m/s] that no asked state may exceed.
 
     Raises:
         LostConflictError: the best place on the road loses a conflict of the template, and `config.allow` does not name that.
-        RefusedError: it does not fit, or a state that is asked for cannot be had; the message says why, with figures.
+        RefusedError: it does not fit, or a requested state cannot be had; the message says why, with figures.
         InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
     """
     request.ego_of(encounter)  # no such vehicle: refused before anything is placed
     if request.moves:
-        return _fit_asked(encounter, segmentation, road, config, request, max_speed)
+        return _fit_request(encounter, segmentation, road, config, request, max_speed)
     if starts is not None or goals is not None:
         placement, given = place_given(encounter, road, config, starts, goals)
         return finish(encounter, segmentation, road, placement, config, given)
@@ -70,7 +70,7 @@ def fit_template(
     return fit
 
 
-def _fit_asked(
+def _fit_request(
     encounter: Encounter, segmentation: Segmentation, road: Road, config: FittingConfig, request: Request, max_speed: float
 ) -> Fit:
     starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))

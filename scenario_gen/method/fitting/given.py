@@ -67,18 +67,18 @@ def place_given(
     """
     tracks = clean_tracks(encounter)
     states = np.stack((_states("starts", starts, encounter, 0, base), _states("goals", goals, encounter, -1, base)), axis=1)
-    wanted = np.asarray(np.isfinite(states[..., 0]))
-    ends = states if base is None else np.where(wanted[..., None], states, _ends_of(base, encounter))
-    given = np.where(np.any(wanted, axis=1, keepdims=True)[..., None], ends, np.nan)
+    has_state = np.asarray(np.isfinite(states[..., 0]))
+    ends = states if base is None else np.where(has_state[..., None], states, _ends_of(base, encounter))
+    given = np.where(np.any(has_state, axis=1, keepdims=True)[..., None], ends, np.nan)
     joint = _joint_similarity(tracks, ends)
     rows, notes = [], []
     for n, track in enumerate(tracks):
-        if base is not None and not wanted[n].any():
+        if base is not None and not has_state[n].any():
             rows.append((base.tracks[n], base.scale[n], base.manoeuvre[n], base.moved[n]))
             continue
         placed, scale, how = _place(track, ends[n], joint, road, config)
         rows.append((placed, scale, "wait" if track.still else _name(placed), 0.0))
-        which = "start and goal" if wanted[n].all() else "start" if wanted[n, 0] else "goal"
+        which = "start and goal" if has_state[n].all() else "start" if has_state[n, 0] else "goal"
         notes.append(f"vehicle {track.vehicle.id}: {which} as given, {how}")
     on_road, scales, manoeuvres, moves = zip(*rows, strict=True)
     sentences = (*(() if base is None else base.notes), *notes)

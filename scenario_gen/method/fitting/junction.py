@@ -109,7 +109,7 @@ def _misfit_reason(choice: Choice, scale: float) -> str:
 def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[Way]]:
     """The drawn routes that suit each vehicle's turning; vehicles of about one size and sharpness share theirs."""
     drawn: dict[tuple[float, float, float, bool], list[Way]] = {}
-    found = []
+    ways = []
     for track in tracks:
         sharpness = float(exact.exp(round(float(exact.log(sharpness_of(track))) / _SHARPNESS_STEP) * _SHARPNESS_STEP))
         size = (np.ceil(2.0 * track.vehicle.length) / 2.0, np.ceil(10.0 * track.vehicle.width) / 10.0)
@@ -117,8 +117,8 @@ def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[Way]]:
         if key not in drawn:
             stop_if_cancelled()
             drawn[key] = _all_ways(Vehicle("", *size), road, u_turns=track.makes_u_turn, sharpness=sharpness)
-        found.append([way for way in drawn[key] if _suits(track, way)])
-    return found
+        ways.append([way for way in drawn[key] if _suits(track, way)])
+    return ways
 
 
 def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool, sharpness: float | None = None) -> list[Way]:
@@ -152,13 +152,13 @@ def _search(tracks: tuple[Track, ...], ways: list[list[Way]], relations: tuple[R
     """Assignments, solved, the best first."""
     solver = Solver(tracks, relations, scale)
     tracks_on = _Laying(tracks, ways, scale).best(solver)
-    found: dict[tuple[int, ...], Choice] = {}
+    choices: dict[tuple[int, ...], Choice] = {}
 
     def solved(chosen: tuple[int, ...]) -> Choice:
-        if chosen not in found:
+        if chosen not in choices:
             stop_if_cancelled()
-            found[chosen] = solver.solve({i: ways[i][k] for i, k in enumerate(chosen)})
-        return found[chosen]
+            choices[chosen] = solver.solve({i: ways[i][k] for i, k in enumerate(chosen)})
+        return choices[chosen]
 
     best = min((chosen for chosen, _ in tracks_on), key=lambda chosen: round(solved(chosen).cost, 6))
     order = dict(tracks_on)[best]
@@ -168,7 +168,7 @@ def _search(tracks: tuple[Track, ...], ways: list[list[Way]], relations: tuple[R
         if round(solved(other).cost, 6) >= round(solved(best).cost, 6):
             break
         best = other
-    return sorted(found.values(), key=lambda choice: (bool(_misfit_reason(choice, scale)), round(choice.cost, 6)))
+    return sorted(choices.values(), key=lambda choice: (bool(_misfit_reason(choice, scale)), round(choice.cost, 6)))
 
 
 class _Laying:
@@ -206,7 +206,7 @@ class _Laying:
                 rigid = solver.align({i: way}, {i: start}, [i])
                 motions.append(np.array([*rigid.of(self.middle[None])[0], rigid.yaw]))  # where the middle goes, and the rotation
         rated = sorted(((self._rated(motion)[0], k) for k, motion in enumerate(motions)), key=lambda r: (round(r[0], 6), r[1]))
-        found: dict[tuple[int, ...], tuple[float, list[list[int]]]] = {}
+        matches: dict[tuple[int, ...], tuple[float, list[list[int]]]] = {}
         for _, k in rated[:_LAID]:
             motion = motions[k]
             for _ in range(_ROUNDS):
@@ -214,11 +214,11 @@ class _Laying:
                 motion = self._refined(motion, nearest)
             cost, nearest = self._rated(motion)
             chosen = tuple(int(np.argmin(costs)) for costs, _, _ in nearest)
-            if chosen not in found or cost < found[chosen][0]:
+            if chosen not in matches or cost < matches[chosen][0]:
                 others = [[int(w) for w in np.argsort(np.round(costs, 6), kind="stable")[1:]] for costs, _, _ in nearest]
-                found[chosen] = cost, others
-        order = sorted(found, key=lambda chosen: (round(found[chosen][0], 6), chosen))
-        return [(chosen, found[chosen][1]) for chosen in order[:_SOLVED]]
+                matches[chosen] = cost, others
+        order = sorted(matches, key=lambda chosen: (round(matches[chosen][0], 6), chosen))
+        return [(chosen, matches[chosen][1]) for chosen in order[:_SOLVED]]
 
     def _rated(self, motion: Floats) -> tuple[float, list[tuple[Floats, Floats, Floats]]]:
         """The cost of a motion [m²]; for each vehicle the cost of its ways (W,), how far it is beside them and where (W, K)."""

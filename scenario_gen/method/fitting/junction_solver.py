@@ -79,9 +79,9 @@ class Solver:
         lost = 0
         for k, relation in enumerate(self.relations):
             if relation.a in ways and relation.b in ways:
-                found = self._equations(k, relation, ways[relation.a], ways[relation.b])
-                lost += found is None
-                system.extend(found or ())
+                equations = self._equations(k, relation, ways[relation.a], ways[relation.b])
+                lost += equations is None
+                system.extend(equations or ())
         for i in members:  # who turns does so where the way turns
             if abs(self._turn(i)) > _TURNS and abs(ways[i].turn) > _TURNS:
                 key = (i, id(ways[i]))
@@ -101,10 +101,10 @@ class Solver:
             rigid = self.align(ways, start, members)
         return self._checked(ways, start, lost, rigid)
 
-    def _equations(self, k: int, relation: Relation, one: Way, two: Way) -> tuple[Equation, ...] | None:
-        key = (k, id(one), id(two))
+    def _equations(self, k: int, relation: Relation, first: Way, second: Way) -> tuple[Equation, ...] | None:
+        key = (k, id(first), id(second))
         if key not in self.cache:
-            self.cache[key] = equations(relation, one.curve, two.curve, self.scale)
+            self.cache[key] = equations(relation, first.curve, second.curve, self.scale)
         return self.cache[key]
 
     def _turn(self, i: int) -> float:

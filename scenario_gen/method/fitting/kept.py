@@ -34,7 +34,7 @@ def refuse_lost_conflicts(lost: Iterable[Loss], road: str) -> None:
     Raises:
         LostConflictError: one is; it names the vehicles, and how it can be had all the same.
     """
-    lost_here = [loss.said for loss in lost if loss.kind == CONFLICT]
+    lost_here = [loss.message for loss in lost if loss.kind == CONFLICT]
     if lost_here:
         message = "; ".join(lost_here)
         raise LostConflictError(
@@ -163,11 +163,11 @@ def _lost_neighbours(encounter: Encounter, own: Floats, poses: Floats) -> list[L
     return lost
 
 
-def _side(one: Floats, other: Floats, reach: float, wider: float = 0.0) -> Ints:
-    """(T,) 1 where `other` (T, 3) is to the left of `one`, side by side and the same way, -1 to the right, 0 elsewhere."""
-    d = other[:, :2] - one[:, :2]
-    cos, sin = exact.cos(one[:, 2]), exact.sin(one[:, 2])
+def _side(path: Floats, other: Floats, reach: float, wider: float = 0.0) -> Ints:
+    """(T,) 1 where `other` (T, 3) is to the left of `path`, side by side and the same way, -1 to the right, 0 elsewhere."""
+    d = other[:, :2] - path[:, :2]
+    cos, sin = exact.cos(path[:, 2]), exact.sin(path[:, 2])
     ahead, left = d[:, 0] * cos + d[:, 1] * sin, d[:, 1] * cos - d[:, 0] * sin
-    same = np.abs(wrap_angle(other[:, 2] - one[:, 2])) < _SAME_WAY
+    same = np.abs(wrap_angle(other[:, 2] - path[:, 2])) < _SAME_WAY
     beside = same & (np.abs(ahead) < reach) & (np.abs(left) > _NEAREST) & (np.abs(left) < _FARTHEST + wider)
     return np.where(beside, np.sign(left), 0.0).astype(np.int64)

@@ -56,11 +56,11 @@ def place_along_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConf
             if fitting:
                 break
         if not fitting:
-            found = "; ".join(f"{len(a.ahead)} and {len(a.against)}" for a in axes)
-            if found:
+            counts = "; ".join(f"{len(a.ahead)} and {len(a.against)}" for a in axes)
+            if counts:
                 reasons.append(
                     f"road {road.name} has no way through with the lanes that the template needs "
-                    f"({needed[1]} one way, {needed[-1]} the other; found: {found})"
+                    f"({needed[1]} one way, {needed[-1]} the other; found: {counts})"
                 )
             continue
         for axis in sorted(fitting, key=lambda a: -round(a.line.length, 1)):
@@ -151,11 +151,11 @@ def _bent_axes(road: Road, main: MainLine) -> list[_Axis]:
             entry, leave = reverse(a.pose), b.pose
             if a is b or (main.straight and abs(wrap_angle(np.asarray(leave[2] - entry[2]))) < _PARALLEL):
                 continue
-            found = line_between(main.shape, entry, leave)
-            if found is not None:
+            line = line_between(main.shape, entry, leave)
+            if line is not None:
                 ahead = [-k for k in a.inward if np.abs(b.outward - -k).min(initial=np.inf) < _COLLINEAR]
                 against = [k for k in b.inward if np.abs(-a.outward - k).min(initial=np.inf) < _COLLINEAR]
-                axes.append(_Axis(found[0], frozen(sorted(ahead, reverse=True)), frozen(sorted(against)), found[1]))
+                axes.append(_Axis(line[0], frozen(sorted(ahead, reverse=True)), frozen(sorted(against)), line[1]))
     return axes
 
 

@@ -49,8 +49,8 @@ class Equation:
 
 def find_relations(tracks: tuple[Track, ...]) -> tuple[Relation, ...]:
     """One relation for each pair that shares a lane or crosses."""
-    found = (_relation(a, tracks[a], b, tracks[b]) for a, b in combinations(range(len(tracks)), 2))
-    return tuple(relation for relation in found if relation is not None)
+    relations = (_relation(a, tracks[a], b, tracks[b]) for a, b in combinations(range(len(tracks)), 2))
+    return tuple(relation for relation in relations if relation is not None)
 
 
 def _relation(a: int, one: Track, b: int, two: Track) -> Relation | None:
@@ -77,33 +77,33 @@ def _on_path(pose: Floats, track: Track) -> float | None:
     return s if on else None
 
 
-def equations(relation: Relation, one: Curve, two: Curve, scale: float) -> tuple[Equation, ...] | None:
+def equations(relation: Relation, first: Curve, second: Curve, scale: float) -> tuple[Equation, ...] | None:
     """The relation on two routes as equations, or None if these routes do not have it."""
     a, b, la, lb = relation.a, relation.b, scale * relation.at_a, scale * relation.at_b
-    starts, ends = (float(exact.hypot(*(one.points[k, :2] - two.points[k, :2]))) for k in (0, -1))
+    starts, ends = (float(exact.hypot(*(first.points[k, :2] - second.points[k, :2]))) for k in (0, -1))
     if relation.kind is Kind.SHARED_START:
         return None if starts > _SAME_END else (Equation(((a, 1.0), (b, -1.0)), lb - la, 2.0),)
     if relation.kind is Kind.SHARED_END:
         if ends > _SAME_END or starts <= _SAME_END:  # they come from different lanes
             return None
-        return (Equation(((a, 1.0), (b, -1.0)), (one.length - la) - (two.length - lb), 1.0),)
-    found = crossings(one, two, _ANGLE)
+        return (Equation(((a, 1.0), (b, -1.0)), (first.length - la) - (second.length - lb), 1.0),)
+    found = crossings(first, second, _ANGLE)
     if len(found) == 0:
-        found = _merging(one, two)
+        found = _merging(first, second)
     if len(found) == 0:
         return None
     at_a, at_b = found[len(found) // 2]
     return (Equation(((a, 1.0),), float(at_a) - la, 1.0), Equation(((b, 1.0),), float(at_b) - lb, 1.0))
 
 
-def _merging(one: Curve, two: Curve) -> Floats:
+def _merging(first: Curve, second: Curve) -> Floats:
     """(1, 2) stations from which on two routes run in one lane, as in a roundabout; (0, 2) if they never do so."""
-    s = np.arange(0.0, one.length, 1.0)
-    poses = one.at(s)
-    station, offset = two.project(poses[:, :2])
-    same = (np.abs(offset) < 1.0) & (np.abs(wrap_angle(two.at(station)[:, 2] - poses[:, 2])) < _SAME_WAY)
-    same &= (station > 0.0) & (station < two.length)
+    s = np.arange(0.0, first.length, 1.0)
+    poses = first.at(s)
+    station, offset = second.project(poses[:, :2])
+    same = (np.abs(offset) < 1.0) & (np.abs(wrap_angle(second.at(station)[:, 2] - poses[:, 2])) < _SAME_WAY)
+    same &= (station > 0.0) & (station < second.length)
     if not same.any() or same[0]:
         return np.zeros((0, 2))
-    first = int(np.argmax(same))
-    return np.array([[s[first], station[first]]])
+    begins = int(np.argmax(same))
+    return np.array([[s[begins], station[begins]]])

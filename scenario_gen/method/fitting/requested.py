@@ -18,7 +18,7 @@ NAMES = {"starts": "start", "goals": "goal"}
 
 
 def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: Floats, max_speed: float) -> None:
-    """Refuse states, (N, 4) each with NaN where none is asked, that no motion can have.
+    """Refuse states, (N, 4) each with NaN where none is requested, that no motion can have.
 
     Raises:
         RefusedError: one is faster than `max_speed` [m/s], or off the road; with figures.
@@ -37,12 +37,12 @@ def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: F
 
 
 def refuse_misfits(fit: Fit, starts: Floats, goals: Floats) -> None:
-    """Refuse asked states, (N, 4) each with NaN where none is asked, that do not go with others or with the template's motion.
+    """Refuse requested states, (N, 4) each, NaN where there is none, that do not go with others or with the template's motion.
 
     Raises:
         RefusedError: two footprints overlap at the start or the end, or a vehicle that stands there is asked to drive.
     """
-    for name, rows, states, first in (("starts", starts, fit.asked.start, True), ("goals", goals, fit.asked.end, False)):
+    for name, rows, states, first in (("starts", starts, fit.requested.start, True), ("goals", goals, fit.requested.end, False)):
         requested = ~np.isnan(rows[:, 0])
         for (i, a), (j, b) in combinations(enumerate(fit.vehicles), 2):
             gap = float(footprint_gap(a, states[[i], :3], b, states[[j], :3])[0][0])

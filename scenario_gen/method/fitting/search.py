@@ -53,8 +53,8 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
     best: tuple[float, Placement] | None = None
     reason = f"the template ({np.ptp(discs, axis=0).max():.0f} m) is larger than the map"
     for scale in filter(config.accepts, SCALES):
-        found = sorted(_coarse(discs, road, required, scale), key=_order)[:_KEPT]
-        for motion in sorted((_refined(discs, road, required, motion) for motion in found), key=_order):
+        placements = sorted(_coarse(discs, road, required, scale), key=_order)[:_KEPT]
+        for motion in sorted((_refined(discs, road, required, motion) for motion in placements), key=_order):
             stop_if_cancelled()
             try:
                 placement, share, farthest = _tried(tracks, centre, motion, road, config)

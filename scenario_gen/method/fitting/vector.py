@@ -29,15 +29,15 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     network = road.lanes
     if network is None:
         raise RefusedError(f"road {road.name} has no lanes")
-    reason, second = "", None
+    reason, fallback = "", None
     scales = list(filter(config.accepts, SCALES))
-    for tried, (one, scale) in enumerate(placements(network, tracks, scales=scales)):
-        if tried >= (_TRIED if second is None else _MORE):
+    for tried, (match, scale) in enumerate(placements(network, tracks, scales=scales)):
+        if tried >= (_TRIED if fallback is None else _MORE):
             break
-        notes = [*network.notes, *(_note(c, t, network) for c, t in zip(one.courses, tracks, strict=True))]
+        notes = [*network.notes, *(_note(c, t, network) for c, t in zip(match.courses, tracks, strict=True))]
         if scale != 1.0:
             notes.append(f"scaled by {scale:g} to fit the lanes")
-        placement = Placement.of(tracks_on(one, tracks, scale), scale, notes, map(_manoeuvre, one.courses))
+        placement = Placement.of(tracks_on(match, tracks, scale), scale, notes, map(_manoeuvre, match.courses))
         try:
             placement = separated(placement, config, sideways=0.0)
             max_repair(placement.tracks, road, config.max_move)
@@ -46,9 +46,9 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
             continue
         if keeps_conflicts(tracks, placement.tracks):
             return placement
-        second = second or placement
-    if second is not None:
-        return second
+        fallback = fallback or placement
+    if fallback is not None:
+        return fallback
     raise RefusedError(f"the template does not fit the lanes of road {road.name}: {reason}")
 
 

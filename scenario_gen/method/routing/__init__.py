@@ -15,9 +15,8 @@ from scenario_gen.method.routing.search.planner import (
     Query,
 )
 from scenario_gen.method.routing.search.rrt_star_connect import PAPER
-from scenario_gen.types import Route
 
 __all__ = [
-    "PAPER", "Budget", "BudgetSpentError", "MakePlanner", "Plan", "Planner", "PlanningConfig", "Query", "Route", "check_query",
+    "PAPER", "Budget", "BudgetSpentError", "MakePlanner", "Plan", "Planner", "PlanningConfig", "Query", "check_query",
     "deviations", "make_planner", "plan_routes", "plan_with_retry",
 ]  # fmt: skip

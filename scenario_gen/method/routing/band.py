@@ -77,7 +77,7 @@ def _bending(points: Floats, ends: Floats, spacing: float, i: int) -> tuple[floa
 @kernel(I, F2, F, F2, F1, F2, F1, F2, F1, F2, F1, F, F, F, OUT1, OUT1, OUT2)
 def relax(
     steps: int, field: Floats, resolution: float, reference: Floats, hold: Floats, anchor: Floats, pull: Floats,
-    ends: Floats, disc: Floats, need: Floats, wish: Floats, spacing: float, bend: float, limit: float,
+    ends: Floats, disc: Floats, required: Floats, wish: Floats, spacing: float, bend: float, limit: float,
     stiff: Floats, push: Floats, points: Floats,
 ) -> None:  # fmt: skip
     """Relax a band of M >= 6 points between two fixed poses; lengths in metres from the grid's corner.
@@ -96,7 +96,7 @@ def relax(
         pull: (M,) its weight, 0 where there is no anchor.
         ends: (2, 2) unit vectors of the headings at the first and the last point.
         disc: (D,) offsets along the heading of the discs that cover the footprint.
-        need: (M, D) clearance that each disc's centre must have: where it lacks, the push becomes ever stronger.
+        required: (M, D) clearance that each disc's centre must have: where it lacks, the push becomes ever stronger.
         wish: (M,) clearance that they should have: it only pushes.
         spacing: distance between two points.
         bend: weight of bending [m^4].
@@ -107,16 +107,16 @@ def relax(
     """
     n = points.shape[0]
     matrix, right = np.empty((n, 4)), np.empty((n, 2))
-    one, row = np.ones(1), np.empty(3)
+    unit, row = np.ones(1), np.empty(3)
     second, third = np.array([1.0, -2.0, 1.0]), np.array([-1.0, 3.0, -3.0, 1.0])
     first_third, last_third = np.array([3.0, -4.0, 1.0]), np.array([1.0, -4.0, 3.0])
     curve, twist = bend / spacing**4, bend / spacing**6
     for _ in range(steps):
         matrix[:], right[:] = 0.0, 0.0
         for i in range(n):
-            _add(matrix, right, i, one, 1, hold[i], reference[i, 0], reference[i, 1])
-            _add(matrix, right, i, one, 1, pull[i], anchor[i, 0], anchor[i, 1])
-            _add(matrix, right, i, one, 1, DAMPING, points[i, 0], points[i, 1])
+            _add(matrix, right, i, unit, 1, hold[i], reference[i, 0], reference[i, 1])
+            _add(matrix, right, i, unit, 1, pull[i], anchor[i, 0], anchor[i, 1])
+            _add(matrix, right, i, unit, 1, DAMPING, points[i, 0], points[i, 1])
             if i + 2 < n:
                 _add(matrix, right, i, second, 3, stiff[i + 1] * curve, 0.0, 0.0)
             if i + 3 < n:
@@ -129,21 +129,21 @@ def relax(
                     x, y = points[i, 0] + disc[k] * tx / norm, points[i, 1] + disc[k] * ty / norm
                     room, gx, gy = _clearance_at(field, x / resolution, y / resolution)
                     slope = np.sqrt(gx * gx + gy * gy)
-                    wanted = need[i, k] if room < need[i, k] else wish[i]
-                    if room < wanted and slope > 1e-9:
-                        away = (wanted - room) / slope
+                    aim = required[i, k] if room < required[i, k] else wish[i]
+                    if room < aim and slope > 1e-9:
+                        away = (aim - room) / slope
                         row[0], row[1], row[2] = -disc[k] / norm, 1.0, disc[k] / norm
-                        weight = push[i] if room < need[i, k] else WISH_WEIGHT
+                        weight = push[i] if room < required[i, k] else WISH_WEIGHT
                         _add(matrix, right, i - 1, row, 3, weight, x + away * gx, y + away * gy)
-                        if room < need[i, k]:
-                            worst = max(worst, (need[i, k] - room) / need[i, k])
+                        if room < required[i, k]:
+                            worst = max(worst, (required[i, k] - room) / required[i, k])
                 push[i] = min(push[i] * (1.0 + worst), STRONG)
         for side in range(2):  # the ends: position, and heading through the mirrored point
             i, inner = (0, 1) if side == 0 else (n - 1, n - 2)
             sign = spacing if side == 0 else -spacing
             hx, hy = sign * ends[side, 0], sign * ends[side, 1]
-            _add(matrix, right, i, one, 1, PINNED, points[i, 0], points[i, 1])
-            _add(matrix, right, inner, one, 1, 4.0 * stiff[i] * curve, points[i, 0] + hx, points[i, 1] + hy)
+            _add(matrix, right, i, unit, 1, PINNED, points[i, 0], points[i, 1])
+            _add(matrix, right, inner, unit, 1, 4.0 * stiff[i] * curve, points[i, 0] + hx, points[i, 1] + hy)
             edge, first = (first_third, 0) if side == 0 else (last_third, n - 3)
             _add(matrix, right, first, edge, 3, (stiff[i] + stiff[inner]) * twist, -2.0 * hx, -2.0 * hy)
         _solve(matrix, right)

@@ -11,7 +11,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import Registry
 from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
 from scenario_gen.method.routing.search.planner import Planner
-from scenario_gen.method.routing.search.pose_planner import PoseSearchConfig
+from scenario_gen.method.routing.search.pose_planner import PoseRrtStarConnect, PoseSearchConfig
 from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig
 
 
@@ -23,8 +23,12 @@ class MakePlanner(Protocol):
         ...
 
 
-def _rrt_star_connect(config: "PlanningConfig") -> Planner:
-    return RrtStarConnect(config.rrt_star_connect)
+class PaperPlanner(RrtStarConnect):
+    """RRT*-Connect: in the plane for a disc, and from pose to pose for the vehicle itself."""
+
+    def __init__(self, config: "PlanningConfig") -> None:
+        super().__init__(config.rrt_star_connect)
+        self.plan_poses = PoseRrtStarConnect(config.pose).plan
 
 
 def _ompl(name: str, config: "PlanningConfig") -> Planner:
@@ -34,7 +38,7 @@ def _ompl(name: str, config: "PlanningConfig") -> Planner:
 _OF_OMPL = ("ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star")
 PLANNERS = Registry[MakePlanner](
     "scenario_gen.planners",
-    {"rrt_star_connect": _rrt_star_connect, **{name: partial(_ompl, name) for name in _OF_OMPL}},
+    {"rrt_star_connect": PaperPlanner, **{name: partial(_ompl, name) for name in _OF_OMPL}},
 )
 """The geometric planners by name."""
 

@@ -13,8 +13,8 @@ def farthest(points: Floats, path: Floats) -> float:
     """Largest distance [m] between two polylines (M, 2 or more), from a point of either to the other; NaN: there is no path."""
     if not len(path):
         return float("nan")
-    one, other = points[:, :2], path[:, :2]
-    return max(float(distances_to_line(one, other).max()), float(distances_to_line(other, one).max()))
+    line, other = points[:, :2], path[:, :2]
+    return max(float(distances_to_line(line, other).max()), float(distances_to_line(other, line).max()))
 
 
 def distances_to_line(points: Floats, line: Floats) -> Floats:

@@ -23,7 +23,7 @@ from scenario_gen.method.routing.search.planner import (  # fmt: skip
     Planner,
     Query,
 )
-from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, Wishes
+from scenario_gen.method.routing.search.pose_planner import PlansPoses, PoseQuery, Wishes
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
 from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
@@ -141,13 +141,13 @@ def _route(task: _Task) -> Route:
     failed: RefusedError | None = None
     for share in TIGHTEST:
         try:
-            found = _smoothed(replace(task, tightest=share), waypoints)
+            smoothed = _smoothed(replace(task, tightest=share), waypoints)
         except RefusedError as error:  # none is found as gentle as that
             raise failed or error from None
-        if isinstance(found, Route):
-            return found
-        failed = failed or found.reason
-        if not found.searched:
+        if isinstance(smoothed, Route):
+            return smoothed
+        failed = failed or smoothed.reason
+        if not smoothed.searched:
             break
     assert failed is not None
     raise failed
@@ -210,15 +210,15 @@ def _legs(task: _Task, waypoints: list[int]) -> tuple[list[_Leg], list[int], tup
             if len(kept) == 2:
                 raise
         ends = [w for w in (kept[k], kept[k + 1]) if w not in (kept[0], kept[-1])]
-        hard = next((w for w in ends if w not in eased), None)
-        if hard is None:
-            hard = ends[-1]
-            at = kept.index(hard)
-            kept.remove(hard)
+        failing = next((w for w in ends if w not in eased), None)
+        if failing is None:
+            failing = ends[-1]
+            at = kept.index(failing)
+            kept.remove(failing)
         else:
-            at = kept.index(hard)
-            eased.add(hard)
-            poses[hard] = _eased(task, poses[kept[at - 1]], poses[hard], poses[kept[at + 1]])
+            at = kept.index(failing)
+            eased.add(failing)
+            poses[failing] = _eased(task, poses[kept[at - 1]], poses[failing], poses[kept[at + 1]])
         k = min(k, at - 1)  # what led to it is to be found anew
         del legs[k:]
     return legs, kept, tuple(w for w in waypoints if w not in kept)
@@ -229,8 +229,8 @@ def _eased(task: _Task, before: Floats, pose: Floats, after: Floats) -> Floats:
     onward = (after - before)[:2]
     turned = np.array([pose[0], pose[1], exact.arctan2(onward[1], onward[0])])
     length, width = task.vehicle.length + 2.0 * EASE, task.vehicle.width + 2.0 * EASE
-    found = nearest_pose_with_room(task.road, turned, length, width, FARTHEST)
-    return pose if found is None else found[0]
+    roomy = nearest_pose_with_room(task.road, turned, length, width, FARTHEST)
+    return pose if roomy is None else roomy[0]
 
 
 def _waypoints(anchors: Floats, stands: Bools, limit: float) -> list[int]:
@@ -281,11 +281,10 @@ def _leg(task: _Task, a: int, b: int, poses: Floats, *, last: bool) -> _Leg:
     curve = direct(task.road, task.vehicle, start, end, config.max_curvature)
     if curve is not None:
         return _Leg(Guess(curve[:, :2], np.full(len(curve), DIRECT_HOLD)), searched=False)
-    points = (
-        _searched_poses(task, a, b, start, end, PATIENCE if last else 1)[:, :2]
-        if config.planner == "rrt_star_connect"
-        else _searched(task, a, b)
-    )
+    if isinstance(task.planner, PlansPoses):
+        points = _searched_poses(task, task.planner, (a, b), (start, end), PATIENCE if last else 1)[:, :2]
+    else:
+        points = _searched(task, a, b)
     return _Leg(Guess(points, np.full(len(points), PATH_HOLD)), searched=True)
 
 
@@ -308,21 +307,22 @@ def _fitted_piece(task: _Task, start: Floats, end: Floats) -> Floats | None:
     return poses if free.all() else None
 
 
-def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, patience: int) -> Floats:
-    """A path (P, 3) from anchor a to anchor b, at `start` and `end` (3,), in the vehicle's own space.
+def _searched_poses(
+    task: _Task, planner: PlansPoses, anchors: tuple[int, int], ends: tuple[Floats, Floats], patience: int
+) -> Floats:
+    """A path (P, 3) between two anchors, whose poses (3,) are `ends`, for the vehicle itself.
 
-    First with a little more room than it needs, which the smoothing can use; else with what there is.
+    First with more room than the footprint, which the smoothing can use; then with the footprint alone.
     """
-    config, vehicle = task.config, task.vehicle
+    (a, b), (start, end), config, vehicle = anchors, ends, task.config, task.vehicle
     guide = next(candidates(start, end, config.max_curvature))[::GUIDE_STRIDE]
     free = Wishes(config.margin, LACK, guide, *_sides(config, config.keep_side * AGAINST, config.keep_side))
     most_left, most_right = _sides(config, HALF_LANE, np.inf)
     own = replace(free, about=_own_side(guide, config), most_left=most_left, most_right=most_right)
-    few = max(int(OWN_SHARE * config.iterations), 1)
+    own_iterations = max(int(OWN_SHARE * config.iterations), 1)
     attempts = [(free, ROOMY, config.iterations), (free, 0.0, config.iterations)]
     if config.keep_side > 0.0:
-        attempts.insert(0, (own, ROOMY, few))
-    planner = PoseRrtStarConnect(config.pose)
+        attempts.insert(0, (own, ROOMY, own_iterations))
     where = f"between {task.name(a)} and {task.name(b)}"
     limit = task.tightest * config.max_curvature
     error: RefusedError | None = None
@@ -330,12 +330,12 @@ def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, pat
         query = PoseQuery(start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit)
         try:
             try:
-                return planner.plan(task.road, query, Budget(iterations), task.seed + a, wishes).poses
+                return planner.plan_poses(task.road, query, Budget(iterations), task.seed + a, wishes).poses
             except BudgetSpentError:
                 if extra or patience == 1:
                     raise
                 budget = Budget(patience * config.iterations, first=True)
-                return planner.plan(task.road, query, budget, task.seed + a, wishes).poses
+                return planner.plan_poses(task.road, query, budget, task.seed + a, wishes).poses
         except NoWayError as reason:
             error = RefusedError(f"{where}: {reason}")
         except BudgetSpentError:
@@ -431,7 +431,7 @@ def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
 
 
 def _polyline(task: _Task, waypoints: list[int]) -> Route:
-    """The planner's bare path through the waypoints: shortest, with corners; only its ends have the asked headings."""
+    """The planner's bare path through the waypoints: shortest, with corners; only its ends have the requested headings."""
     legs = [_searched(task, a, b) for a, b in itertools.pairwise(waypoints)]
     path = np.concatenate([legs[0]] + [leg[1:] for leg in legs[1:]])
     edge = np.diff(path, axis=0)

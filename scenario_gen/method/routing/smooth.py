@@ -5,7 +5,7 @@
 
 The band (see `band.relax`) trades four things: nearness to a first guess, nearness to the anchors, little bending, and room
 beside the footprint. Where the curvature limit or the room is violated, the weights there rise from step to step. The
-cubic spline through the band is clamped to the asked headings at both ends, and it is the spline that is verified.
+cubic spline through the band is clamped to the requested headings at both ends, and it is the spline that is verified.
 """
 
 from dataclasses import dataclass
@@ -104,12 +104,12 @@ def smooth(
     for round_ in range(rounds):
         spacing = path_length(points) / (len(points) - 1)
         anchor, pull = _assigned(points, targets)
-        need = np.minimum(_room(road, guess.points, disc), cover)
+        required = np.minimum(_room(road, guess.points, disc), cover)
         wish = _wished(road, disc, cover + config.margin, start, end, spacing, len(points))
         before, points = points, np.ascontiguousarray(points - road.origin)
         relax(
             STEPS, field, road.resolution, guess.points - road.origin, guess.hold, anchor - road.origin, pull, headings,
-            disc, need, wish, spacing, BEND, config.max_curvature, stiff, push, points,
+            disc, required, wish, spacing, BEND, config.max_curvature, stiff, push, points,
         )  # fmt: skip
         points = points + road.origin
         still = np.abs(points - before).max() < 0.02
@@ -143,11 +143,11 @@ def _wished(road: Road, disc: Floats, wish: float, start: Floats, end: Floats, s
     """Clearance wanted along the band (count,): what there is at its ends, rising from there by 5 cm per metre to `wish`."""
     field = clearance_field(road)
     along = np.arange(count) * spacing
-    wanted = np.full(count, wish)
+    room = np.full(count, wish)
     for pose, distance in ((start, along), (end, along[::-1])):
         row, column, _ = road.cells(pose[:2] + disc[:, None] * _ahead(pose))
-        wanted = np.minimum(wanted, field[row, column].min() + TAPER * distance)
-    return wanted
+        room = np.minimum(room, field[row, column].min() + TAPER * distance)
+    return room
 
 
 def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: Floats) -> Curve:

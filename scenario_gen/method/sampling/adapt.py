@@ -48,7 +48,7 @@ class Judge:
         if undisturbed is None:
             return cls(check, ANY, enough)
         (verdict,) = check([undisturbed])
-        lost = {one.vehicles: one.message for one in verdict.violations if one.cause == Cause.REACTION}
+        lost = {violation.vehicles: violation.message for violation in verdict.violations if violation.cause == Cause.REACTION}
         return cls(check, verdict.not_applicable if sampler.free else ANY, enough, lost)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
@@ -109,11 +109,11 @@ def label_of(encounter: Encounter, request: Request, aim: Aim | None, reactions:
 def _order(encounter: Encounter, own: Conflict, whole: Scenario) -> str:
     """Say who goes first in a scenario at one of the template's conflicts."""
     a, b = sorted((own.first, own.second))
-    found = pair_conflict(whole.vehicles, whole.time, whole.position, whole.heading, a, b, whole.present)
+    conflict = pair_conflict(whole.vehicles, whole.time, whole.position, whole.heading, a, b, whole.present)
     one, two = (encounter.vehicles[n].id for n in (own.first, own.second))
-    if found is None:
+    if conflict is None:
         return f"{one} and {two} do not meet (in the template {one} goes first)"
-    return f"{one} before {two}, as in the template" if found.first == own.first else f"{two} before {one}, swapped"
+    return f"{one} before {two}, as in the template" if conflict.first == own.first else f"{two} before {one}, swapped"
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,9 +185,9 @@ def _stage(
     nearest = [k for k in np.argsort(seen.distance[-1], kind="stable").tolist() if drawn[k] is not None]
     for start in range(0, len(nearest), CHUNK):
         rows = nearest[start : start + CHUNK]
-        found = judge([scenario for k in rows if (scenario := drawn[k]) is not None])
-        causes |= dict(zip(rows, found, strict=True))
-        for k, cause in zip(rows, found, strict=True):
+        verdicts = judge([scenario for k in rows if (scenario := drawn[k]) is not None])
+        causes |= dict(zip(rows, verdicts, strict=True))
+        for k, cause in zip(rows, verdicts, strict=True):
             checked, good = checked + 1, good + (cause is None)
             seen.judge(aim, k, cause)
         in_range = bool(seen.distance[-1][rows[-1]] == 0.0)

@@ -50,7 +50,7 @@ def sample_scenarios(
     road, fit = planned.placed()
     mirrored = [note for note in (road.lanes.notes if road.lanes is not None else ()) if note.startswith(MIRRORED)]
     drawn = replace(drawn, adaptations=(*mirrored, *drawn.adaptations), graph=reactions_of(plan.encounter))
-    return replace(planned, fit=replace(fit, asked=plan.asked), generated=drawn)
+    return replace(planned, fit=replace(fit, requested=plan.requested), generated=drawn)
 
 
 def plan_of(planned: GenerationResult, sampling: SamplingConfig, request: Request, waits: tuple[Wait, ...] | None = None) -> Plan:
@@ -60,7 +60,7 @@ def plan_of(planned: GenerationResult, sampling: SamplingConfig, request: Reques
         InputError: road or fit are not known.
     """
     encounter, segmentation, (road, fit) = planned.encounter, planned.segmentation, planned.placed()
-    states = relaxed_states(fit.asked, encounter, sampling, request)
+    states = relaxed_states(fit.requested, encounter, sampling, request)
     waits = waits_to_keep(encounter, segmentation) if waits is None else waits
     return Plan(encounter, segmentation, road, planned.routes, states, waits)
 
@@ -72,4 +72,4 @@ def checker_of(plan: Plan, sampling: SamplingConfig, limits: Limits, request: Re
         RefusedError: an order is to be swapped, and there is none.
     """
     edges = kept_reactions(plan.encounter, sampling, request.order).edges
-    return Checker.of_template(plan.encounter, plan.road, plan.asked, plan.waits, limits, request.order, edges)
+    return Checker.of_template(plan.encounter, plan.road, plan.requested, plan.waits, limits, request.order, edges)

@@ -149,9 +149,9 @@ def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Fl
 
     Where the road has lanes, straight on must be along one of them too: before a bend it leads across those of others.
     """
-    found = np.zeros(2)
+    metres = np.zeros(2)
     if len(path.node) == 1:
-        return found
+        return metres
     for end, sign in ((0, -1.0), (-1, 1.0)):
         x, y, yaw = path.node[end].tolist()
         ahead = np.array([float(exact.cos(yaw)), float(exact.sin(yaw))])
@@ -162,8 +162,8 @@ def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Fl
         flat = points.reshape(-1, 2)
         free &= along_lanes(road, np.column_stack((flat, np.full(len(flat), yaw)))).reshape(len(points), -1).all(axis=1)
         clear = float(step[-1]) if free.all() else _FLANK_STEP * int(np.argmin(free))
-        found[end] = min(max(clear - 0.5 * vehicle.length - _FLANK_STEP, 0.0), most[end])
-    return found
+        metres[end] = min(max(clear - 0.5 * vehicle.length - _FLANK_STEP, 0.0), most[end])
+    return metres
 
 
 def soft_clipped(deviation: Floats, room: Floats) -> Floats:

@@ -13,15 +13,15 @@ POOL_SHARE = 10  # valid candidates that are drawn per scenario wanted
 FAR = 100.0  # bins to which what is infinite is taken
 
 
-def spread_out(features: Sequence[tuple[float, ...]], wanted: int) -> list[int]:
-    """Return the places of at most `wanted` candidates, in the order in which they were chosen.
+def spread_out(features: Sequence[tuple[float, ...]], count: int) -> list[int]:
+    """Return the places of at most `count` candidates, in the order in which they were chosen.
 
     Greedy, each time the candidate that opens a bin, as long as one does, and among those the one farthest from all that are
     chosen (farthest-point sampling, Gonzalez 1985). The first is the one nearest to the median.
 
     Args:
         features: (S,) of each candidate, in bins of width 1.
-        wanted: how many.
+        count: how many.
     """
     if not features:
         return []
@@ -34,7 +34,7 @@ def spread_out(features: Sequence[tuple[float, ...]], wanted: int) -> list[int]:
     taken[chosen[0]] = True
     opened = np.zeros(int(bins.max()) + 1, dtype=np.bool_)
     opened[bins[chosen[0]]] = True
-    while len(chosen) < min(wanted, len(at)):
+    while len(chosen) < min(count, len(at)):
         allowed = ~taken & ~opened[bins]
         if not allowed.any():
             allowed = ~taken

@@ -7,7 +7,7 @@ Every vehicle has a clock of its own: the shared one, shifted by a_n, faster or 
 shorter by q_n in each wait. A scenario is the stretch of time in which all clocks run, so one mechanism frees where and how fast
 a vehicle starts, who arrives when, how long it waits, and where and when the scenario ends. What was asked for stays: where a
 start or an end state is asked of any vehicle, shift and pace of all own clocks die away there. A wait of another length still
-moves its vehicle's end; where ends are asked, the checker refuses what that moves too far.
+moves its vehicle's end; where ends are requested, the checker refuses what that moves too far.
 """
 
 from collections.abc import Sequence
@@ -43,13 +43,13 @@ def cut(z: Floats, bound: float) -> Floats:
     return np.asarray(exact.ndtri(low + (1.0 - 2.0 * low) * exact.ndtr(z)))
 
 
-def relaxed_states(asked: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request) -> BoundaryStates:
+def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request) -> BoundaryStates:
     """Return the states with how far each may be left: 0 where it was asked for, or nothing is freed.
 
     A vehicle that starts a seconds later or earlier, starts as far along its lane as it drives in that time.
     """
     if config.variety != "wide":
-        return replace(asked, relaxed=np.zeros_like(asked.relaxed)) if asked.relaxed.any() else asked
+        return replace(requested, relaxed=np.zeros_like(requested.relaxed)) if requested.relaxed.any() else requested
     ego = request.ego_of(encounter)
     relaxed = np.zeros((len(encounter.vehicles), 2, 2))
     own = [np.asarray(np.isfinite(request.rows(end, encounter)).any(axis=1)) for end in ("starts", "goals")]
@@ -66,7 +66,7 @@ def relaxed_states(asked: BoundaryStates, encounter: Encounter, config: Sampling
     across = config.freedom * config.place_sigma
     for n, (first, last) in enumerate(encounter.present.tolist()):
         speed = encounter.speed[n, first : last + 1]
-        for end, (near, state) in enumerate(((speed[: steps + 1], asked.start[n]), (speed[-steps - 1 :], asked.end[n]))):
+        for end, (near, state) in enumerate(((speed[: steps + 1], requested.start[n]), (speed[-steps - 1 :], requested.end[n]))):
             if own[end][n]:
                 continue
             top, there = max(float(near.max()), float(state[3])), float(state[3])
@@ -74,7 +74,7 @@ def relaxed_states(asked: BoundaryStates, encounter: Encounter, config: Sampling
             along = 0.0 if tied[end] else slowest * seconds * (top + faster)
             off = 0.0 if tied[end] else max(slowest * top - there, there - float(near.min()))
             relaxed[n, end] = along + across, off + faster + _FASTEST
-    return replace(asked, relaxed=np.ceil(1000.0 * relaxed) / 1000.0)
+    return replace(requested, relaxed=np.ceil(1000.0 * relaxed) / 1000.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,25 +106,25 @@ class OwnClock:
 
     @classmethod
     def of(
-        cls, nominal: Clock, rests: Sequence[tuple[float, float]], asked: tuple[bool, bool], config: SamplingConfig
+        cls, nominal: Clock, rests: Sequence[tuple[float, float]], requested: tuple[bool, bool], config: SamplingConfig
     ) -> "OwnClock":
         """Prepare.
 
         Args:
             nominal: the clock without deviation.
             rests: when the vehicle stands [s], on the template's clock.
-            asked: whether start and end states are asked of any vehicle.
+            requested: whether start and end states are asked of any vehicle.
             config: the standard deviations.
         """
         grid, ramp = nominal.grid, min(_RAMP, _RAMP_SHARE * float(nominal.grid[-1]))
         shift, shift_rate = np.ones(len(grid)), np.zeros(len(grid))
-        for tied, since, sign in ((asked[0], grid - grid[0], 1.0), (asked[1], grid[-1] - grid, -1.0)):
+        for tied, since, sign in ((requested[0], grid - grid[0], 1.0), (requested[1], grid[-1] - grid, -1.0)):
             if tied:
                 value, rate = _smooth_step(since / ramp)
                 shift, shift_rate = shift * value, shift_rate * value + shift * sign * rate / ramp
         about = nominal.time - 0.5 * nominal.time[-1]
         length = np.array([b - a for a, b in rests])
-        left = np.array([grid[-1] - b if asked[1] else np.inf for _, b in rests])  # s, to make up for a wait
+        left = np.array([grid[-1] - b if requested[1] else np.inf for _, b in rests])  # s, to make up for a wait
         waits, rates, made_up = (np.zeros((len(rests), len(grid))) for _ in range(3))
         for k, (a, b) in enumerate(rests):
             waits[k], rates[k] = _smooth_step((grid - a) / (b - a))
@@ -172,11 +172,11 @@ class Freedom:
 
     Attributes:
         clock: its own clock.
-        place: (G,) share of its place in the lane at the nodes of its route: 1, but 0 where its state is asked.
+        place: (G,) share of its place in the lane at the nodes of its route: 1, but 0 where its state is requested.
         place_sigma: m; end_speed: (2,) m/s, standard deviations.
         bound: standard deviations at which all are cut.
         sizes: (C, 2) length and width [m] to choose from; empty to keep its own.
-        ahead: (2,) metres of free road straight on before its route and behind it; 0 where its state is asked.
+        ahead: (2,) metres of free road straight on before its route and behind it; 0 where its state is requested.
     """
 
     clock: OwnClock
@@ -261,7 +261,7 @@ def freedom_of(
     arc: Floats,
     clock: OwnClock,
     relaxed: Floats,
-    asked: Bools,
+    requested: Bools,
     ahead: Floats,
     gap: float,
     config: SamplingConfig,
@@ -273,7 +273,7 @@ def freedom_of(
         arc: (G,) arc lengths [m] of its route's nodes.
         clock: how its clock leaves the shared one.
         relaxed: (2, 2) metres and m/s by which its start and end may differ from what is given.
-        asked: (2,) whether start and end states are asked of any vehicle.
+        requested: (2,) whether start and end states are asked of any vehicle.
         ahead: (2,) metres of free road straight on before its route and behind it.
         gap: metres of its least gap to any other vehicle in the template.
         config: the standard deviations.
@@ -292,7 +292,7 @@ def freedom_of(
         np.where(relaxed[:, 1] > 0.0, config.end_speed_sigma, 0.0),
         config.freedom,
         sizes if other_size else np.zeros((0, 2)),
-        np.where(asked, 0.0, ahead),
+        np.where(requested, 0.0, ahead),
     )
 
 

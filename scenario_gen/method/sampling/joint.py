@@ -3,11 +3,14 @@
 
 """One joint model: what a vehicle does differently comes back in those that react to it.
 
-Every candidate is made of standard normal numbers z, and all that is free moves the events of its vehicle linearly in them: how
-late it is at a time of the template, and how far ahead of its place. A reaction is a set of such equations that hold up to a
-residual: the follower is as late as its leader was a lag ago, and as far ahead; the yielder leaves as late as the other clears.
-Given the numbers of those whom a vehicle reacts to, its own are Gaussian again: z = m(z of them) + L eps. So the whole is one
-mixing of independent numbers eps, in the order of the graph. Who reacts to nobody is as free as before.
+Every candidate is computed from standard normal numbers z. They move each vehicle linearly: how late it is at a time of the
+template (`lateness`), and how far ahead of its place (`advance`). A reaction is a set of linear equations between the numbers of
+two vehicles, each with a residual: a follower is as late, and as far ahead, as its leader was a lag ago; a yielder leaves as late
+as the other vehicle clears the conflict.
+
+Given the numbers of the vehicles it reacts to, those of a vehicle are again Gaussian: z = m(z of the others) + L eps. So all
+numbers follow from independent ones, eps, vehicle by vehicle in the order of the graph. A vehicle that reacts to nobody keeps
+its own eps.
 """
 
 from collections.abc import Sequence
@@ -20,13 +23,13 @@ from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import exact, Floats
 from scenario_gen.types import FOLLOW, Reaction, ReactionGraph
 
-_STEP, _MOST = 0.8, 60  # s between the equations of a follower; number of them
-_BLUR = 3.0  # s to either side, over which a leader's motion is averaged in the part that its follower does not answer at once
-_SLOWLY, _QUICKLY = 8.0, 1.2  # s, over which a follower's own residual varies
-_QUICK = 0.08  # m, of that quick part
-_ROUGH = 0.05  # of a residual, that varies from equation to equation
-_SLOWEST, _STANDS = 1.0, 0.5  # m/s, at least, by which metres are made seconds
-_EVENT = 0.05  # s, of an event beside its residual
+_STEP, _MOST = 0.8, 60  # [s] between the equations of a follower; largest number of them
+_BLUR = 3.0  # [s] to either side over which a leader's motion is averaged, in the part that its follower answers late
+_SLOWLY, _QUICKLY = 8.0, 1.2  # [s] correlation lengths of the slow and the quick part of a follower's residual
+_QUICK = 0.08  # [m] standard deviation of the quick part
+_ROUGH = 0.05  # share of a residual that is independent in each equation
+_SLOWEST, _STANDS = 1.0, 0.5  # [m/s] least speeds, of a crossing vehicle and of a follower, that turn metres into seconds
+_EVENT = 0.05  # [s] standard deviation of when a vehicle clears or leaves, beside the residual
 
 Rows = dict[int, Floats]
 """By vehicle: (m, d) what each of its standard normal numbers adds to m equations."""
@@ -34,12 +37,12 @@ Rows = dict[int, Floats]
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """How the numbers of one vehicle are mixed: own += (all `into`) `out`.
+    """How the numbers of one vehicle follow from all: z[own] += (z into) out, of rank k.
 
     Attributes:
-        own: where its numbers are among all.
-        into: (size, k), out: (k, d).
-        out: see there.
+        own: the place of its d numbers among all of them.
+        into: (size, k) from all numbers.
+        out: (k, d) to its own.
     """
 
     own: slice
@@ -49,7 +52,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Mixing:
-    """The mixing of the numbers of all vehicles: one step each, of those who react, in the order of the graph."""
+    """The numbers of all vehicles from independent ones: a step for each vehicle that reacts, in the order of the graph."""
 
     steps: tuple[Step, ...]
 
@@ -57,7 +60,7 @@ class Mixing:
     def of(
         cls, models: Sequence[VehicleModel], first: Sequence[int], nominal: Clock, graph: ReactionGraph, scale: Scale
     ) -> "Mixing":
-        """Prepare.
+        """Prepare the steps of all vehicles that react.
 
         Args:
             models: of all vehicles.
@@ -69,7 +72,9 @@ class Mixing:
         steps = []
         for n in graph.order:
             edges = [edge for edge in graph.edges if edge.who == n]
-            equations = [one for edge in edges for one in _equations(edge, models, nominal, scale) if one[0][n].any()]
+            equations = [
+                equation for edge in edges for equation in _equations(edge, models, nominal, scale) if equation[0][n].any()
+            ]
             if equations:
                 steps.append(_step(n, equations, first))
         return cls(tuple(steps))
@@ -97,7 +102,7 @@ def _step(n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[int]
         k += len(white)
     q, r, _ = exact.qr(np.vstack(own).T)
     upper = np.ascontiguousarray(exact.cholesky(np.eye(len(r)) + exact.matmul(r, r.T)).T)
-    inverse = exact.solve_triangular(upper, np.eye(len(r)))  # of the root of the covariance that is left
+    inverse = exact.solve_triangular(upper, np.eye(len(r)))  # of the root of the remaining covariance
     pull = exact.matmul(exact.matmul(inverse, inverse.T), r)
     into = -exact.matmul(np.vstack(others).T, pull.T)
     into[first[n] : first[n + 1]] = exact.matmul(q, (inverse - np.eye(len(r))).T)
@@ -111,7 +116,7 @@ def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, s
         count = min(max(int((edge.until - edge.since) / _STEP), 1) + 1, _MOST)
         at = np.linspace(edge.since, edge.until, count)
         before = at - edge.lag
-        spread = edge.residual / np.maximum(_speeds(who, at), _STANDS)  # s: while it stands, lateness is not seen
+        spread = edge.residual / np.maximum(_speeds(who, at), _STANDS)  # [s] the slower it drives, the less its lateness shows
         slow, quick = _alike(at, _SLOWLY), _alike(at, _QUICKLY)
         rough = np.square(_ROUGH) * np.eye(count)
         late = {edge.who: lateness(who, at, nominal, scale), edge.whom: -lateness(whom, before, nominal, scale)}
@@ -132,13 +137,13 @@ def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, s
 
 
 def _answered(edge: Reaction, leader: VehicleModel, at: Floats, scale: Scale) -> Floats:
-    """(q, d) metres that a follower answers: of the leader's motion the share `gain` at once, the rest over some seconds."""
-    about = np.mean([advance(leader, at + off, scale) for off in np.linspace(-_BLUR, _BLUR, 7)], axis=0)
-    return np.asarray(edge.gain * advance(leader, at, scale) + (1.0 - edge.gain) * about)
+    """(q, d) metres of the leader's motion that a follower answers: the share `gain` at once, the rest over some seconds."""
+    averaged = np.mean([advance(leader, at + off, scale) for off in np.linspace(-_BLUR, _BLUR, 7)], axis=0)
+    return np.asarray(edge.gain * advance(leader, at, scale) + (1.0 - edge.gain) * averaged)
 
 
 def _alike(at: Floats, length: float) -> Floats:
-    """(q, q) correlation of what varies over so many seconds, at times (q,) [s]."""
+    """(q, q) correlation, with a length [s], of values at times (q,) [s]."""
     return exact.exp(-0.5 * np.square((at[:, None] - at) / length))
 
 
@@ -162,7 +167,7 @@ def lateness(model: VehicleModel, at: Floats, nominal: Clock, scale: Scale) -> F
 
 
 def advance(model: VehicleModel, at: Floats, scale: Scale) -> Floats:
-    """(q, d) metres by which each standard normal number sets a vehicle forward at template times (q,) [s], its clock apart."""
+    """(q, d) metres by which each standard normal number sets a vehicle forward at template times (q,) [s], beside its clock."""
     rows = np.zeros((len(at), model.size))
     spline = model.speed.spline
     driven = spline.driven(np.clip(at, spline.breaks[0], spline.breaks[-1]))

@@ -44,7 +44,9 @@ class NaturalScenarios:
         judge = Judge.of(sampler, check, ENOUGH[config.variety])
         shares: list[float] = []
         for level in range(len(LEVELS)):
-            drawn = [one for k in range(PILOT // BLOCK) for one in _scenarios(sampler, level, k) if one is not None]
+            drawn = [
+                scenario for k in range(PILOT // BLOCK) for scenario in _scenarios(sampler, level, k) if scenario is not None
+            ]
             shares.append(judge(drawn).count(None) / PILOT if drawn else 0.0)
             if shares[-1] >= judge.enough:
                 break
@@ -61,8 +63,8 @@ class NaturalScenarios:
         """Return the certified scenarios, of all vehicles, of numbers (S, size); None where a candidate is refused."""
         batch = self.sampler.model.draw(numbers, LEVELS[self.level])
         drawn = batch.scenarios(self.sampler.seed, [searched_index(row) for row in numbers], self.sampler.frame_id)
-        causes = iter(self.judge([one for one in drawn if one is not None]))
-        return [one if one is not None and next(causes) is None else None for one in drawn]
+        causes = iter(self.judge([scenario for scenario in drawn if scenario is not None]))
+        return [scenario if scenario is not None and next(causes) is None else None for scenario in drawn]
 
 
 def _scenarios(sampler: Sampler, level: int, number: int) -> list[Scenario | None]:

@@ -26,18 +26,18 @@ def template_grid(encounter: Encounter) -> Floats:
     return np.linspace(0.0, encounter.duration, parts * (len(encounter.time) - 1) + 1)
 
 
-def slowed_clock(grid: Floats, needs: Sequence[Floats], most: float) -> Clock:
-    """The clock that runs everywhere as slow as any vehicle needs, smooth (C2), at most `most` times as long as the template.
+def slowed_clock(grid: Floats, slowdowns: Sequence[Floats], most: float) -> Clock:
+    """The clock as slow everywhere as the slowest vehicle requires, smooth (C2), at most `most` times as long as the template.
 
     Args:
         grid: (G,) template times [s].
-        needs: (G,) per vehicle, by how much the clock must be slowed there; 1 where it need not.
-        most: duration over the template's, at most; needs beyond it are met in part.
+        slowdowns: (G,) per vehicle, the factor by which the clock must be slowed there, 1 or more.
+        most: duration over the template's, at most; larger slowdowns are met in part.
     """
-    need = np.maximum(np.max(needs, axis=0), 1.0)
+    slowdown = np.maximum(np.max(slowdowns, axis=0), 1.0)
     step = float(grid[1] - grid[0])
     width = 2 * max(round(REACH / step / 3.0), 1) + 1
-    rate = exact.moving_max(need, 3 * (width - 1) + 1)
+    rate = exact.moving_max(slowdown, 3 * (width - 1) + 1)
     for _ in range(3):
         rate = exact.moving_mean(rate, width)
     extra = rate - 1.0

@@ -23,7 +23,7 @@ class Plan:
         segmentation: its changepoints.
         road: the target road, for the room it leaves.
         routes: one per vehicle, with an anchor at start, changepoints and end.
-        asked: start and end states; their speeds are met exactly.
+        requested: start and end states; their speeds are met exactly.
         waits: when a vehicle stands, on the template's clock.
     """
 
@@ -31,7 +31,7 @@ class Plan:
     segmentation: Segmentation
     road: Road
     routes: Sequence[Route]
-    asked: BoundaryStates
+    requested: BoundaryStates
     waits: Sequence[Wait]
 
 

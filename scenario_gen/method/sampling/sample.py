@@ -74,7 +74,7 @@ def draw_scenarios(
     """
     encounter, ego = plan.encounter, request.ego_of(plan.encounter)
     prepared = prepare(plan, config, request.order)
-    slot = None if ego is None else EgoSlot(encounter.vehicles[ego], plan.asked.start[ego], plan.asked.end[ego])
+    slot = None if ego is None else EgoSlot(encounter.vehicles[ego], plan.requested.start[ego], plan.requested.end[ego])
     if prepared.model is None:
         drawn = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
     else:
@@ -83,7 +83,7 @@ def draw_scenarios(
         judge = Judge.of(sampler, check, _enough(config, request))
         kept = tuple(edge for edge in prepared.model.reactions.edges if (edge.who, edge.whom) not in judge.lost)
         sampler = replace(sampler, label=label_of(encounter, request, aim, kept))
-        loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.asked, slot))
+        loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.requested, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
         lost = [f"{NOT_KEPT}: {message}" for message in judge.lost.values()]
@@ -155,24 +155,24 @@ class _Loop:
 
     def run_request(self, attempts: int, *, diverse: bool) -> None:
         """Sample what was asked: towards a target, and, if a choice is asked for, from a pool."""
-        wanted = self.count
+        remaining = self.count
         if diverse:
-            self.count, self.keep, self.publish = wanted * POOL_SHARE, 0, False
+            self.count, self.keep, self.publish = remaining * POOL_SHARE, 0, False
         if self.aim is None:
             self.run(attempts * max(self.count, LEAST_COUNT if self.sampler.free else 1))
         else:
             self.run_directed(DIRECTED_BUDGET * attempts * self.count)
         if diverse:
-            self.choose(wanted)
+            self.choose(remaining)
 
-    def choose(self, wanted: int) -> None:
+    def choose(self, count: int) -> None:
         """Keep those of the pool that cover best."""
         if self.measures is None:
             raise InputError("choose: nothing is given that measures scenarios (`measures`)")
         pool = list(self.index)
         features = [self.measures.features(whole) for whole in self._whole(pool)]
-        chosen = spread_out(features, wanted)
-        self.chosen_from, self.count, self.keep, self.publish = len(pool), wanted, KEPT, True
+        chosen = spread_out(features, count)
+        self.chosen_from, self.count, self.keep, self.publish = len(pool), count, KEPT, True
         self.index = array("q")
         self.adaptations.append(
             f"chosen for diversity: {len(chosen)} of {len(pool)} valid scenarios; such a set is no sample, so it has no weights"
@@ -186,7 +186,7 @@ class _Loop:
     def _whole(self, index: Sequence[int]) -> Iterator[Scenario]:
         """Candidates of all vehicles, by ascending indices."""
         plain = replace(self.sampler, ego=None, label=lambda _: {}, weighted=False)
-        for _, together in itertools.groupby(index, lambda one: one // BLOCK):
+        for _, together in itertools.groupby(index, lambda number: number // BLOCK):
             yield from plain.redraw(list(together))
 
     def _keep(self, number: int, scenario: Scenario) -> None:

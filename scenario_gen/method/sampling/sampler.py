@@ -100,7 +100,7 @@ class Sampler:
         level, candidate = place_of(index[0])
         batch, own = self.block(level, candidate // BLOCK)
         drawn = batch.scenarios(self.seed, own, self.frame_id)
-        return [self.published(whole) for whole in (drawn[one - own[0]] for one in index) if whole is not None]
+        return [self.published(whole) for whole in (drawn[number - own[0]] for number in index) if whole is not None]
 
     def published(self, whole: Scenario) -> Scenario:
         """A candidate of all vehicles as it is published: with its facts, the ego's motion apart, as witness."""

@@ -7,15 +7,14 @@ from scenario_gen.method.segmentation.estimator import SegmentationWarning, Stic
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.library import assign, Assignment, build_library, PrimitiveLibrary
 from scenario_gen.method.segmentation.live import LiveSegmenter
-from scenario_gen.method.segmentation.online import Changepoint, OnlineConfig, OnlineSegmenter
+from scenario_gen.method.segmentation.online import OnlineConfig, OnlineSegmenter
 from scenario_gen.method.segmentation.posterior import Posterior
 from scenario_gen.method.segmentation.segment_classes import FinishedSegment
 from scenario_gen.method.segmentation.segmenter import DEFAULT, segment, segment_track, SegmentationConfig
 from scenario_gen.method.segmentation.series import segment_series
-from scenario_gen.types import LiveChangepoints, Segmentation
 
 __all__ = [
-    "DEFAULT", "USUAL_R_HAT", "Assignment", "Changepoint", "FinishedSegment", "LiveChangepoints", "LiveSegmenter",
-    "OnlineConfig", "OnlineSegmenter", "Posterior", "PrimitiveLibrary", "SamplerConfig", "Segmentation", "SegmentationConfig",
+    "DEFAULT", "USUAL_R_HAT", "Assignment", "FinishedSegment", "LiveSegmenter",
+    "OnlineConfig", "OnlineSegmenter", "Posterior", "PrimitiveLibrary", "SamplerConfig", "SegmentationConfig",
     "SegmentationWarning", "StickyHDPHMM", "assign", "build_library", "segment", "segment_series", "segment_track",
 ]  # fmt: skip

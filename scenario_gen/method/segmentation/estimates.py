@@ -81,13 +81,13 @@ def estimate(x: Floats, ends: Ints, posterior: Posterior, config: SamplerConfig)
     problem, rows = regressed((seen - centre) / unit, ends, config)
     states = int(posterior.labels.max()) + 1
     share = np.stack([(posterior.samples == k).mean(axis=0) for k in range(states)])
-    found = settle_emissions(problem, share[:, rows], posterior)
-    regression = found.regression * unit[:, None]
+    settled = settle_emissions(problem, share[:, rows], posterior)
+    regression = settled.regression * unit[:, None]
     p = problem.regressors
     if p > 1:
         regression[:, :, 1:] /= np.tile(unit, problem.lead)
     regression[:, :, 0] += centre - (regression[:, :, 1:] * np.tile(centre, problem.lead)).sum(axis=2)
-    covariance = found.covariance * unit[:, None] * unit
+    covariance = settled.covariance * unit[:, None] * unit
     means = regression[:, :, 0].copy()
     if p > 1:
         counts = share[:, :, None] * ~np.isnan(seen)

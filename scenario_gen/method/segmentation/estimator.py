@@ -282,31 +282,31 @@ class StickyHDPHMM:
         total = smooth(every, self.transitions_, self.startprob_, ends, proba)
         return proba, total
 
-    def _concerns(self, x: Floats, visible: Floats, asked: float) -> list[str]:
+    def _concerns(self, x: Floats, visible: Floats, requested: float) -> list[str]:
         """What a user should know of the fit."""
-        found = []
+        concerns = []
         if not self.converged_:
-            far = ", ".join(f"{name} {value:.2f}" for name, value in self.r_hat_.items() if value > asked)
+            far = ", ".join(f"{name} {value:.2f}" for name, value in self.r_hat_.items() if value > requested)
             ran, chains = len(self.posterior_.trace[0]) * 2, len(self.posterior_.trace)
-            found.append(
-                f"R-hat is above {asked:g} after {ran} sweeps of {chains} chain(s): {far}. What was sampled "
+            concerns.append(
+                f"R-hat is above {requested:g} after {ran} sweeps of {chains} chain(s): {far}. What was sampled "
                 "depends on where it began: raise `sweeps`, and compare the chains (`to_arviz`)"
             )
         if self.posterior_.full:
-            found.append(
+            concerns.append(
                 f"all L = {self.posterior_.states} states were in use in more than a few samples: more may be needed; "
                 + ("raise `states`, or set it to 0" if self.states else "the series may have no states that recur")
             )
         left = sorted(set(range(x.shape[1])) - set(self.posterior_.channels.tolist()))
         if left:
-            found.append(
+            concerns.append(
                 "channels that say nothing of their own are left out: " + ", ".join(f"{i} ({why(x[:, i])})" for i in left)
             )
         hidden = np.argwhere(np.isnan(visible) & ~np.isnan(x))
         if len(hidden):
             at = ", ".join(f"sample {t} of channel {i}" for t, i in hidden[:3]) + (", ..." if len(hidden) > 3 else "")
-            found.append(f"{len(hidden)} values far from those before and after them are taken for not measured: {at}")
-        return found
+            concerns.append(f"{len(hidden)} values far from those before and after them are taken for not measured: {at}")
+        return concerns
 
 
 def _parameters() -> dict[str, Any]:

@@ -120,10 +120,10 @@ class PrimitiveLibrary:
         }
         for name, shape in shapes.items():
             check_shape(values[name], shape, f"{what}: {name}")
-        for name, one in (("transition", "row"), ("initial", "list")):
+        for name, part in (("transition", "row"), ("initial", "list")):
             sums = np.sum(values[name], axis=-1)
             if (np.abs(sums - 1.0) > 1e-6).any():
-                raise InputError(f"{what}: {name} holds probabilities; each {one} must sum to 1, not {np.ravel(sums)[0]:g}")
+                raise InputError(f"{what}: {name} holds probabilities; each {part} must sum to 1, not {np.ravel(sums)[0]:g}")
         with guarded(f"{what}: covariances", remedy="each must be symmetric and positive definite"):
             covariances = np.array(values["covariances"])
             for covariance in covariances:
@@ -167,8 +167,8 @@ def build_library(
     points = []
     for encounter, start, stop in zip(encounters, (0, *ends[:-1]), ends, strict=True):
         own = posterior.part(start, stop)
-        found = on_trends(encounter, own, cut(own, config, encounter.dt), config)
-        labels[start:stop] = relabel(posterior.labels[start:stop], found, fresh=False)
+        changepoints = on_trends(encounter, own, cut(own, config, encounter.dt), config)
+        labels[start:stop] = relabel(posterior.labels[start:stop], changepoints, fresh=False)
         points.append(np.flatnonzero(np.diff(labels[start:stop])) + 1)
     labels = in_order(labels)
     library = _summarise(x, labels, ends, encounters[0], windows, config.sampler.weight or 1.0, blur)
@@ -248,8 +248,8 @@ def assign(encounter: Encounter, library: PrimitiveLibrary, config: Segmentation
         points = np.delete(points, min(near, len(points) - 1))
     result = relabel(labels, points, fresh=False)
     points = np.flatnonzero(np.diff(result)) + 1
-    found = Segmentation(in_order(result), points, changed, describe_segments(encounter, points))
-    return Assignment(found, frozen_ints(result[[0, *points]]))
+    segmentation = Segmentation(in_order(result), points, changed, describe_segments(encounter, points))
+    return Assignment(segmentation, frozen_ints(result[[0, *points]]))
 
 
 def _smooth(library: PrimitiveLibrary, x: Floats) -> tuple[Floats, Floats]:

@@ -32,20 +32,20 @@ class LiveSegmenter:
             self._online = OnlineSegmenter(len(sample.vehicles), self._dt_ns * 1e-9, self._config)
             self._start_ns = sample.stamp_ns
         self._past.append(sample)
-        found = self._online.push(sample.position, sample.speed)
-        return self._states(found) if found else None
+        changepoints = self._online.push(sample.position, sample.speed)
+        return self._states(changepoints) if changepoints else None
 
     def _follows(self, last: Sample, sample: Sample) -> bool:
         return sample.stamp_ns == last.stamp_ns + self._dt_ns and sample.vehicles == last.vehicles
 
-    def _states(self, found: Sequence[Changepoint]) -> LiveChangepoints:
-        time_ns = np.array([changepoint.sample for changepoint in found], dtype=np.int64) * self._dt_ns
+    def _states(self, changepoints: Sequence[Changepoint]) -> LiveChangepoints:
+        time_ns = np.array([changepoint.sample for changepoint in changepoints], dtype=np.int64) * self._dt_ns
         at = (self._start_ns + time_ns - self._past[0].stamp_ns) // self._dt_ns
         position = np.stack([sample.position for sample in self._past], axis=1)
         speed = np.stack([sample.speed for sample in self._past], axis=1)
         heading = np.array([course(xy, v, self._dt_ns * 1e-9)[0] for xy, v in zip(position, speed, strict=True)])
         vehicles = self._past[-1].vehicles
-        ended = [changepoint.ended for changepoint in found]
+        ended = [changepoint.ended for changepoint in changepoints]
         return LiveChangepoints(
             self._start_ns,
             vehicles,
@@ -53,7 +53,7 @@ class LiveSegmenter:
             position[:, at],
             heading[:, at],
             speed[:, at],
-            probability=np.array([changepoint.probability for changepoint in found]),
+            probability=np.array([changepoint.probability for changepoint in changepoints]),
             label=np.array([segment.label for segment in ended], dtype=np.int64),
             label_probability=np.array([segment.probability[segment.labels == segment.label][0] for segment in ended]),
         )

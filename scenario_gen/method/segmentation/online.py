@@ -115,18 +115,18 @@ class OnlineSegmenter:
         points = trends.add(fixed, free, least, gap)
         points = fixed + trends.settle(points, gap, gap)[len(fixed) :]
         ripe = len(self._samples) - round(config.delay / self._dt)
-        found = []
+        changepoints = []
         for i, c in enumerate(points):
             if start <= c <= ripe and (gain := trends.gain(points, i)) > least:
                 a = max(self._begun - first, 0)
                 ended = self._classes.add(self._begun, first + c, *segment_features(trends, speed, a, c, self._dt))
-                found.append(Changepoint(first + c, self._count - 1, chance_of_knot(gain, trends, points, i), ended))
+                changepoints.append(Changepoint(first + c, self._count - 1, chance_of_knot(gain, trends, points, i), ended))
                 self._begun = first + c
-        self._confirmed.extend(c.sample for c in found)
+        self._confirmed.extend(c.sample for c in changepoints)
         while len(self._confirmed) == 2 and len(self._samples) > 1 and first < self._confirmed[0] - gap:
             self._samples.popleft()
             first += 1
-        return found
+        return changepoints
 
 
 def chance_of_knot(gain: float, trends: Trends, points: list[int], i: int) -> float:

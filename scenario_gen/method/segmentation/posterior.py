@@ -92,14 +92,14 @@ class Posterior:
     def intervals(self, low: float = 0.05, high: float = 0.95) -> Floats:
         """(K, 2) credible interval of each changepoint's sample index, from the sampled changepoints nearest to it."""
         centres = self.changepoints
-        found: list[list[int]] = [[] for _ in centres]
+        samples: list[list[int]] = [[] for _ in centres]
         for row in self.samples if len(centres) else []:
             sampled = changepoints_of(row, self.ends)
             for k, centre in enumerate(centres):
                 if len(sampled):
-                    found[k].append(int(sampled[np.argmin(np.abs(sampled - centre))]))
+                    samples[k].append(int(sampled[np.argmin(np.abs(sampled - centre))]))
         return np.array(
-            [np.quantile(f, [low, high], method="inverted_cdf") if f else [c, c] for f, c in zip(found, centres, strict=True)]
+            [np.quantile(f, [low, high], method="inverted_cdf") if f else [c, c] for f, c in zip(samples, centres, strict=True)]
         ).reshape(-1, 2)
 
     def primitives(self) -> Floats:
@@ -144,8 +144,8 @@ def ess(traces: list[Floats]) -> Floats:
 
 def changepoints_of(labels: Ints, ends: Ints) -> Ints:
     """Return the samples (K,) whose label, of (T,), differs from the one before, within each sequence."""
-    found = np.flatnonzero(np.diff(labels)) + 1
-    return found[~np.isin(found, ends)].astype(np.int64)
+    changepoints = np.flatnonzero(np.diff(labels)) + 1
+    return changepoints[~np.isin(changepoints, ends)].astype(np.int64)
 
 
 def in_order(labels: Ints) -> Ints:

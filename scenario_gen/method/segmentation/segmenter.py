@@ -118,13 +118,13 @@ def on_trends(encounter: Tracks, posterior: Posterior, points: Ints, config: Seg
     most = int(encounter.duration * config.max_rate)
     everything = encounter.speed.shape[1]
     candidates = np.flatnonzero(posterior.probability_within(round(0.5 / encounter.dt)) > config.min_probability)
-    found = trends.settle([int(c) for c in points], reach, gap)
-    found = trends.settle(trends.drop(found, least, everything), reach, gap)
-    found = trends.settle(trends.add(found, candidates, least, gap), reach, gap)
+    changepoints = trends.settle([int(c) for c in points], reach, gap)
+    changepoints = trends.settle(trends.drop(changepoints, least, everything), reach, gap)
+    changepoints = trends.settle(trends.add(changepoints, candidates, least, gap), reach, gap)
     # speeds that change by less than their noise in the sampler's window still show in a line's knots over many seconds
-    found = trends.settle(trends.add(found, np.arange(trends.samples), certain, gap), reach, gap)
-    found = trends.settle(trends.drop(found, least, most), reach, gap)
-    return np.array(found, dtype=np.int64)
+    changepoints = trends.settle(trends.add(changepoints, np.arange(trends.samples), certain, gap), reach, gap)
+    changepoints = trends.settle(trends.drop(changepoints, least, most), reach, gap)
+    return np.array(changepoints, dtype=np.int64)
 
 
 def cut(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:

@@ -40,12 +40,12 @@ class Checker:
 
     Proven at every instant of the motion that `Scenario` defines, not on a grid of instants: footprints do not overlap,
     and each lies inside drivable cells. What cannot be proven at `limits.time_resolution` is refused. The other
-    guarantees are listed in docs/validity.md. Any of road, asked, conflicts and waits may be None: those checks are
+    guarantees are listed in docs/validity.md. Any of road, requested, conflicts and waits may be None: those checks are
     left out, and `not_applicable` names them. One checker serves many scenarios of one request.
 
     Attributes:
         road: the road they drive on.
-        asked: start and end states, one per vehicle.
+        requested: start and end states, one per vehicle.
         conflicts: the template's conflicts, whose order must be kept, unless `first` says otherwise.
         waits: the template's waits; in every scenario the vehicle stands, or moves slowly, as often, one after the other.
         limits: the limits; the default ones if None.
@@ -57,7 +57,7 @@ class Checker:
     """
 
     road: Road | None
-    asked: BoundaryStates | None
+    requested: BoundaryStates | None
     conflicts: Sequence[Conflict] | None
     waits: Sequence[Wait] | None
     limits: Limits | None = None
@@ -78,7 +78,7 @@ class Checker:
         cls,
         encounter: Encounter,
         road: Road,
-        asked: BoundaryStates,
+        requested: BoundaryStates,
         waits: Sequence[Wait],
         limits: Limits | None = None,
         order: str = "keep",
@@ -89,7 +89,7 @@ class Checker:
         Args:
             encounter: the template, whose conflicts are kept.
             road: the road they drive on.
-            asked: start and end states of all vehicles.
+            requested: start and end states of all vehicles.
             waits: the template's waits that are kept.
             limits: the limits; the default ones if None.
             order: who goes first, see `required_orders`.
@@ -101,14 +101,14 @@ class Checker:
         conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
         own = (limits or Limits()).for_template(encounter)
         ends = at_ends(encounter.present, len(encounter.time))
-        return cls(road, asked, conflicts, waits, own, required_orders(conflicts, order), reactions, ends)
+        return cls(road, requested, conflicts, waits, own, required_orders(conflicts, order), reactions, ends)
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
         """Sentences naming the checks that cannot be made, and why."""
         missing = {
             "off_road: no road is known": self.road,
-            "boundary_state: it is not known what was asked": self.asked,
+            "boundary_state: it is not known what was asked": self.requested,
             "passing_order: no template's conflicts are known": self.conflicts,
             "stop_not_kept: no template's waits are known": self.waits,
         }
@@ -141,9 +141,9 @@ class Checker:
             *self._wrong_ways(scenario),
             *self._waits(scenario),
         ]
-        found = [conflict_of(scenario, requested.first, requested.second) for requested in self.conflicts or ()]
-        wrong, present, absent = self._passing_orders(scenario, found)
-        return Verdict((*violations, *wrong, *self._reactions(scenario, found)), present, absent)
+        conflicts = [conflict_of(scenario, conflict.first, conflict.second) for conflict in self.conflicts or ()]
+        wrong, present, absent = self._passing_orders(scenario, conflicts)
+        return Verdict((*violations, *wrong, *self._reactions(scenario, conflicts)), present, absent)
 
     def _refuse_misfits(self, scenario: Scenario) -> None:
         n, where = len(scenario.vehicles), f"scenario {scenario.index} of seed {scenario.seed}"
@@ -157,7 +157,7 @@ class Checker:
             raise InputError(f"{where}: a vehicle's length or width is not positive")
         if self.road is not None and scenario.frame_id != self.road.frame_id:
             raise InputError(f"{where} is in frame {scenario.frame_id!r}, its road in {self.road.frame_id!r}")
-        known = () if self.asked is None else (self.asked.start, self.asked.end, self.asked.relaxed)
+        known = () if self.requested is None else (self.requested.start, self.requested.end, self.requested.relaxed)
         counts = sorted({len(states) for states in (*known, *(() if self.ends is None else (self.ends,)))} - {n})
         if counts:
             raise InputError(f"{where} has {n} vehicle(s), but states were asked for {counts[0]}")
@@ -172,7 +172,7 @@ class Checker:
     def _ends(self, scenario: Scenario) -> Iterator[Violation]:
         """Vehicles that come or go within the scenario, though the template has them from its start or to its end.
 
-        Who stands could else vanish at once: its first and last state are as asked, and nobody meets it.
+        Who stands could else vanish at once: its first and last state are as requested, and nobody meets it.
         """
         if self.ends is None or scenario.all_present:
             return
@@ -183,15 +183,18 @@ class Checker:
             yield Violation(Cause.BOUNDARY_STATE, time, (i,), message)
 
     def _boundary_states(self, scenario: Scenario) -> Iterator[Violation]:
-        if self.asked is None:
+        if self.requested is None:
             return
         limits = self._limits
-        relaxed = self.asked.relaxed.tolist()
-        for name, k, requested in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
+        relaxed = self.requested.relaxed.tolist()
+        for name, k, states in (
+            ("start", 0, self.requested.start),
+            ("end", -1, self.requested.end),
+        ):  # too few numbers for arrays
             # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
-            ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), requested.tolist(), strict=True)
-            for i, ((x, y), speed, (x_asked, y_asked, _, speed_asked)) in enumerate(ends):
-                distance, difference = exact.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
+            ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), states.tolist(), strict=True)
+            for i, ((x, y), speed, (x_requested, y_requested, _, speed_requested)) in enumerate(ends):
+                distance, difference = exact.hypot(x - x_requested, y - y_requested), abs(speed - speed_requested)
                 far, off = self._within_a_step(scenario, i, k)
                 free, faster = relaxed[i][k]
                 far, off = far + free + limits.position_tolerance, off + faster + limits.speed_tolerance
@@ -310,19 +313,19 @@ class Checker:
     def _passing_orders(self, scenario: Scenario, conflicts: Sequence[Conflict | None]) -> tuple[list[Violation], int, int]:
         """Violations, and how many of the template's conflicts are present and absent in the scenario, which has `conflicts`."""
         wrong, present = [], 0
-        for requested, first, found in zip(self.conflicts or (), self._first, conflicts, strict=True):
-            a, b = sorted((requested.first, requested.second))
-            present += found is not None
-            swapped = first == requested.second
-            wanted = "asked is that" if swapped else "in the template"
-            if found is not None and first is not None and found.first != first:
+        for recorded, first, conflict in zip(self.conflicts or (), self._first, conflicts, strict=True):
+            a, b = sorted((recorded.first, recorded.second))
+            present += conflict is not None
+            swapped = first == recorded.second
+            expected = "asked is that" if swapped else "in the template"
+            if conflict is not None and first is not None and conflict.first != first:
                 message = (
-                    f"vehicle {found.first} goes first ({found.entry_first:.2f} s, vehicle {found.second} "
-                    f"{found.entry_second:.2f} s); {wanted} vehicle {first} does"
+                    f"vehicle {conflict.first} goes first ({conflict.entry_first:.2f} s, vehicle {conflict.second} "
+                    f"{conflict.entry_second:.2f} s); {expected} vehicle {first} does"
                 )
-                wrong.append(Violation(Cause.PASSING_ORDER, found.entry_first, (found.first, found.second), message))
-            elif found is None and swapped:
-                message = f"vehicles {a} and {b} do not meet; {wanted} vehicle {first} goes first"
+                wrong.append(Violation(Cause.PASSING_ORDER, conflict.entry_first, (conflict.first, conflict.second), message))
+            elif conflict is None and swapped:
+                message = f"vehicles {a} and {b} do not meet; {expected} vehicle {first} goes first"
                 wrong.append(Violation(Cause.PASSING_ORDER, 0.0, (a, b), message))
         return wrong, present, len(self.conflicts or ()) - present
 
@@ -358,30 +361,30 @@ class Checker:
     def _waits(self, scenario: Scenario) -> Iterator[Violation]:
         waits = self.waits or ()
         for i in sorted({wait.vehicle for wait in waits}):
-            requested = [wait for wait in waits if wait.vehicle == i]
+            recorded = [wait for wait in waits if wait.vehicle == i]
             throughout = [tuple(scenario.present[i].tolist())]
             if (
-                self._never_moves(i, requested[0].start, scenario)
+                self._never_moves(i, recorded[0].start, scenario)
                 and self._slow(scenario, i, self._limits.stand_speed) != throughout
             ):
                 k = int(np.argmax(scenario.speed[i]))
                 message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
                 yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
                 continue
-            standing = [wait for wait in requested if not wait.moves_slowly]
-            for wanted, limit, verb in (
+            standing = [wait for wait in recorded if not wait.moves_slowly]
+            for required, limit, verb in (
                 (standing, self._limits.stand_speed, "stands"),
-                (requested, self._limits.creep_speed, "waits"),
+                (recorded, self._limits.creep_speed, "waits"),
             ):
                 # a stand serves as many consecutive waits as it is long: the template's may be parted by a short twitch
                 lengths = [float(scenario.time[b] - scenario.time[a]) for a, b in self._slow(scenario, i, limit)]
                 served = sum(int((length + 1e-9) / self._limits.stand_duration) for length in lengths)
-                if served < len(wanted):
+                if served < len(required):
                     message = (
-                        f"vehicle {i}: {verb} {len(wanted)} time(s) in the template; is below {limit:g} m/s for "
+                        f"vehicle {i}: {verb} {len(required)} time(s) in the template; is below {limit:g} m/s for "
                         f"{', '.join(f'{length:.1f} s' for length in lengths) or 'less than two samples'}"
                     )
-                    yield Violation(Cause.STOP_NOT_KEPT, wanted[min(served, len(wanted) - 1)].start, (i,), message)
+                    yield Violation(Cause.STOP_NOT_KEPT, required[min(served, len(required) - 1)].start, (i,), message)
                     break
 
     def _slow(self, scenario: Scenario, i: int, limit: float) -> list[tuple[int, int]]:
@@ -393,10 +396,10 @@ class Checker:
         return runs(still)  # of T - 1 steps: a step's end is a sample
 
     def _never_moves(self, i: int, begins: float, scenario: Scenario) -> bool:
-        """Whether vehicle i, whose first wait `begins` when it arrives, was asked to end where it starts."""
-        if self.asked is None or begins > float(scenario.time[scenario.present[i, 0]]):
+        """Whether vehicle i, whose first wait `begins` when it arrives, is requested to end where it starts."""
+        if self.requested is None or begins > float(scenario.time[scenario.present[i, 0]]):
             return False
-        off = self.asked.end[i, :2] - self.asked.start[i, :2]
+        off = self.requested.end[i, :2] - self.requested.start[i, :2]
         return bool(exact.hypot(off[0], off[1]) <= self._limits.position_tolerance)
 
 

@@ -208,10 +208,10 @@ def lstsq(a: Numbers, b: Numbers) -> Floats:
     q, r, order = qr(a, pivot=True)
     diagonal = np.diag(r)
     rank = int((diagonal > EPSILON * max(a.shape) * diagonal.max(initial=0.0)).sum())
-    found = np.zeros((a.shape[1], *b.shape[1:]))
+    solution = np.zeros((a.shape[1], *b.shape[1:]))
     if rank:
-        found[order[:rank]] = solve_triangular(r[:rank, :rank], matmul(np.ascontiguousarray(q.T)[:rank], b))
-    return found
+        solution[order[:rank]] = solve_triangular(r[:rank, :rank], matmul(np.ascontiguousarray(q.T)[:rank], b))
+    return solution
 
 
 @kernel(OUT2)

@@ -114,21 +114,23 @@ def read_cases(
     Raises:
         InputError: the bag cannot be read, holds no scenario that is asked for, or an ego is none of the vehicles.
     """
-    found = read_recording(bag, config, TOPICS).namespaces
-    spaces = [one for one in found.values() if SCENARIOS in one.messages]
+    namespaces = read_recording(bag, config, TOPICS).namespaces
+    spaces = [entry for entry in namespaces.values() if SCENARIOS in entry.messages]
     if not spaces:
         raise InputError(f"{bag}: no topic `{SCENARIOS}` in any namespace; there is nothing to export")
     if namespace is not None:
-        wanted = namespace if not namespace or namespace.startswith("/") else f"/{namespace}"
-        spaces = [one for one in spaces if one.name == wanted]
+        full_name = namespace if not namespace or namespace.startswith("/") else f"/{namespace}"
+        spaces = [entry for entry in spaces if entry.name == full_name]
         if not spaces:
-            raise InputError(f"{bag}: no scenarios in namespace {namespace!r}; there are: {', '.join(n or '/' for n in found)}")
+            raise InputError(
+                f"{bag}: no scenarios in namespace {namespace!r}; there are: {', '.join(n or '/' for n in namespaces)}"
+            )
     with within(bag):
         groups = [(space, group) for space in spaces for group in _groups(space, export)]
         cases = [_case(k + 1, space, group, export, indices) for k, (space, group) in enumerate(groups)]
     cases = [case for case in cases if case.scenarios]
     if not cases:
-        known = sorted({one.index for _, group in groups for one in group.scenarios})
+        known = sorted({entry.index for _, group in groups for entry in group.scenarios})
         raise InputError(f"{bag}: no scenario of index {sorted(indices)}; there are {known[0]} to {known[-1]}")
     return tuple(cases)
 
@@ -148,7 +150,7 @@ def _groups(space: Namespace, export: ExportConfig) -> Iterator[_Group]:
 
 
 def _with_ego(
-    space: Namespace, entry: ScenarioEntry | None, scenario: Scenario, asked: str
+    space: Namespace, entry: ScenarioEntry | None, scenario: Scenario, requested: str
 ) -> tuple[Scenario, Scenario | None, bool]:
     """Return the vehicles around the ego, its track, and whether that is a part of the scenario.
 
@@ -159,19 +161,19 @@ def _with_ego(
     ids = list(tokens(vehicle.id for vehicle in scenario.vehicles))
     where = f"{space.where(SCENARIOS)}, scenario {scenario.index}"
     if slot:
-        if asked not in ("", slot):
+        if requested not in ("", slot):
             raise InputError(f"{where} was made for ego {slot!r}; leave --ego out, or name that one")
         track = scenario.witness or space.ego_track
         if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
             raise InputError(f"{where} was made for ego {slot!r}, whose track is not on {space.where(WITNESS)}")
         return replace(scenario, witness=None), track, scenario.witness is not None
-    if not asked:
+    if not requested:
         return scenario, None, False
-    if asked not in ids:
-        raise InputError(f"{where} has no vehicle {asked!r} to be the ego; there are: {', '.join(ids)}")
+    if requested not in ids:
+        raise InputError(f"{where} has no vehicle {requested!r} to be the ego; there are: {', '.join(ids)}")
     if len(ids) == 1:
-        raise InputError(f"{where} has no vehicle but {asked!r}: there would be nobody around the ego")
-    others, ego = split_off(scenario, ids.index(asked))
+        raise InputError(f"{where} has no vehicle but {requested!r}: there would be nobody around the ego")
+    others, ego = split_off(scenario, ids.index(requested))
     return others, ego, True
 
 
@@ -186,13 +188,13 @@ def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, in
         road = space.road
     tracks = space.tracks_of(group.entry, group.stamp)
     values = next((s.values for s in reversed(space.summaries) if group.entry and s.request == group.entry.request), {})
-    everybody: Sequence[Scenario] = [s for one in group.scenarios for s in (one.others, one.ego) if s is not None]
+    everybody: Sequence[Scenario] = [s for exported in group.scenarios for s in (exported.others, exported.ego) if s is not None]
     name = group.entry.road if group.entry else ""
     return Case(
         number=number,
         namespace=space.name,
         road_name=name or "road",
         start_ns=group.stamp,
-        scenarios=tuple(one for one in group.scenarios if not indices or one.index in indices),
+        scenarios=tuple(exported for exported in group.scenarios if not indices or exported.index in indices),
         lane_map=lane_map_of(road, name, tracks, values, everybody, export.run_out),
     )

@@ -28,25 +28,25 @@ GOAL_TURN = 0.3  # rad by which an ego may be turned at its goal
 AUTHOR = "scenario_gen"
 
 
-def benchmark_id(case: Case, one: Exported) -> str:
+def benchmark_id(case: Case, exported: Exported) -> str:
     """Return the scenario's name in CommonRoad's manner, which is its file's name too."""
     words = re.findall(r"[0-9A-Za-z]+", case.road_name)
     name = "".join(word[:1].upper() + word[1:] for word in words) or "Road"
-    return f"ZAM_{name}-{case.number}_{one.index + 1}_T-1"
+    return f"ZAM_{name}-{case.number}_{exported.index + 1}_T-1"
 
 
-def write_commonroad(case: Case, one: Exported, export: ExportConfig = ExportConfig()) -> tuple[bytes, tuple[str, ...]]:
+def write_commonroad(case: Case, exported: Exported, export: ExportConfig = ExportConfig()) -> tuple[bytes, tuple[str, ...]]:
     """Return a scenario as the bytes of a CommonRoad file, and sentences on what was changed for it.
 
     Raises:
         RefusedError: a vehicle arrives late, for which the schema has no form, or the ego does.
     """
-    one.refuse_late_ego()
-    scenario, notes = _even(one.others, export)
+    exported.refuse_late_ego()
+    scenario, notes = _even(exported.others, export)
     late = [v.id for v, (first, _) in zip(scenario.vehicles, scenario.present.tolist(), strict=True) if first > 0]
     if late and export.late == "refused":
         raise RefusedError(
-            f"scenario {one.index}: vehicle {', '.join(late)} arrives late, and CommonRoad's schema has obstacles "
+            f"scenario {exported.index}: vehicle {', '.join(late)} arrives late, and CommonRoad's schema has obstacles "
             "from the first step on only; `--set late=written` writes the step at which it arrives, which commonroad-io "
             "reads; or export it to openscenario or autoware"
         )
@@ -57,11 +57,11 @@ def write_commonroad(case: Case, one: Exported, export: ExportConfig = ExportCon
         "commonRoad",
         {
             "commonRoadVersion": "2020a",
-            "benchmarkID": benchmark_id(case, one),
+            "benchmarkID": benchmark_id(case, exported),
             "date": datetime.fromtimestamp(case.start_ns // 10**9, UTC).date().isoformat(),
             "author": AUTHOR,
             "affiliation": AUTHOR,
-            "source": f"scenario {one.index} of {case.namespace or '/'}, sha256 {one.sha256}",
+            "source": f"scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}",
             "timeStepSize": f"{step:.9f}".rstrip("0"),
         },
     )
@@ -80,12 +80,12 @@ def write_commonroad(case: Case, one: Exported, export: ExportConfig = ExportCon
     for n, vehicle in enumerate(scenario.vehicles):
         comment(root, f"vehicle {vehicle.id}")
         _obstacle(root, scenario, n)
-    if one.ego is None:
+    if exported.ego is None:
         comment(root, "a placeholder: nobody is left out of this scenario, and the format demands a planning problem")
         _placeholder(root, case.lanes, len(scenario.time))
     else:
-        comment(root, f"vehicle {one.ego.vehicles[0].id}")
-        _problem(root, one.ego, step, export)
+        comment(root, f"vehicle {exported.ego.vehicles[0].id}")
+        _problem(root, exported.ego, step, export)
     return serialized(root), notes
 
 

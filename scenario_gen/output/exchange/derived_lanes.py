@@ -39,7 +39,7 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
             paths.setdefault(vehicle.id, driven_path(scenario, n))
     lanes: list[tuple[str, Curve]] = []
     homes: dict[str, int] = {}
-    for name in sorted(paths, key=lambda one: (-paths[one].length, one)):
+    for name in sorted(paths, key=lambda name_of_path: (-paths[name_of_path].length, name_of_path)):
         home = next((k for k, (_, lane) in enumerate(lanes) if _runs_in(paths[name], lane)), None)
         if home is None:
             home = len(lanes)
@@ -155,12 +155,12 @@ def _lane(
 
 def widest_near(line: Curve, station: Floats, wide: Floats) -> Floats:
     """Return (M,) for each point of a line the largest of distances (P,) [m] at stations (P,) [m] within `NEAR` points of it."""
-    found = np.zeros(len(line.points))
+    widest = np.zeros(len(line.points))
     at = np.clip(np.searchsorted(line.station, station), 1, len(line.points) - 1)
-    np.maximum.at(found, at, wide)
-    np.maximum.at(found, at - 1, wide)
-    padded = np.pad(found, NEAR)
-    return frozen(np.max([padded[k : k + len(found)] for k in range(2 * NEAR + 1)], axis=0))
+    np.maximum.at(widest, at, wide)
+    np.maximum.at(widest, at - 1, wide)
+    padded = np.pad(widest, NEAR)
+    return frozen(np.max([padded[k : k + len(widest)] for k in range(2 * NEAR + 1)], axis=0))
 
 
 def _rows(scenario: Scenario, members: set[str]) -> list[int]:
@@ -174,12 +174,12 @@ def outline(scenario: Scenario, n: int, parts: Sequence[float] = (-0.5, 0.0, 0.5
     x, y = scenario.position[n, first : last + 1].T
     yaw = scenario.heading[n, first : last + 1]
     cos, sin = exact.cos(yaw), exact.sin(yaw)
-    found = []
+    points = []
     for u in parts:
         for v in (-0.5, 0.5):
             along, across = u * vehicle.length, v * vehicle.width
-            found.append(np.column_stack((x + along * cos - across * sin, y + along * sin + across * cos)))
-    return np.concatenate(found)
+            points.append(np.column_stack((x + along * cos - across * sin, y + along * sin + across * cos)))
+    return np.concatenate(points)
 
 
 def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out: float) -> Floats:

@@ -84,11 +84,11 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
     ring = ring_of(road)
     sides = []
     for k, arm in enumerate((*arms, *ramps)):
-        found = _mouth(road, arm, _line(arm, k, axis, road), width, ring)
-        if found is None:
+        mouth = _mouth(road, arm, _line(arm, k, axis, road), width, ring)
+        if mouth is None:
             return None
-        sides.append(found)
-    strips = [_arm_strip(f"arm {k + 1}", one, width, extra, side, run_out) for k, one in enumerate(sides)]
+        sides.append(mouth)
+    strips = [_arm_strip(f"arm {k + 1}", arm_lanes, width, extra, side, run_out) for k, arm_lanes in enumerate(sides)]
     drawn = ((places, _way(sides, places, width, side, ring)) for places in _places(sides))
     ways = {places: way for places, way in drawn if way is not None and road.drivable_at(way.points[:, :2]).all()}
     if {places[0] for places in ways} != set(range(len(sides))):
@@ -111,13 +111,13 @@ def _ramps(road: Road, arms: Sequence[Arm], width: float, side: str) -> list[Arm
     """Return an arm of one lane, by which nobody leaves, for each entry that is in no arm."""
     known = [arm.pose[:2] + offset * _left(arm.pose) for arm in arms for offset in arm.inward]
     offset = width / 2.0 if side == "right" else -width / 2.0  # lanes in lie to the left of who looks out, on the right side
-    found = []
+    ramps = []
     for entry in road.entries:
         if all(float(exact.hypot(*(entry[:2] - place))) > EVEN for place in known):
             out = reverse(entry)
             pose = np.array([*(out[:2] - offset * _left(out)), out[2]])
-            found.append(Arm(pose, np.array([offset]), np.zeros(0)))
-    return found
+            ramps.append(Arm(pose, np.array([offset]), np.zeros(0)))
+    return ramps
 
 
 def _left(pose: Floats) -> Floats:
@@ -198,7 +198,7 @@ def _way(sides: Sequence[_Side], places: Way, width: float, side: str, ring: tup
 
 def _used(ways: dict[Way, Curve], sides: Sequence[_Side], width: float, scenarios: Sequence[Scenario]) -> dict[Way, list[Floats]]:
     """Return, for each way that somebody drives, the outlines (P, 2) [m] of those who do."""
-    found: dict[Way, list[Floats]] = {}
+    used: dict[Way, list[Floats]] = {}
     for scenario in scenarios:
         for n in range(len(scenario.vehicles)):
             first, last = scenario.present[n].tolist()
@@ -206,8 +206,8 @@ def _used(ways: dict[Way, Curve], sides: Sequence[_Side], width: float, scenario
             inside = ~np.any([_in_arm(arm, place, width) for arm in sides], axis=0)
             near = [_farthest(way, place[inside], yaw[inside]) if inside.any() else np.inf for way in ways.values()]
             if near and min(near) < np.inf:
-                found.setdefault(list(ways)[int(np.argmin(near))], []).append(outline(scenario, n))
-    return found
+                used.setdefault(list(ways)[int(np.argmin(near))], []).append(outline(scenario, n))
+    return used
 
 
 def _in_arm(arm: _Side, place: Floats, width: float) -> np.ndarray:

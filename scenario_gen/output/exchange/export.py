@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`scenario-gen export`: a folder of files for other software, and what is said of them."""
+"""`scenario-gen export`: a folder of files for other software, with notes on them."""
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-import hashlib
 import json
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from scenario_gen.bags.recordings.autoware import add_autoware
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.base.folders import Kind, replaced_folder, write_text
+from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
 from scenario_gen.base.registry import Registry
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
@@ -35,7 +34,7 @@ class Export:
 
 @dataclass(frozen=True)
 class Written:
-    """Names of the files of one scenario, in the folder of the export, and what is to be said of it."""
+    """Names of the files of one scenario, in the folder of the export, with notes on it."""
 
     names: tuple[str, ...]
     notes: tuple[str, ...] = ()
@@ -94,18 +93,18 @@ def export_bag(
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
             notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, to)}")
             for name, data in to.shared(case).items():
-                _write(folder, name, data)
-            for one in case.scenarios:
+                (folder / name).write_bytes(data)
+            for exported in case.scenarios:
                 try:
-                    message = to.write(folder, case, one, export)
+                    message = to.write(folder, case, exported, export)
                 except RefusedError as error:
                     notes.append(f"{about}: left out: {error}")
                     continue
-                notes += [f"{about}, scenario {one.index}: {sentence}" for sentence in message.notes]
-                entries.append(_entry(case, one, message.names, to))
+                notes += [f"{about}, scenario {exported.index}: {sentence}" for sentence in message.notes]
+                entries.append(_entry(case, exported, message.names, to))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
-        digests = {str(p.relative_to(folder)): _digest(p) for p in sorted(folder.rglob("*")) if p.is_file()}
+        digests = {str(p.relative_to(folder)): sha256_of(p) for p in sorted(folder.rglob("*")) if p.is_file()}
         document = {"format": target, "notes": notes, "scenarios": entries, "sha256": digests}
         write_text(folder / MANIFEST, json.dumps(document, indent=2) + "\n")
     return Export(len(entries), tuple(notes))
@@ -120,33 +119,25 @@ def _origin(case: Case, to: ExportFormat) -> str:
     return case.lane_map.network_origin if _has_own_lanes(case, to) else case.lane_map.origin
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _write(folder: Path, name: str, data: bytes) -> None:
-    (folder / name).write_bytes(data)
-
-
-def _entry(case: Case, one: Exported, names: tuple[str, ...], to: ExportFormat) -> dict[str, object]:
+def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFormat) -> dict[str, object]:
     """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
     return {
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
         "lanes": "derived" if case.lane_map.derived and not _has_own_lanes(case, to) else "true",
-        "index": one.index,
-        "seed": one.seed,
-        "sha256": one.sha256,
-        "vehicles": [vehicle.id for vehicle in one.others.vehicles],
-        "ego": None if one.ego is None else one.ego.vehicles[0].id,
+        "index": exported.index,
+        "seed": exported.seed,
+        "sha256": exported.sha256,
+        "vehicles": [vehicle.id for vehicle in exported.others.vehicles],
+        "ego": None if exported.ego is None else exported.ego.vehicles[0].id,
     }
 
 
-def _to_commonroad(folder: Path, case: Case, one: Exported, export: ExportConfig) -> Written:
-    data, notes = write_commonroad(case, one, export)
-    name = f"{benchmark_id(case, one)}.xml"
-    _write(folder, name, data)
+def _to_commonroad(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
+    data, notes = write_commonroad(case, exported, export)
+    name = f"{benchmark_id(case, exported)}.xml"
+    (folder / name).write_bytes(data)
     return Written((name,), notes)
 
 
@@ -154,17 +145,17 @@ def _road_file(case: Case) -> str:
     return f"case_{case.number}.xodr"
 
 
-def _to_openscenario(folder: Path, case: Case, one: Exported, export: ExportConfig) -> Written:
-    name = f"case_{case.number}_{one.index}.xosc"
-    _write(folder, name, write_openscenario(case, one, _road_file(case), export))
+def _to_openscenario(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
+    name = f"case_{case.number}_{exported.index}.xosc"
+    (folder / name).write_bytes(write_openscenario(case, exported, _road_file(case), export))
     return Written((name, _road_file(case)))
 
 
-def _to_autoware(folder: Path, case: Case, one: Exported, _: ExportConfig) -> Written:
-    name = f"case_{case.number}_{one.index}"
+def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Written:
+    name = f"case_{case.number}_{exported.index}"
     with BagWriter(folder / name) as bag:
-        add_autoware(bag, one.others, one.ego, case.start_ns)
-    notes = () if one.ego is not None else ("there is no ego, so no /localization/kinematic_state; name one with --ego",)
+        add_autoware(bag, exported.others, exported.ego, case.start_ns)
+    notes = () if exported.ego is not None else ("there is no ego, so no /localization/kinematic_state; name one with --ego",)
     return Written((name,), notes)
 
 

@@ -4,7 +4,7 @@
 """`scenario-gen import`: trajectories of CommonRoad and OpenSCENARIO files as a table that is read as a log.
 
 Columns: vehicle, t_s from the file's time zero, x_m and y_m of the footprint's centre, speed_mps, heading_rad from +x
-counter-clockwise, length_m, width_m. CommonRoad (2018b, 2020a) says all of it; a speed it does not say is derived. OpenSCENARIO
+counter-clockwise, length_m, width_m. CommonRoad (2018b, 2020a) gives all of it; a missing speed is derived. OpenSCENARIO
 poses the rear axle, and its vertices have no speeds: the centre follows from the bounding box; the speeds are those of our own
 files' property; in others' files they are derived from positions and times, but for the first, which the initial action says.
 """
@@ -116,7 +116,7 @@ def _commonroad(root: Place) -> Imported:
 
 
 def _state(state: Place, step: float) -> tuple[float, ...]:
-    """Return time [s], x, y [m], speed [m/s], NaN if it is not said, and heading [rad] of a state."""
+    """Return time [s], x, y [m], speed [m/s], NaN if it is not given, and heading [rad] of a state."""
     point = state.child("position/point")
     message = state.element.find("velocity") is not None
     speed = state.value("velocity/exact") if message else float("nan")
@@ -130,8 +130,8 @@ def _openscenario(root: Place) -> Imported:
     own: dict[str, Floats | None] = {}
     notes = []
     for entity in root.all("Entities/ScenarioObject", "name"):
-        found = entity.element.find("Vehicle/BoundingBox")
-        if found is None:
+        box = entity.element.find("Vehicle/BoundingBox")
+        if box is None:
             notes.append(f"{entity.text('name')} left out: it is no vehicle with a bounding box in this file")
         else:
             boxes[entity.text("name")] = entity.child("Vehicle/BoundingBox")
@@ -158,10 +158,10 @@ def _own_speeds(entity: Place) -> Floats | None:
     for own in entity.all("Vehicle/Properties/Property", "name"):
         if own.element.get("name") == SPEEDS:
             try:
-                found = np.array(own.text("value").split(), dtype=np.float64)
+                speeds = np.array(own.text("value").split(), dtype=np.float64)
             except ValueError:
                 return None
-            return found if np.isfinite(found).all() else None
+            return speeds if np.isfinite(speeds).all() else None
     return None
 
 
@@ -191,7 +191,7 @@ def _followed(follow: Place, name: str, box: Place, speed: float | None, speeds:
 
 
 def _track(place: Place, vehicle: str, size: tuple[float, float], rows: Floats, speed: float | None) -> Track:
-    """Return a track whose times ascend; speeds that are not said are derived.
+    """Return a track whose times ascend; speeds that are not given are derived.
 
     Raises:
         InputError: a time is not later than the one before, a size is not positive, or there are too many rows.

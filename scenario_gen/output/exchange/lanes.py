@@ -159,10 +159,10 @@ def lanes_of(lane_map: LaneMap) -> tuple[Lane, ...]:
     before: dict[Place, list[int]] = {place: [] for place in places}
     turns = {joint.by: joint.turn for joint in lane_map.joints}
     for joint in lane_map.joints:
-        for one, other in pairwise(joined(lane_map, joint)):
-            after[one].append(number[other])
-            before[other].append(number[one])
-    found = []
+        for from_lane, to_lane in pairwise(joined(lane_map, joint)):
+            after[from_lane].append(number[to_lane])
+            before[to_lane].append(number[from_lane])
+    lanes = []
     for place in places:
         strip, side, k = place
         edges = lane_map.strips[strip].edges(side)[k : k + 2]
@@ -176,7 +176,7 @@ def lanes_of(lane_map: LaneMap) -> tuple[Lane, ...]:
         further = number.get((strip, side, k + 1))
         outward = (further, True) if further else None
         left_of, right_of = (inward, outward) if lane_map.side == "right" else (outward, inward)
-        found.append(
+        lanes.append(
             Lane(
                 id=number[place],
                 strip=strip,
@@ -192,12 +192,12 @@ def lanes_of(lane_map: LaneMap) -> tuple[Lane, ...]:
                 derived=lane_map.is_derived(strip),
             )
         )
-    return tuple(found)
+    return tuple(lanes)
 
 
 def network_lanes(network: LaneNetwork) -> tuple[Lane, ...]:
     """Return the lanes of a vector map, numbered from 1 in their order; those beside them to which one may change."""
-    found = []
+    lanes = []
     for k, lane in enumerate(network.lanes):
         sides: dict[str, tuple[int, bool]] = {}
         across = lane.left[0] - lane.right[0]
@@ -205,7 +205,7 @@ def network_lanes(network: LaneNetwork) -> tuple[Lane, ...]:
             gap = network.lanes[other].centre - lane.centre[0]
             nearest = gap[int(np.argmin(np.square(gap).sum(axis=1)))]
             sides["left" if float((nearest * across).sum()) > 0.0 else "right"] = (other + 1, True)
-        found.append(
+        lanes.append(
             Lane(
                 id=k + 1,
                 strip=-1,
@@ -221,7 +221,7 @@ def network_lanes(network: LaneNetwork) -> tuple[Lane, ...]:
                 derived=False,
             )
         )
-    return tuple(found)
+    return tuple(lanes)
 
 
 def _overlapping(edges: Floats) -> Floats:

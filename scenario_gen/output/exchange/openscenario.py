@@ -24,13 +24,13 @@ LIMITS = {"maxSpeed": 70.0, "maxAcceleration": 10.0, "maxDeceleration": 10.0}  #
 STEERING = 0.7  # rad
 
 
-def write_openscenario(case: Case, one: Exported, road_file: str, export: ExportConfig = ExportConfig()) -> bytes:
+def write_openscenario(case: Case, exported: Exported, road_file: str, export: ExportConfig = ExportConfig()) -> bytes:
     """Return a scenario as the bytes of an OpenSCENARIO file; `road_file` names its OpenDRIVE file, beside it.
 
     Raises:
         RefusedError: the ego arrives late.
     """
-    one.refuse_late_ego()
+    exported.refuse_late_ego()
     root = Element("OpenSCENARIO")
     add(
         root,
@@ -38,29 +38,29 @@ def write_openscenario(case: Case, one: Exported, road_file: str, export: Export
         revMajor="1",
         revMinor="2",
         date=datetime.fromtimestamp(case.start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S"),
-        description=f"{case.road_name}, scenario {one.index} of {case.namespace or '/'}, sha256 {one.sha256}",
+        description=f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}",
         author="scenario_gen",
     )
     add(root, "ParameterDeclarations")
     add(root, "CatalogLocations")
     add(add(root, "RoadNetwork"), "LogicFile", filepath=road_file)
     entities = add(root, "Entities")
-    for n, vehicle in enumerate(one.others.vehicles):
-        _entity(entities, entity_name(vehicle), vehicle, _speeds(one.others, n))
-    if one.ego is not None:
-        _entity(entities, EGO, one.ego.vehicles[0], "")
+    for n, vehicle in enumerate(exported.others.vehicles):
+        _entity(entities, entity_name(vehicle), vehicle, _speeds(exported.others, n))
+    if exported.ego is not None:
+        _entity(entities, EGO, exported.ego.vehicles[0], "")
     storyboard = add(root, "Storyboard")
     actions = add(add(storyboard, "Init"), "Actions")
-    for n in range(len(one.others.vehicles)):
-        if one.others.present[n, 0] == 0:
-            _placed(actions, entity_name(one.others.vehicles[n]), one.others, n)
-    if one.ego is not None:
-        _ego(actions, one.ego)
+    for n in range(len(exported.others.vehicles)):
+        if exported.others.present[n, 0] == 0:
+            _placed(actions, entity_name(exported.others.vehicles[n]), exported.others, n)
+    if exported.ego is not None:
+        _ego(actions, exported.ego)
     act = _story(storyboard)
-    for n in range(len(one.others.vehicles)):
-        _follow(act, one.others, n, export.following)
+    for n in range(len(exported.others.vehicles)):
+        _follow(act, exported.others, n, export.following)
     _start(act)
-    _at(add(storyboard, "StopTrigger"), "end", one.duration, "greaterThan")
+    _at(add(storyboard, "StopTrigger"), "end", exported.duration, "greaterThan")
     return serialized(root)
 
 

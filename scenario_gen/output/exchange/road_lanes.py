@@ -42,9 +42,9 @@ def lane_map_of(
         config = read_parameters(config, values, "road.", "export")
     if road is not None and not config.paper:
         for candidate in (name,) if name in BUILT_IN else () if name else BUILT_IN:
-            found = true_lanes(road, candidate, tracks, config, scenarios, run_out)
-            if found is not None:
-                return found
+            lanes = true_lanes(road, candidate, tracks, config, scenarios, run_out)
+            if lanes is not None:
+                return lanes
     result = derived_lanes(scenarios, road, config.lane_width, run_out)
     if road is None or road.lanes is None:
         return result

@@ -108,15 +108,15 @@ class Place:
         Raises:
             InputError: there is none.
         """
-        found = self.element.find(way)
-        if found is None:
+        element = self.element.find(way)
+        if element is None:
             raise self.error(f"no element {way}")
-        return Place(self.path, found, f"{self.name}/{way}")
+        return Place(self.path, element, f"{self.name}/{way}")
 
     def all(self, way: str, key: str = "id") -> Iterable["Place"]:
         """Yield every element that a path of tags leads to."""
-        for k, found in enumerate(self.element.findall(way)):
-            yield Place(self.path, found, f"{self.name}/{way}[{found.get(key, str(k + 1))}]")
+        for k, element in enumerate(self.element.findall(way)):
+            yield Place(self.path, element, f"{self.name}/{way}[{element.get(key, str(k + 1))}]")
 
     def value(self, way: str = "") -> float:
         """Return the number in the text of the element that a path leads to.

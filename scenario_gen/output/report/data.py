@@ -27,9 +27,11 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     arms = {name: tuple(result.scenarios[:samples]) for name, result in sets.items() if result is not None}
     covered = case.coverage
     if covered is not None:  # the scenarios that stand out are always drawn
-        shown = {one.index for one in arms["with"]}
+        shown = {scenario.index for scenario in arms["with"]}
         extra = {index for index in covered.picks.values() if index not in shown}
-        arms["with"] += tuple(one for one in case.generated.scenarios[samples:] if one.index in extra) if extra else ()
+        arms["with"] += (
+            tuple(scenario for scenario in case.generated.scenarios[samples:] if scenario.index in extra) if extra else ()
+        )
     ids = [vehicle.id for vehicle in case.encounter.vehicles]
     if case.oracle is not None:
         arms["oracle"] = (case.oracle,)
@@ -125,13 +127,13 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
 
 def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
     """Return for each vehicle speed, acceleration and lateral acceleration of the template and of the scenarios that have it."""
-    found = []
+    motions = []
     for n, vehicle in enumerate(encounter.vehicles):
         rows = [(s, k) for s in scenarios for k, own in enumerate(s.vehicles) if own.id == vehicle.id]
         samples = [_over_time(scenario, k) for scenario, k in rows]
         index = [scenario.index for scenario, _ in rows]
-        found.append({"template": _over_time(encounter, n), "samples": samples, "index": index})
-    return found
+        motions.append({"template": _over_time(encounter, n), "samples": samples, "index": index})
+    return motions
 
 
 def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:

@@ -12,16 +12,15 @@ from scenario_gen.base.folders import write_text
 from scenario_gen.output.report.data import case_data
 from scenario_gen.output.report.html import render_page
 from scenario_gen.types import (
+    causes_in_words,
     ERRORS,
     formatted,
     GenerationResult,
     Interval,
     NARROW,
-    NOT_KEPT,
     ORACLE,
     Route,
     routes_in_words,
-    ScenarioSet,
     UNIFORM,
     WITHOUT,
 )
@@ -89,7 +88,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "title": case.title,
         "without": case.references.get(WITHOUT),
         "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
-        "arms": [(name, result, _causes(result)) for name, result in arms if result is not None],
+        "arms": [(name, result, causes_in_words(result.refused)) for name, result in arms if result is not None],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
         "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
@@ -99,7 +98,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "errors": {key: _errors(case, key) for key in ERRORS},
         "best": {key: case.best(key) for key in ERRORS},
         "reactions": case.reacting,
-        "not_kept": [message for message in case.generated.adaptations if message.startswith(NOT_KEPT)],
+        "not_kept": case.lost_reactions,
         "outdone": case.similarity()["said"],
         "segments": [
             {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
@@ -119,8 +118,8 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
             }
             for v, f, r in vehicles
         ],
-        "remarks": [message for v, r in zip(case.encounter.vehicles, case.routes, strict=False) for message in r.remarks(v.id)],
-        "lost": [loss.said for loss in case.fit.lost] if case.fit else [],
+        "remarks": case.route_remarks,
+        "lost": case.lost,
         "planned": routes_in_words(case.routes),
     }
 
@@ -129,19 +128,12 @@ def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
     """E of the delivered set, and what stands below it: each with its words and whether it is the best of what is compared."""
     best = case.best(metric)
     words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", ORACLE: "replayed"}
-    found = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
+    errors = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
     return {
         "own": formatted(Interval(case.evaluation.value(case.row, metric)), ""),
         "kind": "" if not best else "good" if best == case.row else "bad",
-        "beside": [(f"{value} {words[row]}", row == best) for row, value in found.items() if value != "–"],
+        "beside": [(f"{value} {words[row]}", row == best) for row, value in errors.items() if value != "–"],
     }
-
-
-def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
-    """Return the causes of refusal, the most frequent first."""
-    return sorted(
-        ((cause.value.replace("_", " "), count) for cause, count in made.refused.items() if count), key=lambda c: (-c[1], c[0])
-    )
 
 
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -151,7 +143,7 @@ def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         cases = [view["case"] for view in views if row in view["case"].compared]
         for key, what in ERRORS.items():
             pairs = [(case.evaluation.value(case.row, key), case.evaluation.value(row, key)) for case in cases]
-            known = [one < other for one, other in pairs if other >= SIGNIFICANT]
+            known = [value < other for value, other in pairs if other >= SIGNIFICANT]
             if known:
                 better.setdefault(words, {})[what] = (sum(known), len(known))
     sets = [view["case"].generated for view in views]

@@ -13,12 +13,12 @@ from rich.text import Text
 from scenario_gen.base.errors import printable
 from scenario_gen.types import (
     Cause,
+    causes_in_words,
     ERRORS,
     formatted,
     GenerationResult,
     Interval,
     NARROW,
-    NOT_KEPT,
     ORACLE,
     routes_in_words,
     UNIFORM,
@@ -33,9 +33,7 @@ def summary(cases: Sequence[GenerationResult]) -> RenderableType:
     """Return two lines per case and what was refused, for rich to print; names are long, so no table."""
     lines = [line for case in cases for line in _case(case)]
     refused: Counter[Cause] = sum((case.generated.refused for case in cases), Counter())
-    causes = ", ".join(
-        f"{count} {cause.value.replace('_', ' ')}" for cause, count in sorted(refused.items(), key=lambda c: (-c[1], c[0]))
-    )
+    causes = ", ".join(f"{count} {words}" for words, count in causes_in_words(refused))
     return Group(
         *lines,
         Text(f"refused candidates: {causes}" if causes else "no candidate was refused"),
@@ -48,37 +46,35 @@ def summary(cases: Sequence[GenerationResult]) -> RenderableType:
 
 
 def _case(case: GenerationResult) -> list[Text]:
-    """The name of a case, its figures, and what is to be said of its segmentation."""
-    result, found = case.generated, case.evaluation.row(WITH)
-    order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
+    """The name of a case, its figures, and the notes on its segmentation."""
+    result, row = case.generated, case.evaluation.row(WITH)
+    order = formatted(row.values.get("order_kept"), "%", bounds=False) if row else "–"
     title = Text(printable(case.title), style="bold")
     title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
     complete = len(result.scenarios) >= result.requested
-    measured = f" (of {found.samples:,}, evenly spaced)" if found and found.samples < len(result.scenarios) else ""
+    measured = f" (of {row.samples:,}, evenly spaced)" if row and row.samples < len(result.scenarios) else ""
     figures = Text.assemble(
         "  ",
         (f"{len(result.scenarios)}/{result.requested} valid", "green" if complete else "red"),
         f" of {result.candidates}  K {len(case.segmentation.changepoints)}"
         f"  order {order if order == '–' else order + ' %'}{measured}",
     )
-    kept = [] if found is None else _not_kept(found.values)
+    kept = [] if row is None else _not_kept(row.values)
     remark = case.segmentation.remark(case.encounter.duration)
-    lost = [f"lost on this road: {loss.said}" for loss in case.fit.lost] if case.fit else []
-    vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
-    routes = [message for vehicle, route in vehicles for message in route.remarks(vehicle.id)]
+    lost = [f"lost on this road: {message}" for message in case.lost]
     planned = routes_in_words(case.routes)
     if planned:
         figures.append(f"  routes: {planned}")
-    similar = [_errors(case, metric) for metric in ERRORS if found and metric in found.values]
-    kept += case.similarity()["said"]
-    kept += [message for message in result.adaptations if message.startswith(NOT_KEPT)]
+    similar = [_errors(case, metric) for metric in ERRORS if row and metric in row.values]
+    kept += [*case.similarity()["said"], *case.lost_reactions]
     reactions = case.reacting["sentences"]
+    warnings = [*lost, *kept, *case.route_remarks, *([remark] if remark else [])]
     return [
         title,
         figures,
         *(Text(f"  {printable(line)}") for line in reactions),
         *similar,
-        *(Text(f"  {printable(line)}", style="yellow") for line in (*lost, *kept, *routes, *([remark] if remark else []))),
+        *(Text(f"  {printable(line)}", style="yellow") for line in warnings),
     ]
 
 

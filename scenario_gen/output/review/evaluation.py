@@ -16,8 +16,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.output.review.validation import kept_reactions, Reference
-from scenario_gen.template import find_conflicts, find_waits, reactions_of, required_orders
-from scenario_gen.types import at_ends, CheckCounts, EgoSlot, GenerationResult, join_ego, Scenario, ScenarioSet, Verdict, WITHOUT
+from scenario_gen.template import reactions_of
+from scenario_gen.types import CheckCounts, EgoSlot, GenerationResult, join_ego, Scenario, ScenarioSet, Verdict, WITHOUT
 
 
 def bag_results(
@@ -25,18 +25,18 @@ def bag_results(
 ) -> tuple[GenerationResult, ...]:
     """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
 
-    The scenarios are checked anew, on the bag's map if it has one; start and end states are not asked. What the bag does not say
-    is left out: without `changepoints` K counts as 0; fit and routes are shown if both are there, with what the fitting decided.
+    The scenarios are checked again, on the bag's map if it has one, but not for start and end states. What the bag lacks is
+    left out: without `changepoints` K counts as 0; fit and routes are shown if both are there, with what the fitting decided.
 
     Raises:
         InputError: the bag is missing or damaged, or no namespace has both topics.
     """
     namespaces = read_recording(path, bag).namespaces.values()
-    whole = [one for one in namespaces if {"tracks", SCENARIOS} <= one.messages.keys()]
-    if not whole:
+    complete = [namespace for namespace in namespaces if {"tracks", SCENARIOS} <= namespace.messages.keys()]
+    if not complete:
         raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
     with within(path):
-        return tuple(_result(one, config or EvaluationConfig(), limits, seed) for one in whole)
+        return tuple(_result(namespace, config or EvaluationConfig(), limits, seed) for namespace in complete)
 
 
 def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | None, seed: int) -> GenerationResult:
@@ -62,8 +62,10 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
     evaluation = replace(evaluation, rows=tuple(rows))
     ego, track = None, namespace.ego_track
     if track is not None and track.vehicles[0].id not in evaluation.vehicles:  # else of another request than these scenarios
-        scenarios = tuple(one if one.witness else replace(one, witness=track) for one in scenarios)  # to be drawn
-    witness = next((one.witness for one in scenarios if one.witness is not None), None)
+        scenarios = tuple(
+            scenario if scenario.witness else replace(scenario, witness=track) for scenario in scenarios
+        )  # to be drawn
+    witness = next((scenario.witness for scenario in scenarios if scenario.witness is not None), None)
     if witness is not None:
         first, last = (np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]]) for k in (0, -1))
         ego = EgoSlot(witness.vehicles[0], first, last)
@@ -90,25 +92,18 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
 def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Limits | None) -> list[Verdict]:
     """Check every scenario; an ego may have been left out of one, and its map be another than the newest."""
     encounter = namespace.encounter
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-    waits = find_waits(encounter) if namespace.segmentation.changepoints.size else ()
-    names = tuple(vehicle.id for vehicle in encounter.vehicles)
     checkers: dict[tuple[object, ...], Checker] = {}
     verdicts: list[Verdict] = []
-    for k, one in enumerate(scenarios):
-        entry = namespace.entry(k)
-        map_hash = entry.map_hash if entry else None
-        scenario = join_ego(one)
-        order = entry.order if entry else "keep"
-        reactions = kept_reactions(encounter, entry)
-        key = (map_hash or "", order, *reactions, *(vehicle.id for vehicle in scenario.vehicles))
+    for k, recorded in enumerate(scenarios):
+        entry, scenario = namespace.entry(k), join_ego(recorded)
+        map_hash, order = (entry.map_hash, entry.order) if entry else (None, "keep")
+        ids = tuple(vehicle.id for vehicle in scenario.vehicles)
+        key = (map_hash or "", order, kept_reactions(encounter, entry), ids)
         if key not in checkers:
             road = namespace.road
             if namespace.roads_differ:
                 road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
-            first, ends = required_orders(conflicts, order), at_ends(encounter.present, len(encounter.time))
-            reference = Reference(road, names, tuple(conflicts), waits, first, reactions, ends=ends)
-            checkers[key] = reference.checker(scenario, limits, None)
+            checkers[key] = Reference.of(encounter, namespace.segmentation, road, entry).checker(scenario, limits, None)
         verdicts += checkers[key].check([scenario])
     return verdicts
 

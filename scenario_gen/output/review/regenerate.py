@@ -132,7 +132,7 @@ def replanned(bag: Path, namespace: str | None = None, config: BagConfig = BagCo
         road, placed = planned.placed()
         fit = found.namespace.fit[0]  # with what was decided, which the messages of one request do not hold
         if fit is not None and not known.request.moves:
-            placed = replace(fit, asked=placed.asked)
+            placed = replace(fit, requested=placed.requested)
         encounter = replace(planned.encounter, name=facts.get("template", planned.encounter.name))
         planned = replace(planned, encounter=encounter, road=replace(road, name=facts.get("road", road.name)), fit=placed)
         return replace(known, planned=planned)
@@ -156,11 +156,11 @@ def _replan(found: "_Found", what: str, log: Path | None) -> Replanned:
     return Replanned(planned, requested, sampling, read_parameters(Limits(), values, "limits.", what))
 
 
-def write_regenerated(made: Regenerated, folder: Path, inputs: Sequence[Path] = ()) -> Path:
+def write_regenerated(regenerated: Regenerated, folder: Path, inputs: Sequence[Path] = ()) -> Path:
     """Write the scenario, its entry and its template to a bag of its own; return `folder`.
 
     Args:
-        made: the scenario.
+        regenerated: the scenario.
         folder: of the bag; one that this function wrote there earlier is replaced.
         inputs: the bag, and the log, it was made from.
 
@@ -168,7 +168,7 @@ def write_regenerated(made: Regenerated, folder: Path, inputs: Sequence[Path] = 
         InputError: the folder is there and is something else, holds an input, or cannot be written.
     """
     with atomic_bag(folder, REGENERATED, inputs) as bag:
-        for message in made.messages:
+        for message in regenerated.messages:
             add_message(bag, message.topic, message.data, message.stamp_ns)
     return folder
 
@@ -183,13 +183,19 @@ def _is_regenerated(folder: Path) -> bool:
         return False
     try:
         (namespace,) = read_recording(folder).namespaces.values()
-        (one, _), (closing, (summary,)) = namespace.infos
+        (opening, _), (closing, (summary,)) = namespace.infos
     except (InputError, ValueError):
         return False
     topics = {topic: len(messages) for topic, messages in namespace.messages.items() if topic != INFO}
     known = not topics.keys() & {"posterior", "fit/info", "diagnostics"} and len(bag_topics(folder)) == len(topics) + 1
     whole = {"scenarios", *TEMPLATE} <= set(topics) and set(topics.values()) == {1}
-    return known and whole and isinstance(summary, RequestSummary) and summary.published == 1 and one.stamp_ns == closing.stamp_ns
+    return (
+        known
+        and whole
+        and isinstance(summary, RequestSummary)
+        and summary.published == 1
+        and opening.stamp_ns == closing.stamp_ns
+    )
 
 
 REGENERATED = Kind("regenerated bag", _is_regenerated)
@@ -224,9 +230,11 @@ def _entries(bag: Path, config: BagConfig) -> list[tuple[Namespace, ScenarioEntr
         InputError: there is none.
     """
     entries = []
-    for one in read_recording(bag, config).namespaces.values():
-        one.check_infos()
-        entries += [(one, info, message) for message, infos in one.infos for info in infos if isinstance(info, ScenarioEntry)]
+    for namespace in read_recording(bag, config).namespaces.values():
+        namespace.check_infos()
+        entries += [
+            (namespace, info, message) for message, infos in namespace.infos for info in infos if isinstance(info, ScenarioEntry)
+        ]
     if not entries:
         raise InputError(f"{bag}: no scenario has an entry on `{INFO}`; only what this suite published can be made again")
     return entries
@@ -249,7 +257,7 @@ def _find(bag: Path, index: int, namespace: str | None, request: str | None, con
         places = "; ".join(f"--namespace '{where.name}' --request {entry.request}" for where, entry, _ in same)
         raise InputError(f"{bag}: {len(same)} scenarios have index {index}; choose one: {places}")
     ((where, entry, info),) = same
-    summary = next((one for one in reversed(where.summaries) if one.request == entry.request), None)
+    summary = next((candidate for candidate in reversed(where.summaries) if candidate.request == entry.request), None)
     if summary is None:
         raise InputError(f"{bag}: request {entry.request} was not closed on {where.where(INFO)}: its parameters are missing")
     return _Found(where, entry, summary, where.messages_of(info, entry, summary))

@@ -23,7 +23,19 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.numerics import Bools
 from scenario_gen.template import Conflict, find_conflicts, find_waits, reactions_of, required_orders, Wait
-from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, join_ego, Reaction, Road, Scenario, split_pieces, tokens
+from scenario_gen.types import (
+    at_ends,
+    BoundaryStates,
+    Cause,
+    Encounter,
+    join_ego,
+    Reaction,
+    Road,
+    Scenario,
+    Segmentation,
+    split_pieces,
+    tokens,
+)
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
 NO_WITNESS = f"the ego: its witness is not on {WITNESS}"
@@ -84,20 +96,39 @@ class Reference:
     reactions: tuple[Reaction, ...] = ()
     ends: Bools | None = None
 
-    def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None) -> Checker:
-        """Return the checker of scenarios with this one's vehicles, of which `asked` was asked."""
+    @classmethod
+    def of(
+        cls, encounter: Encounter, segmentation: Segmentation | None, road: Road | None, entry: ScenarioEntry | None
+    ) -> "Reference":
+        """Return what a scenario with this entry is held against; without a segmentation its waits are not known."""
+        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+        waits: tuple[Wait, ...] | None = None
+        if segmentation is not None:
+            waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
+        return cls(
+            road,
+            tokens(vehicle.id for vehicle in encounter.vehicles),
+            tuple(conflicts),
+            waits,
+            required_orders(conflicts, entry.order if entry else "keep"),
+            kept_reactions(encounter, entry),
+            at_ends(encounter.present, len(encounter.time)),
+        )
+
+    def checker(self, scenario: Scenario, limits: Limits | None, requested: BoundaryStates | None) -> Checker:
+        """Return the checker of scenarios with the same vehicles as this one, which must meet the states `requested`."""
         ids = tokens(vehicle.id for vehicle in scenario.vehicles)
         if self.template is None or not set(ids) <= set(self.template):
-            return Checker(self.road, asked, None, None, limits)
+            return Checker(self.road, requested, None, None, limits)
         at = {self.template.index(name): k for k, name in enumerate(ids)}
         known = [k for k, c in enumerate(self.conflicts) if {c.first, c.second} <= set(at)]
         conflicts = [replace(c, first=at[c.first], second=at[c.second]) for c in (self.conflicts[k] for k in known)]
-        asked_first = self.first or tuple(c.first for c in self.conflicts)
-        first = [None if one is None else at[one] for one in (asked_first[k] for k in known)]
+        required_first = self.first or tuple(c.first for c in self.conflicts)
+        first = [None if leader is None else at[leader] for leader in (required_first[k] for k in known)]
         waits = None if self.waits is None else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
         edges = [replace(e, who=at[e.who], whom=at[e.whom]) for e in self.reactions if {e.who, e.whom} <= set(at)]
         ends = None if self.ends is None else self.ends[list(at)]
-        return Checker(self.road, asked, conflicts, waits, limits, first, edges, ends)
+        return Checker(self.road, requested, conflicts, waits, limits, first, edges, ends)
 
 
 def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = BagConfig()) -> tuple[Validation, ...]:
@@ -109,11 +140,11 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = B
     namespaces = read_recording(
         path, config, ("tracks", "changepoints", "map", "road/lanes", "fit", "fit/info", SCENARIOS, INFO)
     ).namespaces.values()
-    found = [namespace for namespace in namespaces if SCENARIOS in namespace.messages]
-    if not found:
+    checked = [namespace for namespace in namespaces if SCENARIOS in namespace.messages]
+    if not checked:
         raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
     with within(path):
-        return tuple(_validate(namespace, limits) for namespace in found)
+        return tuple(_validate(namespace, limits) for namespace in checked)
 
 
 def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
@@ -191,13 +222,4 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     encounter = namespace.tracks_of(entry, stamp)
     if encounter is None:
         return Reference(road, None, (), None)
-    segmentation = namespace.segmentation_of(encounter)
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-    waits = None  # without changepoints there is no dwell to hold: waits are not asked for
-    if segmentation is not None:
-        waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
-    names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    reactions = kept_reactions(encounter, entry)
-    first = required_orders(conflicts, entry.order if entry else "keep")
-    ends = at_ends(encounter.present, len(encounter.time))
-    return Reference(road, names, tuple(conflicts), waits, first, reactions, ends)
+    return Reference.of(encounter, namespace.segmentation_of(encounter), road, entry)

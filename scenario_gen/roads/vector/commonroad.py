@@ -91,12 +91,12 @@ def _speed_limit(lanelet: Element, signs: dict[str, float]) -> float:
 
 def _junctions(root: Element, known: set[str]) -> dict[str, str]:
     """The intersection of each lanelet that lies in one: those that follow its incoming lanelets."""
-    found: dict[str, str] = {}
+    junctions: dict[str, str] = {}
     for intersection in root.all("intersection"):
         for incoming in intersection.all("incoming"):
             for tag in ("successorsLeft", "successorsRight", "successorsStraight"):
                 for ref in incoming.all(tag):
                     if ref.get("ref") not in known:
                         raise InputError(f"{ref.place}: lanelet {ref.get('ref')} is not there")
-                    found[ref.get("ref")] = intersection.get("id")
-    return found
+                    junctions[ref.get("ref")] = intersection.get("id")
+    return junctions

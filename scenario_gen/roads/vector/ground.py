@@ -30,12 +30,12 @@ def directions(road: Road) -> npt.NDArray[np.uint16]:
 
     Several lanes may lie in a cell, as in a junction; each allows what differs from it by at most 90°.
     """
-    found = np.zeros(road.drivable.shape, dtype=np.uint16)
+    directions = np.zeros(road.drivable.shape, dtype=np.uint16)
     for lane in road.lanes.lanes if road.lanes is not None else ():
         rows, columns = _cells(road, lane)
-        found[rows, columns] |= _bits(road, lane, rows, columns)
-    found[found == 0] = _ALL
-    return sealed(found)
+        directions[rows, columns] |= _bits(road, lane, rows, columns)
+    directions[directions == 0] = _ALL
+    return sealed(directions)
 
 
 def _cells(road: Road, lane: Lane) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -93,11 +93,11 @@ def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
 
 def along_lanes(road: Road, poses: Floats) -> Bools:
     """Return (M,) whether poses (M, 3) x, y [m], yaw [rad] lie in a lane about its way; everywhere, on a road without lanes."""
-    found = np.full(len(poses), road.lanes is None)
+    along = np.full(len(poses), road.lanes is None)
     for lane in road.lanes.lanes if road.lanes is not None else ():
-        near = ~found & _in_box(lane, poses)
-        found[near] = _along(lane, poses[near])
-    return found
+        near = ~along & _in_box(lane, poses)
+        along[near] = _along(lane, poses[near])
+    return along
 
 
 def _uses(lane: Lane, path: Floats) -> bool:
@@ -113,10 +113,10 @@ def _in_box(lane: Lane, poses: Floats) -> Bools:
 
 def _along(lane: Lane, poses: Floats) -> Bools:
     """Whether poses (M, 3) in the box about a lane lie in it, about its way."""
-    found = np.zeros(len(poses), dtype=np.bool_)
+    along = np.zeros(len(poses), dtype=np.bool_)
     half = exact.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
     for row, (x, y, heading) in enumerate(poses.tolist()):
         away = exact.hypot(lane.middle[:, 0] - x, lane.middle[:, 1] - y)
         k = int(np.argmin(away))
-        found[row] = away[k] <= half[k] and abs(angle_between(lane.yaw[k], heading)) < _ALONG
-    return found
+        along[row] = away[k] <= half[k] and abs(angle_between(lane.yaw[k], heading)) < _ALONG
+    return along

@@ -131,7 +131,7 @@ def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
     Raises:
         InputError: there is not one of each, or it is not in the map.
     """
-    found = []
+    refs = []
     for role in ("left", "right"):
         members = [member for member in relation.all("member") if member.attributes.get("role") == role]
         if len(members) != 1:
@@ -141,8 +141,8 @@ def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
         ref = members[0].get("ref")
         if ref not in ways:
             raise InputError(f"{members[0].place}: way {ref} is not in the map")
-        found.append(ref)
-    return found
+        refs.append(ref)
+    return refs
 
 
 def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
@@ -262,8 +262,8 @@ def _may_change(border: _Border, *, to_right: bool) -> bool:
 
 def _speed(text: str) -> float:
     """Metres per second of a text such as "50", "50 km/h" or "30 mph"; NaN if it is none."""
-    found = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]+)?)\s*([a-zA-Z/]*)\s*", text[:40])
-    return float(found[1]) * _UNITS.get(found[2].lower(), math.nan) if found else math.nan
+    match = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]+)?)\s*([a-zA-Z/]*)\s*", text[:40])
+    return float(match[1]) * _UNITS.get(match[2].lower(), math.nan) if match else math.nan
 
 
 def _sign_limit(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> float:

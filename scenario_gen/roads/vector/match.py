@@ -115,11 +115,11 @@ class Chains:
         """Lanes that pass a pose (3,) x, y [m], yaw [rad] nearby, about its way; the nearest first."""
         away = exact.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
         fits = (away <= NEAR) & (np.abs(wrap_angle(self.yaws - pose[2])) <= _HEADING)
-        found: dict[int, float] = {}
+        nearest: dict[int, float] = {}
         for k in np.flatnonzero(fits).tolist():
             owner = int(self.owner[k])
-            found[owner] = min(found.get(owner, math.inf), round(float(away[k]), 6))
-        return sorted(found, key=lambda lane: (found[lane], lane))
+            nearest[owner] = min(nearest.get(owner, math.inf), round(float(away[k]), 6))
+        return sorted(nearest, key=lambda lane: (nearest[lane], lane))
 
     def from_lane(self, first: int, travelled: float) -> Iterator[tuple[int, ...]]:
         """Chains that begin before a lane and go on for what is travelled from it, or until the lanes end."""
@@ -182,8 +182,8 @@ def _course(chains: Chains, track: Track, spot: Spot, scale: float) -> Course | 
     poses = _placed(track, spot)
     driven = scale * track.travelled
     tried: dict[tuple[int, ...], tuple[float, Curve, Floats]] = {}
-    found = (chain for first in chains.near(poses[0]) for chain in chains.from_lane(first, driven))
-    for chain in dict.fromkeys(islice(found, _MOST_TRIED)):
+    candidates = (chain for first in chains.near(poses[0]) for chain in chains.from_lane(first, driven))
+    for chain in dict.fromkeys(islice(candidates, _MOST_TRIED)):
         curve = _around(chains.curve(chain), poses, driven)
         misses = _misses(curve, poses)
         tried[chain] = (float(misses.mean()) + _turn_cost(curve, poses), curve, misses)
@@ -262,11 +262,11 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
     for a in range(len(tracks)):
         for b in range(a):
             crossing = crossing_of.get((a, b))
-            found = crossings(courses[a].curve, courses[b].curve, _CROSS) if crossing else ()
-            if crossing and len(found):
+            crossing_points = crossings(courses[a].curve, courses[b].curve, _CROSS) if crossing else ()
+            if crossing and len(crossing_points):
                 along = scale * np.array([crossing.first, crossing.second])
-                wanted = np.array([courses[a].start, courses[b].start]) + along
-                at = found[int(np.argmin(np.abs(found - wanted).sum(axis=1)))] - along
+                target = np.array([courses[a].start, courses[b].start]) + along
+                at = crossing_points[int(np.argmin(np.abs(crossing_points - target).sum(axis=1)))] - along
                 weight = _CROSSED if crossing.driven else _BEYOND
                 rows += [(one_each[a], float(at[0]), weight), (one_each[b], float(at[1]), weight)]
             for first, second in ((a, b), (b, a)):

@@ -80,12 +80,12 @@ def by_id(elements: Iterable[Element]) -> dict[str, Element]:
     Raises:
         InputError: an id is there twice.
     """
-    found: dict[str, Element] = {}
+    seen: dict[str, Element] = {}
     for element in elements:
-        first = found.setdefault(element.get("id"), element)
+        first = seen.setdefault(element.get("id"), element)
         if first is not element:
             raise InputError(f"{element.place}: {element.tag} {element.get('id')} is there twice, first on line {first.line}")
-    return found
+    return seen
 
 
 def refuse_too_many_lanes(count: int, place: str) -> None:
@@ -110,13 +110,13 @@ def refuse_too_long(sections: int, place: str) -> None:
         )
 
 
-def network_of(name: str, found: MapLanes) -> LaneNetwork:
+def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
     """Return the network of what a reader found; neighbours that are no lanes for cars are left out.
 
     Raises:
         InputError: there is no lane, an id is there twice, or a border is no line.
     """
-    drafts, notes = found.drafts, found.notes
+    drafts, notes = draft_lanes.drafts, draft_lanes.notes
     if not drafts:
         raise InputError(f"map {name}: no lane that cars may use")
     index: dict[str, int] = {}
@@ -136,8 +136,8 @@ def network_of(name: str, found: MapLanes) -> LaneNetwork:
             tuple(dict.fromkeys(index[other] for other in names if other in index)) for names in (draft.successors, draft.beside)
         )
         lanes.append(Lane(draft.id, left, right, after, beside, draft.speed_limit, draft.junction))
-    if found.left_out:
-        notes += (f"{found.left_out} lanelets are for others than cars and were left out",)
+    if draft_lanes.left_out:
+        notes += (f"{draft_lanes.left_out} lanelets are for others than cars and were left out",)
     network = LaneNetwork(name, tuple(lanes), notes)
     return network if any(lane.junction for lane in lanes) else with_junctions(network)
 

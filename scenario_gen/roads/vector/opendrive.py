@@ -226,7 +226,7 @@ class _Joints:
             for lane in section.lanes.values():
                 for tag, at in (("predecessor", 0), ("successor", 1)):
                     beyond = k + (1 if at else -1)
-                    for link in [found for group in lane.element.all("link") for found in group.all(tag)]:
+                    for link in [child for group in lane.element.all("link") for child in group.all(tag)]:
                         other = int(link.number("id"))
                         if 0 <= beyond < len(road.sections):
                             self.join((lane.key, at), ((road.id, beyond, other), 1 - at), link.place)

@@ -74,12 +74,12 @@ def placements(
                 matches.append(placement)
         matches.sort(key=lambda placement: round(placement.cost, 3))
         pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
-        found = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
-        yield from found
-        if found:
+        placed = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
+        yield from placed
+        if placed:
             break
     yield from pressed
-    if pressed or found:
+    if pressed or placed:
         return
     why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in reasons.most_common(2))
     raise RefusedError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")

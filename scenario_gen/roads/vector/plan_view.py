@@ -104,10 +104,10 @@ def reference_line(road: Element) -> ReferenceLine:
 
 
 def _shape(piece: Element) -> Element:
-    found = next((child for child in piece.children if child.tag in _SHAPES), None)
-    if found is None:
+    shape = next((child for child in piece.children if child.tag in _SHAPES), None)
+    if shape is None:
         raise InputError(f"{piece.place} holds none of {', '.join(_SHAPES)}")
-    return found
+    return shape
 
 
 def _piece(piece: Element, ds: Floats) -> Floats:

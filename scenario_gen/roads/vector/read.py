@@ -96,7 +96,7 @@ def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
         InputError: an id is not in the map.
     """
     kind, _, ids = part.partition("=")
-    found: list[int] = []
+    chosen: list[int] = []
     for name in (piece.strip() for piece in ids.split(",")):
         own = [lane.id if kind == "lanelet" else lane.junction for lane in network.lanes]
         rows = [k for k, known in enumerate(own) if known and known == name]
@@ -104,8 +104,8 @@ def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
             known = list(dict.fromkeys(value for value in own if value))
             listed = ", ".join(known[:_NAMED]) + (f" and {len(known) - _NAMED} more" if len(known) > _NAMED else "")
             raise InputError(f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {listed or 'none'}")
-        found += rows
-    return tuple(dict.fromkeys(found))
+        chosen += rows
+    return tuple(dict.fromkeys(chosen))
 
 
 def box_of(network: LaneNetwork, part: str) -> Floats:

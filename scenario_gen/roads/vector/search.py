@@ -159,12 +159,12 @@ def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
 
 def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
     """Poses of the template that are laid onto lanes: where paths cross, and the begin, middle and end of the longest paths."""
-    found: list[Floats] = []
+    anchors: list[Floats] = []
     for a, b, crossing in islice(pair_crossings(tracks), 2):
-        found += [tracks[a].curve.at(crossing.first), tracks[b].curve.at(crossing.second)]
+        anchors += [tracks[a].curve.at(crossing.first), tracks[b].curve.at(crossing.second)]
     for track in sorted(tracks, key=lambda track: -track.travelled)[:2]:
-        found += [track.curve.at(share * track.travelled) for share in (0.05, 0.5, 0.95)]
-    return found
+        anchors += [track.curve.at(share * track.travelled) for share in (0.05, 0.5, 0.95)]
+    return anchors
 
 
 def _costs(field: _Field, poses: Floats, weight: Floats, placements: Floats) -> Floats:

@@ -84,7 +84,7 @@ def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int
     except RefusedError:
         return
     low, high = (end + room for end, room in zip(compact.span(tracks), (-_ROOM, _ROOM), strict=True))
-    stretches = sorted(_stretches(chains, high - low, lanes), key=lambda found: (round(found.bend, 4), found.chain))
+    stretches = sorted(_stretches(chains, high - low, lanes), key=lambda candidate: (round(candidate.bend, 4), candidate.chain))
     for frenet in (compact.spread(), compact):
         for stretch in stretches[:_TRIED]:
             stop_if_cancelled()
@@ -188,7 +188,7 @@ def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:
     yaw = start[2] + (0.0 if sign > 0 else np.pi)
     away = exact.hypot(chains.points[:, 0] - start[0], chains.points[:, 1] - start[1])
     near = np.flatnonzero((away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL))
-    found: list[_Side] = []
+    sides: list[_Side] = []
     for first in sorted(set(chains.owner[near].tolist())):
         chain = _beside(chains, first, poses[::sign], sign)
         back = chains.network.predecessors[first]
@@ -200,10 +200,10 @@ def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:
         inside = (station > -0.1).all() and (station < curve.length + 0.1).all()
         if inside and (turned < _PARALLEL).all() and np.ptp(offset) < _WANDER:
             mean = float(offset.mean())
-            if all(abs(mean - other.offset) > 1.0 for other in found):
+            if all(abs(mean - other.offset) > 1.0 for other in sides):
                 low, high = float(station.min()) - _FORTH, float(station.max()) + _FORTH
-                found.append(_Side(chain, curve.cut(max(low, 0.0), min(high, curve.length)), mean))
-    return found
+                sides.append(_Side(chain, curve.cut(max(low, 0.0), min(high, curve.length)), mean))
+    return sides
 
 
 def _beside(chains: Chains, first: int, poses: Floats, sign: int) -> tuple[int, ...]:

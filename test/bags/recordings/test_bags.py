@@ -97,7 +97,7 @@ def test_a_run_is_read_back_from_its_bag(run, tmp_path):
     _, road = decode_map(by_topic["/map"], by_topic["/road/entries"], by_topic["/road/exits"])
     assert (road.drivable == run.road.drivable).all()
     assert decode_posterior(by_topic["/posterior"]).changepoints.tolist() == [20, 45]
-    assert decode_fit(by_topic["/fit"])[2].end.tobytes() == run.fit.asked.end.tobytes()
+    assert decode_fit(by_topic["/fit"])[2].end.tobytes() == run.fit.requested.end.tobytes()
     anchors = anchor_stamps(template, run.segmentation.changepoints)
     assert decode_route(by_topic["/vehicle_1/route"], anchors)[1].points.tobytes() == run.routes[0].points.tobytes()
     sent = [message.data for message in messages if message.topic == "/scenarios"]

@@ -136,8 +136,8 @@ def test_ends_do_not_depend_on_changepoints(recorded):
         for road_name in ("four_way", "corridor"):
             road = build_road(road_name, encounter)
             with_, without = (fit_template(encounter, s, road) for s in (every(encounter, 10), segmented(encounter)))
-            assert np.array_equal(with_.asked.start, without.asked.start)
-            assert np.array_equal(with_.asked.end, without.asked.end)
+            assert np.array_equal(with_.requested.start, without.requested.start)
+            assert np.array_equal(with_.requested.end, without.requested.end)
             assert [f.manoeuvre for f in with_.fitted] == [f.manoeuvre for f in without.fitted]
 
 
@@ -191,7 +191,7 @@ def test_who_comes_from_the_right_still_does_and_arrival_times_are_kept(road_nam
         assert relative(first[k], second[k]) == pytest.approx(template, abs=0.3)
     assert fit.fitted[1].stands[13:17].all()  # it waits from 6 s to 9 s
     assert not fit.fitted[0].stands.any()
-    assert fit.asked.start[:, 3].tolist() == pytest.approx([9.0, 6.0])
+    assert fit.requested.start[:, 3].tolist() == pytest.approx([9.0, 6.0])
 
 
 def test_turns_take_the_arm_on_their_side():
@@ -234,7 +234,7 @@ def test_scale_out_of_range_is_refused_with_the_figure():
         fit_template(encounter, every(encounter), road)
     fit = fit_template(encounter, every(encounter), road, FittingConfig(scale_low=0.4))
     assert fit.fitted[0].scale == pytest.approx(0.55, abs=0.04)
-    assert fit.asked.start[0, 3] == pytest.approx(12.0 * fit.fitted[0].scale)
+    assert fit.requested.start[0, 3] == pytest.approx(12.0 * fit.fitted[0].scale)
 
 
 def test_given_ends_are_met_exactly_and_the_map_keeps_orientation():
@@ -247,8 +247,8 @@ def test_given_ends_are_met_exactly_and_the_map_keeps_orientation():
         goals[i, :2] += 1.1 * chord[i] * np.array([np.cos(starts[i, 2]), np.sin(starts[i, 2])])
     goals[:, 3] = (9.0, 7.0)
     fit = fit_template(encounter, every(encounter), road, starts=starts, goals=goals)
-    assert np.abs(fit.asked.start - starts).max() < 1e-8
-    assert np.abs(fit.asked.end - goals).max() < 1e-8
+    assert np.abs(fit.requested.start - starts).max() < 1e-8
+    assert np.abs(fit.requested.end - goals).max() < 1e-8
     assert [f.scale for f in fit.fitted] == pytest.approx([1.1, 1.1], abs=0.01)
     for i in (0, 1):  # stations along the chord are the template's, times s
         along = np.hypot(*(fit.fitted[i].anchors[:, :2] - starts[i, :2]).T)

@@ -42,7 +42,7 @@ def case(request):
 
 def model_of(encounter, result):
     waits = waits_to_keep(encounter, result.segmentation)
-    plan = Plan(encounter, result.segmentation, result.road, result.routes, result.fit.asked, waits)
+    plan = Plan(encounter, result.segmentation, result.road, result.routes, result.fit.requested, waits)
     return prepare(plan, CONFIG.sampling).model
 
 

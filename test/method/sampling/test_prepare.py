@@ -61,7 +61,7 @@ def undisturbed(encounter, segmentation):
     """The drive without deviations on the own road, and what was adapted."""
     road = build_road("corridor", encounter, CONFIG.road)
     planned = Attempt(encounter, segmentation, road, CONFIG).plan()
-    done = prepare(Plan(encounter, segmentation, road, planned.routes, planned.fit.asked, find_waits(encounter)), NARROW)
+    done = prepare(Plan(encounter, segmentation, road, planned.routes, planned.fit.requested, find_waits(encounter)), NARROW)
     return done.model.draw(np.zeros((1, done.model.size)), Scale()).scenarios(0, [0], "map")[0], done.adaptations, planned
 
 

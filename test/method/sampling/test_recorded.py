@@ -37,8 +37,8 @@ def test_recorded_encounter(data, case, ablation):
     fit = fit_template(encounter, segmentation, road)
     routes = plan_routes(road, fit)
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
-    checker, config = Checker(road, fit.asked, conflicts, waits), SamplingConfig(variety="narrow")
-    plan = Plan(encounter, segmentation, road, routes, fit.asked, waits)
+    checker, config = Checker(road, fit.requested, conflicts, waits), SamplingConfig(variety="narrow")
+    plan = Plan(encounter, segmentation, road, routes, fit.requested, waits)
     found = draw_scenarios(plan, checker.check, config, count=30, seed=2)
     assert len(found.scenarios) == 30
     assert found.acceptance > 0.7

@@ -30,7 +30,7 @@ def states(scenario, k):
 
 
 def causes(scenario, **known):
-    given = {"road": None, "asked": None, "conflicts": None, "waits": None, "limits": Limits()} | known
+    given = {"road": None, "requested": None, "conflicts": None, "waits": None, "limits": Limits()} | known
     (verdict,) = Checker(**given).check([scenario])
     return [violation.cause for violation in verdict.violations]
 
@@ -40,21 +40,21 @@ def causes(scenario, **known):
 def test_what_was_asked_is_never_near_to_nan(column, end):
     scenario = passing()
     asked = {"start": states(scenario, 0), "end": states(scenario, -1)}
-    assert causes(scenario, asked=BoundaryStates(**asked)) == []
+    assert causes(scenario, requested=BoundaryStates(**asked)) == []
     asked[end][1, column] = np.nan
-    assert causes(scenario, asked=BoundaryStates(**asked)) == [Cause.BOUNDARY_STATE]
+    assert causes(scenario, requested=BoundaryStates(**asked)) == [Cause.BOUNDARY_STATE]
 
 
 def test_nan_frees_no_state():
     scenario = passing()
     asked = BoundaryStates(states(scenario, 0) + 5.0, states(scenario, -1), np.full((2, 2, 2), np.nan))
-    assert Cause.BOUNDARY_STATE in causes(scenario, asked=asked)
+    assert Cause.BOUNDARY_STATE in causes(scenario, requested=asked)
 
 
 def test_a_request_for_fewer_vehicles_is_refused():
     scenario = passing()
     with pytest.raises(InputError, match="states were asked for 1"):
-        causes(scenario, asked=BoundaryStates(states(scenario, 0), states(scenario, -1)[:1]))
+        causes(scenario, requested=BoundaryStates(states(scenario, 0), states(scenario, -1)[:1]))
 
 
 @pytest.mark.parametrize("index", [-1, 2])

@@ -41,12 +41,12 @@ def asked_of(scenario):
     return BoundaryStates(start, end)
 
 
-def causes(scenario, *, road=ROAD, asked=None, conflicts=None, waits=None, limits=None):
+def causes(scenario, *, road=ROAD, requested=None, conflicts=None, waits=None, limits=None):
     """Causes found by the checker; the oracle must find nothing where the checker finds nothing."""
-    (verdict,) = Checker(road, asked, conflicts, waits, limits).check([scenario])
+    (verdict,) = Checker(road, requested, conflicts, waits, limits).check([scenario])
     assert all(violation.message and np.isfinite(violation.time) for violation in verdict.violations)
     if verdict.valid:
-        assert oracle_violations(scenario, road, asked, conflicts, waits, limits, dt=0.02) == []
+        assert oracle_violations(scenario, road, requested, conflicts, waits, limits, dt=0.02) == []
     return [violation.cause for violation in verdict.violations]
 
 
@@ -152,7 +152,7 @@ def test_asked_states_are_kept_within_the_tolerances():
         for name in ("start", "end"):
             states = np.array(getattr(asked, name))
             states[1, column] += off
-            assert causes(scenario, asked=replace(asked, **{name: states})) == [Cause.BOUNDARY_STATE] * expected
+            assert causes(scenario, requested=replace(asked, **{name: states})) == [Cause.BOUNDARY_STATE] * expected
 
 
 CROSSING = (straight(-90, 0, 0, 9, TIME), straight(0, -60, np.pi / 2, 7, TIME))
@@ -217,11 +217,11 @@ def test_a_vehicle_that_waits_throughout_never_moves():
     waits = (Wait(0, 0.0, 20.0),)
     scenario = scenario_of([standing, other], TIME)
     asked = asked_of(scenario)
-    assert causes(scenario, asked=asked, waits=waits) == []
+    assert causes(scenario, requested=asked, waits=waits) == []
     twitch = np.interp(TIME, [0, 15, 15.2, 15.6, 15.8, 20], [0, 0, 0.2, -0.2, 0, 0])
     position = standing[0] + np.stack((np.cumsum(twitch) * 0.1, 0 * TIME), axis=-1)
     moving = scenario_of([(position, standing[1], np.abs(twitch)), other], TIME)
-    assert Cause.STOP_NOT_KEPT in causes(moving, asked=asked, waits=waits)
+    assert Cause.STOP_NOT_KEPT in causes(moving, requested=asked, waits=waits)
 
 
 def test_what_is_not_given_is_not_checked_and_said():

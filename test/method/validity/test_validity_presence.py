@@ -32,7 +32,7 @@ def together(present):
 
 
 def causes(scenario, **known):
-    given = {"road": ROAD, "asked": None, "conflicts": None, "waits": None, "limits": FREE} | known
+    given = {"road": ROAD, "requested": None, "conflicts": None, "waits": None, "limits": FREE} | known
     (verdict,) = Checker(**given).check([scenario])
     return [violation.cause for violation in verdict.violations], verdict
 
@@ -161,9 +161,9 @@ def test_states_are_asked_of_a_vehicle_s_own_first_and_last_instant():
     start = np.array([[-25, 0, 0, 5], [15, 0, np.pi, 5]], dtype=float)
     end = np.array([[-5.5, 0, 0, 5], [-25, 0, np.pi, 5]], dtype=float)
     shown = replace(FREE, presence_margin=0.0)
-    assert causes(scenario, asked=BoundaryStates(start, end), limits=shown)[0] == []
+    assert causes(scenario, requested=BoundaryStates(start, end), limits=shown)[0] == []
     off = BoundaryStates(start + np.array([[0, 0, 0, 0], [1, 0, 0, 0]]), end)
-    found, verdict = causes(scenario, asked=off, limits=shown)
+    found, verdict = causes(scenario, requested=off, limits=shown)
     assert found == [Cause.BOUNDARY_STATE]
     assert verdict.violations[0].time == 2.0
 
@@ -173,10 +173,10 @@ def test_who_waits_from_its_arrival_on_to_its_end_stands_throughout():
     scenario = replace(scenario_of([straight(-25, 0, 0, 5, TIME), stands], TIME), present=np.array([[0, 100], [20, 80]]))
     state = np.column_stack((scenario.position[:, 0], scenario.heading[:, 0], scenario.speed[:, 0]))
     asked = BoundaryStates(state, state + np.array([[50, 0, 0, 0], [0, 0, 0, 0]]))
-    assert causes(scenario, asked=asked, waits=[Wait(1, 2.0, 8.0)])[0] == []
+    assert causes(scenario, requested=asked, waits=[Wait(1, 2.0, 8.0)])[0] == []
     speed = scenario.speed.copy()
     speed[1, 50] = 0.4
-    assert causes(replace(scenario, speed=speed), asked=asked, waits=[Wait(1, 2.0, 8.0)])[0] == [Cause.STOP_NOT_KEPT]
+    assert causes(replace(scenario, speed=speed), requested=asked, waits=[Wait(1, 2.0, 8.0)])[0] == [Cause.STOP_NOT_KEPT]
 
 
 def test_who_drives_against_its_lane_does_so_while_it_is_there():

@@ -113,10 +113,10 @@ def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path)
     write_results(tmp_path, [case], seed=1, title="", quality=(), provenance={})
     figures = json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]
     for text in (console.export_text(), (tmp_path / "report.html").read_text(encoding="utf-8")):
-        assert lost.said in text and "vehicle south: its route passes 2.2 m from its fitted path" in text
+        assert lost.message in text and "vehicle south: its route passes 2.2 m from its fitted path" in text
         assert "5 legs joined at once, 1 searched for, at most 2.25 m from the fitted paths" in text
     assert "6°, 20°" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert figures["fit"]["lost"] == [{"kind": "conflict", "vehicles": ["west", "south"], "said": lost.said}]
+    assert figures["fit"]["lost"] == [{"kind": "conflict", "vehicles": ["west", "south"], "said": lost.message}]
     assert figures["fit"]["vehicles"]["west"]["turned_on_road_deg"] == 20.1
     assert figures["routes"]["south"]["farthest_from_fit_m"] == 2.25
     read = read_recording(tmp_path / "bag").namespaces[""]

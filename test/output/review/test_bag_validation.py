@@ -124,7 +124,9 @@ def test_what_the_bag_does_not_say_is_said(run, tmp_path):
 
 def test_a_scenario_is_held_against_what_was_asked_of_itself(run, tmp_path):
     """A request with states of its own does not change `fit`: its `scenarios/info` says what they were."""
-    fit = replace(run.fit, asked=BoundaryStates(run.fit.asked.start + np.array((0.0, 5.0, 0.0, 0.0)), run.fit.asked.end))
+    fit = replace(
+        run.fit, requested=BoundaryStates(run.fit.requested.start + np.array((0.0, 5.0, 0.0, 0.0)), run.fit.requested.end)
+    )
     (found,) = validate_bag(write_recording(tmp_path / "other", replace(run, fit=fit)))
     assert found.found["boundary_state"].count == 4
     without_fit = rewritten(tmp_path / "other", tmp_path / "info", lambda _, data: data, ("fit",))
@@ -167,9 +169,9 @@ def several_maps(run, target):
     """A bag in which the road moved by 1 km after the first set; the stamps are the same."""
     far = replace(run.road, origin=run.road.origin + np.array((0.0, 1000.0)))
     moved = tuple(replace(s, position=s.position + np.array((0.0, 1000.0))) for s in run.generated.scenarios)
-    states = [s + np.array((0.0, 1000.0, 0.0, 0.0)) for s in (run.fit.asked.start, run.fit.asked.end)]
+    states = [s + np.array((0.0, 1000.0, 0.0, 0.0)) for s in (run.fit.requested.start, run.fit.requested.end)]
     later = replace(run, road=far, generated=replace(run.generated, scenarios=moved))
-    later = replace(later, fit=replace(run.fit, asked=BoundaryStates(*states)))
+    later = replace(later, fit=replace(run.fit, requested=BoundaryStates(*states)))
     with atomic_bag(target) as writer:
         for k, one in enumerate((run, later)):
             for topic, data, stamp in result_messages(one, str(k + 1)):

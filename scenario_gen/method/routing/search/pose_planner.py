@@ -6,6 +6,7 @@
 from dataclasses import dataclass, field
 import math
 from time import thread_time
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -204,6 +205,21 @@ def _refuse_blocked(road: Road, query: PoseQuery) -> None:
                 f"the {name} ({pose[0]:.2f}, {pose[1]:.2f}) m has no room on road {road.name!r} for a footprint of "
                 f"{query.length:.2f} m by {query.width:.2f} m",
             )
+
+
+@runtime_checkable
+class PlansPoses(Protocol):
+    """A planner that also plans for the vehicle itself: drivable routes are then searched for with this method."""
+
+    def plan_poses(self, road: Road, query: PoseQuery, budget: Budget, seed: int, wishes: Wishes = Wishes()) -> PosePlan:
+        """Return the best path found within the budget.
+
+        Raises:
+            BlockedError: the footprint has no room at start or goal.
+            NoWayError: there is no way.
+            BudgetSpentError: none was found within the budget.
+        """
+        ...
 
 
 class PoseRrtStarConnect:

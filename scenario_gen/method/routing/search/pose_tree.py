@@ -98,14 +98,14 @@ def _nearest(
 ) -> tuple[int, int, float, float, float]:
     """The node from which the curve to a pose is shortest, and the curve; -1 where the pose is a node itself."""
     first, last = _range(tree, node, counter)
-    best, found, word, a, b, c = np.inf, -1, 0, 0.0, 0.0, 0.0
+    best, nearest, word, a, b, c = np.inf, -1, 0, 0.0, 0.0, 0.0
     for m in range(first, last):
         dx, dy = node[m, X] - x, node[m, Y] - y
         if dx * dx + dy * dy < best * best:  # no curve is shorter than the straight line
             w, p, q, r = shortest(node[m, X], node[m, Y], node[m, YAW], x, y, yaw, radius)
             if p + q + r < best:
-                best, found, word, a, b, c = p + q + r, m, w, p, q, r
-    return found, word, a, b, c
+                best, nearest, word, a, b, c = p + q + r, m, w, p, q, r
+    return nearest, word, a, b, c
 
 
 @kernel(inline=True)

@@ -121,14 +121,14 @@ def room_beside(
 @kernel(inline=True)
 def offset_from(x: float, y: float, guide: Floats) -> float:
     """How far (x, y) lies left of a guide (G, 3) [cells, rad], at its nearest pose."""
-    best, found = np.inf, 0
+    best, nearest = np.inf, 0
     for k in range(guide.shape[0]):
         dx, dy = x - guide[k, 0], y - guide[k, 1]
         square = dx * dx + dy * dy
         if square < best:
-            best, found = square, k
-    yaw = guide[found, 2]
-    return float(exact.cos(yaw) * (y - guide[found, 1]) - exact.sin(yaw) * (x - guide[found, 0]))
+            best, nearest = square, k
+    yaw = guide[nearest, 2]
+    return float(exact.cos(yaw) * (y - guide[nearest, 1]) - exact.sin(yaw) * (x - guide[nearest, 0]))
 
 
 @kernel(inline=True)

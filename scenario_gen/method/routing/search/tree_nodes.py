@@ -47,7 +47,7 @@ def nearest_node(tree: int, x: float, y: float, node: Floats, chunk: Ints, head:
     rows = head.shape[1] // columns
     row, column = int(y / side), int(x / side)
     border = min(x - column * side, (column + 1) * side - x, y - row * side, (row + 1) * side - y)
-    best, found = np.inf, -1
+    best, nearest = np.inf, -1
     ring = 0
     while True:
         for i in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
@@ -61,11 +61,11 @@ def nearest_node(tree: int, x: float, y: float, node: Floats, chunk: Ints, head:
                         dx, dy = node[m, X] - x, node[m, Y] - y
                         square = dx * dx + dy * dy
                         if square < best:
-                            best, found = square, m
+                            best, nearest = square, m
                     k = chunk[k, 0]
         reach = max(ring * side + border, 0.0)
         if best <= reach * reach or ring > rows + columns:
-            return found
+            return nearest
         ring += 1
 
 

@@ -46,16 +46,16 @@ def standing_within(
     Returns:
         The stands with those of dwells, and the dwells (K + 1,) that are left: of those it is never slow enough to stand.
     """
-    found, left = list(stands), dwells.copy()
+    stands_kept, left = list(stands), dwells.copy()
     for a, b in runs(dwells):
         inside = (time >= times[a]) & (time <= times[b])
         still = time[inside & (speed <= STAND_SPEED)]
         if len(still):
             start = times[a] if a == 0 and speed[0] <= STAND_SPEED else still[0]
             end = times[b] if b == len(dwells) and speed[-1] <= STAND_SPEED else still[-1]
-            found.append((float(start), float(end)))
+            stands_kept.append((float(start), float(end)))
             left[a:b] = False
-    return found, left
+    return stands_kept, left
 
 
 def least_shares(grid: Floats, waits: Sequence[Wait]) -> Floats:

@@ -50,7 +50,7 @@ class SamplerConfig(Parameters):
 
     @property
     def hyper(self) -> Floats:
-        """(6,) hyperpriors in the kernels' order."""
+        """(6,) parameters of the hyperpriors, in the order in which the kernels read them."""
         return np.array(
             [self.gamma_shape, self.gamma_rate, self.alpha_kappa_shape, self.alpha_kappa_rate, self.rho_a, self.rho_b]
         )

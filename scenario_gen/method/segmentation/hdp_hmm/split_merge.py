@@ -33,15 +33,15 @@ MOST_LOG_RATIO, CERTAIN, LEAST_PRODUCT = 200.0, 1e150, 1e-150
 @kernel(inline=True)
 def members_of(labels: Ints, ends: Ints, i: int, j: int, index: Ints, opens: Ints) -> None:
     """Fill the head of index (T,) with the samples of states i and j, that of opens (T,) with 1 where a run of them begins."""
-    found = 0
+    count = 0
     before = -2
     sequence = 0
     for t in range(len(labels)):
         if labels[t] == i or labels[t] == j:
-            index[found] = t
-            opens[found] = 1 if before != t - 1 else 0
+            index[count] = t
+            opens[count] = 1 if before != t - 1 else 0
             before = t
-            found += 1
+            count += 1
         if t + 1 == ends[sequence]:
             sequence += 1
             before = -2
@@ -223,11 +223,11 @@ def propose_sides(
 @kernel(inline=True)
 def predecessors(n: Ints, k: int) -> int:
     """Rows of n (L + 1, L), other than k's own, from which state k is entered; at least 1. So many tables it has at least."""
-    found = 0
+    count = 0
     for j in range(n.shape[0]):
         if j != k and n[j, k] > 0:
-            found += 1
-    return max(found, 1)
+            count += 1
+    return max(count, 1)
 
 
 @kernel(inline=True)
@@ -317,17 +317,17 @@ def sides_of(labels: Ints, index: Ints, j: int, side: Ints) -> None:
 
 
 @kernel(inline=True)
-def log_pair(found: int, left: int, right: int, used: int, empty: int) -> float:
+def log_pair(members: int, left: int, right: int, used: int, empty: int) -> float:
     """Logarithm of how often a merge draws a pair and its anchors, over how often the split that undoes it does.
 
     Args:
-        found: samples of both.
+        members: samples of both.
         left: of the first.
         right: of the second.
         used: states in use when they are one.
         empty: states not in use then.
     """
-    return exact.log(float(empty) * found * (found - 1.0) / ((used + 1.0) * left * right))
+    return exact.log(float(empty) * members * (members - 1.0) / ((used + 1.0) * left * right))
 
 
 @kernel(inline=True)
@@ -378,9 +378,9 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
     if not draw_pair(state, counts, splits, pair):
         return False
     i, j = pair[0], pair[1]
-    m, found = len(g0), counts[i] + counts[j]
+    m, members = len(g0), counts[i] + counts[j]
     index, opens = np.empty(len(labels), np.int64), np.empty(len(labels), np.int64)
-    side, anchors, after = np.zeros(found, np.int64), np.empty(2, np.int64), labels
+    side, anchors, after = np.zeros(members, np.int64), np.empty(2, np.int64), labels
     whole, total = outer[i] + outer[j], sums[i] + sums[j]
     stay = min(max(top[2], LEAST_STAY), MOST_STAY)
     two_outer, two_sums, two_factors, two_own = np.zeros((2, m, m)), np.zeros((2, 2)), np.empty((2, m, m)), np.zeros(2)
@@ -389,10 +389,10 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
         members_of(labels, ends, i, j, index, opens)
         place_anchors(side, pair, True, anchors)
         gain -= propose_sides(
-            state, v, mass, index[:found], opens[:found], anchors, whole, total, g0, p, nu, weight, blur, stay, side, False
+            state, v, mass, index[:members], opens[:members], anchors, whole, total, g0, p, nu, weight, blur, stay, side, False
         )
-        fit_sides(v, mass, index[:found], side, whole, total, two_outer, two_sums)
-        after = divided(labels, index[:found], side, i, j)
+        fit_sides(v, mass, index[:members], side, whole, total, two_outer, two_sums)
+        after = divided(labels, index[:members], side, i, j)
         count_transitions(after, ends, n_after)
     else:
         two_outer[0], two_sums[0] = whole, total
@@ -411,19 +411,19 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
     gain -= log_share(a, predecessors(n, i), here, exact.log(beta[i] / both), exact.log(beta[j] / both))
     used, right = (counts > 0).sum(), side.sum() if splits else counts[j]
     if splits:
-        gain += log_pair(found, found - right, right, used, len(counts) - used)
+        gain += log_pair(members, members - right, right, used, len(counts) - used)
     else:
-        gain -= log_pair(found, found - right, right, used - 1, len(counts) - used + 1)
+        gain -= log_pair(members, members - right, right, used - 1, len(counts) - used + 1)
     gain -= log_transitions(n, top[1], top[2], beta)
     keep_i, keep_j = beta[i], beta[j]
     beta[i], beta[j] = max(both * exact.exp(share_i), 1e-100), max(both * exact.exp(share_j), 1e-100)
     gain += log_transitions(n_after, top[1], top[2], beta)
     if not splits and gain >= threshold:
         members_of(labels, ends, i, j, index, opens)
-        sides_of(labels, index[:found], j, side)
+        sides_of(labels, index[:members], j, side)
         place_anchors(side, pair, False, anchors)
         gain += propose_sides(
-            state, v, mass, index[:found], opens[:found], anchors, whole, total, g0, p, nu, weight, blur, stay, side, True
+            state, v, mass, index[:members], opens[:members], anchors, whole, total, g0, p, nu, weight, blur, stay, side, True
         )
     if not gain >= threshold:
         beta[i], beta[j] = keep_i, keep_j

@@ -23,7 +23,7 @@ def search(answer: Any, request: tuple[Any, ...], iterations: int | None, second
     def stop(calls: int) -> bool:
         return (iterations is not None and calls > iterations) or (seconds is not None and process_time() - started > seconds)
 
-    found = solve(clearance, ends, radius, name, stop, Options(config.step or None, config.simplify), seed)
-    answer.send((found.simplified, found.checks, process_time() - started))
+    solution = solve(clearance, ends, radius, name, stop, Options(config.step or None, config.simplify), seed)
+    answer.send((solution.simplified, solution.checks, process_time() - started))
     answer.close()
     os._exit(0)  # OMPL's destructors are among the things that crash
