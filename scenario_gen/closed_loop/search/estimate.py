@@ -19,8 +19,8 @@ import math
 from typing import Protocol, TypeVar
 
 import numpy as np
-from scipy import special
 
+from scenario_gen.closed_loop.search.gamma import gamma_quantile
 from scenario_gen.closed_loop.search.surrogate import Surrogate
 from scenario_gen.method.evaluation import wilson
 from scenario_gen.numerics import exact, Floats
@@ -249,7 +249,7 @@ class Search:
             self._check_budget()
             population += heads
         share = accepted / (len(seeds) * (SEEDS - 1))
-        return population, min(max(step * math.exp(share - _ACCEPTED), 0.05), 1.0)
+        return population, min(max(step * float(exact.exp(share - _ACCEPTED)), 0.05), 1.0)
 
     def _predictor(self) -> "_Predictor":
         """Return what predicts the parts of a drive from what was driven so far."""
@@ -303,12 +303,12 @@ class Search:
 
     def _result(self) -> Estimate:
         failures = [k for k, one in enumerate(self.responses) if one.failed]
-        hits, natural = sum(self.responses[k].failed for k in self._natural), len(self._natural)
+        hits, natural = len([k for k in self._natural if self.responses[k].failed]), len(self._natural)
         plain = wilson(hits, natural, LEVEL) if natural else Interval(math.nan, 0.0, 1.0)
         shares: dict[str, float] = {}
         for k, weight in self.weights.items():
             shares[self.responses[k].kind] = shares.get(self.responses[k].kind, 0.0) + weight
-        whole = sum(shares.values())
+        whole = math.fsum(shares.values())
         rate = plain if self._seen == 0 else self._rate()
         return Estimate(
             rate,
@@ -324,7 +324,7 @@ class Search:
     def _unexpected(self) -> float:
         if not self._floor:
             return math.nan
-        hits = sum(self.responses[k].failed for k in self._floor)
+        hits = len([k for k in self._floor if self.responses[k].failed])
         return wilson(hits, len(self._floor), LEVEL).high * self._calm / self._seen
 
     def deviation(self, k: int) -> float:
@@ -342,14 +342,9 @@ class Search:
         if not len(w):
             return Interval(0.0, 0.0, wilson(0, max(round(self._seen * self._evenly), 1), LEVEL).high)
         total, square = float(w.sum()), float((w * (w - w.sum() / self._seen)).sum())
-        low = _gamma(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
-        high = _gamma(total + float(w.mean()), square + float(np.square(w).mean()), 0.5 + 0.5 * LEVEL)
+        low = gamma_quantile(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
+        high = gamma_quantile(total + float(w.mean()), square + float(np.square(w).mean()), 0.5 + 0.5 * LEVEL)
         return Interval(min(total / self._seen, 1.0), min(low / self._seen, 1.0), min(high / self._seen, 1.0))
-
-
-def _gamma(mean: float, variance: float, share: float) -> float:
-    """Return the quantile of the gamma distribution with this mean and variance."""
-    return float(special.gammaincinv(mean * mean / variance, share)) * variance / mean
 
 
 @dataclass(frozen=True, eq=False)
