@@ -36,6 +36,7 @@ BATCH = 256  # natural candidates of which some are driven
 REFIT = 1.1  # times as many drives as at the last regression ask for a new one
 EXPLORING = 0.4  # share of a batch's drives that are chosen evenly
 LEAST, MOST = 0.005, 0.1  # bounds of the probability with which every scenario is driven
+OFTEN = 1.5  # times the share of natural drives that fail is driven, where that is above MOST: frequent failures need no choice
 WIDER = 2.0  # factor on the error of the regression
 LEVEL = 0.95  # of the intervals
 _STEP, _ACCEPTED = 0.5, 0.4  # first step of a chain, and the share of accepted moves that it is adapted to
@@ -281,16 +282,18 @@ class Search:
         self._certified += len(rows)
         if not rows:
             return False
+        frequent = len([k for k in self._natural if self.responses[k].failed]) / len(self._natural)
+        evenly = max(self._evenly, min(OFTEN * frequent, 1.0) if frequent > MOST else 0.0)
         predicted, error = self._predictor()(z[rows], features)
         near = 2.0 * exact.ndtr(-predicted / (WIDER * error))
-        probability = np.clip(near.max(axis=1), self._evenly, 1.0)
+        probability = np.clip(near.max(axis=1), evenly, 1.0)
         chosen = np.flatnonzero(choosing[rows] < probability)
         own = [rows[k] for k in chosen]
         driven = self._drive([z[k] for k in own], [candidates[k] for k in chosen], [features[k] for k in chosen])
         self._sampled += driven
         if len(driven) == len(chosen):
             self._seen += len(rows)
-            calm = probability <= self._evenly
+            calm = probability <= evenly
             self._calm += int(calm.sum())
             self._floor += [k for place, k in zip(chosen.tolist(), driven, strict=True) if calm[place]]
             for place, k in zip(chosen.tolist(), driven, strict=True):
