@@ -75,7 +75,7 @@ def search(options: Search) -> None:
     from rich.table import Table
 
     from scenario_gen.base.terminal import progress_bars
-    from scenario_gen.closed_loop.search.command import search_failures, SearchRequest
+    from scenario_gen.closed_loop.search.command import JOURNAL, search_failures, SearchRequest
     from scenario_gen.closed_loop.search.objective import Objective
 
     remind(options.source)
@@ -93,6 +93,7 @@ def search(options: Search) -> None:
         options.worst,
         options.assignments or [],
     )
+    say(f"drives are kept in {options.out}{JOURNAL}: the same command continues a search that was stopped")
     with progress_bars() as advance:
         result = search_failures(
             request, options.out, workers=options.workers, progress=lambda done, total: advance("drives", done, total)
