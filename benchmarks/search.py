@@ -26,7 +26,7 @@ PLANNERS = {  # seconds late: drives of a search, failures of brute force, share
 BRUTE = 300_000
 SEEDS = 20
 MIDDLE = 0.485  # s, of the planner on which VerifAI's samplers are tried
-VERIFAI = {"ce": ("cross-entropy", 5, 3000), "bo": ("Bayesian", 1, 80)}  # seeds and drives at most: 80 Bayesian ones take 10 min
+VERIFAI = {"ce": ("cross-entropy", 5, 3000), "bo": ("Bayesian", 1, 40)}  # seeds, drives at most: 40 Bayesian ones take 4 min
 PLAIN = 5000  # drives of plain sampling and of VerifAI's samplers until the first failure, at most
 
 
