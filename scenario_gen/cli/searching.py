@@ -50,7 +50,12 @@ class Search:
 
 
 def drawn_from(options: Search) -> "Replanned":
-    """Return what the scenarios are drawn from: a bag's template on its road, or an encounter of a log on the road given."""
+    """Return what the scenarios are drawn from: a bag's template on its road, or an encounter of a log on the road given.
+
+    Raises:
+        InputError: source, road or encounter cannot be read, or the log has several encounters and none was chosen.
+        RefusedError: the road does not take the encounter.
+    """
     from scenario_gen.cli.folder import FolderRequest, generate_folder
     from scenario_gen.output.results import BAG
     from scenario_gen.output.review.regenerate import replanned
