@@ -5,11 +5,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from tempfile import TemporaryDirectory
+from typing import Annotated, TYPE_CHECKING
 
 import typer
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.cli.options import remind, say, takes
+
+if TYPE_CHECKING:
+    from scenario_gen.output.review.regenerate import Replanned
 
 commands = typer.Typer()
 
@@ -18,9 +23,13 @@ commands = typer.Typer()
 class Search:
     """The options of `search`."""
 
-    bag: Annotated[Path, typer.Argument(help="a bag of `generate`: its template, road and parameters are searched")]
+    source: Annotated[
+        Path, typer.Argument(help="a bag of `generate`: its template, road and parameters are searched; or a log, with --road")
+    ]
     planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower")]
     budget: Annotated[int, typer.Option(min=1, help="drives at most; a larger budget continues an earlier search")] = 1000
+    road: Annotated[str, typer.Option(help="the road, where the source is a log")] = ""
+    encounter: Annotated[str, typer.Option(help="name of an encounter, where the source is a log of several")] = ""
     objective: Annotated[
         str, typer.Option(help="what counts as a failure: at_fault, collision, off_road, goal, or e.g. 'ttc<1.5', 'pet<1' [s]")
     ] = "at_fault"
@@ -40,6 +49,30 @@ class Search:
     ] = None
 
 
+def drawn_from(options: Search) -> "Replanned":
+    """Return what the scenarios are drawn from: a bag's template on its road, or an encounter of a log on the road given.
+
+    Raises:
+        InputError: source, road or encounter cannot be read, or the log has several encounters and none was chosen.
+        RefusedError: the road does not take the encounter.
+    """
+    from scenario_gen.cli.folder import FolderRequest, generate_folder
+    from scenario_gen.output.results import BAG
+    from scenario_gen.output.review.regenerate import replanned
+    from scenario_gen.pipeline import PipelineConfig
+
+    if not options.road:
+        return replanned(options.source, options.namespace)
+    names = [options.encounter] if options.encounter else []
+    request = FolderRequest([([options.source], [options.road])], PipelineConfig(), count=1, seed=options.seed, encounters=names)
+    with TemporaryDirectory() as place:
+        cases, _ = generate_folder(Path(place) / "one", request)
+        if len(cases) > 1:
+            known = " or ".join(case.encounter.name for case in cases)
+            raise InputError(f"{options.source}: {len(cases)} encounters; choose one: --encounter {known}")
+        return replanned(Path(place) / "one" / BAG, options.namespace)
+
+
 @commands.command()
 @takes(Search)
 def search(options: Search) -> None:
@@ -47,12 +80,11 @@ def search(options: Search) -> None:
     from rich.table import Table
 
     from scenario_gen.base.terminal import progress_bars
-    from scenario_gen.closed_loop.search.command import search_failures, SearchRequest
+    from scenario_gen.closed_loop.search.command import JOURNAL, search_failures, SearchRequest
     from scenario_gen.closed_loop.search.objective import Objective
-    from scenario_gen.output.review.regenerate import replanned
 
-    remind(options.bag)
-    source = replanned(options.bag, options.namespace)
+    remind(options.source)
+    source = drawn_from(options)
     request = SearchRequest(
         source.planned,
         source.request,
@@ -66,6 +98,7 @@ def search(options: Search) -> None:
         options.worst,
         options.assignments or [],
     )
+    say(f"drives are kept in {options.out}{JOURNAL}: the same command continues a search that was stopped")
     with progress_bars() as advance:
         result = search_failures(
             request, options.out, workers=options.workers, progress=lambda done, total: advance("drives", done, total)
