@@ -37,7 +37,7 @@ REFIT = 1.1  # times as many drives as at the last regression ask for a new one
 EXPLORING = 0.4  # share of a batch's drives that are chosen evenly
 LEAST, MOST = 0.005, 0.1  # bounds of the probability with which every scenario is driven
 OFTEN = 1.5  # times the share of natural drives that fail is driven, where that is above MOST: frequent failures need no choice
-WIDER = 2.0  # factor on the error of the regression
+WIDER = 3.0  # factor on the error of the regression: the wider, the more is driven, and the smaller are the weights
 LEVEL = 0.95  # of the intervals
 _STEP, _ACCEPTED = 0.5, 0.4  # first step of a chain, and the share of accepted moves that it is adapted to
 
@@ -337,7 +337,7 @@ class Search:
         return abs(float(exact.matmul(slope, self.z[k])))
 
     def _rate(self) -> Interval:
-        """Return the rate over the batches with its interval, the gamma interval of a sum of weights (Tiwari, Clegg & Zou 2006).
+        """Return the rate over the batches with its interval, the gamma interval of a sum of weights (Fay & Feuer 1997).
 
         Without a failure its upper end is that of plain sampling with as many drives as were chosen evenly.
         """
@@ -346,7 +346,8 @@ class Search:
             return Interval(0.0, 0.0, wilson(0, max(round(self._seen * self._evenly), 1), LEVEL).high)
         total, square = float(w.sum()), float((w * (w - w.sum() / self._seen)).sum())
         low = gamma_quantile(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
-        high = gamma_quantile(total + float(w.mean()), square + float(np.square(w).mean()), 0.5 + 0.5 * LEVEL)
+        most = float(w.max())
+        high = gamma_quantile(total + most, square + most * most, 0.5 + 0.5 * LEVEL)
         return Interval(min(total / self._seen, 1.0), min(low / self._seen, 1.0), min(high / self._seen, 1.0))
 
 
