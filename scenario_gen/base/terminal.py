@@ -31,7 +31,8 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
     what = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
     columns = (*what, TimeElapsedColumn(), TextColumn("left:"), TimeRemainingColumn())
     tasks: dict[str, TaskID] = {}
-    with Progress(*columns, console=Terminal(stderr=True), transient=True) as bars:
+    console = Terminal(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
 
         def advance(name: str, done: int, total: int) -> None:
             if name not in tasks:

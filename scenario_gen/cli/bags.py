@@ -60,8 +60,9 @@ def report(
     from scenario_gen.output.results import BAG, REPORT
     from scenario_gen.output.review.evaluation import write_page
 
-    if (bag / REPORT).is_file() and (bag / BAG).is_dir() and out is None:  # `generate` wrote it already
-        page = bag / REPORT
+    folders = [place for place in (bag.resolve(), bag.resolve().parent) if (place / REPORT).is_file()]
+    if out is None and folders and bag.resolve() in (folders[0], folders[0] / BAG):  # `generate` wrote it already
+        page = folders[0] / REPORT
     else:
         remind(bag)
         folder = out or bag.resolve().with_name(f"{bag.resolve().stem}_report")
