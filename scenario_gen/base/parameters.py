@@ -3,6 +3,7 @@
 
 """Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
 
+from contextlib import suppress
 from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
 from pathlib import Path
@@ -14,6 +15,7 @@ from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.registry import installed
 
 Config = TypeVar("Config")
+KINDS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
 
 
 def parameter(
@@ -65,15 +67,14 @@ def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        raise InputError(f"parameter {name} must be of type {kind.__name__}, not {type(value).__name__} ({shown(value)})")
+        raise InputError(f"parameter {name} must be {KINDS[kind]}, not {shown(value)!r}")
     meta = entry.metadata
     if meta["choices"] and value not in meta["choices"]:
         plugins = installed(meta["group"]) if meta["group"] else {}
         if value not in plugins:
-            choices = (*meta["choices"], *plugins)
-            raise InputError(
-                f"parameter {name} is {shown(value)!r}; choose one of {', '.join(choices)}{did_you_mean(str(value), choices)}"
-            )
+            choices = [one for one in (*meta["choices"], *plugins) if one]
+            listed = ", ".join(choices) + did_you_mean(str(value), choices)
+            raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {listed}")
     if kind in (int, float):
         if not math.isfinite(value):
             raise InputError(f"parameter {name} is {value}; give a finite number")
@@ -148,7 +149,11 @@ def assigned(config: Config, assignment: str) -> Config:
     if name not in known:
         raise InputError(f"unknown parameter {shown(name)}; `scenario-gen parameters` lists them{did_you_mean(name, known)}")
     is_text = isinstance(known[name][0].default, str)  # stays text: vehicle "007" is no number
-    return updated(config, {name: text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")})
+    value = text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")
+    if isinstance(known[name][0].default, float) and isinstance(value, str):
+        with suppress(ValueError):
+            value = float(value)  # 1e9 and nan, which are texts in YAML
+    return updated(config, {name: value})
 
 
 def loaded(config: Config, path: Path) -> Config:

@@ -4,6 +4,7 @@
 """The command line: its commands and its exit codes. Each command loads the libraries that it needs."""
 
 from contextlib import suppress
+from importlib import metadata
 import os
 import sys
 from typing import Annotated, Any, NoReturn
@@ -21,14 +22,18 @@ app = typer.Typer(
 )
 
 installation = output.Commands("This installation")
+PLAIN = {  # words of the library that reads the options
+    "Input should be greater than or equal to": "it must be at least",
+    "Input should be less than or equal to": "it must be at most",
+    "Input should be a valid integer, unable to parse string as an integer": "it must be a whole number",
+    "Input should be a valid number, unable to parse string as a number": "it must be a number",
+}
 UsageError: Any = typer.BadParameter.__bases__[0]  # typer has its own copy of click
 
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        print(f"scenario-gen {version('scenario_gen')}")
+        print(f"scenario-gen {metadata.version('scenario_gen')}")
         raise typer.Exit
 
 
@@ -117,11 +122,17 @@ def of_usage(error: Any) -> InputError:
         print(error.ctx.get_help())
         sys.exit(2)
     message = " ".join(error.format_message().split())
+    for its, ours in PLAIN.items():
+        message = message.replace(its, ours)
+    if type(error).__name__ == "MissingParameter" and getattr(error.param, "help", None):
+        message = f"{message.rstrip('.')} ({error.param.help.split('. ')[0].rstrip('.')})"
     path = error.ctx.command_path if error.ctx else "scenario-gen"
     unknown, known = getattr(error, "option_name", ""), []
     if unknown and error.ctx:
         known = [name for entry in error.ctx.command.get_params(error.ctx) for name in entry.opts if name.startswith("--")]
         message = f"there is no option {unknown}{did_you_mean(unknown, known)}"
+        if unknown[1:].isdecimal():
+            message = f"{unknown}: a number here must not be negative"
     return InputError(f"{message.rstrip('.')}; see `{path} --help`")
 
 

@@ -103,8 +103,12 @@ def find_planner(name: str) -> MakePlanner:
         found: Any = importlib.import_module(module)
         for part in attribute.split("."):
             found = getattr(found, part)
-    except (ImportError, AttributeError) as error:
-        raise InputError(f"--planner {name}: {error}") from error
+    except ImportError as error:
+        raise InputError(f"--planner {name}: {error}; run in the folder of the module, or put it on PYTHONPATH") from error
+    except AttributeError as error:
+        known = [one for one in vars(importlib.import_module(module)) if one[:1].isupper()]
+        near = did_you_mean(attribute, known)
+        raise InputError(f"--planner {name}: {error}; name a class of that module{near}") from error
     except (Exception, SystemExit) as error:  # the module runs
         raise InputError(f"--planner {name}: {type(error).__name__}: {error}") from error
     if not callable(found):

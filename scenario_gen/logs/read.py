@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.bags.storage.files import files_of
-from scenario_gen.base.errors import guarded, InputError, needs, reading
+from scenario_gen.base.errors import did_you_mean, guarded, InputError, needs, reading
 from scenario_gen.base.registry import Registry
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
@@ -352,11 +352,12 @@ def present(path: Path) -> list[Path]:
         InputError: there is nothing there that can be read.
     """
     if not path.exists():
-        raise InputError(f"{path} does not exist")
+        beside = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise InputError(f"{path} does not exist; check the name and the folder{did_you_mean(path.name, beside)}")
     if not (path.is_file() or path.is_dir()):
         raise InputError(f"{path} is neither a file nor a folder")
     if path.is_dir() and not any(path.iterdir()):
-        raise InputError(f"{path} is an empty folder")
+        raise InputError(f"{path} is an empty folder; name a folder with a recording")
     if path.is_file() and path.stat().st_size == 0:
         raise InputError(f"{path} is empty (0 bytes); copy it again")
     if path.is_file() or is_bag(path):

@@ -147,7 +147,11 @@ def test_a_truncated_parquet_file(tmp_path):
 def test_paths_that_are_no_logs(tmp_path):
     (tmp_path / "notes.md").write_text("hello")
     (tmp_path / "folder").mkdir()
-    for path, words in (("nothing.csv", "does not exist"), ("notes.md", "none of the known logs"), ("folder", "empty folder")):
+    for path, words in (
+        ("nothing.csv", "does not exist"),
+        ("notes.md", "not a log that can be read"),
+        ("folder", "empty folder"),
+    ):
         with pytest.raises(InputError, match=words):
             read_log(tmp_path / path)
 

@@ -40,9 +40,8 @@ class Objective:
         if bound is not None:
             return cls(bound[1], float(bound[2]))
         if text.strip() not in NAMES:
-            raise InputError(
-                f"objective {text!r} is not known; take {', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds){did_you_mean(text, NAMES)}"
-            )
+            known = f"{', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds)"
+            raise InputError(f"objective {text!r} is not known; take {known}{did_you_mean(text, NAMES)}")
         return cls(text.strip())
 
     def __str__(self) -> str:

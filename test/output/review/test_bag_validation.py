@@ -232,7 +232,7 @@ def test_the_command_answers_with_its_exit_code(run, tmp_path):
     answer = CliRunner().invoke(app, ["validate", str(cut)])
     assert answer.exit_code == 1
     assert "3 of 4" in answer.output and UNUSABLE in answer.output
-    with pytest.raises(InputError, match="no such bag"):
+    with pytest.raises(InputError, match="does not exist"):
         validate_bag(tmp_path / "none")
     with pytest.raises(InputError, match="nothing to check"):
         validate_bag(rewritten(bag, tmp_path / "empty", lambda _, data: data, ("scenarios",)))
