@@ -148,8 +148,8 @@ def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int =
 
     terminal = Terminal(stderr=_current.as_json)
     if not terminal.is_terminal:
-        for row in (columns, *rows):
-            say("\t".join(text.replace("\t", " ").replace("\n", " ") for text in row))
+        for row in (columns, *rows) if not _current.quiet else ():
+            print("\t".join(printable(" ".join(text.split())) for text in row), file=terminal.file)
         return
     widths = [max(len(text) for text in column) for column in zip(columns, *rows, strict=True)]
     if sum(widths) + 2 * len(widths) <= terminal.width:
