@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from functools import partial
 import json
 from pathlib import Path
-from typing import Annotated, TYPE_CHECKING
+from typing import Annotated
 
 import typer
 
@@ -15,13 +15,8 @@ from scenario_gen.base.errors import did_you_mean, InputError, printable
 from scenario_gen.cli.options import configured, ParametersOption, remind, SetOption
 from scenario_gen.cli.output import bars, Commands, give, open_page, say, say_rows
 
-if TYPE_CHECKING:
-    from scenario_gen.closed_loop.command import RunTrials
-
 commands = Commands("Look at a bag of scenarios")
-TESTING = "Test a planner"
 OTHER = "Other formats"
-NAMED = 12  # scenarios that the terminal names
 
 
 @commands.command()
@@ -101,95 +96,6 @@ def validate(
             say(f"  not checked in {count}: {sentence}")
     if any(one.invalid for one in found):
         raise typer.Exit(1)
-
-
-@commands.command(panel=TESTING)
-def drive(
-    bag: Annotated[Path, typer.Argument(help="A bag of this suite with scenarios.")],
-    planner: Annotated[
-        str,
-        typer.Option(
-            help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower. With --ros: the command that "
-            "starts its node."
-        ),
-    ],
-    ego: Annotated[
-        str, typer.Option(help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first.")
-    ] = "",
-    ros: Annotated[
-        bool,
-        typer.Option(
-            "--ros", help="The planner is a ROS 2 node that answers each odometry message with a command, over DDS in lock-step."
-        ),
-    ] = False,
-    count: Annotated[int, typer.Option(min=0, help="Most scenarios to drive. 0: all.")] = 0,
-    workers: Annotated[int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")] = 0,
-    against: Annotated[
-        Path | None,
-        typer.Option(help="drives.json of another planner on the same bag. Exit code 1 if this planner is worse."),
-    ] = None,
-    unlooking: Annotated[
-        bool, typer.Option(help="Also drive a planner that ignores the others, to show how many scenarios need no reaction.")
-    ] = True,
-    out: Annotated[Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")] = Path("out/drives"),
-    assignments: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", help="Set a parameter of the drive (step, policy, …) or a bar (bars.collisions, …), as name=value."
-        ),
-    ] = None,
-) -> None:
-    """Test a planner in closed loop in every scenario of a bag. Exit code 1: a bar is not met."""
-    from scenario_gen.closed_loop.command import drive_bag, in_processes
-
-    remind(bag)
-    with bars() as advance:
-        result = drive_bag(
-            bag,
-            planner,
-            ego=ego,
-            count=count,
-            out=out,
-            assignments=assignments or [],
-            progress=lambda done, total: advance(planner, done, total),
-            run=_over_dds() if ros else in_processes(workers),
-            unlooking=in_processes(workers) if unlooking else None,
-            against=against,
-        )
-    give(rates=result.found, notes=result.notes, bars_not_met=result.broken, files=result.written)
-    say_rows(("drives", planner), [(name, str(rate)) for name, rate in result.found.items()])
-    for note in result.notes:
-        say(note)
-    if comparison := result.beside.comparison:
-        for title, names in (("now fail", comparison.now_fail), ("now pass", comparison.now_pass)):
-            if names:
-                more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-                give(**{title.replace(" ", "_"): names})
-                say(f"{title}: {', '.join(names[:NAMED])}{more}")
-    if result.decisions.count:
-        took = result.decisions
-        slow = f"{took.slow} of {took.count} slower than decision_time, the longest {took.longest:.3f} s"
-        say(f"decisions: {slow} (depends on this machine, so no file has it)")
-    for outcome in result.worst:
-        say(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
-    for path in result.written:
-        say(str(path))
-    if result.broken:
-        say("bars not met: " + "; ".join(result.broken))
-        raise typer.Exit(1)
-
-
-def _over_dds() -> "RunTrials":
-    """Return the function that drives over DDS.
-
-    Raises:
-        InputError: ROS 2 is not in this environment.
-    """
-    try:
-        from scenario_gen.cli.drive import drive_over_dds
-    except ImportError as error:
-        raise InputError(f"ROS 2 is not available ({error}); source its setup file, or leave out --ros") from error
-    return drive_over_dds
 
 
 @commands.command("export", panel=OTHER)

@@ -12,7 +12,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from scenario_gen.base.errors import did_you_mean, InputError, of_system, presentable, ScenarioGenError
-from scenario_gen.cli import bags, corpus, generation, output, searching
+from scenario_gen.cli import bags, corpus, generation, output, testing
 
 app = typer.Typer(
     help="Turn recorded encounters of vehicles into new, valid ones on other roads.",
@@ -79,7 +79,7 @@ def doctor() -> None:
     raise typer.Exit(examined())
 
 
-for commands in (generation.commands, bags.commands, searching.commands, corpus.commands, installation):
+for commands in (generation.commands, bags.commands, testing.commands, corpus.commands, installation):
     app.add_typer(commands)
 
 

@@ -70,45 +70,65 @@ def in_processes(workers: int = 0) -> RunTrials:
     return lambda trials, planner, config, progress: run_trials(trials, planner, config, workers or os.cpu_count() or 1, progress)
 
 
-def drive_bag(
-    bag: Path,
-    planner: str,
-    *,
-    ego: str = "",
-    count: int = 0,
-    out: Path,
-    assignments: Sequence[str] = (),
-    progress: Progress = lambda *_: None,
-    run: RunTrials | None = None,
-    unlooking: RunTrials | None = None,
-    against: Path | None = None,
-) -> DriveResult:
-    """Drive a planner through the scenarios of a bag and write what it came to.
+@dataclass(frozen=True)
+class DriveRequest:
+    """Which planner drives where.
 
-    Args:
+    Attributes:
         bag: of this suite.
         planner: MODULE:CLASS; over DDS the command that starts its node.
         ego: id of the vehicle in whose place it drives.
         count: scenarios at most; 0: all.
-        out: folder of the results.
         assignments: parameters as name=value; those of a drive without prefix, those of the bars as bars.name.
+        against: drives.json of an earlier planner on the same scenarios, or its folder.
+    """
+
+    bag: Path
+    planner: str
+    ego: str = ""
+    count: int = 0
+    assignments: Sequence[str] = ()
+    against: Path | None = None
+
+    def config(self) -> DriveCommandConfig:
+        """Return the parameters of the drives and the bars.
+
+        Raises:
+            InputError: a name is unknown, or a value does not suit.
+        """
+        config = DriveCommandConfig()
+        for assignment in self.assignments:
+            config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
+        return config
+
+
+def drive_bag(
+    request: DriveRequest,
+    out: Path,
+    *,
+    progress: Progress = lambda *_: None,
+    run: RunTrials | None = None,
+    unlooking: RunTrials | None = None,
+) -> DriveResult:
+    """Drive a planner through the scenarios of a bag and write what it came to.
+
+    Args:
+        request: planner and bag.
+        out: folder of the results.
         progress: called with how many are done of how many.
         run: drives them; `in_processes()` if None, or over DDS, one after the other.
         unlooking: drives the same scenarios, at most UNLOOKING of them, with a planner that looks at nobody; None: nobody does.
-        against: drives.json of an earlier planner on the same scenarios, or its folder.
 
     Raises:
         InputError: bag, planner, folder, a parameter or the file to compare with is wrong; the message names it.
     """
-    config = DriveCommandConfig()
-    for assignment in assignments:
-        config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
-    earlier = read_drives(against) if against is not None else None
-    trials = read_trials(bag, ego, count)
+    config, planner = request.config(), request.planner
+    earlier = read_drives(request.against) if request.against is not None else None
+    trials = read_trials(request.bag, request.ego, request.count)
     if earlier is not None:  # before there is work that could not be compared
         digests = {trial.name: origin.digest for trial, origin in zip(trials, origins_of(trials), strict=True)}
         refuse_others(digests, config.drive, earlier)
-    with replaced_folder(out, DRIVEN, [bag]) as folder:  # before there is work that might not be kept
+    with replaced_folder(out, DRIVEN, [request.bag]) as folder:  # before there is work that might not be kept
         outcomes = with_origins((run or in_processes())(trials, planner, config.drive, progress), trials)
         found = rates(outcomes)
         comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None

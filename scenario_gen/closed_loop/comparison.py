@@ -95,7 +95,8 @@ def read_drives(path: Path) -> Earlier:
         InputError: it is not there, or is none, or an older one without digests.
     """
     file = path / "drives.json" if path.is_dir() else path
-    document = parse_json(read_text(file, LONGEST, f"--against {file}"), f"--against {file}", DRIVES)
+    what = f"--against {file} (give a drives.json of `scenario-gen drive`)"
+    document = parse_json(read_text(file, LONGEST, what), what, DRIVES)
     drives = {drive["name"]: (drive["scenario"], drive["passed"]) for drive in document["drives"]}
     return Earlier(document["planner"], document["parameters"], drives)
 

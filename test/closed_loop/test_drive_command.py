@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
-from scenario_gen.closed_loop.command import drive_bag, in_processes
+from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import as_junit
 from scenario_gen.closed_loop.trials import find_planner, read_trials
@@ -128,36 +128,31 @@ class Nowhere(Still):
 )
 def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, workers, said):
     with pytest.raises(InputError, match=said):
-        drive_bag(bag, f"{__name__}:{planner}", count=2, run=in_processes(workers), out=tmp_path / "out")
+        drive_bag(DriveRequest(bag, f"{__name__}:{planner}", count=2), tmp_path / "out", run=in_processes(workers))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
     Hangs.drives = 0
     with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 3 s") as caught:
-        drive_bag(
-            bag,
-            f"{__name__}:Hangs",
-            count=2,
-            run=in_processes(1),
-            out=tmp_path / "out",
-            assignments=["drive_time=3", "overtime=1"],
-        )
+        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=3", "overtime=1"])
+        drive_bag(request, tmp_path / "out", run=in_processes(1))
     assert "of the 1 drives before: failures 1, collisions" in str(caught.value) and not (tmp_path / "out").exists()
 
 
 def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
     with pytest.raises(InputError, match=r"has ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time"):
-        drive_bag(
-            bag, f"{__name__}:HangsInCompiledCode", count=2, run=in_processes(2), out=tmp_path, assignments=["drive_time=0.5"]
-        )
+        request = DriveRequest(bag, f"{__name__}:HangsInCompiledCode", count=2, assignments=["drive_time=0.5"])
+        drive_bag(request, tmp_path, run=in_processes(2))
 
 
 def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_path):
     known = {}
     for planner in ("Slow", "Still"):
         sets = ["decision_time=0.04", "overtime=1.0"]
-        result = drive_bag(bag, f"{__name__}:{planner}", count=1, run=in_processes(1), out=tmp_path / planner, assignments=sets)
+        result = drive_bag(
+            DriveRequest(bag, f"{__name__}:{planner}", count=1, assignments=sets), tmp_path / planner, run=in_processes(1)
+        )
         known[planner] = json.loads(result.written[0].read_text())
         if planner == "Slow":
             assert result.decisions.slow >= 1 and result.decisions.longest >= 0.05
@@ -165,13 +160,13 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
 
 
 def test_who_never_moves_breaks_a_bar_by_default(bag, tmp_path):
-    result = drive_bag(bag, f"{__name__}:Still", run=in_processes(1), out=tmp_path / "out")
+    result = drive_bag(DriveRequest(bag, f"{__name__}:Still"), tmp_path / "out", run=in_processes(1))
     assert any(line.startswith("progress: 0.0 %; at least 90.0 %") for line in result.broken)
 
 
 @pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
 def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path, planner):
-    result = drive_bag(bag, f"{__name__}:{planner}", count=1, run=in_processes(1), out=tmp_path / "out")
+    result = drive_bag(DriveRequest(bag, f"{__name__}:{planner}", count=1), tmp_path / "out", run=in_processes(1))
     (drive,) = json.loads(result.written[0].read_text())["drives"]
     assert drive["faults"] > 0 and not drive["passed"]
 
@@ -192,7 +187,7 @@ def test_a_module_that_ends_the_process_is_no_planner(tmp_path, monkeypatch):
 def test_a_folder_of_somebodys_own_is_refused_before_anything_is_driven(bag, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match=r"holds mine\.txt"):
-        drive_bag(bag, f"{__name__}:NeverMade", run=in_processes(1), out=tmp_path)
+        drive_bag(DriveRequest(bag, f"{__name__}:NeverMade"), tmp_path, run=in_processes(1))
 
 
 def test_an_ego_that_is_not_there_is_named(bag):

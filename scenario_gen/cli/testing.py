@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The command that searches for the failures of a planner."""
+"""The commands that test a planner: drive it in every scenario of a bag, and search for its failures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +15,107 @@ from scenario_gen.cli.options import remind, takes
 from scenario_gen.cli.output import bars, Commands, give, say, say_rows
 
 if TYPE_CHECKING:
+    from scenario_gen.closed_loop.command import DriveResult, RunTrials
     from scenario_gen.output.review.regenerate import Replanned
 
 commands = Commands("Test a planner")
+NAMED = 12  # scenarios that the terminal names
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The options of `drive`."""
+
+    bag: Annotated[Path, typer.Argument(help="A bag of this suite with scenarios.")]
+    planner: Annotated[
+        str,
+        typer.Option(
+            help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower. With --ros: the command that "
+            "starts its node."
+        ),
+    ]
+    ego: Annotated[
+        str, typer.Option(help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first.")
+    ] = ""
+    ros: Annotated[
+        bool,
+        typer.Option(
+            "--ros", help="The planner is a ROS 2 node that answers each odometry message with a command, over DDS in lock-step."
+        ),
+    ] = False
+    count: Annotated[int, typer.Option(min=0, help="Most scenarios to drive. 0: all.")] = 0
+    workers: Annotated[int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")] = 0
+    against: Annotated[
+        Path | None,
+        typer.Option(help="drives.json of another planner on the same bag. Exit code 1 if this planner is worse."),
+    ] = None
+    unlooking: Annotated[
+        bool, typer.Option(help="Also drive a planner that ignores the others, to show how many scenarios need no reaction.")
+    ] = True
+    out: Annotated[Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")] = Path("out/drives")
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", help="Set a parameter of the drive (step, policy, …) or a bar (bars.collisions, …), as name=value."
+        ),
+    ] = None
+
+
+@commands.command()
+@takes(Drive)
+def drive(options: Drive) -> None:
+    """Test a planner in closed loop in every scenario of a bag. Exit code 1: a bar is not met."""
+    from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
+
+    remind(options.bag)
+    planner, processes = options.planner, in_processes(options.workers)
+    request = DriveRequest(options.bag, planner, options.ego, options.count, options.assignments or [], options.against)
+    with bars() as advance:
+        result = drive_bag(
+            request,
+            options.out,
+            progress=lambda done, total: advance(planner, done, total),
+            run=_over_dds() if options.ros else processes,
+            unlooking=processes if options.unlooking else None,
+        )
+    _report(result, planner)
+    if result.broken:
+        say("bars not met: " + "; ".join(result.broken))
+        raise typer.Exit(1)
+
+
+def _report(result: "DriveResult", planner: str) -> None:
+    give(rates=result.found, notes=result.notes, bars_not_met=result.broken, files=result.written)
+    say_rows(("drives", planner), [(name, str(rate)) for name, rate in result.found.items()])
+    for note in result.notes:
+        say(note)
+    if comparison := result.beside.comparison:
+        for title, names in (("now fail", comparison.now_fail), ("now pass", comparison.now_pass)):
+            if names:
+                more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+                give(**{title.replace(" ", "_"): names})
+                say(f"{title}: {', '.join(names[:NAMED])}{more}")
+    if result.decisions.count:
+        took = result.decisions
+        slow = f"{took.slow} of {took.count} slower than decision_time, the longest {took.longest:.3f} s"
+        say(f"decisions: {slow} (depends on this machine, so no file has it)")
+    for outcome in result.worst:
+        say(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
+    for path in result.written:
+        say(str(path))
+
+
+def _over_dds() -> "RunTrials":
+    """Return the function that drives over DDS.
+
+    Raises:
+        InputError: ROS 2 is not in this environment.
+    """
+    try:
+        from scenario_gen.cli.drive import drive_over_dds
+    except ImportError as error:
+        raise InputError(f"ROS 2 is not available ({error}); source its setup file, or leave out --ros") from error
+    return drive_over_dds
 
 
 @dataclass(frozen=True)
