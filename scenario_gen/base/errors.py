@@ -3,8 +3,9 @@
 
 """The errors of the project, how they are shown, and how errors of libraries become ours."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 from importlib.util import find_spec
 import sys
 
@@ -62,6 +63,13 @@ def presentable(text: str) -> str:
 
 class RefusedError(ScenarioGenError):
     """The input is sound but the request cannot be met with it, e.g. a template that fits no road."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return a question that names the known name nearest to an unknown one, to be put behind a message; "" if none is near."""
+    by_lower = {one.lower(): one for one in known}
+    near = get_close_matches(name.lower()[:LONGEST], by_lower, n=1, cutoff=0.6)
+    return f"; did you mean {by_lower[near[0]]}?" if near else ""
 
 
 def of_system(error: OSError, name: object = None, advice: str = "") -> InputError:

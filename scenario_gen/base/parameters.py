@@ -3,6 +3,7 @@
 
 """Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
 
+from contextlib import suppress
 from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
 from pathlib import Path
@@ -10,10 +11,11 @@ from typing import Any, TypeVar
 import warnings
 
 from scenario_gen.base.documents import parse_yaml, read_yaml, shown, WHOLE
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.registry import installed
 
 Config = TypeVar("Config")
+KINDS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
 
 
 def parameter(
@@ -65,15 +67,17 @@ def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        raise InputError(f"parameter {name} must be of type {kind.__name__}, not {type(value).__name__} ({shown(value)})")
+        raise InputError(f"parameter {name} must be {KINDS[kind]}, not {shown(value)!r}")
     meta = entry.metadata
     if meta["choices"] and value not in meta["choices"]:
         plugins = installed(meta["group"]) if meta["group"] else {}
         if value not in plugins:
-            raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {', '.join((*meta['choices'], *plugins))}")
+            choices = [one for one in (*meta["choices"], *plugins) if one]
+            listed = ", ".join(choices) + did_you_mean(str(value), choices)
+            raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {listed}")
     if kind in (int, float):
         if not math.isfinite(value):
-            raise InputError(f"parameter {name} is {value}, not a number that can be reckoned with")
+            raise InputError(f"parameter {name} is {value}; give a finite number")
         if meta["low"] is not None and value < meta["low"]:
             raise InputError(f"parameter {name} is {value}; it must be at least {meta['low']} {meta['unit']}".rstrip())
         if meta["high"] is not None and value > meta["high"]:
@@ -118,7 +122,10 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     for name, value in values.items():
         head, _, rest = current_name(config, name).partition(".")
         if head not in known or bool(rest) != is_dataclass(getattr(config, head)):
-            raise InputError(f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them")
+            raise InputError(
+                f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them"
+                f"{did_you_mean(name, flatten(config))}"
+            )
         if rest:
             nested.setdefault(head, {})[rest] = value
         else:
@@ -140,9 +147,13 @@ def assigned(config: Config, assignment: str) -> Config:
         raise InputError(f"--set {shown(assignment)}: write it as name=value")
     known, name = flatten(config), current_name(config, name)
     if name not in known:
-        raise InputError(f"unknown parameter {shown(name)}; `scenario-gen parameters` lists them")
+        raise InputError(f"unknown parameter {shown(name)}; `scenario-gen parameters` lists them{did_you_mean(name, known)}")
     is_text = isinstance(known[name][0].default, str)  # stays text: vehicle "007" is no number
-    return updated(config, {name: text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")})
+    value = text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")
+    if isinstance(known[name][0].default, float) and isinstance(value, str):
+        with suppress(ValueError):
+            value = float(value)  # 1e9 and nan, which are texts in YAML
+    return updated(config, {name: value})
 
 
 def loaded(config: Config, path: Path) -> Config:

@@ -8,7 +8,7 @@ from functools import cache
 from importlib.metadata import entry_points, EntryPoint
 from typing import cast, Generic, TypeVar
 
-from scenario_gen.base.errors import describe, InputError
+from scenario_gen.base.errors import describe, did_you_mean, InputError
 
 T = TypeVar("T")
 
@@ -75,7 +75,9 @@ class Registry(Generic[T]):
         if name in self.built_in:
             return self.built_in[name]
         if name not in self:
-            raise InputError(f"{self.group} has no {name!r}; choose one of {', '.join(self.names())}")
+            raise InputError(
+                f"{self.group} has no {name!r}; choose one of {', '.join(self.names())}{did_you_mean(name, self.names())}"
+            )
         entry = installed(self.group)[name]
         try:
             loaded = entry.load()

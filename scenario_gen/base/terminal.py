@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.text import Text
 
 from scenario_gen.base.errors import printable
@@ -28,9 +28,11 @@ class Terminal(Console):
 @contextmanager
 def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
     """Show progress bars on standard error if it is a terminal; yield a function that takes name, done and total of a bar."""
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    what = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
+    columns = (*what, TimeElapsedColumn(), TextColumn("left:"), TimeRemainingColumn())
     tasks: dict[str, TaskID] = {}
-    with Progress(*columns, console=Terminal(stderr=True), transient=True) as bars:
+    console = Terminal(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
 
         def advance(name: str, done: int, total: int) -> None:
             if name not in tasks:
@@ -42,6 +44,6 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 @contextmanager
 def status_line() -> Iterator[Callable[[str], None]]:
-    """Show a changing line if this is a terminal; yield a function that sets its text."""
-    with Terminal().status("starting") as status:
+    """Show a changing line on standard error if it is a terminal; yield a function that sets its text."""
+    with Terminal(stderr=True).status("starting") as status:
         yield lambda text: status.update(Text(printable(text)))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The commands about many encounters, which `cli` takes in; libraries are loaded by the command that needs them."""
+"""The commands for archives of many encounters."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -12,25 +12,27 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.cli.options import assigned_all, say, takes
+from scenario_gen.cli.options import assigned_all, takes
+from scenario_gen.cli.output import Commands, give, say, say_rows, status
 
 if TYPE_CHECKING:
     from scenario_gen.corpus.tasks import Workers
 
-commands = typer.Typer()
+commands = Commands("Archives of recordings")
 
-WorkersOption = Annotated[int, typer.Option(min=0, help="processes; 0: one for each core")]
-SchedulerOption = Annotated[str, typer.Option(help="address of a Dask scheduler, e.g. tcp://host:8786, instead of own processes")]
+WorkersOption = Annotated[int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")]
+SchedulerOption = Annotated[
+    str, typer.Option(help="Address of a Dask scheduler, e.g. tcp://host:8786, to use instead of local processes.")
+]
 
 
 @contextmanager
 def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
-    """Give who does the tasks; show how far it is, and how much time is left."""
-    from scenario_gen.base.terminal import status_line
+    """Give the workers; show the tasks done and the time left."""
     from scenario_gen.corpus.tasks import Workers
 
-    with status_line() as status:
-        yield Workers(count, scheduler, lambda done, total, left: status(f"{done} of {total} tasks, {left}"))
+    with status() as show:
+        yield Workers(count, scheduler, lambda done, total, left: show(f"{done} of {total} tasks, {left}"))
 
 
 def lines(texts: Sequence[str]) -> None:
@@ -40,23 +42,24 @@ def lines(texts: Sequence[str]) -> None:
 
 
 def conclude(failed: Sequence[str], out: Path) -> None:
-    """Say that not everything could be done.
+    """Give the failed tasks.
 
     Raises:
         RefusedError: a task failed.
     """
+    give(out=out, failed=failed)
     if failed:
-        raise RefusedError(f"{len(failed)} tasks failed, as said above; the rest is in {out}")
+        raise RefusedError(f"{len(failed)} tasks failed, see above; the results of the others are in {out}")
 
 
 @commands.command()
 def mine(
-    archive: Annotated[list[Path], typer.Argument(help="folders of SPMD files, tables and bags, or single ones; repeatable")],
-    out: Annotated[Path, typer.Option(help="folder of the corpus; an unfinished one is gone on with")],
+    archive: Annotated[list[Path], typer.Argument(help="Folders of SPMD files, tables and bags, or single files. Repeatable.")],
+    out: Annotated[Path, typer.Option(help="Folder for the corpus. An unfinished corpus is continued.")],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     assignments: Annotated[
-        list[str] | None, typer.Option("--set", help="memory, range_size, interaction, log.proximity, …, as name=value")
+        list[str] | None, typer.Option("--set", help="Set memory, range_size, interaction, log.proximity, …, as name=value.")
     ] = None,
 ) -> None:
     """Find the encounters in an archive of any size."""
@@ -66,48 +69,51 @@ def mine(
     config = assigned_all(CorpusConfig(), assignments)
     with workers_of(workers, scheduler) as who:
         result = mined(archive, out, config, workers=who)
+    give(summary=result.lines(), page=out / "encounters.html")
     lines([*result.lines(), f"page: {out / 'encounters.html'}"])
     conclude(result.failed, out)
 
 
 @commands.command("synthetic-archive")
 def synthetic_archive(
-    out: Annotated[Path, typer.Argument(help="folder of the files; an earlier synthetic archive there is replaced")],
-    seed: Annotated[int, typer.Option(min=0, help="same seed, same bytes")] = 0,
+    out: Annotated[Path, typer.Argument(help="Folder for the files. An earlier synthetic archive there is replaced.")],
+    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same files.")] = 0,
     assignments: Annotated[
-        list[str] | None, typer.Option("--set", help="rows, hours, encounters, outside, loss, duplicates, …, as name=value")
+        list[str] | None, typer.Option("--set", help="Set rows, hours, encounters, outside, loss, duplicates, …, as name=value.")
     ] = None,
 ) -> None:
-    """Write a synthetic archive in the Safety Pilot's format, whose encounters are known."""
+    """Write a synthetic archive with known encounters, in the format of the Safety Pilot."""
     from scenario_gen.corpus.synthetic import ArchiveConfig, read_planted, write_archive
 
     config = assigned_all(ArchiveConfig(), assignments)
     planted = read_planted(write_archive(out, config, seed))
     inside = sum(int(one.inside) for one in planted)
-    lines([f"{out}: synthetic, {inside} encounters to be found, {len(planted) - inside} just outside of a threshold"])
+    give(out=out, encounters=inside, outside=len(planted) - inside)
+    lines([f"{out}: synthetic, {inside} encounters to find, {len(planted) - inside} just beyond a threshold"])
 
 
 @dataclass(frozen=True)
 class Batch:
     """The options of `batch`."""
 
-    corpus: Annotated[Path, typer.Argument(help="a corpus that `mine` wrote")]
-    roads: Annotated[list[str], typer.Option(help="as for `generate`; several separated by commas, or repeated")]
-    out: Annotated[Path, typer.Option(help="folder of tables and bags; an unfinished batch is gone on with")]
-    count: Annotated[int, typer.Option(min=1, help="scenarios per template and road")] = 50
-    seed: Annotated[int, typer.Option(min=0, help="same seed, same scenarios")] = 0
-    templates: Annotated[int, typer.Option(min=0, help="the first so many of the corpus; 0: all")] = 0
+    corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote.")]
+    roads: Annotated[list[str], typer.Option(help="Roads, as for `generate`: separated by commas, or repeated.")]
+    out: Annotated[Path, typer.Option(help="Folder for tables and bags. An unfinished batch is continued.")]
+    count: Annotated[int, typer.Option(min=1, max=100_000, help="Scenarios per template and road.")] = 50
+    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 0
+    templates: Annotated[int, typer.Option(min=0, help="Use the first so many templates of the corpus. 0: all.")] = 0
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
     assignments: Annotated[
-        list[str] | None, typer.Option("--set", help="a parameter of the pipeline, as name=value; repeatable")
+        list[str] | None,
+        typer.Option("--set", help="Set one parameter, as name=value (repeatable). `scenario-gen parameters` lists them."),
     ] = None
 
 
 @commands.command()
 @takes(Batch)
 def batch(options: Batch) -> None:
-    """Generate scenarios of all templates of a corpus on all roads."""
+    """Generate scenarios from all templates of a corpus on all given roads."""
     from scenario_gen.corpus.batch import BatchRequest, run_batch
     from scenario_gen.method.config import PipelineConfig
 
@@ -118,6 +124,7 @@ def batch(options: Batch) -> None:
             options.corpus, names, options.out, BatchRequest(config, options.count, options.seed),
             templates=options.templates, workers=who,
         )  # fmt: skip
+    give(summary=result.lines())
     lines(result.lines())
     conclude(result.failed, options.out)
 
@@ -129,61 +136,70 @@ def needs_bag(bag: Path | None) -> None:
         InputError: there is none.
     """
     if bag is None:
-        raise InputError("--report is on the bag of the hits: give --bag, too")
+        raise InputError("--report needs --bag: the page shows the bag of the scenarios found; give both")
+
+
+def shown(value: object) -> str:
+    """Return a value of the table as text."""
+    return "" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
 @commands.command()
 def find(
-    batch: Annotated[Path, typer.Argument(help="a batch, finished or not")],
-    condition: Annotated[str, typer.Argument(help="SQL, e.g. \"kind = 'crossing' and pet < 1\"")] = "true",
-    limit: Annotated[int, typer.Option(min=0, help="at most so many; 0: all")] = 20,
-    bag: Annotated[Path | None, typer.Option(help="write the hits to this bag, with their templates and roads")] = None,
-    report: Annotated[Path | None, typer.Option(help="folder of the report on the bag of the hits")] = None,
-    again: Annotated[bool, typer.Option("--again", help="make each hit again, alone, and compare it bit for bit")] = False,
+    batch: Annotated[Path, typer.Argument(help="A batch, finished or not.")],
+    condition: Annotated[str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")] = "true",
+    limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list. 0: all.")] = 20,
+    bag: Annotated[
+        Path | None, typer.Option(help="Write the scenarios found to this bag, with their templates and roads.")
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Folder for the page of that bag.")] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Generate each scenario found again and check that it is byte-identical.")
+    ] = False,
 ) -> None:
-    """Find scenarios of a batch by what they are: kind, road, PET, time to collision, …."""
-    from rich.table import Table
-
+    """Find scenarios of a batch by kind, road, PET, time to collision, …."""
     from scenario_gen.corpus import find as finding
+    from scenario_gen.output.review.evaluation import write_page
 
     if report is not None:
         needs_bag(bag)
     found = finding.find(batch, condition, limit)
-    table = Table(*finding.COLUMNS)
-    for row in found.rows:
-        table.add_row(
-            *(
-                "" if row[name] is None else f"{row[name]:.2f}" if isinstance(row[name], float) else str(row[name])
-                for name in finding.COLUMNS
-            )
-        )
-    say(table, wrap=True)
+    give(scenarios=found.rows, coverage=finding.coverage_lines(found, batch))
+    say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in found.rows], names=5)
     lines(finding.coverage_lines(found, batch))
     if again:
         for row in found.rows:
             finding.make_again(batch, row)
-        lines([f"{len(found.rows)} scenarios made again: the same bytes"])
+        lines([f"{len(found.rows)} scenarios generated again: all byte-identical"])
     if bag is not None:
-        lines([f"bag: {finding.export_hits(batch, found.rows, bag)}"])
+        finding.export_hits(batch, found.rows, bag)
+        give(bag=bag)
+        lines([f"bag: {bag}"])
         if report is not None:
-            finding.write_page(bag, report)
+            write_page(bag, report)
+            give(report=report)
             lines([f"report: {report}"])
 
 
 @commands.command()
 def library(
-    corpus: Annotated[Path, typer.Argument(help="a corpus that `mine` wrote; the library goes to CORPUS/library")],
-    most: Annotated[int, typer.Option(min=4, help="pairs of vehicles that are fitted at most; the others are assigned")] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="same seed, same library")] = 0,
+    corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote. The library goes to CORPUS/library.")],
+    most: Annotated[
+        int, typer.Option(min=4, help="Most pairs of vehicles that are fitted. The others are assigned to the result.")
+    ] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same library.")] = 0,
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
-    assignments: Annotated[list[str] | None, typer.Option("--set", help="a parameter of the segmentation, as name=value")] = None,
+    assignments: Annotated[
+        list[str] | None, typer.Option("--set", help="Set a parameter of the segmentation, as name=value.")
+    ] = None,
 ) -> None:
-    """Segment the encounters of a corpus together: primitives that they share, with frequencies, transitions and examples."""
+    """Segment the encounters of a corpus together; write the primitives that they share."""
     from scenario_gen.corpus.library import build, SHARED
 
     config = assigned_all(SHARED, assignments)
     with workers_of(workers, scheduler) as who:
         built = build(corpus, config, most=most, seed=seed, workers=who)
+    give(summary=built.lines())
     lines(built.lines())
     conclude(built.failed, corpus / "library")

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import did_you_mean, InputError, RefusedError
 from scenario_gen.base.folders import replaced_folder
-from scenario_gen.logs import read_log
+from scenario_gen.logs import LogResult, read_log
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types import Encounter, GenerationResult, Request
@@ -19,6 +19,7 @@ from scenario_gen.types import Encounter, GenerationResult, Request
 Select = Callable[[GenerationResult], GenerationResult]
 Advance = Callable[[str, int, int], None]
 """Called with the progress of a case: its name, scenarios so far, scenarios requested."""
+NOTES = 5  # on logs, that the terminal shows
 OPTIONS = {
     "starts:='": "--start '", "goals:='": "--goal '", "sampling.max_stretch:=": "--set sampling.max_stretch=",
     "fitting.allow=": "--allow ",
@@ -78,7 +79,7 @@ def generate_folder(
         requested: what it is to hold.
         record: writes the bag (its path and the cases are given) instead of this process.
         progress: a context whose value is called with the progress of each case.
-        tell: called with a sentence for each set with an ego slot: how many scenarios a planner passes that looks at nobody.
+        tell: called with notes on the logs, and for each set with an ego slot with how many scenarios need no reaction.
 
     Returns:
         The cases, and a sentence for each encounter and road that was refused or came out short.
@@ -90,6 +91,8 @@ def generate_folder(
     logs, roads, config, count, seed = requested.logs, requested.roads, requested.config, requested.count, requested.seed
     with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *requested.also_read]) as folder:
         readings = [read_log(group, config.log) for group, _ in requested.jobs]
+        for line in notes_of(readings):
+            tell(line)
         pairs = [
             (encounter, road)
             for log, (_, names) in zip(readings, requested.jobs, strict=True)
@@ -122,6 +125,13 @@ def generate_folder(
             provenance=provenance_of(logs, seed, count, roads, config, requested.request),
         )
     return cases, refusals
+
+
+def notes_of(readings: Sequence[LogResult]) -> list[str]:
+    """Return what there is to say about how logs were read, at most `NOTES` lines; the report has all."""
+    notes = [f"{log.quality.name}: {note}" for log in readings for note in log.quality.notes]
+    more = len(notes) - NOTES
+    return notes if more <= 0 else [*notes[:NOTES], f"{more} more notes on the log are in the report"]
 
 
 def unlooking_said(cases: Sequence[GenerationResult]) -> list[str]:
@@ -181,7 +191,7 @@ def chosen(encounters: Sequence[Encounter], names: Sequence[str]) -> list[Encoun
     """
     known = {encounter.name: encounter for encounter in encounters}
     for unknown in (name for name in names if name not in known):
-        raise InputError(f"no encounter named {unknown!r} in the log; there are: {', '.join(known)}")
+        raise InputError(f"the log has no encounter {unknown!r}; it has {', '.join(known)}{did_you_mean(unknown, known)}")
     return [known[name] for name in names] or list(encounters)
 
 

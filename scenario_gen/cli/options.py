@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the commands share: options, how a command takes a class of them, the configuration, and what is printed."""
+"""What the commands share: options, how a command takes a class of them, and the configuration."""
 
 from collections.abc import Callable
 from dataclasses import fields, MISSING
@@ -11,15 +11,20 @@ from typing import Annotated, Any, get_type_hints, TYPE_CHECKING, TypeVar
 
 import typer
 
+from scenario_gen.cli.output import say
+
 if TYPE_CHECKING:
     from scenario_gen.pipeline import PipelineConfig
 
 Options = TypeVar("Options")
 Config = TypeVar("Config")
 SetOption = Annotated[
-    list[str] | None, typer.Option("--set", help="one parameter, as name=value; `scenario-gen parameters` lists them")
+    list[str] | None,
+    typer.Option("--set", help="Set one parameter, as name=value (repeatable). `scenario-gen parameters` lists them."),
 ]
-ParametersOption = Annotated[Path | None, typer.Option("--params", help="a parameter file, e.g. config/default.yaml")]
+ParametersOption = Annotated[
+    Path | None, typer.Option("--params", help="Read parameters from a YAML file such as config/default.yaml.")
+]
 
 
 def takes(options: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:
@@ -43,13 +48,6 @@ def takes(options: type[Options]) -> Callable[[Callable[[Options], None]], Calla
         return parsed
 
     return of
-
-
-def say(*what: Any, sep: str = " ", wrap: bool = False) -> None:
-    """Print to standard output: texts letter by letter, and what rich can draw; `wrap` breaks lines at the terminal's width."""
-    from scenario_gen.base.terminal import Terminal
-
-    Terminal().print(*what, sep=sep, soft_wrap=not wrap)
 
 
 def assigned_all(config: Config, assignments: list[str] | None) -> Config:

@@ -11,12 +11,13 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.cli.options import remind, say, takes
+from scenario_gen.cli.options import remind, takes
+from scenario_gen.cli.output import bars, Commands, give, say, say_rows
 
 if TYPE_CHECKING:
     from scenario_gen.output.review.regenerate import Replanned
 
-commands = typer.Typer()
+commands = Commands("Test a planner")
 
 
 @dataclass(frozen=True)
@@ -24,28 +25,33 @@ class Search:
     """The options of `search`."""
 
     source: Annotated[
-        Path, typer.Argument(help="a bag of `generate`: its template, road and parameters are searched; or a log, with --road")
+        Path,
+        typer.Argument(help="A bag of `generate`: the search uses its template, road and parameters. Or a log, with --road."),
     ]
-    planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower")]
-    budget: Annotated[int, typer.Option(min=1, help="drives at most; a larger budget continues an earlier search")] = 1000
-    road: Annotated[str, typer.Option(help="the road, where the source is a log")] = ""
-    encounter: Annotated[str, typer.Option(help="name of an encounter, where the source is a log of several")] = ""
+    planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower.")]
+    budget: Annotated[
+        int, typer.Option(min=1, max=10_000_000, help="Most drives. A larger budget continues an earlier search.")
+    ] = 1000
+    road: Annotated[str, typer.Option(help="Road, if the source is a log.")] = ""
+    encounter: Annotated[str, typer.Option(help="Name of the encounter, if the source is a log of several.")] = ""
     objective: Annotated[
-        str, typer.Option(help="what counts as a failure: at_fault, collision, off_road, goal, or e.g. 'ttc<1.5', 'pet<1' [s]")
+        str, typer.Option(help="What counts as a failure: at_fault, collision, off_road, goal, or e.g. 'ttc<1.5', 'pet<1' (s).")
     ] = "at_fault"
-    ego: Annotated[str, typer.Option(help="id of the vehicle in whose place it drives; default: the ego slot, or the first")] = ""
-    worst: Annotated[bool, typer.Option("--worst", help="look for the worst failure instead of the failure rate")] = False
+    ego: Annotated[
+        str, typer.Option(help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first.")
+    ] = ""
+    worst: Annotated[bool, typer.Option("--worst", help="Look for the worst failure instead of the failure rate.")] = False
     max_rate: Annotated[
-        float | None, typer.Option(min=0.0, max=1.0, help="exit code 1 if the interval of the failure rate ends above this")
+        float | None, typer.Option(min=0.0, max=1.0, help="Exit code 1 if the interval of the failure rate ends above this.")
     ] = None
-    namespace: Annotated[str | None, typer.Option(help="of the scenarios in the bag, where there are several")] = None
-    seed: Annotated[int, typer.Option(min=0, help="same seed, same search")] = 0
-    workers: Annotated[int, typer.Option(min=0, help="processes; 0: one for each core")] = 0
-    out: Annotated[Path, typer.Option(help="folder of search.json, search.html, junit.xml and the bag of failures")] = Path(
+    namespace: Annotated[str | None, typer.Option(help="Namespace of the scenarios, if the bag has several.")] = None
+    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same search.")] = 0
+    workers: Annotated[int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")] = 0
+    out: Annotated[Path, typer.Option(help="Folder for search.json, search.html, junit.xml and the bag of failures.")] = Path(
         "out/search"
     )
     assignments: Annotated[
-        list[str] | None, typer.Option("--set", help="a parameter of the drive (step, policy, …), as name=value")
+        list[str] | None, typer.Option("--set", help="Set a parameter of the drive (step, policy, …), as name=value.")
     ] = None
 
 
@@ -77,9 +83,6 @@ def drawn_from(options: Search) -> "Replanned":
 @takes(Search)
 def search(options: Search) -> None:
     """Find the scenarios in which a planner fails, and the rate at which it does."""
-    from rich.table import Table
-
-    from scenario_gen.base.terminal import progress_bars
     from scenario_gen.closed_loop.search.command import JOURNAL, search_failures, SearchRequest
     from scenario_gen.closed_loop.search.objective import Objective
 
@@ -98,23 +101,25 @@ def search(options: Search) -> None:
         options.worst,
         options.assignments or [],
     )
-    say(f"drives are kept in {options.out}{JOURNAL}: the same command continues a search that was stopped")
-    with progress_bars() as advance:
+    say(f"Drives are kept in {options.out}{JOURNAL}. The same command continues a search that was stopped.")
+    with bars() as advance:
         result = search_failures(
             request, options.out, workers=options.workers, progress=lambda done, total: advance("drives", done, total)
         )
+    give(rate=result.estimate.rate, failures=len(result.findings), sentences=result.sentences(), files=result.written)
     for sentence in result.sentences():
         say(sentence)
     if result.findings:
-        table = Table("kind of failure", "kept", "likeliest")
-        for kind, own in result.kinds.items():
-            table.add_row(kind, str(len(own)), f"drive {own[0].trial.name}: {own[0].outcome.verdict.sentence()}")
-        say(table, wrap=True)
+        rows = [
+            (kind, str(len(own)), f"drive {own[0].trial.name}: {own[0].outcome.verdict.sentence()}")
+            for kind, own in result.kinds.items()
+        ]
+        say_rows(("kind of failure", "kept", "likeliest"), rows)
     for path in result.written:
         say(str(path))
     if result.findings:
         again = f"scenario-gen drive {options.out / 'bag'} --planner {options.planner} --ego {request.ego_id()}"
-        say(f"again, as a regression test: {again}")
+        say(f"as a regression test: {again}")
     if options.max_rate is not None and not result.estimate.rate.high <= options.max_rate:
         say(f"the failure rate may be above {options.max_rate:g}: its interval ends at {result.estimate.rate.high:.3g}")
         raise typer.Exit(1)

@@ -21,7 +21,7 @@ import numpy as np
 from scenario_gen.bags.recordings.read import INFO, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
-from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
 from scenario_gen.base.interrupts import end_with_parent, starting
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.closed_loop.bounded import bounded, Decisions, Timed, TooLongError
@@ -103,8 +103,12 @@ def find_planner(name: str) -> MakePlanner:
         found: Any = importlib.import_module(module)
         for part in attribute.split("."):
             found = getattr(found, part)
-    except (ImportError, AttributeError) as error:
-        raise InputError(f"--planner {name}: {error}") from error
+    except ImportError as error:
+        raise InputError(f"--planner {name}: {error}; run in the folder of the module, or put it on PYTHONPATH") from error
+    except AttributeError as error:
+        known = [one for one in vars(importlib.import_module(module)) if one[:1].isupper()]
+        near = did_you_mean(attribute, known)
+        raise InputError(f"--planner {name}: {error}; name a class of that module{near}") from error
     except (Exception, SystemExit) as error:  # the module runs
         raise InputError(f"--planner {name}: {type(error).__name__}: {error}") from error
     if not callable(found):
@@ -183,7 +187,7 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
         )
     wanted = ids[0] if not asked else next((one for one in ids if asked in (one, token(one))), "")
     if not wanted:
-        raise InputError(f"{where}: no vehicle {asked!r} to be the ego; it has {', '.join(ids)}")
+        raise InputError(f"{where}: no vehicle {asked!r} to be the ego; it has {', '.join(ids)}{did_you_mean(asked, ids)}")
     return wanted
 
 

@@ -9,13 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from scenario_gen.bags.recordings.write import add_message
-from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.base.folders import replaced_folder
 from scenario_gen.corpus.messages import database, quoted
-from scenario_gen.output.results import EVALUATED, write_evaluation
-from scenario_gen.output.review.evaluation import bag_results
 from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerated
 
 MEMORY = 500  # MiB
@@ -109,20 +105,10 @@ def export_hits(batch: Path, rows: Sequence[Mapping[str, Any]], folder: Path) ->
         InputError: there is no row, a bag is missing or damaged, or `folder` is something else.
     """
     if not rows:
-        raise InputError("there is no scenario to export; ask for less with the condition")
+        raise InputError("no scenario meets the condition, so there is nothing to export; use a wider condition")
     with atomic_bag(folder) as bag:
         for k, row in enumerate(rows):
             for message in make_again(batch, row).messages:
                 own = message.topic.removeprefix(row["namespace"])
                 add_message(bag, f"/hit_{k + 1}{own}", message.data, message.stamp_ns)
     return folder
-
-
-def write_page(bag: Path, folder: Path) -> None:
-    """Write the report of a bag of hits.
-
-    Raises:
-        InputError: the bag is damaged, or the folder may not be replaced.
-    """
-    with replaced_folder(folder, EVALUATED, [bag]) as place:
-        write_evaluation(place, bag_results(bag), bag, BagConfig())

@@ -132,7 +132,8 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
         raise InputError(
             f"{log.segments[0].label} holds no usable position among {log.rows} rows"
             + (f" ({causes})" if causes else "")
-            + "; check it, or name columns and units with the parameter columns"
+            + ("; lat and lon may be swapped: --set log.columns=lat=…,lon=…" if log.geographic else "")
+            + "; check the columns and their units, or name them with --set log.columns=…"
         )
     first, last = min(int(s.min()) for s in stamps), max(int(s.max()) for s in stamps)
     if config.end and config.end <= config.start:

@@ -3,18 +3,36 @@
 
 """The columns of a table by quantity, with their units: by option, or by name and suffix."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
+import re
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.logs.config import listed
 
 # Column names of each quantity, the preferred first. Clocks that all files share come before those that start with the file.
 NAMES: dict[str, tuple[str, ...]] = {
     "time": ("utc", "stamp", "unix", "gentime", "clock", "t", "time", "timestamp", "global_time"),
-    "vehicle": ("vehicle", "vehicle_id", "vehicle_name", "txdevice", "track_id", "id", "name", "agent_id", "object_id"),
+    "vehicle": (
+        "vehicle",
+        "vehicle_id",
+        "vehicle_name",
+        "txdevice",
+        "track_id",
+        "id",
+        "name",
+        "agent_id",
+        "object_id",
+        "car",
+        "car_id",
+        "veh",
+        "veh_id",
+        "trackid",
+        "actor_id",
+        "obj_id",
+    ),
     "lat": ("lat", "latitude"),
     "lon": ("lon", "lng", "longitude"),
     "x": ("x", "e", "east", "easting", "pos_x", "position_x"),
@@ -38,6 +56,12 @@ UNITS: dict[str, dict[str, float]] = {
     "speed": SPEEDS,
     "heading": {"rad": 1.0, "deg": math.pi / 180.0, "north_deg": math.nan, "cw_deg": math.nan},
 }
+IN_BRACKETS = re.compile(r"(.+?)\s*[\[(]\s*([^\])]+?)\s*[\])]")  # x [m]
+SPELLED = {"m/s": "mps", "km/h": "kmh", "°": "deg", "degrees": "deg", "seconds": "s", "metres": "m", "meters": "m", "feet": "ft"}
+NGSIM = {  # columns of the trajectory files, in feet, and their units; positions are those of the middle of the front
+    "time": ("global_time", "ms"), "vehicle": ("vehicle_id", ""), "x": ("local_x", "ft"), "y": ("local_y", "ft"),
+    "speed": ("v_vel", "fps"), "length": ("v_length", "ft"), "width": ("v_width", "ft"),
+}  # fmt: skip
 CLOCKWISE = ("course", "bearing")  # by convention degrees clockwise from north
 
 
@@ -56,13 +80,13 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
     Raises:
         InputError: a required column is missing, or the parameter names a column that is not there.
     """
-    names = {name.strip().lower(): name for name in header}
+    names = {normal(name): name for name in header}
     columns: dict[str, Column] = {}
     without: set[str] = set()
     for part in listed(option):
         quantity, _, name = (p.strip() for p in part.partition("="))
         if quantity not in NAMES:
-            raise InputError(f"parameter columns: {quantity!r} is none of {', '.join(NAMES)} (write quantity=column, …)")
+            raise InputError(f"parameter columns: write quantity=column, …; {quantity!r} is none of {', '.join(NAMES)}")
         if name == "none":
             without.add(quantity)
             continue
@@ -73,6 +97,10 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
         if unit and unit not in UNITS[quantity]:
             raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
         columns[quantity] = as_column(quantity, names[name.lower()], unit)
+    if NGSIM["x"][0] in names and NGSIM["speed"][0] in names:
+        for quantity, (name, unit) in NGSIM.items():
+            if name in names and quantity not in without:
+                columns.setdefault(quantity, as_column(quantity, names[name], unit))
     for quantity, aliases in NAMES.items():
         if quantity in columns or quantity in without:
             continue
@@ -83,34 +111,60 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
             columns[quantity] = as_column(quantity, match)
     if "heading" in columns and "time" in columns and columns["time"].name.strip().lower() == "gentime":  # basic safety messages
         columns["heading"] = Column(columns["heading"].name, math.pi / 180.0, clockwise=True)
-    return complete(columns, without, path, names)
+    return complete(columns, path, names)
 
 
-def complete(columns: dict[str, Column], without: set[str], path: Path, names: dict[str, str]) -> dict[str, Column]:
+def normal(name: str) -> str:
+    """Return a column's name in small letters, with a unit in brackets as a suffix: `Speed [m/s]` is `speed_mps`."""
+    name = name.strip().lower()
+    bracketed = IN_BRACKETS.fullmatch(name)
+    return f"{bracketed[1]}_{SPELLED.get(bracketed[2], bracketed[2])}" if bracketed else name
+
+
+def notes_on(columns: dict[str, Column], option: str) -> list[str]:
+    """Return what there is to say about the columns that were found with the parameter `columns`."""
+    notes = []
+    if "speed" not in columns and "speed" not in option:
+        notes.append("there is no speed column: speeds are derived from the positions")
+    if columns.get("x", Column("")).name.strip().lower() == NGSIM["x"][0]:
+        notes.append("NGSIM columns: feet are converted to metres; positions are those of the front of each vehicle")
+    if "vehicle" not in columns:
+        notes.append("there is no column for the vehicle: each file is read as one vehicle")
+    return notes
+
+
+def complete(columns: dict[str, Column], path: Path, names: dict[str, str]) -> dict[str, Column]:
     """Check that all required columns are there; leave out x and y where there are latitude and longitude.
 
     Raises:
         InputError: a needed column is missing.
     """
-    missing = None
+    missing: tuple[str, str, tuple[str, ...]] | None = None
     if not ({"lat", "lon"} <= columns.keys() or {"x", "y"} <= columns.keys()):
-        missing = ("position (lat and lon, or x and y)", "x=…,y=…")
+        missing = ("position (x and y, or lat and lon)", "x=…,y=…", ("x", "y", "lat", "lon"))
     elif "time" not in columns:
-        missing = ("time", "time=…")
-    elif "speed" not in columns and "speed" not in without:
-        missing = ("speed", "speed=… or speed=none to take it from the positions")
+        missing = ("time", "time=…", ("time",))
     if missing:
-        present = ", ".join(names.values())
+        what, remedy, quantities = missing
+        aliases = {alias for quantity in quantities if quantity not in columns for alias in NAMES[quantity]}
+        near = nearest(names.values(), aliases)
         raise InputError(
-            f"{path} has no column for {missing[0]}; it has {present}. Name it with the parameter columns, {missing[1]}"
+            f"{path} has no column for {what}; it has {', '.join(names.values())}. "
+            f"Rename it, or name it with --set log.columns={remedy}{near}"
         )
     unused = ("x", "y") if {"lat", "lon"} <= columns.keys() else ("lat", "lon")
     return {quantity: column for quantity, column in columns.items() if quantity not in unused}
 
 
+def nearest(present: Collection[str], aliases: Collection[str]) -> str:
+    """Return a question whether one of the columns is meant by an alias; "" if none is near."""
+    found = [(name, did_you_mean(normal(name), aliases)) for name in present if len(name) > 2]
+    return next((f"; is it {name}?" for name, question in found if question), "")
+
+
 def as_column(quantity: str, name: str, unit: str = "") -> Column:
     """Return the column in the given unit; by default its suffix names the unit."""
-    lower = name.strip().lower()
+    lower = normal(name)
     unit = unit or max((unit for unit in UNITS[quantity] if lower.endswith("_" + unit)), key=len, default="")
     if quantity == "heading":
         base = lower.removesuffix("_" + unit)

@@ -6,7 +6,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
 
 FORMATS = ("auto", "spmd", "table", "bag", "argoverse2", "interaction", "ind", "highd", "commonroad")
@@ -78,5 +78,7 @@ def picked(known: Sequence[str], config: LogConfig, where: str) -> list[str]:
     """
     names = listed(config.vehicles)
     for unknown in (name for name in names if name not in known):
-        raise InputError(f"parameter vehicles: {where} has no vehicle {unknown!r}; it has {', '.join(known)}")
+        raise InputError(
+            f"parameter vehicles: {where} has no vehicle {unknown!r}; it has {', '.join(known)}{did_you_mean(unknown, known)}"
+        )
     return list(dict.fromkeys(names)) or list(known)

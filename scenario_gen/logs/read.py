@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.bags.storage.files import files_of
-from scenario_gen.base.errors import guarded, InputError, needs, reading
+from scenario_gen.base.errors import did_you_mean, guarded, InputError, needs, reading
 from scenario_gen.base.registry import Registry
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
@@ -25,6 +25,7 @@ from scenario_gen.logs.groups import distances, find_groups, Group
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
+from scenario_gen.logs.units import remarks_on_units
 from scenario_gen.types import cut, Encounter, Vehicle
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
@@ -102,7 +103,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         dropped=drops.of(log),
         vehicles=tuple(vehicles),
         encounters=tuple(encounter_quality(encounter) for encounter in encounters),
-        notes=(*log.notes, *dict.fromkeys(notes)),
+        notes=(*log.notes, *remarks_on_units(pieces, origin_ns, config), *dict.fromkeys(notes)),
     )
     return LogResult(tuple(encounters), summary)
 
@@ -122,7 +123,7 @@ def notes_on_vehicles(
     if len(left) > config.max_vehicles:
         notes = [f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"]
     else:
-        notes = [f"vehicle {v.id} is in no encounter: there for {v.seconds:.1f} s" for v in left]
+        notes = [f"vehicle {v.id} is in no encounter; it was recorded for {v.seconds:.1f} s" for v in left]
     if without_positions:
         notes.append(f"fewer than two usable positions: vehicle {', '.join(without_positions)}")
     return (*notes, *(f"vehicle {name}: its measured speeds contradict its positions and are not used" for name in doubted))
@@ -151,10 +152,10 @@ def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[s
     last = min(last, len(encounter.time))
     inside = cut(encounter.present, first, last)
     rows = [n for n in requested if inside[n, 1] > inside[n, 0]]
-    notes = tuple(f"vehicle {ids[n]} is left out: it is not there in the asked time" for n in requested if n not in rows)
+    notes = tuple(f"vehicle {ids[n]} is left out: it is not recorded in the requested time" for n in requested if n not in rows)
     if len(rows) < 2:
         raise InputError(
-            f"encounter {encounter.name!r}: {len(rows)} of {len(requested)} vehicles are there between {config.start:g} s and "
+            f"encounter {encounter.name!r}: {len(rows)} of {len(requested)} vehicles are recorded between {config.start:g} s and "
             f"{(last - 1) * encounter.dt:g} s; at least 2 are needed: see the parameters start, end and vehicles"
         )
     first, last = first + int(inside[rows, 0].min()), first + int(inside[rows, 1].max()) + 1
@@ -221,21 +222,22 @@ def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
     causes = "; ".join(map(str, drops.of(log)))
     have = f"only vehicle {names[0]}" if names else "no vehicle"
     return (
-        f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock "
-        f"(give their files together, or check the parameters columns and vehicles)" + (f". Left out: {causes}" if causes else "")
+        f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock. "
+        "Give the files of all vehicles in one command, or check --set log.columns=… and log.vehicles=…"
+        + (f". Left out: {causes}" if causes else "")
     )
 
 
 def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig) -> str:
     """Return the error message on a log without encounters."""
     pairs = [(a, b) for a, b in combinations(pieces, 2) if a.track.id != b.track.id and len(distances(a, b))]
-    who = "no two vehicles are there at the same time"
+    who = "no two vehicles are recorded at the same time"
     if pairs:
         nearest, (a, b) = min(((float(distances(a, b).min()), (a, b)) for a, b in pairs), key=lambda pair: pair[0])
         who = f"{a.track.id} and {b.track.id} come closest, to {nearest:.0f} m"
     return (
         f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.min_duration:g} s while one "
-        f"drives {config.travel:g} m ({who}); see the parameters proximity, min_duration, travel and longest_gap"
+        f"drives {config.travel:g} m ({who}); change --set log.proximity=…, log.min_duration=…, log.travel=… or log.longest_gap=…"
     )
 
 
@@ -336,8 +338,8 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
             known = FORMATS[config.format]
     if known is None:
         raise InputError(
-            f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
-            "CommonRoad scenarios, rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
+            f"{paths[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
+            "CommonRoad scenarios, rosbag2 folders, .mcap, .db3. If its name misleads: --set log.format=table"
         )
     with reading(files[0]):
         return known.read(files, config)
@@ -350,13 +352,14 @@ def present(path: Path) -> list[Path]:
         InputError: there is nothing there that can be read.
     """
     if not path.exists():
-        raise InputError(f"{path} does not exist")
+        beside = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise InputError(f"{path} does not exist; check the name and the folder{did_you_mean(path.name, beside)}")
     if not (path.is_file() or path.is_dir()):
         raise InputError(f"{path} is neither a file nor a folder")
     if path.is_dir() and not any(path.iterdir()):
-        raise InputError(f"{path} is an empty folder")
+        raise InputError(f"{path} is an empty folder; name a folder with a recording")
     if path.is_file() and path.stat().st_size == 0:
-        raise InputError(f"{path} is empty (0 bytes); record or copy it again")
+        raise InputError(f"{path} is empty (0 bytes); copy it again")
     if path.is_file() or is_bag(path):
         return [path]
     return sorted(file for file in path.iterdir() if is_table(file) and file.stat().st_size) or [path]

@@ -4,6 +4,7 @@
 """Tables: CSV or Parquet with named columns, and the headerless files of the Safety Pilot Model Deployment (SPMD)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 import math
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,10 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.logs.columns import Column, find_columns
+from scenario_gen.logs.columns import Column, find_columns, notes_on
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, LONGEST_HEADER, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.text import layout_of
 from scenario_gen.numerics import Floats, Ints
 
 PARQUET = (".parquet", ".pq")
@@ -47,30 +49,67 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
         InputError: a file is damaged or too large, or a column is missing or of no kind that its quantity can have.
     """
     frames, segments, row, size = [], [], 0, 0
+    notes: list[str] = []
     for path in paths:
         size += path.stat().st_size
         check_size(str(path), size, row, config)
-        frames.append(read_messages(path, row, config) if spmd else read_columns(path, row, config))
+        frames.append(read_messages(path, row, config) if spmd else read_columns(path, row, config, notes))
+        if "vehicle" not in frames[-1]:
+            frames[-1]["vehicle"] = "0" if len(paths) == 1 else path.stem
         segments.append(segment_of(path, row, header=not spmd))
         row += len(frames[-1])
     if len({"lat" in frame for frame in frames}) > 1:
         raise InputError(f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one")
-    return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
+    log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
+    return replace(log, notes=tuple(dict.fromkeys(notes)))
 
 
-def read_columns(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
-    """Read the needed columns of one table in our units; `before` rows were read from other files.
+def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -> pd.DataFrame:
+    """Read the needed columns of one table in our units.
+
+    Args:
+        path: the table.
+        before: rows that were read from other files.
+        config: as of `read`.
+        notes: how the table was read is added here.
 
     Raises:
-        InputError: as `read`.
+        InputError: as `read`, or stamps repeat and no column says which vehicle a row is of.
     """
     if path.suffix.lower() in PARQUET:
         needs("parquet", "pyarrow")
         from scenario_gen.logs import parquet
 
-        return to_numbers(*parquet.read_columns(path, before, config), path)
-    frame = read_text(path, before, config)
-    return to_numbers(frame, find_columns([str(name) for name in frame.columns], path, config.columns), path)
+        frame, columns = parquet.read_columns(path, before, config)
+    else:
+        layout = layout_of(path)
+        notes += layout.notes
+        form = {"encoding": layout.encoding, "sep": layout.separator, "decimal": layout.decimal}
+        frame = read_text(path, before, config, **form)
+        columns = find_columns([str(name) for name in frame.columns], path, config.columns)
+    notes += notes_on(columns, config.columns)
+    numbers = to_numbers(frame, columns, path)
+    if "vehicle" not in columns and "vehicle=none" not in config.columns.replace(" ", ""):
+        check_alone(frame, columns, numbers["time"], path)
+    return numbers
+
+
+def check_alone(frame: pd.DataFrame, columns: dict[str, Column], time: "pd.Series[int]", path: Path) -> None:
+    """Check that a table without a column for the vehicle is of one vehicle.
+
+    Raises:
+        InputError: it has most stamps more than once; the message names the columns that could be of the vehicle.
+    """
+    if time.nunique() > len(time) / 2 + 1:
+        return
+    unused = [name for name in frame.columns if name not in {column.name for column in columns.values()}]
+    could = [
+        str(name)
+        for name in unused
+        if 2 <= frame[name].nunique() <= len(frame) / 2 and not pd.DataFrame({"t": time, "v": frame[name]}).duplicated().any()
+    ]
+    remedy = f"it could be {' or '.join(could)}: --set log.columns=vehicle={could[0]}" if could else "add a column `id`"
+    raise InputError(f"{path}: several rows have the same time, and no column names the vehicle; {remedy}")
 
 
 def segment_of(path: Path, row: int, *, header: bool = True) -> Segment:
@@ -79,32 +118,29 @@ def segment_of(path: Path, row: int, *, header: bool = True) -> Segment:
 
 
 def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.DataFrame:
-    """Read a table in text with pandas; `before` rows were read from other files.
+    """Read a table in text with pandas, whose options say how it is written; `before` rows were read from other files.
 
     Raises:
         InputError: it is no table, or too large.
     """
+    options = {"encoding": "utf-8-sig"} | options
     with guarded(f"{path} cannot be read as a table"):
-        if not options:
-            with path.open(encoding="utf-8-sig") as file:
-                header = file.readline(LONGEST_HEADER)
-            if len(header) == LONGEST_HEADER:
-                raise InputError(f"{path} is no table: its first line has {LONGEST_HEADER} characters or more")
-            options = {"sep": max(",;\t", key=header.count)}
-        frame = pd.read_csv(
-            path,
-            skipinitialspace=True,
-            encoding="utf-8-sig",
-            skip_blank_lines=False,
-            compression=None,
-            nrows=config.row_limit - before + 1,
-            **options,
-        )
+        try:
+            frame = pd.read_csv(
+                path,
+                skipinitialspace=True,
+                skip_blank_lines=False,
+                compression=None,
+                nrows=config.row_limit - before + 1,
+                **options,
+            )
+        except UnicodeDecodeError as error:
+            raise InputError(f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
     check_size(str(path), 0, before + len(frame), config)
     if frame.empty:
         raise InputError(f"{path} has a header but no rows")
     if not isinstance(frame.index, pd.RangeIndex):
-        raise InputError(f"{path}: the rows have more fields than the header; name every column")
+        raise InputError(f"{path}: the rows have more fields than the header; name every column, and write 0.5, not 0,5")
     return frame
 
 
@@ -128,8 +164,6 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
         else:
             numbers = reals(values) * column.factor
             out[quantity] = (math.pi / 2.0 - numbers) if column.clockwise else numbers
-    if "vehicle" not in out:
-        out["vehicle"] = "0"
     return out
 
 

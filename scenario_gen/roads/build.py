@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from scenario_gen.base.documents import shown
-from scenario_gen.base.errors import InputError, reading, RefusedError
+from scenario_gen.base.errors import did_you_mean, InputError, reading, RefusedError
 from scenario_gen.base.registry import Registry
 from scenario_gen.roads.builtin import draw, draw_corridor, draw_paper, layout_for
 from scenario_gen.roads.config import RoadConfig
@@ -114,10 +114,10 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
         with reading(path):
             return read_map(path, config)
     if name_or_path not in ROADS:
-        names = ", ".join(ROADS.names())
+        names, near = ", ".join(ROADS.names()), did_you_mean(name_or_path, ROADS.names())
         kinds = f"a map_server YAML file or a vector map ({', '.join(FORMATS)})"
         part = "; one part behind one # can be named of a vector map alone" if "#" in name_or_path else ""
-        raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}")
+        raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}{near}")
     return ROADS[name_or_path](name_or_path, encounter, config)
 
 

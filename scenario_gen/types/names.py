@@ -6,7 +6,7 @@
 from collections.abc import Iterable
 import re
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.types.encounter import Encounter
 
 
@@ -46,4 +46,4 @@ def vehicle_index(encounter: Encounter, name: str, what: str) -> int:
     for known in (ids, list(tokens(ids))):
         if name in known:
             return known.index(name)
-    raise InputError(f"{what}: no vehicle {name!r} in {encounter.name}; there are: {', '.join(ids)}")
+    raise InputError(f"{what}: no vehicle {name!r} in {encounter.name}; there are: {', '.join(ids)}{did_you_mean(name, ids)}")

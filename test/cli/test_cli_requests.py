@@ -63,4 +63,4 @@ def test_bad_requests_say_what_is_wrong(run):
         code, said = run("generate", LOG, *QUICK, "--count", 2, *arguments)
         assert code == 2 and reason in said
     code, said = run("regenerate", "none", 0)
-    assert code == 2 and "no such bag" in said
+    assert code == 2 and "does not exist" in said

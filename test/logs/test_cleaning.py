@@ -127,7 +127,7 @@ def test_a_slow_source_is_not_cut_to_bits(tmp_path):
         (lambda rows: rows.iloc[:40], "no two vehicles"),
         (
             lambda rows: rows.assign(t_s=rows["t_s"] + 100.0 * (rows["vehicle_id"] == "a")),
-            "no two vehicles are there at the same",
+            "no two vehicles are recorded at the same",
         ),
     ],
     ids=["all NaN", "one vehicle", "clock stands", "clock runs backwards", "far apart", "too short", "at different times"],
@@ -144,7 +144,7 @@ def test_what_cannot_be_used_is_refused(tmp_path, damage, words):
         (LogConfig(start=100.0), "only 12.0 s long"),
         (LogConfig(start=5.0, end=4.0), "must be after start"),
         (LogConfig(start=8.0, end=9.0), "no two vehicles"),
-        (LogConfig(proximity=2.0), "see the parameters proximity"),
+        (LogConfig(proximity=2.0), "change --set log.proximity"),
     ],
 )
 def test_parameters_that_leave_nothing(tmp_path, config, words):

@@ -38,7 +38,7 @@ def test_a_vehicle_that_is_there_for_little_is_left_out(tmp_path):
     cars = (car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 4, 20, 0, 8))
     found, quality = groups(tmp_path, *cars, whole=True)
     assert found == [("1,2", 20.0)]
-    assert quality.notes == ("vehicle 3 is in no encounter: there for 4.0 s",)
+    assert quality.notes == ("vehicle 3 is in no encounter; it was recorded for 4.0 s",)
 
 
 def presence(tmp_path, *cars, **options):
@@ -73,7 +73,8 @@ def test_nobody_is_left_out_in_silence(tmp_path):
     cars = [car(str(k), 0, 10, 12 * k, 0, 10) for k in range(4)] + [car("brief", 0, 2, 0, 4, 10), car("far", 0, 10, 9e3, 0, 1)]
     _, result = presence(tmp_path, *cars)
     assert result.quality.notes == tuple(
-        f"vehicle {name} is in no encounter: there for {seconds} s" for name, seconds in (("brief", "2.0"), ("far", "10.0"))
+        f"vehicle {name} is in no encounter; it was recorded for {seconds} s"
+        for name, seconds in (("brief", "2.0"), ("far", "10.0"))
     )
     _, result = presence(tmp_path, *cars, max_vehicles=3)
     assert any("left out of an encounter of 3 vehicles (max_vehicles)" in note for note in result.quality.notes)

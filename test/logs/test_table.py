@@ -105,10 +105,12 @@ def test_columns_by_option(tmp_path):
             read_log(path, LogConfig(columns=columns))
 
 
-@pytest.mark.parametrize("column", ["t_s", "x_m", "speed_mps"])
+@pytest.mark.parametrize("column", ["t_s", "x_m"])
 def test_a_missing_column_is_named(tmp_path, column):
     path = save(crossing().drop(columns=column), tmp_path)
-    with pytest.raises(InputError, match=rf"log\.csv has no column for .*{'position' if column == 'x_m' else ''}.*Name it with"):
+    with pytest.raises(
+        InputError, match=rf"log\.csv has no column for .*{'position' if column == 'x_m' else ''}.*name it with --set"
+    ):
         read_log(path)
 
 
@@ -123,7 +125,7 @@ def test_without_a_vehicle_column_there_is_one_vehicle(tmp_path):
         (b"", "is empty"),
         (b"t_s,vehicle_id,x_m,y_m,speed_mps\n", "header but no rows"),
         (b"t_s,vehicle_id,x_m,y_m,speed_mps\n1,a,1,1,1\n1,a,1,1,1,7,8\n", "line 3"),
-        (b"\x00\xff\xfe\x00garbage", "cannot be read|not a well-formed|no rows|no column"),
+        (b"\x00\xff\xfe\x00garbage", "not a text file"),
     ],
 )
 def test_broken_files(tmp_path, content, words):
@@ -145,7 +147,11 @@ def test_a_truncated_parquet_file(tmp_path):
 def test_paths_that_are_no_logs(tmp_path):
     (tmp_path / "notes.md").write_text("hello")
     (tmp_path / "folder").mkdir()
-    for path, words in (("nothing.csv", "does not exist"), ("notes.md", "none of the known logs"), ("folder", "empty folder")):
+    for path, words in (
+        ("nothing.csv", "does not exist"),
+        ("notes.md", "not a log that can be read"),
+        ("folder", "empty folder"),
+    ):
         with pytest.raises(InputError, match=words):
             read_log(tmp_path / path)
 

@@ -159,10 +159,10 @@ def open_bag(
     except (OSError, ValueError) as error:
         raise InputError(f"{shown(str(path))}: no path of a bag ({error})") from error
     if not there:
-        raise InputError(f"{path}: no such bag")
+        raise InputError(f"{path} does not exist; name the folder of a bag, or an .mcap or .db3 file")
     found = files_of(path) if path.is_dir() or path.is_file() else None
     if found is None or not found.files:
-        raise InputError(f"{path}: no bag; name a folder that holds .mcap or .db3 files, or one of them")
+        raise InputError(f"{path} is not a bag; name a folder with .mcap or .db3 files, or one of these files")
     allowance = Allowance(config, str(path), sum(file.stat().st_size for file in found.files), bound)
     with ExitStack() as stack:
         files: list[tuple[Path, McapFile | SqliteFile]] = []

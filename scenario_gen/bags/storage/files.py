@@ -83,6 +83,8 @@ def remarks(path: Path) -> tuple[str, ...]:
         return ()
     if (path / METADATA).exists():
         return tuple(f"not whole, by its recorder: {topic}: {words}" for topic, words in _lost(path / METADATA).items())
+    if not _in_folder(path):
+        return ()
     return (f"{path} has no metadata.yaml: its files are read in order of their names; `scenario-gen reindex {path}` writes it",)
 
 

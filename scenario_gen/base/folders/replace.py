@@ -82,6 +82,9 @@ def _place(target: Path, inputs: Iterable[Path]) -> Path:
     place = target.resolve()
     if place.parent == place:
         raise InputError(f"{target} is the root of the file system; name a folder in it")
+    above = next((folder for folder in place.parents if folder.exists()), place)
+    if not above.is_dir():
+        raise InputError(f"{target} cannot be a folder, because {above} is a file; name another folder")
     if not place.exists():
         return place
     if not place.is_dir():

@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.closed_loop.trials import Outcome
@@ -40,7 +40,8 @@ class Objective:
         if bound is not None:
             return cls(bound[1], float(bound[2]))
         if text.strip() not in NAMES:
-            raise InputError(f"objective {text!r} is not known; take {', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds)")
+            known = f"{', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds)"
+            raise InputError(f"objective {text!r} is not known; take {known}{did_you_mean(text, NAMES)}")
         return cls(text.strip())
 
     def __str__(self) -> str:

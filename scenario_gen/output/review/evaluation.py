@@ -4,7 +4,9 @@
 """The evaluation of any bag that keeps the conventions of the suite, ours or not."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -13,20 +15,29 @@ from scenario_gen.bags.recordings.read import Namespace, NO_ENTRY, read_recordin
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders import replaced_folder
 from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
 from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.output.results import EVALUATED, write_evaluation
 from scenario_gen.output.review.validation import kept_reactions, Reference
 from scenario_gen.template import reactions_of
 from scenario_gen.types import CheckCounts, EgoSlot, GenerationResult, join_ego, Scenario, ScenarioSet, Verdict, WITHOUT
 
 
 def bag_results(
-    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = BagConfig()
+    path: Path,
+    config: EvaluationConfig | None = None,
+    limits: Limits | None = None,
+    seed: int = 0,
+    bag: BagConfig = BagConfig(),
+    *,
+    progress: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[GenerationResult, ...]:
     """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
 
     The scenarios are checked again, on the bag's map if it has one, but not for start and end states. What the bag lacks is
     left out: without `changepoints` K counts as 0; fit and routes are shown if both are there, with what the fitting decided.
+    `progress` is called with the number of scenarios checked, and of all.
 
     Raises:
         InputError: the bag is missing or damaged, or no namespace has both topics.
@@ -36,15 +47,32 @@ def bag_results(
     if not complete:
         raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
     with within(path):
-        return tuple(_result(namespace, config or EvaluationConfig(), limits, seed) for namespace in complete)
+        total, done = sum(len(namespace.hashes) for namespace in complete), count(1)
+
+        def tick() -> None:
+            progress(next(done), total)
+
+        return tuple(_result(namespace, config or EvaluationConfig(), limits, seed, tick) for namespace in complete)
 
 
-def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | None, seed: int) -> GenerationResult:
+def write_page(bag: Path, folder: Path, *, progress: Callable[[int, int], None] = lambda *_: None) -> None:
+    """Write the report of a bag; `progress` as of `bag_results`.
+
+    Raises:
+        InputError: the bag is damaged, or the folder may not be replaced.
+    """
+    with replaced_folder(folder, EVALUATED, [bag]) as place:
+        write_evaluation(place, bag_results(bag, progress=progress), bag, BagConfig())
+
+
+def _result(
+    namespace: Namespace, config: EvaluationConfig, limits: Limits | None, seed: int, tick: Callable[[], None]
+) -> GenerationResult:
     encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
     fit, routes = namespace.fit
     graph = reactions_of(encounter)
     scenarios = tuple(namespace.scenario(k)[1] for k in range(len(namespace.hashes)))
-    counts = CheckCounts.of_verdicts(_verdicts(namespace, scenarios, limits))
+    counts = CheckCounts.of_verdicts(_verdicts(namespace, scenarios, limits, tick))
     evaluation = evaluate_scenarios(
         encounter,
         {SCENARIOS: scenarios},
@@ -89,7 +117,9 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
     )
 
 
-def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Limits | None) -> list[Verdict]:
+def _verdicts(
+    namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Limits | None, tick: Callable[[], None]
+) -> list[Verdict]:
     """Check every scenario; an ego may have been left out of one, and its map be another than the newest."""
     encounter = namespace.encounter
     checkers: dict[tuple[object, ...], Checker] = {}
@@ -105,6 +135,7 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
                 road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
             checkers[key] = Reference.of(encounter, namespace.segmentation, road, entry).checker(scenario, limits, None)
         verdicts += checkers[key].check([scenario])
+        tick()
     return verdicts
 
 

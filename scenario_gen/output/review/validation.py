@@ -12,8 +12,9 @@ published; one without any entry is counted, and checked as far as that goes.
 """
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 
 from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
@@ -131,8 +132,20 @@ class Reference:
         return Checker(self.road, requested, conflicts, waits, limits, first, edges, ends)
 
 
-def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = BagConfig()) -> tuple[Validation, ...]:
-    """Check every scenario of every namespace that holds any; `config` says how much is read at most.
+def validate_bag(
+    path: Path,
+    limits: Limits | None = None,
+    config: BagConfig = BagConfig(),
+    *,
+    progress: Callable[[int, int], None] = lambda *_: None,
+) -> tuple[Validation, ...]:
+    """Check every scenario of every namespace that holds any.
+
+    Args:
+        path: the bag.
+        limits: of validity.
+        config: says how much is read at most.
+        progress: called with the number of scenarios checked, and of all.
 
     Raises:
         InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
@@ -144,16 +157,19 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = B
     if not checked:
         raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
     with within(path):
-        return tuple(_validate(namespace, limits) for namespace in checked)
+        total = sum(len(namespace.hashes) for namespace in checked)
+        done = count(1)
+        return tuple(_validate(namespace, limits, lambda: progress(next(done), total)) for namespace in checked)
 
 
-def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
+def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], None]) -> Validation:
     namespace.check_infos()
     result = Validation(namespace.name, missing=namespace.missing)
     message = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
     references: dict[tuple[object, ...], Reference] = {}
     checkers: dict[tuple[object, ...], Checker] = {}
     for k, sha256 in enumerate(namespace.hashes):
+        tick()
         wrong, entry = [], namespace.unknown.get(k)
         if entry is not None:
             wrong = [(ALTERED, _altered(k, sha256, entry))]

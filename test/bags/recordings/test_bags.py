@@ -228,7 +228,7 @@ def test_a_truncated_or_missing_bag_is_an_error_that_names_the_file(run, tmp_pat
         (folder / "bag_0.mcap").write_bytes(whole[:cut])
         with pytest.raises(InputError, match="bag"):
             list(read_messages(folder))
-    with pytest.raises(InputError, match="no such bag"):
+    with pytest.raises(InputError, match="does not exist"):
         list(read_messages(tmp_path / "none"))
     with pytest.raises(InputError, match=r"no \.mcap"):
         reindex(tmp_path, tmp_path / "x")

@@ -81,7 +81,7 @@ def test_a_bag_without_scenarios_is_refused(tmp_path):
     empty = replace(case, generated=ScenarioSet(0, (), 0))
     with pytest.raises(InputError, match="nothing to compare"):
         bag_results(write_recording(tmp_path / "run", empty), QUICK)
-    with pytest.raises(InputError, match="no such bag"):
+    with pytest.raises(InputError, match="does not exist"):
         bag_results(tmp_path / "missing", QUICK)
 
 

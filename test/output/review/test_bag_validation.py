@@ -196,7 +196,7 @@ def test_a_scenario_whose_entry_was_lost_is_unaccounted(run, tmp_path):
     (found,) = validate_bag(cut)
     assert (found.scenarios, found.invalid, found.unaccounted, found.found) == (4, 0, 2, {})
     answer = CliRunner().invoke(app, ["validate", str(cut)])
-    assert answer.exit_code == 0 and "2 unaccounted" in answer.output
+    assert answer.exit_code == 0 and "2 without an entry" in answer.output
     (case,) = bag_results(cut)
     assert any("2 of 4 scenarios are unaccounted" in note for note in case.evaluation.row("scenarios").notes)
     assert "unaccounted" in case.evaluation.to_json()
@@ -232,7 +232,7 @@ def test_the_command_answers_with_its_exit_code(run, tmp_path):
     answer = CliRunner().invoke(app, ["validate", str(cut)])
     assert answer.exit_code == 1
     assert "3 of 4" in answer.output and UNUSABLE in answer.output
-    with pytest.raises(InputError, match="no such bag"):
+    with pytest.raises(InputError, match="does not exist"):
         validate_bag(tmp_path / "none")
     with pytest.raises(InputError, match="nothing to check"):
         validate_bag(rewritten(bag, tmp_path / "empty", lambda _, data: data, ("scenarios",)))

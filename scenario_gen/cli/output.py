@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What commands print: messages, tables, progress, and with --json one object of results."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field, fields, is_dataclass
+import functools
+import inspect
+import json
+import math
+from pathlib import Path
+import sys
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+from scenario_gen.base.errors import presentable, printable, ScenarioGenError
+
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.", rich_help_panel="Output")]
+JsonOption = Annotated[
+    bool,
+    typer.Option(
+        "--json", help="Print one JSON object to standard output; messages go to standard error.", rich_help_panel="Output"
+    ),
+]
+
+
+@dataclass
+class Output:
+    """How the running command prints, and its results so far."""
+
+    quiet: bool = False
+    as_json: bool = False
+    results: dict[str, Any] = field(default_factory=dict)
+
+
+_current = Output()
+
+
+@contextmanager
+def printing(command: str, *, quiet: bool, as_json: bool) -> Iterator[None]:
+    """Set how a command prints; with `as_json`, print its results as the last line of standard output, also after an error."""
+    global _current  # noqa: PLW0603 - the command line runs one command in a process
+    before, _current = _current, Output(quiet, as_json, {"command": command, "exit_code": 0})
+    own = _current
+    try:
+        yield
+    except typer.Exit as end:
+        own.results["exit_code"] = end.exit_code
+        raise
+    except (ScenarioGenError, OSError) as error:
+        own.results |= {"exit_code": getattr(error, "exit_code", 2), "error": presentable(str(error))}
+        raise
+    finally:
+        _current = before
+        if as_json:
+            print(json.dumps(plain(own.results), ensure_ascii=False, allow_nan=False))
+
+
+class Commands(typer.Typer):
+    """Commands that stand together in `--help`; each takes --quiet and --json."""
+
+    def __init__(self, panel: str) -> None:
+        super().__init__()
+        self.panel = panel
+
+    def command(self, name: str | None = None, *, panel: str = "", **options: Any) -> Callable[..., Any]:
+        """Return a decorator that adds a command, as typer's; the function itself stays as it is."""
+
+        def of(function: Callable[..., None]) -> Callable[..., None]:
+            own = name or function.__name__
+
+            @functools.wraps(function)
+            def run(*, quiet: bool, as_json: bool, **values: Any) -> None:
+                with printing(own, quiet=quiet or _current.quiet, as_json=as_json or _current.as_json):
+                    function(**values)
+
+            signature = getattr(function, "__signature__", None) or inspect.signature(function)
+            hints = get_type_hints(function, include_extras=True) | {"quiet": QuietOption, "as_json": JsonOption}
+            parameters = [
+                entry.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[entry.name])
+                for entry in signature.parameters.values()
+            ]
+            parameters += [
+                inspect.Parameter(flag, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=hints[flag])
+                for flag in ("quiet", "as_json")
+            ]
+            run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+            run.__annotations__ = hints
+            super(Commands, self).command(own, rich_help_panel=panel or self.panel, **options)(run)
+            return function
+
+        return of
+
+
+def start(*, quiet: bool, as_json: bool) -> None:
+    """Set how the commands of this process print, from the options before the command's name."""
+    global _current  # noqa: PLW0603
+    _current = Output(quiet, as_json)
+
+
+def give(**results: Any) -> None:
+    """Add results to the object of --json."""
+    _current.results |= results
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON has it: dataclasses become objects, paths texts, NaN and infinity null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {entry.name: plain(getattr(value, entry.name)) for entry in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(getattr(key, "value", key)): plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(inner) for inner in value]
+    if hasattr(value, "tolist"):  # numpy's
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (bool, int)):
+        return value
+    return printable(str(value))
+
+
+def say(*what: Any, sep: str = " ", wrap: bool = False) -> None:
+    """Print a message: texts letter by letter, and what rich can draw; `wrap` breaks lines at the terminal's width."""
+    from scenario_gen.base.terminal import Terminal
+
+    if not _current.quiet:
+        Terminal(stderr=_current.as_json).print(*what, sep=sep, soft_wrap=not wrap)
+
+
+def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1) -> None:
+    """Print a table; nothing in it is cut off.
+
+    Where standard output is no terminal, fields are separated by tabs. Where the terminal is too narrow, each row becomes two
+    lines: what it is, and its other fields with their names.
+
+    Args:
+        columns: their names.
+        rows: their texts.
+        names: the first so many columns say what a row is.
+    """
+    from rich.table import Table
+
+    from scenario_gen.base.terminal import Terminal
+
+    terminal = Terminal(stderr=_current.as_json)
+    if not terminal.is_terminal:
+        for row in (columns, *rows) if not _current.quiet else ():
+            print("\t".join(printable(" ".join(text.split())) for text in row), file=terminal.file)
+        return
+    widths = [max(len(text) for text in column) for column in zip(columns, *rows, strict=True)]
+    if sum(widths) + 2 * len(widths) <= terminal.width:
+        table = Table(*columns, box=None, pad_edge=False)
+        for row in rows:
+            table.add_row(*row)
+        say(table)
+        return
+    for row in rows:
+        say(", ".join(row[:names]), wrap=True)
+        pairs = [f"{name} {text}" for name, text in zip(columns[names:], row[names:], strict=True) if text]
+        say("  " + "  ".join(pairs), wrap=True)
+
+
+def bars() -> AbstractContextManager[Callable[[str, int, int], None]]:
+    """Return progress bars with the remaining time, or with --quiet nothing; the value takes name, done and total of a bar."""
+    from scenario_gen.base.terminal import progress_bars
+
+    return nullcontext(lambda *_: None) if _current.quiet else progress_bars()
+
+
+def status() -> AbstractContextManager[Callable[[str], None]]:
+    """Return a line that changes, or with --quiet nothing; the value takes its text."""
+    from scenario_gen.base.terminal import status_line
+
+    return nullcontext(lambda _: None) if _current.quiet else status_line()
+
+
+def open_page(page: Path) -> bool:
+    """Open a page in a browser if somebody sits at this terminal and there is a display; return whether it was opened."""
+    import os
+    import webbrowser
+
+    has_display = sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    if _current.as_json or _current.quiet or not (sys.stdout.isatty() and has_display):
+        return False
+    return webbrowser.open(page.resolve().as_uri())

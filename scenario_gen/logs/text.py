@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How a table in text is written: its encoding, what separates its fields, and its decimal sign."""
+
+import codecs
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.logs.raw import LONGEST_HEADER
+
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+WITH_COMMA = re.compile(r"[-+]?\d*,\d+")
+LOOKED_AT = 20  # lines after the header in which a decimal comma is looked for
+SEPARATORS = ",;\t|"
+EXAMPLE = "t,id,x,y,speed"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a table is written; `notes` says what is unusual about it."""
+
+    encoding: str = "utf-8-sig"
+    separator: str = ","
+    decimal: str = "."
+    notes: tuple[str, ...] = ()
+
+
+def layout_of(path: Path) -> Layout:
+    """Return how a table in text is written.
+
+    Raises:
+        InputError: it is no text, its first line is too long, or has no names of columns.
+    """
+    with path.open("rb") as file:
+        start = file.read(4 * LONGEST_HEADER)
+    is_utf16 = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    if not is_utf16 and b"\0" in start:
+        raise InputError(f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as UTF-8 text")
+    encoding = "utf-16" if is_utf16 else "utf-8-sig"
+    header, *lines = start.decode(encoding, errors="replace").splitlines()[: LOOKED_AT + 1] or [""]
+    if len(header) >= LONGEST_HEADER:
+        raise InputError(f"{path} is no table: its first line has {LONGEST_HEADER} characters or more")
+    separator = max(SEPARATORS, key=header.count)
+    if separator not in header and len(header.split()) > 1:
+        separator = r"\s+"
+    names = re.split(separator if separator == r"\s+" else re.escape(separator), header.strip())
+    if sum(NUMBER.fullmatch(name.strip()) is not None for name in names) > len(names) / 2:
+        raise InputError(f"{path}: line 1 has numbers instead of column names; put a line such as {EXAMPLE} above it")
+    has_comma = separator != "," and any(
+        WITH_COMMA.fullmatch(field.strip()) for line in lines for field in re.split(separator.replace("|", r"\|"), line)
+    )
+    notes = ["the file is UTF-16"] if is_utf16 else []
+    notes += ["its numbers have a decimal comma"] if has_comma else []
+    return Layout(encoding, separator, "," if has_comma else ".", tuple(notes))

@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Mistakes of users: each gets one line that says what is wrong and what to do, exit code 2, and nothing is lost."""
+
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from scenario_gen.cli.commands import main
+
+ROWS = "".join(f"{k / 10},a,{-60 + 0.8 * k:.2f},0,8\n{k / 10},b,0,{-70 + 0.8 * k:.2f},8\n" for k in range(150))
+LOG = f"t,id,x,y,speed\n{ROWS}"
+ROAD = ("--road", "four_way", "--count", "2")
+GENERATE = ("generate", "my log ü.csv", *ROAD)
+PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
+DRIVE = ("drive", "made/bag", "--planner", PLANNER)
+SEARCH = ("search", "made/bag", "--planner", PLANNER)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with spaces and letters beyond ASCII in its path: a log, a result, and what is neither."""
+    place = tmp_path_factory.mktemp("my data ü")
+    (place / "my log ü.csv").write_text(LOG)
+    (place / "empty.csv").touch()
+    (place / "binary.csv").write_bytes(bytes(range(256)) * 20)
+    (place / "letter.docx").write_text(LOG)
+    (place / "note.txt").write_text("hello\n")
+    (place / "header.csv").write_text("t,id,x,y,speed\n")
+    (place / "numbers.csv").write_text(ROWS)
+    (place / "columns.csv").write_text(LOG.replace("t,id,x", "tyme,id,x", 1))
+    (place / "alone.csv").write_text("".join(line for line in LOG.splitlines(keepends=True) if ",b," not in line))
+    (place / "nobody.csv").write_text(LOG.replace("t,id,x", "t,kind of car,x", 1))
+    (place / "bad.yaml").write_text("a: [")
+    (place / "bad.json").write_text("{")
+    (place / "nothing").mkdir()
+    (place / "sealed").mkdir(mode=0o555)
+    arguments = ["scenario-gen", "generate", str(place / "my log ü.csv"), *ROAD, "--out", str(place / "made")]
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as end:
+        patch.setattr(sys, "argv", arguments)
+        main()
+    assert not end.value.code
+    return place
+
+
+def files(folder):
+    return {path.relative_to(folder): path.read_bytes() if path.is_file() else b"" for path in folder.rglob("*")}
+
+
+MISTAKES = [  # words of the command line, and what the message says: what is wrong, and what to do
+    # names
+    (("genrate", "log.csv"), "'generate'"),
+    ((*GENERATE, "--raod", "x"), "there is no option --raod; did you mean --road?"),
+    (("generate", "my log ü.csv", "--road", "fourway"), "did you mean four_way?"),
+    (("generate", "my log ü.csv", "--road", "map.yaml"), "map.yaml: cannot be read (No such file"),
+    (("generate", "my log ü.csv", "--road", "bad.yaml"), "map bad.yaml: not YAML (line 2"),
+    ((*GENERATE, "--encounter", "my lag ü"), "did you mean my log ü?"),
+    ((*GENERATE, "--ego", "c"), "no vehicle 'c' in my log ü; there are: a, b"),
+    ((*GENERATE, "--choose", "divers"), "choose one of natural, diverse; did you mean diverse?"),
+    ((*GENERATE, "--order", "swop"), "did you mean swap?"),
+    ((*GENERATE, "--allow", "conflict"), "choose one of lost_conflict"),
+    ((*GENERATE, "--set", "sampling.laterl_sigma=1"), "did you mean sampling.lateral_sigma?"),
+    ((*DRIVE, "--set", "stepp=1"), "did you mean drive.step?"),
+    ((*DRIVE, "--ego", "zz"), "no vehicle 'zz' to be the ego; it has a, b"),
+    ((*SEARCH, "--objective", "at_falt"), "did you mean at_fault?"),
+    (("drive", "made/bag", "--planner", "idm"), "write it as MODULE:CLASS"),
+    (("drive", "made/bag", "--planner", "my_planer:Mine"), "No module named 'my_planer'; run in the folder of the module"),
+    (("drive", "made/bag", "--planner", PLANNER.replace("Follower", "Folower")), "did you mean IdmFollower?"),
+    (("export", "made/bag", "--to", "comonroad"), "did you mean commonroad?"),
+    (("regenerate", "made/bag", "99"), "no scenario of index 99; there are: "),
+    # what is missing
+    (("generate",), "Missing argument 'log' (The recording: "),
+    (("generate", "my log ü.csv"), "Missing option '--road' (straight, curve, "),
+    ((*GENERATE, "--for-testing"), "--for-testing: name the vehicle in whose place the planner drives by --ego"),
+    (("find", "nothing"), "holds no scenarios; write them with `scenario-gen batch"),
+    (("library", "nothing"), "write it with `scenario-gen mine"),
+    # numbers
+    ((*GENERATE, "--count", "0"), "'--count': it must be at least 1"),
+    ((*GENERATE, "--count", "-1"), "'--count': it must be at least 1"),
+    ((*GENERATE, "--count", "1000000000"), "'--count': it must be at most 100000"),
+    ((*GENERATE, "--count", "nan"), "'--count': it must be a whole number"),
+    ((*GENERATE, "--seed", "-1"), "'--seed': it must be at least 0"),
+    ((*GENERATE, "--set", "sampling.lateral_sigma=nan"), "sampling.lateral_sigma is nan; give a finite number"),
+    ((*GENERATE, "--set", "sampling.lateral_sigma=1e9"), "it must be at most 10"),
+    ((*GENERATE, "--set", "sampling.lateral_sigma=much"), "must be a number, not 'much'"),
+    ((*GENERATE, "--set", "sampling.lateral_sigma"), "write it as name=value"),
+    ((*GENERATE, "--start", "a 0 0 0"), "is not of the form `id: x y yaw [speed]`"),
+    ((*GENERATE, "--target", "pet=2..1"), "the lower bound must be below the upper one"),
+    ((*GENERATE, "--obstacle", "1 2"), "is not of the form `x y yaw length width`"),
+    ((*DRIVE, "--workers", "1000000000"), "'--workers': it must be at most 1024"),
+    ((*SEARCH, "--budget", "0"), "'--budget': it must be at least 1"),
+    ((*SEARCH, "--max-rate", "nan"), "'--max-rate': it must be at most 1"),
+    (("regenerate", "made/bag", "-1"), "must not be negative"),
+    # files that are read
+    (
+        ("generate", "my log u.csv", *ROAD),
+        "my log u.csv does not exist; check the name and the folder; did you mean my log ü.csv?",
+    ),
+    (("generate", "nothing", *ROAD), "nothing is an empty folder; name a folder with a recording"),
+    (("generate", "empty.csv", *ROAD), "empty.csv is empty (0 bytes); copy it again"),
+    (("generate", "binary.csv", *ROAD), "binary.csv is not a text file"),
+    (("generate", "letter.docx", *ROAD), "If its name misleads: --set log.format=table"),
+    (("generate", "header.csv", *ROAD), "header.csv has a header but no rows"),
+    (("generate", "numbers.csv", *ROAD), "put a line such as t,id,x,y,speed above it"),
+    (("generate", "columns.csv", *ROAD), "--set log.columns=time=…; is it tyme?"),
+    (("generate", "alone.csv", *ROAD), "an encounter needs at least two vehicles"),
+    (("generate", "nobody.csv", *ROAD), "--set log.columns=vehicle=kind of car"),
+    ((*GENERATE, "--params", "bad.yaml"), "bad.yaml: not YAML (line 2"),
+    ((*GENERATE, "--params", "none.yaml"), "none.yaml: cannot be read (No such file"),
+    ((*DRIVE, "--against", "bad.json"), "bad.json: no drives.json of this version"),
+    (("validate", "none"), "none does not exist; name the folder of a bag"),
+    (("validate", "my log ü.csv"), "is not a bag; name a folder with .mcap or .db3 files"),
+    (("report", "nothing"), "nothing is not a bag; name a folder"),
+    (("import", "my log ü.csv"), "no well-formed XML"),
+    (("compare", "made", "nothing"), "nothing/evaluation.json is no evaluation"),
+    (("reindex", "nothing"), "no .mcap file here; name the folder of a recorded bag"),
+    # folders that are written
+    ((*GENERATE, "--out", "note.txt"), "note.txt is a file; name a folder"),
+    ((*GENERATE, "--out", "note.txt/out"), "because"),
+    ((*GENERATE, "--out", "sealed"), "sealed is read-only; name another folder"),
+    ((*GENERATE, "--out", "."), "not an earlier result; name another one"),
+    ((*GENERATE, "--out", "/dev/full"), "/dev/full is a file; name a folder"),
+    (("report", "made/bag", "--out", "note.txt"), "note.txt is a file; name a folder"),
+    (("mine", "my log ü.csv", "--out", "note.txt"), "note.txt is a file; name a folder"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), MISTAKES, ids=[" ".join(words) for words, _ in MISTAKES])
+def test_a_mistake_is_one_line_and_loses_nothing(folder, run, monkeypatch, words, said):
+    monkeypatch.chdir(folder)
+    before = files(folder)
+    code, printed = run(*words)
+    assert code == 2, printed
+    (line,) = [line for line in printed.splitlines() if line.strip()]
+    assert line.startswith("error: ") and said in line
+    assert files(folder) == before
+
+
+def test_the_table_has_forty_mistakes():
+    assert len({words for words, _ in MISTAKES}) >= 40
+
+
+def test_spaces_and_letters_beyond_ascii_are_no_mistake(folder):
+    assert (folder / "made" / "report.html").is_file() and (folder / "made" / "bag").is_dir()
+
+
+def limited():
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+
+def waits_for_ctrl_c():
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def command(folder, *words):
+    return {"args": [sys.executable, "-m", "scenario_gen", *words], "cwd": folder, "text": True, "stderr": subprocess.PIPE}
+
+
+def test_a_disk_that_is_full_is_one_line_and_loses_nothing(folder):
+    """A file may not become longer than 20 kB, as if the disk were full there."""
+    before = files(folder)
+    words = (*GENERATE, "--seed", "1", "--out", "made")
+    ended = subprocess.run(**command(folder, *words), preexec_fn=limited, check=False)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith("error: made") and "File too large; what was there is untouched; make room" in line
+    assert files(folder) == before
+
+
+def test_ctrl_c_is_one_line_and_loses_nothing(folder):
+    before, entries = files(folder), len(list(folder.iterdir()))
+    words = (*GENERATE[:-1], "100000", "--out", "made")
+    process = subprocess.Popen(**command(folder, *words), preexec_fn=waits_for_ctrl_c)  # noqa: PLW1509
+    while process.poll() is None and len(list(folder.iterdir())) == entries:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate()
+    assert process.returncode == 128 + signal.SIGINT and said.strip() == "stopped by SIGINT"
+    assert files(folder) == before

@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What commands print: --version, --quiet, --json; tables in which nothing is cut off; the page of a bag."""
+
+from dataclasses import dataclass
+import io
+import json
+from pathlib import Path
+import sys
+
+import pytest
+from rich.console import Console
+
+from scenario_gen.base.terminal import Terminal
+from scenario_gen.cli import commands as cli
+from scenario_gen.cli import output
+from scenario_gen.logs.synthetic import bundled
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder of `generate`."""
+    folder = tmp_path_factory.mktemp("made")
+    log = str(bundled("c"))
+    words = ["scenario-gen", "generate", log, "--road", "straight", "--count", "2", "--out", str(folder / "out")]
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as end:
+        patch.setattr(sys, "argv", [*words, "--set", "evaluation.resamples=20"])
+        cli.main()
+    assert not end.value.code
+    return folder / "out"
+
+
+@pytest.fixture
+def ran(monkeypatch, capsys, tmp_path):
+    """Run a command in an empty folder; return its exit code, standard output and standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["scenario-gen", *map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        return end.value.code or 0, *capsys.readouterr()
+
+    return call
+
+
+def names():
+    """The names of all commands."""
+    return [entry.name for group in cli.app.registered_groups for entry in group.typer_instance.registered_commands]
+
+
+def test_version(ran):
+    code, out, err = ran("--version")
+    assert code == 0 and out.startswith("scenario-gen ") and out.strip()[-1].isdigit() and not err
+
+
+def test_commands_stand_in_groups(ran):
+    _, out, _ = ran("--help")
+    panels = [line for line in out.splitlines() if line.startswith("╭")]
+    for panel in ("Generate scenarios", "Look at a bag", "Test a planner", "Other formats", "Archives", "This installation"):
+        assert any(panel in line for line in panels)
+    assert all(f"│ {name} " in out for name in names())
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_command_takes_quiet_and_json(ran, name):
+    code, out, _ = ran(name, "--help")
+    assert code == 0 and "--quiet" in out and "--json" in out
+
+
+def one_object(text):
+    """The object of --json, which is all that standard output has."""
+    return json.loads(text, parse_constant=pytest.fail)
+
+
+@pytest.mark.parametrize(
+    ("words", "key", "value"),
+    [
+        (("validate", "{bag}"), "valid", True),
+        (("evaluate", "{bag}", "--set", "evaluation.resamples=20"), "folder", None),
+        (("regenerate", "{bag}", "0"), "index", 0),
+        (("export", "{bag}", "--to", "commonroad", "--out", "written"), "scenarios", 2),
+        (("reindex", "{bag}", "--out", "saved"), "bag", "saved"),
+        (("report", "{bag}"), "opened", False),
+        (("compare", "{made}", "{made}"), "exit_code", 0),
+        (("parameters",), "command", "parameters"),
+    ],
+)
+def test_json_is_one_object_and_messages_go_to_standard_error(ran, made, words, key, value):
+    words = [word.format(bag=made / "bag", made=made) for word in words]
+    code, out, err = ran(*words, "--json")
+    answer = one_object(out)
+    assert (code, answer["exit_code"], answer["command"], answer[key]) == (0, 0, words[0], value) and err
+    code, before, _ = ran("--json", *words[:-1], words[-1].replace("written", "again").replace("saved", "again"))
+    assert code == 0 and one_object(before).keys() == answer.keys()
+
+
+def test_json_of_generate_names_files_and_cases(ran):
+    code, out, err = ran("generate", bundled("c"), "--road", "straight", "--count", 1, "--out", "out", "--json")
+    answer = one_object(out)
+    assert code == 0 and all(Path(answer[name]).exists() for name in ("report", "bag", "figures")) and "1/1 valid" in err
+    assert answer["cases"][0]["scenarios"] == 1 and answer["cases"][0]["vehicles"]
+
+
+def test_json_of_an_error_has_it(ran):
+    code, out, err = ran("validate", "none", "--json")
+    answer = one_object(out)
+    assert code == 2 == answer["exit_code"] and "does not exist" in answer["error"] and err.startswith("error: none")
+
+
+def test_quiet_prints_errors_only(ran, made):
+    assert ran("validate", made / "bag", "--quiet") == (0, "", "")
+    assert ran("-q", "validate", made / "bag") == (0, "", "")
+    code, out, err = ran("validate", "none", "-q")
+    assert (code, out) == (2, "") and "does not exist" in err
+
+
+@dataclass
+class Body:
+    name: str
+    size: float
+
+
+def test_plain_values_are_json():
+    value = {"path": Path("a"), "body": Body("x", float("nan")), 1: (1, True, None, float("inf")), "odd": "\x1b"}
+    expected = {"path": "a", "body": {"name": "x", "size": None}, "1": [1, True, None, None], "odd": "\\x1b"}
+    assert output.plain(value) == expected
+
+
+class Narrow(Terminal):
+    """A terminal of 80 columns that keeps what it prints."""
+
+    text = io.StringIO()
+
+    def __init__(self, **_):
+        super().__init__(file=Narrow.text, width=80, force_terminal=True, color_system=None)
+
+
+COLUMNS = ("template", "kind", "road", *(f"figure_{k}" for k in range(8)))
+ROW = ("20120401-0815-encounter-000017", "crossing", "t_intersection", *("123.45" for _ in range(8)))
+
+
+def test_a_table_for_a_program_has_tabs(capsys):
+    output.say_rows(COLUMNS, [ROW], names=3)
+    assert capsys.readouterr().out == "\t".join(COLUMNS) + "\n" + "\t".join(ROW) + "\n"
+
+
+@pytest.mark.parametrize("columns", [3, 11])
+def test_a_table_in_80_columns_cuts_nothing_off(monkeypatch, columns):
+    monkeypatch.setattr("scenario_gen.base.terminal.Terminal", Narrow)
+    Narrow.text = io.StringIO()
+    output.say_rows(COLUMNS[:columns], [ROW[:columns]], names=3)
+    text = Narrow.text.getvalue()
+    assert "…" not in text and all(len(line) <= 80 for line in text.splitlines())
+    assert all(word in text for word in (*ROW[:columns], *COLUMNS[3:columns]))
+
+
+def test_the_page_of_generate_is_the_page_of_its_bag(ran, made):
+    for bag in (made, made / "bag"):
+        _, out, _ = ran("report", bag, "--no-open")
+        assert out.strip() == f"report: {made / 'report.html'}"
+
+
+def test_the_page_of_another_bag_is_written_beside_it(ran, made, tmp_path):
+    ran("reindex", made / "bag", "--out", "other")
+    _, out, _ = ran("report", "other")
+    assert out.strip().splitlines()[-1] == f"report: {tmp_path / 'other_report' / 'report.html'}"
+    assert (tmp_path / "other_report" / "report.html").is_file()
+
+
+def test_a_page_is_opened_where_somebody_looks(monkeypatch, tmp_path):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert not output.open_page(tmp_path / "page.html")
+    monkeypatch.setattr(sys, "stdout", Console(force_terminal=True).file)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    assert output.open_page(tmp_path / "page.html") and opened[0].startswith("file://")
