@@ -32,7 +32,7 @@ soak: $(TEST)
 	$(BIN)/python test/soak $(PART)
 
 # Peers that are not on this machine give no row.
-bench: $(TEST)
+bench: $(TEST) .venv-judges-verifai/.ready
 	$(LOCKED) -r requirements/bench.lock
 	$(BIN)/python -m benchmarks all
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Sequences with known states for the segmentation benchmark: cells A-D (docs/segmentation.md states their separation)."""
+"""Sequences with known states for the segmentation benchmark: cells A-D (docs/benchmarks.md states their separation)."""
 
 from dataclasses import dataclass, replace
 

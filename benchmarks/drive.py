@@ -19,6 +19,7 @@ import numpy as np
 from benchmarks._drive_judges import contacts, reactive_planner
 from benchmarks._drive_others import braking_jerks, rear_ends
 from benchmarks._drive_peers import highway_env
+from benchmarks._drive_testing import discriminating
 from benchmarks._driving_worlds import Anything, draw_scenario, Witness
 from benchmarks._sampling_cases import cases, Prepared
 from benchmarks._size import sized
@@ -37,6 +38,7 @@ from scenario_gen.types.generation import GenerationResult
 PLANNERS = "scenario_gen.closed_loop.planners"
 BAD, GOOD = f"{PLANNERS}:ConstantSpeed", f"{PLANNERS}:IdmFollower"
 WITNESSES = sized(1000, quick=4)
+TRIED = sized(400, quick=2)  # natural scenarios of which those that need a reaction are driven
 RUNS = sized(10_000, quick=5)
 KEPT = sized(600, quick=5)  # drives of egos that do anything, that are looked at for collisions
 FAR = Pose(1e4, 1e4, 0.0, 0.0)
@@ -52,7 +54,8 @@ def run(count: int = sized(200, quick=2)) -> list[Row]:
     if trials:
         found, driven = planners(spread(trials, count))
         bad = partial(run_trials, trials, BAD, ClosedLoopConfig(policy=REPLAY))
-        rows += found + reactive_planner(spread(trials, max(3 * count // 5, 1)), bad) + witnesses(spread(trials, WITNESSES))
+        rows += found + discriminating(spread(trials, TRIED))
+        rows += reactive_planner(spread(trials, max(3 * count // 5, 1)), bad) + witnesses(spread(trials, WITNESSES))
     found, wild = anything()
     return rows + found + rear_ends() + collisions([*driven, *wild]) + speed() + dds(made)
 

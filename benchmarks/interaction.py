@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Interaction: do generated vehicles drive with one another? Figures of docs/interaction.md, on each encounter's own road.
+"""Interaction: do generated vehicles drive with one another? Figures of docs/benchmarks.md, on each encounter's own road.
 
 Encounters cut at random from the full recordings and by people (see `_naturalness_cuts.py`), where they are present, and the
 bundled ones. `--cases 10` takes the first ten, `--held-out` the third that is kept apart, `--count` so many scenarios of

@@ -12,6 +12,7 @@ from time import process_time
 import numpy as np
 
 from benchmarks._late_witness import brute_force, LateWitness, natural_scenarios
+from benchmarks._search_peers import first_failure, PYTHON
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.closed_loop.search.estimate import Search
@@ -24,6 +25,8 @@ PLANNERS = {  # seconds late: drives of a search, failures of brute force, share
 }
 BRUTE = 300_000
 SEEDS = 20
+MIDDLE = 0.485  # s, of the planner on which VerifAI's samplers are tried
+VERIFAI = {"ce": ("cross-entropy", 5, 3000), "bo": ("Bayesian", 1, 40)}  # seeds, drives at most: 40 Bayesian ones take 4 min
 PLAIN = 5000  # drives of plain sampling and of VerifAI's samplers until the first failure, at most
 
 
@@ -34,6 +37,17 @@ def run(seeds: int = sized(SEEDS, quick=1), brute: int = sized(0, quick=200)) ->
     rows = []
     for (late, (budget, _, asked)), failures in zip(PLANNERS.items(), counted, strict=True):
         rows += _planner(LateWitness(natural, late), failures / (brute or BRUTE), sized(budget, 60), asked, seeds)
+    return rows + _verifai(LateWitness(natural, MIDDLE))
+
+
+def _verifai(problem: LateWitness) -> list[Row]:
+    """Return how soon VerifAI's samplers find a failure, where they are installed."""
+    rows = []
+    for kind, (name, seeds, limit) in VERIFAI.items() if PYTHON.exists() else ():
+        most = sized(limit, 2)
+        first = [first_failure(problem, kind, seed, most) for seed in range(sized(seeds, 1))]
+        remark = f"{seeds} seed(s); {len([k for k in first if k > most])} found none in {most} drives"
+        rows.append(Row(f"VerifAI {name}: drives until the first failure", median(first), "", "lower", None, remark))
     return rows
 
 

@@ -5,12 +5,17 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from tempfile import TemporaryDirectory
+from typing import Annotated, TYPE_CHECKING
 
 import typer
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.cli.options import remind, takes
 from scenario_gen.cli.output import bars, Commands, give, say, say_rows
+
+if TYPE_CHECKING:
+    from scenario_gen.output.review.regenerate import Replanned
 
 commands = Commands("Test a planner")
 
@@ -19,11 +24,16 @@ commands = Commands("Test a planner")
 class Search:
     """The options of `search`."""
 
-    bag: Annotated[Path, typer.Argument(help="A bag of `generate`. The search uses its template, road and parameters.")]
+    source: Annotated[
+        Path,
+        typer.Argument(help="A bag of `generate`: the search uses its template, road and parameters. Or a log, with --road."),
+    ]
     planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower.")]
     budget: Annotated[
         int, typer.Option(min=1, max=10_000_000, help="Most drives. A larger budget continues an earlier search.")
     ] = 1000
+    road: Annotated[str, typer.Option(help="Road, if the source is a log.")] = ""
+    encounter: Annotated[str, typer.Option(help="Name of the encounter, if the source is a log of several.")] = ""
     objective: Annotated[
         str, typer.Option(help="What counts as a failure: at_fault, collision, off_road, goal, or e.g. 'ttc<1.5', 'pet<1' (s).")
     ] = "at_fault"
@@ -45,16 +55,39 @@ class Search:
     ] = None
 
 
+def drawn_from(options: Search) -> "Replanned":
+    """Return what the scenarios are drawn from: a bag's template on its road, or an encounter of a log on the road given.
+
+    Raises:
+        InputError: source, road or encounter cannot be read, or the log has several encounters and none was chosen.
+        RefusedError: the road does not take the encounter.
+    """
+    from scenario_gen.cli.folder import FolderRequest, generate_folder
+    from scenario_gen.output.results import BAG
+    from scenario_gen.output.review.regenerate import replanned
+    from scenario_gen.pipeline import PipelineConfig
+
+    if not options.road:
+        return replanned(options.source, options.namespace)
+    names = [options.encounter] if options.encounter else []
+    request = FolderRequest([([options.source], [options.road])], PipelineConfig(), count=1, seed=options.seed, encounters=names)
+    with TemporaryDirectory() as place:
+        cases, _ = generate_folder(Path(place) / "one", request)
+        if len(cases) > 1:
+            known = " or ".join(case.encounter.name for case in cases)
+            raise InputError(f"{options.source}: {len(cases)} encounters; choose one: --encounter {known}")
+        return replanned(Path(place) / "one" / BAG, options.namespace)
+
+
 @commands.command()
 @takes(Search)
 def search(options: Search) -> None:
     """Find the scenarios in which a planner fails, and the rate at which it does."""
-    from scenario_gen.closed_loop.search.command import search_failures, SearchRequest
+    from scenario_gen.closed_loop.search.command import JOURNAL, search_failures, SearchRequest
     from scenario_gen.closed_loop.search.objective import Objective
-    from scenario_gen.output.review.regenerate import replanned
 
-    remind(options.bag)
-    source = replanned(options.bag, options.namespace)
+    remind(options.source)
+    source = drawn_from(options)
     request = SearchRequest(
         source.planned,
         source.request,
@@ -68,6 +101,7 @@ def search(options: Search) -> None:
         options.worst,
         options.assignments or [],
     )
+    say(f"Drives are kept in {options.out}{JOURNAL}. The same command continues a search that was stopped.")
     with bars() as advance:
         result = search_failures(
             request, options.out, workers=options.workers, progress=lambda done, total: advance("drives", done, total)

@@ -5,13 +5,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError, of_system
+from scenario_gen.base.documents import parse_json, read_text
+from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import units_of
@@ -19,6 +19,21 @@ from scenario_gen.closed_loop.trials import LEVEL, Outcome
 from scenario_gen.method.evaluation import paired_difference
 from scenario_gen.types import Interval
 
+LONGEST = 64 * 1024 * 1024  # bytes of a drives.json; a drive takes 2 kB
+_DRIVE = {
+    "type": "object",
+    "properties": {"name": {"type": "string"}, "scenario": {"type": "string"}, "passed": {"type": "boolean"}},
+    "required": ["name", "scenario", "passed"],
+}
+DRIVES = {
+    "type": "object",
+    "properties": {
+        "planner": {"type": "string"},
+        "parameters": {"type": "object"},
+        "drives": {"type": "array", "items": _DRIVE},
+    },
+    "required": ["planner", "parameters", "drives"],
+}
 OF_THE_MACHINE = {"decision_time", "drive_time"}  # parameters that change no verdict
 
 
@@ -80,14 +95,9 @@ def read_drives(path: Path) -> Earlier:
         InputError: it is not there, or is none, or an older one without digests.
     """
     file = path / "drives.json" if path.is_dir() else path
-    try:
-        said = json.loads(file.read_text())
-        drives = {one["name"]: (one["scenario"], bool(one["passed"])) for one in said["drives"]}
-        return Earlier(str(said["planner"]), dict(said["parameters"]), drives)
-    except OSError as error:
-        raise of_system(error, file) from error
-    except (ValueError, TypeError, KeyError) as error:
-        raise InputError(f"--against {file}: no drives.json of this version ({type(error).__name__}: {error})") from error
+    document = parse_json(read_text(file, LONGEST, f"--against {file}"), f"--against {file}", DRIVES)
+    drives = {drive["name"]: (drive["scenario"], drive["passed"]) for drive in document["drives"]}
+    return Earlier(document["planner"], document["parameters"], drives)
 
 
 def refuse_others(digests: Mapping[str, str], config: ClosedLoopConfig, earlier: Earlier) -> None:

@@ -3,11 +3,13 @@
 
 """A Gymnasium environment over the closed loop: `pip install 'scenario_gen[gym,bags]'`.
 
-    env = DriveEnv(read_trials(Path("out/mine/bag"), ego="2"))
+    import scenario_gen.closed_loop.environment  # registers scenario_gen/Drive-v0
+
+    env = gymnasium.make("scenario_gen/Drive-v0", trials="out/mine/bag", ego="2")
     seen, info = env.reset(seed=7, options={"index": 0})
     seen, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
-Many at once: `gymnasium.vector.SyncVectorEnv([lambda: DriveEnv(trials)] * 8)`, or AsyncVectorEnv.
+Many at once: `gymnasium.make_vec("scenario_gen/Drive-v0", 8, "async", trials="out/mine/bag", ego="2")`.
 """
 
 from collections.abc import Sequence
@@ -22,6 +24,7 @@ import numpy.typing as npt
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.picture import picture
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import read_trials, Trial
 from scenario_gen.closed_loop.verdict import judge
@@ -32,6 +35,8 @@ OTHERS = 8  # nearest others that are seen
 AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route at which it is seen
 OWN, EACH = 5, 7  # numbers about the ego, and about each other
 REACH = 100.0  # metres beyond which nobody is seen
+FARTHEST, LONGEST, FASTEST = 1000.0, 50.0, 100.0  # bounds of what is seen: metres to the goal, metres of a length, m/s
+ID = "scenario_gen/Drive-v0"
 
 Seen = npt.NDArray[np.float32]
 
@@ -46,28 +51,36 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
     - the 8 nearest others within 100 m: 1, x, y [m], cos and sin of the relative yaw, speed [m/s], length [m]; zeros where there
       are fewer.
 
+    All are cut to the bounds of the space: 100 m and m/s, 1000 m to the goal, 50 m of length, the body's sharpest curvature.
+
     Action (float32, 2): -1 to 1 of acceleration (the body's braking to its acceleration), -1 to 1 of its sharpest curvature.
 
     Reward: metres driven along the route; -100 for a collision or leaving the road, +10 at the goal. It terminates with each of
     those, and is truncated when the time is up; `info["verdict"]` then holds the verdict.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(
-        self, trials: Sequence[Trial] | Path | str, config: ClosedLoopConfig = ClosedLoopConfig(), ego: str = ""
+        self,
+        trials: Sequence[Trial] | Path | str,
+        config: ClosedLoopConfig = ClosedLoopConfig(),
+        ego: str = "",
+        render_mode: str | None = None,
     ) -> None:
         """Take what is driven in: trials, or the path of a bag, where `ego` names the vehicle whose place the ego takes.
 
         Raises:
-            InputError: the bag cannot be read, or there is nothing to drive in.
+            InputError: the bag cannot be read, there is nothing to drive in, or the render mode is not known.
         """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(f"render_mode {render_mode!r} is not known; take {', '.join(self.metadata['render_modes'])} or None")
+        self.render_mode = render_mode
         self.trials = read_trials(Path(trials), ego) if isinstance(trials, Path | str) else list(trials)
         if not self.trials:
             raise InputError("there is no scenario to drive in")
         self.config = config
-        size = OWN + 2 * len(AHEAD) + OTHERS * EACH
-        self.observation_space = Box(-np.inf, np.inf, (size,), np.float32)
+        self.observation_space = observation_space(config)
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
         self._loops: dict[int, ClosedLoop] = {}
 
@@ -94,7 +107,16 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         return self._observed(), {"index": index, "name": trial.name}
 
     def step(self, action: Seen) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
-        """Drive one step."""
+        """Drive one step.
+
+        Args:
+            action: (2,) pedal and wheel, -1 to 1 (shares of the body's limits); what is beyond is cut.
+
+        Raises:
+            InputError: a number of the action is not finite.
+        """
+        if not np.isfinite(action).all():
+            raise InputError(f"action {np.asarray(action).tolist()}: both numbers must be finite, from -1 to 1")
         pedal, wheel = (min(max(float(value), -1.0), 1.0) for value in action)
         config, loop = self.config, self._loop
         acceleration = pedal * (config.ego_acceleration if pedal > 0.0 else config.ego_braking)
@@ -113,6 +135,12 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         if terminated or truncated:
             info["verdict"] = judge(loop, loop.record(self._states)).document()
         return seen, reward, terminated, truncated, info
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Return the scene (400, 400, 3) in pixels, the ego in the middle, 100 m a side; None without render_mode "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        return picture(self._loop, self._states[-1])
 
     def _observed(self) -> Seen:
         state = self._states[-1]
@@ -145,4 +173,20 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
                     speed, length = found.others[k, 3], found.sizes[k, 0]
                     others[row] = (1.0, *place[k], float(exact.cos(turn)), float(exact.sin(turn)), speed, length)
         own = np.array((ego.speed, ego.curvature, offset, angle, left))
-        return np.concatenate([own, route.ravel(), others.ravel()]).astype(np.float32)
+        seen = np.concatenate([own, route.ravel(), others.ravel()]).astype(np.float32)
+        return np.clip(seen, self.observation_space.low, self.observation_space.high)
+
+
+def observation_space(config: ClosedLoopConfig) -> Box:
+    """Return the space of what is seen, with finite bounds."""
+    own = np.array((FASTEST, config.ego_curvature, REACH, np.pi, FARTHEST))
+    each = np.array((1.0, REACH, REACH, 1.0, 1.0, FASTEST, LONGEST))
+    high = np.concatenate([own, np.full(2 * len(AHEAD), REACH), np.tile(each, OTHERS)])
+    low = -high
+    low[[0, 4]] = 0.0, -REACH  # the speed; beyond the goal
+    low[OWN + 2 * len(AHEAD) :: EACH] = 0.0  # whether somebody is there
+    return Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
+
+
+if ID not in gymnasium.registry:
+    gymnasium.register(ID, entry_point=f"{__name__}:{DriveEnv.__name__}")

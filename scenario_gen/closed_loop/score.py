@@ -65,7 +65,9 @@ class Terms:
     @property
     def pdms(self) -> float:
         """NAVSIM's score."""
-        weighted = sum(weight * float(getattr(self, name)) for name, weight in WEIGHTS.items()) / sum(WEIGHTS.values())
+        weighted = math.fsum(weight * float(getattr(self, name)) for name, weight in WEIGHTS.items()) / math.fsum(
+            WEIGHTS.values()
+        )
         return self.no_at_fault_collision * self.drivable_area * weighted
 
     @property
@@ -100,7 +102,7 @@ def not_behind(drive: Drive, other: int) -> Floats:
     away = motion.position[other] - motion.position[ego]
     yaw = motion.heading[ego]
     ahead = away[:, 0] * exact.cos(yaw) + away[:, 1] * exact.sin(yaw)
-    return np.asarray(ahead >= math.cos(math.radians(BEHIND)) * exact.hypot(away[:, 0], away[:, 1]))
+    return np.asarray(ahead >= float(exact.cos(math.radians(BEHIND))) * exact.hypot(away[:, 0], away[:, 1]))
 
 
 def _at_fault(drive: Drive, who: int, time: float, *, off_road: bool) -> bool:

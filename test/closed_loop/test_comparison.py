@@ -94,7 +94,7 @@ def test_other_scenarios_or_parameters_are_refused():
 
 def test_what_is_no_list_of_drives_is_refused(tmp_path):
     (tmp_path / "drives.json").write_text('{"planner": "p", "drives": [{"name": "1"}]}')
-    with pytest.raises(InputError, match=r"no drives\.json of this version \(KeyError"):
+    with pytest.raises(InputError, match=r"--against .*drives\.json.*required"):
         read_drives(tmp_path)
     with pytest.raises(InputError, match="nothing"):
         read_drives(tmp_path / "nothing.json")

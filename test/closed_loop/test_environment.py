@@ -3,6 +3,9 @@
 
 """The Gymnasium environment keeps Gymnasium's promises, is deterministic, and runs many at once."""
 
+from dataclasses import replace
+
+import gymnasium
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import SyncVectorEnv
 import numpy as np
@@ -10,8 +13,10 @@ import pytest
 
 from benchmarks._driving_worlds import draw_scenario
 from scenario_gen.base.errors import InputError
-from scenario_gen.closed_loop.environment import DriveEnv
+from scenario_gen.closed_loop.environment import DriveEnv, ID
+from scenario_gen.closed_loop.picture import EGO, SIZE
 from scenario_gen.closed_loop.trials import Trial
+from scenario_gen.types import Road
 
 TRIALS = [Trial(str(seed), draw_scenario(seed), 0, None) for seed in (1, 2, 5)]
 
@@ -29,9 +34,45 @@ def drive(env, seed):
     return np.stack(rows), info["verdict"]
 
 
-@pytest.mark.filterwarnings("ignore:.*bound:UserWarning")
+@pytest.mark.filterwarnings("error::UserWarning")
 def test_gymnasium_finds_nothing_wrong():
-    check_env(DriveEnv(TRIALS), skip_render_check=True)
+    env = gymnasium.make(ID, trials=TRIALS, render_mode="rgb_array")
+    assert env.spec.id == ID and np.isfinite(env.observation_space.low).all() and np.isfinite(env.observation_space.high).all()
+    check_env(env.unwrapped)
+
+
+def test_what_is_seen_keeps_its_bounds():
+    env = DriveEnv(TRIALS)
+    assert all(env.observation_space.contains(row) for row in drive(env, 4)[0])
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_actions_that_are_not_finite_are_refused(bad):
+    env = DriveEnv(TRIALS)
+    env.reset(seed=1)
+    with pytest.raises(InputError, match="must be finite"):
+        env.step(np.array((bad, 0.0), dtype=np.float32))
+
+
+def test_the_picture_shows_road_route_ego_and_others():
+    road = Road("r", np.ones((40, 40), dtype=bool), 1.0, np.array((-20.0, -20.0)), np.zeros((0, 3)), np.zeros((0, 3)))
+    env = DriveEnv([replace(TRIALS[0], road=road)], render_mode="rgb_array")
+    env.reset(seed=1)
+    image = env.render()
+    assert image.shape == (SIZE, SIZE, 3) and tuple(image[SIZE // 2, SIZE // 2]) == EGO
+    assert DriveEnv(TRIALS).render() is None
+    with pytest.raises(InputError, match="render_mode 'human'"):
+        DriveEnv(TRIALS, render_mode="human")
+
+
+@pytest.mark.parametrize("way", ["sync", "async"])
+def test_vectors_of_it_are_made_by_gymnasium(way):
+    many = gymnasium.make_vec(ID, 2, way, trials=TRIALS)
+    first, _ = many.reset(seed=3)
+    again, _ = many.reset(seed=3)
+    assert first.shape == (2, 73) and (first == again).all()
+    assert np.isfinite(many.step(many.action_space.sample())[0]).all()
+    many.close()
 
 
 def test_the_same_seed_gives_the_same_drive():

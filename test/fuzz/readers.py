@@ -29,6 +29,7 @@ OF_TARGETS = {
     "parameters": ("base/parameters.py",),
     "library": ("method/segmentation/library.py",),
     "evaluation_json": ("method/evaluation/comparison.py", "types/evaluation.py"),
+    "drives_json": ("closed_loop/comparison.py",),
     "batch": ("corpus/find.py",),
     "corpus": ("corpus/encounters.py",),
     "archive": ("corpus/messages.py",),
@@ -51,13 +52,13 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "corpus/mine.py": "its own intermediate tables, which are written whole or not at all",
     "corpus/meetings.py": "its own intermediate tables, likewise",
     "corpus/synthetic.py": "the truth of the archive that it wrote",
-    "output/exchange/export.py": "bytes for a digest",
     "base/folders/claim.py": "what is none is no claim: test/base/folders",
     "base/folders/marker.py": "what is none is no marker: test/base/folders",
     "numerics/kernel_cache.py": "source files of the package, for a digest",
     "numerics/kernels.py": "source files of the package, to see which have kernels",
     "output/report/html.py": "assets of the package",
     "output/results.py": "whether a folder is an earlier result: anything else is none",
+    "closed_loop/search/problem.py": "its own journal; what is none is refused: test/closed_loop/search",
     "bags/storage/definitions.py": "definitions of messages that ROS 2 has installed",
 }
 

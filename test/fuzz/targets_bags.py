@@ -33,6 +33,8 @@ from scenario_gen.bags.storage.reindex import reindex
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.base.parameters import assigned, flatten, loaded
+from scenario_gen.closed_loop.comparison import read_drives, refuse_others
+from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.evaluation import compare, comparison_table, EvaluationConfig, read_evaluations
@@ -332,6 +334,18 @@ def evaluations(folder: Path) -> list[bytes]:
     return [json.dumps({"provenance": {}, "cases": [json.loads(text) for text in found]}).encode(), found[0].encode()]
 
 
+def drives(folder: Path) -> list[bytes]:
+    """A drives.json of two drives."""
+    found = [{"name": str(k), "scenario": "0f" * 8, "passed": k == 1} for k in range(2)]
+    return [json.dumps({"planner": "a:B", "parameters": {"step": 0.1}, "drives": found}).encode()]
+
+
+def refuse_other_drives(path: Path) -> None:
+    """Read drives, and compare with none."""
+    earlier = read_drives(path)
+    refuse_others({name: digest for name, (digest, _) in earlier.drives.items()}, ClosedLoopConfig(), earlier)
+
+
 def compare_with_itself(path: Path) -> None:
     """Read figures, show them and compare them."""
     found = read_evaluations(path)
@@ -429,4 +443,5 @@ TARGETS = (
     Target("assignment", assignments, assign_one, (*BYTES, deep)),
     Target("library", libraries, in_file("library.json", use_library), JSON, ("library/*",)),
     Target("evaluation_json", evaluations, in_file("evaluation.json", compare_with_itself), JSON, ("result/*",)),
+    Target("drives_json", drives, in_file("drives.json", refuse_other_drives), JSON),
 )

@@ -49,14 +49,16 @@ SHORT = {
 COPYLEFT = re.compile(r"\bA?GPL")
 INTRO = """# Licences
 
-The project itself is under Apache-2.0. It ships no other's code but one: the HTML pages that it writes contain plotly.js (MIT).
-What it needs is installed from wheels. This table lists every package of the locks in `requirements/` that `make demo`,
-`make install` and `make test` install, with the licence that its metadata states (`make licences` writes it; a test holds it
-against the locks). *Run time* is what `setup.py` asks for, all extras included, and all that follows from it; the rest builds
-and tests. Under the GPL are two linters and one file of docutils, which no user needs; nothing is under the AGPL.
+Which licence has each package? The project itself is under Apache-2.0. It ships the code of one other project: plotly.js (MIT),
+in the HTML pages that it writes. Everything else is installed from wheels.
 
-Not in the table: the peers of `bench.lock`, the judges of `judges-*.lock` and the tools of `audit.lock` and `docs.lock`,
-which `make bench`, `make judges`, `make audit` and `make docs` alone install, and of which nothing is shipped.
+The table lists every package that `make demo`, `make install` and `make test` install, with the licence that its metadata
+states. `make licences` writes it, and a test compares it with the locks in `requirements/`. *Run time*: `setup.py` requires it,
+directly or through an extra. *To test*: it builds or tests. Two linters and one file of docutils are under the GPL; no user
+needs them. Nothing is under the AGPL.
+
+Not listed: packages that only `make bench`, `make judges`, `make audit` and `make docs` install (`bench.lock`, `judges-*.lock`,
+`audit.lock`, `docs.lock`). None of them is shipped.
 
 | package | version | licence | needed |
 |---|---|---|---|

@@ -6,6 +6,9 @@
 from dataclasses import replace
 import json
 import math
+import os
+from pathlib import Path
+import subprocess
 import sys
 
 from bag_examples import hand_made_run
@@ -24,6 +27,7 @@ from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.tracking import of_twist
+from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.plumbing.driving import FIRST_STAMP
 from scenario_gen.types.ego import with_witness
@@ -43,7 +47,7 @@ def traffic(start, client, bag):
     """A running node in lock-step that this client steers."""
 
     def run(**parameters):
-        process = start("traffic", bag=bag, lock_step=True, **parameters)
+        process = start("traffic", bag=bag, lock_step=True, **{"follow_on": False, **parameters})
         client.hear("verdicts", "vehicle_1/odom", "vehicle_bus_2/odom", "/tf", "/clock", "traffic/local_map", "/diagnostics")
         for topic in ("ego/cmd_vel", "ego/odom", "ego/path"):
             client.announce(topic)
@@ -217,6 +221,8 @@ class ByPlace:
 
 PLANNER = """
 import math
+from pathlib import Path
+import subprocess
 import sys
 
 import rclpy
@@ -264,3 +270,21 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag,
     ):
         refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", command])
         assert said in str(refused.exception), refused.output
+
+
+def test_the_example_drives_a_whole_bag_in_lock_step(start, client, bag, domain, tmp_path):
+    """Scenarios follow on by themselves; the end is said once, with how many drives passed."""
+    count = len(read_trials(bag))
+    assert count > 1
+    traffic = start("traffic", bag=bag, lock_step=True, results=tmp_path / "results")
+    client.hear("verdicts")
+    client.until(lambda: client.node.count_publishers("verdicts") >= 1, "verdicts")
+    example = Path(__file__).resolve().parents[2] / "examples" / "ego_consumer.py"
+    command = [sys.executable, str(example), "--ros-args", "-p", "lock_step:=true"]
+    with subprocess.Popen(command, env=os.environ | {"ROS_DOMAIN_ID": str(domain)}) as planner:
+        try:
+            client.wait("verdicts", count)
+        finally:
+            planner.terminate()
+    document = json.loads((tmp_path / "results" / "drives.json").read_text())
+    assert len(document["drives"]) == count and traffic.poll() is None

@@ -128,7 +128,7 @@ class SearchResult:
         kinds: dict[str, list[Finding]] = {}
         for one in self.findings:
             kinds.setdefault(one.kind, []).append(one)
-        return dict(sorted(kinds.items(), key=lambda item: -sum(one.weight or 0.0 for one in item[1])))
+        return dict(sorted(kinds.items(), key=lambda item: -math.fsum(one.weight or 0.0 for one in item[1])))
 
     @property
     def plain(self) -> Rate:

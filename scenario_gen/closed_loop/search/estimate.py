@@ -19,8 +19,8 @@ import math
 from typing import Protocol, TypeVar
 
 import numpy as np
-from scipy import special
 
+from scenario_gen.closed_loop.search.gamma import gamma_quantile
 from scenario_gen.closed_loop.search.surrogate import Surrogate
 from scenario_gen.method.evaluation import wilson
 from scenario_gen.numerics import exact, Floats
@@ -36,7 +36,8 @@ BATCH = 256  # natural candidates of which some are driven
 REFIT = 1.1  # times as many drives as at the last regression ask for a new one
 EXPLORING = 0.4  # share of a batch's drives that are chosen evenly
 LEAST, MOST = 0.005, 0.1  # bounds of the probability with which every scenario is driven
-WIDER = 2.0  # factor on the error of the regression
+OFTEN = 1.5  # times the share of natural drives that fail is driven, where that is above MOST: frequent failures need no choice
+WIDER = 3.0  # factor on the error of the regression: the wider, the more is driven, and the smaller are the weights
 LEVEL = 0.95  # of the intervals
 _STEP, _ACCEPTED = 0.5, 0.4  # first step of a chain, and the share of accepted moves that it is adapted to
 
@@ -249,7 +250,7 @@ class Search:
             self._check_budget()
             population += heads
         share = accepted / (len(seeds) * (SEEDS - 1))
-        return population, min(max(step * math.exp(share - _ACCEPTED), 0.05), 1.0)
+        return population, min(max(step * float(exact.exp(share - _ACCEPTED)), 0.05), 1.0)
 
     def _predictor(self) -> "_Predictor":
         """Return what predicts the parts of a drive from what was driven so far."""
@@ -281,16 +282,18 @@ class Search:
         self._certified += len(rows)
         if not rows:
             return False
+        frequent = len([k for k in self._natural if self.responses[k].failed]) / len(self._natural)
+        evenly = max(self._evenly, min(OFTEN * frequent, 1.0) if frequent > MOST else 0.0)
         predicted, error = self._predictor()(z[rows], features)
         near = 2.0 * exact.ndtr(-predicted / (WIDER * error))
-        probability = np.clip(near.max(axis=1), self._evenly, 1.0)
+        probability = np.clip(near.max(axis=1), evenly, 1.0)
         chosen = np.flatnonzero(choosing[rows] < probability)
         own = [rows[k] for k in chosen]
         driven = self._drive([z[k] for k in own], [candidates[k] for k in chosen], [features[k] for k in chosen])
         self._sampled += driven
         if len(driven) == len(chosen):
             self._seen += len(rows)
-            calm = probability <= self._evenly
+            calm = probability <= evenly
             self._calm += int(calm.sum())
             self._floor += [k for place, k in zip(chosen.tolist(), driven, strict=True) if calm[place]]
             for place, k in zip(chosen.tolist(), driven, strict=True):
@@ -303,12 +306,12 @@ class Search:
 
     def _result(self) -> Estimate:
         failures = [k for k, one in enumerate(self.responses) if one.failed]
-        hits, natural = sum(self.responses[k].failed for k in self._natural), len(self._natural)
+        hits, natural = len([k for k in self._natural if self.responses[k].failed]), len(self._natural)
         plain = wilson(hits, natural, LEVEL) if natural else Interval(math.nan, 0.0, 1.0)
         shares: dict[str, float] = {}
         for k, weight in self.weights.items():
             shares[self.responses[k].kind] = shares.get(self.responses[k].kind, 0.0) + weight
-        whole = sum(shares.values())
+        whole = math.fsum(shares.values())
         rate = plain if self._seen == 0 else self._rate()
         return Estimate(
             rate,
@@ -324,7 +327,7 @@ class Search:
     def _unexpected(self) -> float:
         if not self._floor:
             return math.nan
-        hits = sum(self.responses[k].failed for k in self._floor)
+        hits = len([k for k in self._floor if self.responses[k].failed])
         return wilson(hits, len(self._floor), LEVEL).high * self._calm / self._seen
 
     def deviation(self, k: int) -> float:
@@ -334,7 +337,7 @@ class Search:
         return abs(float(exact.matmul(slope, self.z[k])))
 
     def _rate(self) -> Interval:
-        """Return the rate over the batches with its interval, the gamma interval of a sum of weights (Tiwari, Clegg & Zou 2006).
+        """Return the rate over the batches with its interval, the gamma interval of a sum of weights (Fay & Feuer 1997).
 
         Without a failure its upper end is that of plain sampling with as many drives as were chosen evenly.
         """
@@ -342,14 +345,10 @@ class Search:
         if not len(w):
             return Interval(0.0, 0.0, wilson(0, max(round(self._seen * self._evenly), 1), LEVEL).high)
         total, square = float(w.sum()), float((w * (w - w.sum() / self._seen)).sum())
-        low = _gamma(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
-        high = _gamma(total + float(w.mean()), square + float(np.square(w).mean()), 0.5 + 0.5 * LEVEL)
+        low = gamma_quantile(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
+        most = float(w.max())
+        high = gamma_quantile(total + most, square + most * most, 0.5 + 0.5 * LEVEL)
         return Interval(min(total / self._seen, 1.0), min(low / self._seen, 1.0), min(high / self._seen, 1.0))
-
-
-def _gamma(mean: float, variance: float, share: float) -> float:
-    """Return the quantile of the gamma distribution with this mean and variance."""
-    return float(special.gammaincinv(mean * mean / variance, share)) * variance / mean
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,7 +54,7 @@ def open_journal(path: Path, identity: Mapping[str, Any]) -> Iterator[Journal]:
         if whole:
             _same(path, json.loads(whole[0]), json.loads(head))
         known = [Response(float(margin), tuple(parts), kind) for margin, parts, kind in map(json.loads, whole[1:])]
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{path} is no journal of a search ({error}); move it away, or give another --out") from error
     except OSError as error:
         raise of_system(error, path, "; give another --out") from error

@@ -66,10 +66,10 @@ class Surrogate:
         return cls(mean, scale, exact.matmul(x.T, best[1]), level, max(best[0], 1e-9))
 
     def predict(self, columns: Floats) -> Floats:
-        """Return the figure (S,), in its own unit, for columns (S, q)."""
+        """Return the figure (S,), in its own unit, for columns (S, q) in any unit."""
         return np.asarray(self.level + exact.matmul((columns - self.mean) / self.scale, self.slope))
 
     def direction(self, size: int) -> Floats:
-        """Return the unit direction (size,) of the first columns along which the figure changes most."""
+        """Return the direction (d,), a unit vector in any unit, along which the figure changes most with the first columns."""
         slope = np.asarray(self.slope[:size] / self.scale[:size])
         return slope / max(float(np.sqrt(exact.matmul(slope, slope))), 1e-300)

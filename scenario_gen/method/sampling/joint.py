@@ -8,9 +8,17 @@ template (`lateness`), and how far ahead of its place (`advance`). A reaction is
 two vehicles, each with a residual: a follower is as late, and as far ahead, as its leader was a lag ago; a yielder leaves as late
 as the other vehicle clears the conflict.
 
-Given the numbers of the vehicles it reacts to, those of a vehicle are again Gaussian: z = m(z of the others) + L eps. So all
-numbers follow from independent ones, eps, vehicle by vehicle in the order of the graph. A vehicle that reacts to nobody keeps
-its own eps.
+At template time τ vehicle n is late by ℓ_n(τ)ᵀz_n (shift, pace, waits) and ahead by d_n(τ)ᵀz_n (displacement, end speeds). With
+lag and gain g of the edge:
+
+- follower f, leader l, every 0.8 s: ℓ_f(τ)ᵀz_f − ℓ_l(τ − lag)ᵀz_l = ε₁(τ) and
+  d_f(τ)ᵀz_f − [g d_l(τ − lag) + (1 − g) mean of d_l over ± 3 s]ᵀz_l = ε₂(τ). ε₂ has the edge's residual over 8 s and 8 cm over
+  1.2 s; ε₁ is the residual divided by the follower's speed.
+- yielder y, first o: ℓ_y(leaves)ᵀz_y − [ℓ_o(clears) − d_o(clears) / v_o]ᵀz_o = ε, 0.6 s.
+
+Given the numbers of the vehicles it reacts to, those of a vehicle are again Gaussian. With the whitened equations
+A z + B z_others = η, Aᵀ = QR and WWᵀ = I + RRᵀ they are z = ε + Q (W⁻ᵀ − I) Qᵀ ε − Q (I + RRᵀ)⁻¹ R B z_others. So all numbers
+follow from independent ones, ε, vehicle by vehicle in the order of the graph. A vehicle that reacts to nobody keeps its own ε.
 """
 
 from collections.abc import Sequence

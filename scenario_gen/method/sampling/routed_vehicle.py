@@ -110,7 +110,7 @@ class RoutedVehicle:
         return f"cannot drive its curves within {config.max_lateral_acceleration:g} m/s² sideways in {clock.time[-1]:.1f} s"
 
     def largest_shift(self, mean: Floats) -> float:
-        """The largest distance [m] of the mean from a changepoint's place when it is due."""
+        """Return the largest distance [m] of the mean (d,) from a changepoint's place when it is due."""
         if len(self.path.node) == 1:
             return 0.0
         return float(np.abs(exact.matmul(self.spline.driven(self.times), mean) - self.anchor).max())
@@ -145,7 +145,7 @@ def routed_vehicle(
     waits: Sequence[Wait],
     config: SamplingConfig,
 ) -> RoutedVehicle:
-    """Vehicle n on its route; one without length stands throughout, whatever speed is requested."""
+    """Return vehicle n on its route, with changepoints at times (K,) [s]; one without length stands, whatever is requested."""
     first, last = encounter.present[n].tolist()
     here = slice(first, last + 1)
     time, speed = encounter.time[here], encounter.speed[n, here]

@@ -40,7 +40,7 @@ def index_of(level: int, candidate: int) -> int:
 
 
 def searched_index(numbers: Floats) -> int:
-    """Return the index of a scenario whose numbers, an array of shape (size,), a search chose: made of their SHA-256."""
+    """Return the index of a scenario whose numbers (d,) a search chose: made of their SHA-256."""
     page, within = divmod(int.from_bytes(hashlib.sha256(numbers.tobytes()).digest()[:5]), LEVEL_SIZE)
     return (page * LEVEL_SLOTS + SEARCHED) * LEVEL_SIZE + within
 

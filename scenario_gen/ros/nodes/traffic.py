@@ -7,13 +7,15 @@ Scenarios come from a bag, or, without one, live from `scenarios`, `scenarios/in
 place of one vehicle and is steered by `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or `ego/odom`; what
 came last counts. The drive begins with the first of them. `~/next`, `~/reset`, `~/pause`, `~/resume`, and `~/step` in
 lock-step: one step for each call, which waits for a command that came after the step before, so that a client that answers each
-step with one command gets the same drive again.
+step with one command gets the same drive again. The next scenario begins by itself (parameter `follow_on`); in lock-step 0.5 s
+later, so that an answer to the last state of a drive is not taken for one to the first state of the next.
 Topics, frames and units: msg_conventions/driving.py. What is wrong with the ego stands on /diagnostics and in the verdict.
 """
 
 from collections.abc import Callable
 from functools import partial
 import json
+import math
 from pathlib import Path
 from time import monotonic
 
@@ -51,6 +53,7 @@ from scenario_gen.types import tokens
 
 OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 LOOK_AROUND = 10  # steps between two looks at who commands the ego
+FOLLOWS_ON = 0.5  # seconds of real time from the end of a drive in lock-step to the next one
 LOOK = 0.05  # seconds of real time between two looks at whether a wait is at its end
 
 
@@ -69,6 +72,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._received: EgoCommand | None = None
         self._waiting: Future | None = None
         self._until = 0.0  # when that ends, on the steady clock [s]
+        self._load_at = math.inf  # when the next scenario begins, on the steady clock [s]
         self.create_timer(LOOK, self._end_waiting, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._paused = False
         self._sources: list[str] = []
@@ -136,6 +140,7 @@ class Traffic(Node):  # type: ignore[misc]
         trial = self._trials[number]
         self._loop = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config.drive)
         self._at, self._states, self._received, self._verdict = number, [self._loop.start()], None, ""
+        self._load_at = math.inf
         self._names = tokens(vehicle.id for vehicle in self._loop.scenario.vehicles)
         self._children = tuple(f"vehicle_{name}" for name in self._names)
         for name in self._names:
@@ -150,8 +155,8 @@ class Traffic(Node):  # type: ignore[misc]
     # --- the ego ----------------------------------------------------------------------------------------------
 
     def _receive_command(self, topic: str, data: bytes) -> None:
-        """Keep a command; a damaged one is reported and counts as none."""
-        if self._loop is None:
+        """Keep a command; a damaged one is reported and counts as none. After the end of a drive none counts."""
+        if self._loop is None or self._load_at < math.inf:
             return
         command = decode_command(topic, data, self._loop, self._children[self._loop.ego], self._states[-1].step)
         if command.fault:
@@ -198,7 +203,7 @@ class Traffic(Node):  # type: ignore[misc]
             self._conclude(loop)
 
     def _conclude(self, loop: ClosedLoop) -> None:
-        """Publish the verdict, and go on with the next scenario."""
+        """Publish the verdict, and go on with the next scenario, or say what that waits for."""
         drive = loop.record(self._states)
         verdict, trial = judge(loop, drive), self._trials[self._at]
         self._verdict = verdict.sentence()
@@ -208,11 +213,25 @@ class Traffic(Node):  # type: ignore[misc]
         if self.config.results:
             Path(self.config.results).mkdir(parents=True, exist_ok=True)
             write_verdicts(Path(self.config.results), self.outcomes, f"{self.get_name()} over ROS 2", self.config.drive)
-        if self.config.follow_on and not self.config.lock_step and self._at + 1 < len(self._trials):
-            self._load(self._at + 1)
+        if self._at + 1 < len(self._trials):
+            if not self.config.follow_on:
+                self.get_logger().info(f"scenario {self._trials[self._at + 1].name} waits for a call of {self._service('next')}")
+            elif self.config.lock_step:
+                self._load_at = monotonic() + FOLLOWS_ON
+            else:
+                self._load(self._at + 1)
+        elif self.config.bag:
+            passed = len([outcome for outcome in self.outcomes if outcome.verdict.passed])
+            self.get_logger().info(
+                f"that was the last scenario of {self.config.bag}: {passed} of {len(self.outcomes)} drives passed"
+            )
+
+    def _service(self, name: str) -> str:
+        """Return the full name of a service of this node."""
+        return f"{self.get_fully_qualified_name()}/{name}"
 
     async def _serve_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Go one step, with a command that came after the one before; without one within the patience, without one."""
+        """Go one step, with a command that came after the one before; after the patience, without one."""
         loop = self._loop
         if loop is None or self._verdict or not self.config.lock_step:
             response.message = self._why_no_step()
@@ -241,7 +260,9 @@ class Traffic(Node):  # type: ignore[misc]
         await self._waiting
 
     def _end_waiting(self) -> None:
-        """End a wait for a command that has come to the end of its patience."""
+        """End a wait for a command that has come to the end of its patience; begin the scenario that follows on."""
+        if monotonic() >= self._load_at:
+            self._load(self._at + 1)
         if self._waiting is not None and not self._waiting.done() and monotonic() > self._until:
             self._waiting.set_result(None)
 
@@ -250,7 +271,8 @@ class Traffic(Node):  # type: ignore[misc]
             return "the parameter lock_step is false: the clock makes the steps"
         if self._loop is None:
             return "there is no scenario yet"
-        return f"scenario {self._trials[self._at].name} is over: {self._verdict}; call ~/next or ~/reset"
+        after = "the next one begins at once" if self._load_at < math.inf else "call ~/next or ~/reset"
+        return f"scenario {self._trials[self._at].name} is over: {self._verdict}; {after}"
 
     # --- services ---------------------------------------------------------------------------------------------
 
@@ -293,6 +315,11 @@ class Traffic(Node):  # type: ignore[misc]
         """Whether the topic has subscribers; messages that are slow to encode are left out without."""
         return int(self._out[topic].get_subscription_count()) > 0
 
+    def _over(self) -> str:
+        """Return the verdict of a drive that is over, and what the next one waits for; "" while it is driven."""
+        waits = self._verdict and not self.config.follow_on and self._at + 1 < len(self._trials)
+        return f"{self._verdict}; the next scenario waits for {self._service('next')}" if waits else self._verdict
+
     def _report_status(self, level: Level, message: str, subject: str) -> None:
         self.diagnostics.status(level, message, subject, {}, log=False)
 
@@ -303,7 +330,7 @@ class Traffic(Node):  # type: ignore[misc]
             self._report_status(Level.WARN, f"there is no scenario yet{waiting}", "driving")
             return
         state, trial = self._states[-1], self._trials[self._at]
-        doing = self._verdict or ("paused" if self._paused else "waiting for the ego" if self._waits_for_ego else "driving")
+        doing = self._over() or ("paused" if self._paused else "waiting for the ego" if self._waits_for_ego else "driving")
         self._report_status(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
         if self._waits_for_ego and not self._verdict:
             self._publish_state()  # for planners that started late

@@ -45,7 +45,7 @@ class Config(Parameters):
     wait_for_ego: bool = parameter(True, "begin a drive with the ego's first command; else it brakes until one comes")
     silence: float = parameter(0.5, "a command older than this is no command, and the ego brakes", unit="s", low=0.01)
     patience: float = parameter(5.0, "in lock-step, wait so long for a command, in real time", unit="s", low=0.01)
-    follow_on: bool = parameter(True, "go on with the next scenario when one is over")
+    follow_on: bool = parameter(True, "go on with the next scenario when one is over; else it waits for ~/next")
     autoware: bool = parameter(
         False, f"publish {OBJECTS} and {EGO}, too, as Autoware's planners take them; needs autoware_perception_msgs"
     )

@@ -186,3 +186,15 @@ def test_the_command_says_what_it_found(bag, tmp_path):
     done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out"), "--max-rate", "0.0", "--objective", "collision"])
     assert done.exit_code == 1 and "the failure rate may be above 0" in done.output, done.output
     assert "natural drives alone" in done.output and str(tmp_path / "out" / "search.html") in done.output
+
+
+def test_a_log_and_a_road_are_searched_as_the_bag_made_of_them(bag, tmp_path):
+    words = ["--planner", f"{__name__}:Blind", "--ego", "2", "--budget", "30", "--workers", "1"]
+    runner = CliRunner()
+    done = runner.invoke(app, ["search", str(LOG), "--road", ROAD, *words, "--out", str(tmp_path / "log")])
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "log" / "search.json").read_text())["drives"] == 30
+    refused = runner.invoke(
+        app, ["search", str(LOG), "--road", ROAD, "--encounter", "none", *words, "--out", str(tmp_path / "b")]
+    )
+    assert isinstance(refused.exception, InputError) and "no encounter named 'none'" in str(refused.exception)
