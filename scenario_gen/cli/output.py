@@ -10,9 +10,11 @@ import functools
 import inspect
 import json
 import math
+import os
 from pathlib import Path
 import sys
 from typing import Annotated, Any, get_type_hints
+import webbrowser
 
 import typer
 
@@ -180,9 +182,6 @@ def status() -> AbstractContextManager[Callable[[str], None]]:
 
 def open_page(page: Path) -> bool:
     """Open a page in a browser if somebody sits at this terminal and there is a display; return whether it was opened."""
-    import os
-    import webbrowser
-
     has_display = sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     if _current.as_json or _current.quiet or not (sys.stdout.isatty() and has_display):
         return False

@@ -112,7 +112,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("generate", "nobody.csv", *ROAD), "--set log.columns=vehicle=kind of car"),
     ((*GENERATE, "--params", "bad.yaml"), "bad.yaml: not YAML (line 2"),
     ((*GENERATE, "--params", "none.yaml"), "none.yaml: cannot be read (No such file"),
-    ((*DRIVE, "--against", "bad.json"), "bad.json: no drives.json of this version"),
+    ((*DRIVE, "--against", "bad.json"), "--against bad.json: not JSON"),
     (("validate", "none"), "none does not exist; name the folder of a bag"),
     (("validate", "my log ü.csv"), "is not a bag; name a folder with .mcap or .db3 files"),
     (("report", "nothing"), "nothing is not a bag; name a folder"),
