@@ -58,7 +58,7 @@ def printing(command: str, *, quiet: bool, as_json: bool) -> Iterator[None]:
     finally:
         _current = before
         if as_json:
-            print(json.dumps(plain(own.results), ensure_ascii=False, allow_nan=False))
+            print_object(own.results)
 
 
 class Commands(typer.Typer):
@@ -106,6 +106,11 @@ def start(*, quiet: bool, as_json: bool) -> None:
 def give(**results: Any) -> None:
     """Add results to the object of --json."""
     _current.results |= results
+
+
+def print_object(results: Mapping[str, Any]) -> None:
+    """Print results as one JSON object in one line."""
+    print(json.dumps(plain(results), ensure_ascii=False, allow_nan=False))
 
 
 def plain(value: Any) -> Any:
