@@ -131,7 +131,10 @@ def export_scenarios(
             config = assigned(config, option)
     remind(bag)
     folder = out or bag.resolve().with_name(f"{bag.resolve().name}_{to}")
-    result = export_bag(bag, folder, to, config, bag_config, namespace=namespace, indices=index or ())
+    with bars() as advance:
+        result = export_bag(
+            bag, folder, to, config, bag_config, namespace=namespace, indices=index or (), progress=partial(advance, "scenarios")
+        )
     give(scenarios=result.scenarios, folder=folder, notes=result.notes)
     say("\n".join((*result.notes, f"{result.scenarios} scenarios: {folder}")))
 

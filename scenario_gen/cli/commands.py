@@ -74,9 +74,14 @@ def parameters() -> None:
 @installation.command()
 def doctor() -> None:
     """Check this environment: Python, packages, ROS, DDS, QoS of the visible topics, compiled kernels."""
-    from scenario_gen.ros.plumbing.doctor import main as examined
+    from scenario_gen.ros.plumbing.doctor import ERROR, examine
 
-    raise typer.Exit(examined())
+    findings = []
+    for finding in examine():
+        output.say(finding.line())
+        findings.append(finding)
+    output.give(findings=findings)
+    raise typer.Exit(int(any(finding.level == ERROR for finding in findings)))
 
 
 for commands in (generation.commands, bags.commands, testing.commands, corpus.commands, installation):
@@ -104,7 +109,10 @@ def main() -> None:
             sys.stdout.flush()
         sys.exit(code if isinstance(code, int) else 0)
     except UsageError as error:
-        fail(of_usage(error))
+        wrong = of_usage(error)
+        if "--json" in sys.argv[1:]:  # which was not read as an option
+            output.print_object({"exit_code": wrong.exit_code, "error": str(wrong)})
+        fail(wrong)
     except ScenarioGenError as error:
         fail(error)
     except MemoryError:

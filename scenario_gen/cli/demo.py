@@ -61,7 +61,7 @@ def recorder(
     try:
         from scenario_gen.cli.suite import Job, run_suite
     except ImportError as error:
-        raise InputError(f"ROS 2 is not in this environment ({error}); run `make install`, or leave --ros out") from error
+        raise InputError(f"ROS 2 is not available ({error}); run `make install`, or leave out --ros") from error
 
     def record(bag: Path, cases: Sequence[GenerationResult]) -> None:
         names = namespaces(len(ROADS))

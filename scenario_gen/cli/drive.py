@@ -43,7 +43,7 @@ def drive_over_dds(
     """
     words = shlex.split(command)
     if not words:
-        raise InputError("--planner is empty; with --ros it is a command that starts the planner's node")
+        raise InputError("--planner is empty; with --ros, give the command that starts the planner's node")
     with free_domain() as domain, _environment(domain), tempfile.TemporaryFile() as output:
         try:
             process = subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT, start_new_session=True)
@@ -54,7 +54,9 @@ def drive_over_dds(
             if process.poll() is not None:
                 output.seek(0)
                 lines = output.read().decode(errors="replace").splitlines()[-LINES:]
-                raise InputError(f"--planner {command}: it ended with code {process.returncode}; it said: {' | '.join(lines)}")
+                raise InputError(
+                    f"--planner {command}: the command ended with code {process.returncode}; its last output: {' | '.join(lines)}"
+                )
 
         try:
             with ending(lambda: _end(process)):

@@ -90,7 +90,11 @@ def generate_folder(
     """
     logs, roads, config, count, seed = requested.logs, requested.roads, requested.config, requested.count, requested.seed
     with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *requested.also_read]) as folder:
-        readings = [read_log(group, config.log) for group, _ in requested.jobs]
+        readings = []
+        with progress() as advance:
+            for k, (group, _) in enumerate(requested.jobs):
+                advance("logs read", k, len(requested.jobs))
+                readings.append(read_log(group, config.log))
         for line in notes_of(readings):
             tell(line)
         pairs = [

@@ -37,24 +37,24 @@ NAMESPACE = re.compile(r"/|/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 class Arguments(Parameters):
     """The arguments of the launch file; parameters of nodes are declared as there."""
 
-    log: str = parameter("", f"log to read: a file, a bag or a folder of files; {LIVE}: wait for what others publish")
+    log: str = parameter("", f"log to read: a file, a bag or a folder of files; {LIVE}: wait for what other nodes publish")
     encounter: int = parameter(0, "which encounter of the log, from 0", low=0)
     road: str = parameter("t_intersection", ", ".join(ROADS) + ", or a map_server YAML file")
     count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
     seed: int = parameter(0, "seed of every stage", low=0)
-    ego: str = parameter("", "id of the vehicle that is left out for a planner under test")
-    starts: str = parameter("", "start states on the road, `id:x y yaw [speed]`, vehicles parted by `;`")
-    goals: str = parameter("", "end states, likewise")
+    ego: str = parameter("", "id of the vehicle to leave out for a planner under test")
+    starts: str = parameter("", "start states on the road, `id:x y yaw [speed]`, vehicles separated by `;`")
+    goals: str = parameter("", "end states, in the same form")
     bag: str = parameter("", "folder to record to; empty records nothing")
-    stream: bool = parameter(False, "play the log as fixes and speeds of each vehicle, with /clock, instead of as tracks")
-    rate: float = parameter(1.0, "how many times as fast as it was recorded the stream is", low=0.01, high=1000.0)
+    stream: bool = parameter(False, "play the log as fixes and speeds of each vehicle, with /clock, instead of tracks")
+    rate: float = parameter(1.0, "speed of the stream relative to the recording", low=0.01, high=1000.0)
     use_sim_time: bool = parameter(False, "the nodes follow /clock")
     autostart: bool = parameter(True, "the nodes configure and activate themselves")
     namespace: str = parameter("", "namespace of all nodes")
-    params: str = parameter("", "parameter file; what is given beside it on the command line beats it")
-    composed: bool = parameter(False, "all nodes in one process, for small machines")
-    respawn: bool = parameter(False, "start again what ended, after 2 s")
-    log_level: str = parameter("info", "least severity that is logged: " + ", ".join(LEVELS), choices=LEVELS)
+    params: str = parameter("", "parameter file; arguments on the command line have precedence")
+    composed: bool = parameter(False, "run all nodes in one process, for small machines")
+    respawn: bool = parameter(False, "restart a node that ended, after 2 s")
+    log_level: str = parameter("info", "lowest severity that is logged: " + ", ".join(LEVELS), choices=LEVELS)
     rviz: bool = parameter(False, "open RViz")
 
 
@@ -147,17 +147,19 @@ def _check_places(launch: Launch) -> None:
     """Raise InputError if the namespace, the log, the road or the bag cannot be."""
     namespace = launch.arguments.namespace
     if namespace and not NAMESPACE.fullmatch(namespace):
-        raise InputError(f"namespace:={shown(namespace)}: write names of letters, digits and underscores, parted by /")
+        raise InputError(f"namespace:={shown(namespace)}: write names of letters, digits and underscores, separated by /")
     log = launch.value("log_path")
     if not log and launch.arguments.log != LIVE:
-        raise InputError(f"no log is named: give log:=FILE, or log:={LIVE} to wait for tracks, or fixes and speeds, of others")
+        raise InputError(
+            f"no log is given: write log:=FILE, or log:={LIVE} to wait for tracks, or fixes and speeds, of other nodes"
+        )
     if log and not Path(str(log)).exists():
-        raise InputError(f"log:={shown(log)}: there is no such file or folder")
+        raise InputError(f"log:={shown(log)}: it does not exist; name a file or a folder")
     road = launch.value("road_name")
     roads = (*ROADS, *installed("scenario_gen.roads")) if road not in ROADS else ROADS
     if road and road not in roads and not (str(road).endswith((".yaml", ".yml")) and Path(str(road)).is_file()):
-        raise InputError(f"road:={shown(road)}: neither one of {', '.join(roads)} nor a map_server YAML file that is there")
+        raise InputError(f"road:={shown(road)}: choose one of {', '.join(roads)}, or give a map_server YAML file that exists")
     if launch.records and launch.arguments.composed and launch.arguments.respawn:
-        raise InputError("respawn:=true: a composed suite does not start again where its bag is; leave out bag or composed")
+        raise InputError("respawn:=true: a composed suite with a bag cannot be restarted; leave out bag or composed")
     if (bag := launch.value("bag")) and Path(str(bag)).exists():
         raise InputError(f"bag:={shown(bag)}: exists already; name another folder for the bag, or remove it")

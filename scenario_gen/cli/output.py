@@ -10,6 +10,7 @@ import functools
 import inspect
 import json
 import math
+import os
 from pathlib import Path
 import sys
 from typing import Annotated, Any, get_type_hints
@@ -57,7 +58,7 @@ def printing(command: str, *, quiet: bool, as_json: bool) -> Iterator[None]:
     finally:
         _current = before
         if as_json:
-            print(json.dumps(plain(own.results), ensure_ascii=False, allow_nan=False))
+            print_object(own.results)
 
 
 class Commands(typer.Typer):
@@ -105,6 +106,11 @@ def start(*, quiet: bool, as_json: bool) -> None:
 def give(**results: Any) -> None:
     """Add results to the object of --json."""
     _current.results |= results
+
+
+def print_object(results: Mapping[str, Any]) -> None:
+    """Print results as one JSON object in one line."""
+    print(json.dumps(plain(results), ensure_ascii=False, allow_nan=False))
 
 
 def plain(value: Any) -> Any:
@@ -181,8 +187,6 @@ def status() -> AbstractContextManager[Callable[[str], None]]:
 
 def open_page(page: Path) -> bool:
     """Open a page in a browser if somebody sits at this terminal and there is a display; return whether it was opened."""
-    import os
-
     has_display = sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     if _current.as_json or _current.quiet or not (sys.stdout.isatty() and has_display):
         return False

@@ -191,7 +191,7 @@ def _follow(
             raise RefusedError(f"{late} did not answer within {timeout:.0f} s{_tail(scratch, late)}")
         data = os.read(suite.stdout.fileno(), 65536)
         if not data:
-            raise RefusedError(f"the suite ended before it was done{_tail(scratch, 'suite')}")
+            raise RefusedError(f"the nodes ended before they were done{_tail(scratch, 'suite')}")
         *lines, buffer = (buffer + data).split(b"\n")
         for line in lines:
             _take(json.loads(line), state, scratch, progress)
@@ -223,4 +223,4 @@ def _tail(scratch: Path, node: str) -> str:
     """Return the last lines a node wrote, to put behind a message."""
     path = scratch / f"{node.rpartition('/')[2]}.log"
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()[-5:] if path.is_file() else []
-    return "; its last words: " + " | ".join(lines) if lines else ""
+    return "; its last output: " + " | ".join(lines) if lines else ""

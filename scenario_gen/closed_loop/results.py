@@ -54,7 +54,7 @@ def notes(outcomes: Sequence[Outcome], beside: Beside = Beside()) -> list[str]:
     elif encounters:
         messages.append(f"intervals are for encounters drawn as these {len(encounters)} were: drives of one encounter are alike")
     if copies:
-        messages.append(f"{copies} of {len(outcomes)} scenarios are copies: in another one of their encounter all move likewise")
+        messages.append(f"{copies} of {len(outcomes)} scenarios are copies of another scenario of the same encounter")
     if beside.unlooking:
         sets = {name: [one for one in beside.unlooking if one.origin.encounter == name] for name in encounters}
         each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]

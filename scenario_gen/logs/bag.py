@@ -128,10 +128,12 @@ def read_streams(topics: list[Topic], name: str, config: LogConfig) -> RawLog:
         row += len(topic.data)
     silent = [owners[topic.name] for topic in topics if topic.type == TWIST and not vehicles[owners[topic.name]].fixes]
     if silent:
-        raise InputError(f"{label}: speeds but no positions for {', '.join(silent)}; put {FIX} and {TWIST} in one namespace")
+        raise InputError(
+            f"{label}: there are speeds but no positions of {', '.join(silent)}; put {FIX} and {TWIST} in one namespace"
+        )
     notes = []
     if unstamped:
-        notes = [f"{len(unstamped)} topic(s) bear no header stamps, so the time of reception is used: {', '.join(unstamped)}"]
+        notes = [f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: {', '.join(unstamped)}"]
     notes += [
         f"vehicle {vehicle} has no speeds: taken from its positions" for vehicle, rows in vehicles.items() if not rows.speeds
     ]
@@ -222,7 +224,7 @@ def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
         stamp, frame, objects = decode_tracked(data, where)
         frames.add(frame)
         if len(frames) > 1:
-            raise InputError(f"{where}: frame {frame!r} is not that of those before")
+            raise InputError(f"{where}: frame {frame!r} differs from that of the messages before")
         for item in objects:
             if item.kind not in VEHICLES:
                 left_out.setdefault(item.id, item.kind)

@@ -63,7 +63,9 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     window = time_window(sound, log, drops, config)
     sound = [within(vehicle, *window) for vehicle in sound]
     if not any(len(vehicle.fix_ns) for vehicle in sound):
-        raise InputError(f"{log.name}: no position between {config.start:g} s and {config.end:g} s; parameters start and end")
+        raise InputError(
+            f"{log.name}: no position between {config.start:g} s and {config.end:g} s; change --set log.start=… or log.end=…"
+        )
     origin, sound = to_metres(log, sound, config)
     sound = [in_order(vehicle, log, drops) for vehicle in sound]
     check_clock(sound, log, config)
@@ -83,9 +85,9 @@ def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) ->
     ]
     if geographic:
         checks.append(("position is (0, 0)", (np.abs(fix) < 1e-6).all(axis=1)))
-        checks.append(("position is off the globe", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0)))
+        checks.append(("position is not on Earth", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0)))
     else:
-        checks.append(("position is off the globe", (np.abs(fix) > FARTHEST).any(axis=1)))
+        checks.append(("position is not on Earth", (np.abs(fix) > FARTHEST).any(axis=1)))
     keep = judge(checks, vehicle.fix_row, drops)
     slow_checks: list[tuple[str, Any]] = [
         ("stamp is out of range", beyond(vehicle.speed_ns)),
@@ -181,7 +183,7 @@ def parse_origin(text: str) -> tuple[float, float]:
     except ValueError as error:
         raise InputError(f"parameter origin is {text!r}; write latitude,longitude in degrees") from error
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
-        raise InputError(f"parameter origin is {text!r}; that is not a place on the globe")
+        raise InputError(f"parameter origin is {text!r}; that is not a place on Earth")
     return latitude, longitude
 
 

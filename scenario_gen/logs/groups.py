@@ -231,7 +231,7 @@ def settle(group: Growing, pieces: Sequence[Piece], config: LogConfig) -> None:
     for m, (begin, end) in group.spans.items():
         if (begin, end) != (group.first, group.last):
             group.notes.append(
-                f"vehicle {pieces[m].track.id} is there from {seconds(group.first, begin + 1, config)} to "
+                f"vehicle {pieces[m].track.id} is recorded from {seconds(group.first, begin + 1, config)} to "
                 f"{seconds(group.first, end, config)} s of {seconds(group.first, group.last, config)} s"
             )
 
@@ -281,7 +281,7 @@ def split(group: Group, pieces: Sequence[Piece], config: LogConfig) -> tuple[lis
             if max(driven(pieces[m], *span, config) for m, span in spans) >= config.travel:
                 groups.append(part)
                 notes += [
-                    f"vehicle {pieces[m].track.id} is left out of a part of {seconds(part.first, part.last, config)} s: "
+                    f"vehicle {pieces[m].track.id} is left out of a part that lasts {seconds(part.first, part.last, config)} s: "
                     f"there for {seconds(*span, config)} s (min_presence)"
                     for m, span in left
                 ]

@@ -156,7 +156,7 @@ def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[s
     if len(rows) < 2:
         raise InputError(
             f"encounter {encounter.name!r}: {len(rows)} of {len(requested)} vehicles are recorded between {config.start:g} s and "
-            f"{(last - 1) * encounter.dt:g} s; at least 2 are needed: see the parameters start, end and vehicles"
+            f"{(last - 1) * encounter.dt:g} s; at least 2 are needed: change --set log.start=…, log.end=… or log.vehicles=…"
         )
     first, last = first + int(inside[rows, 0].min()), first + int(inside[rows, 1].max()) + 1
     chosen = replace(

@@ -109,6 +109,11 @@ def test_json_of_an_error_has_it(ran):
     assert code == 2 == answer["exit_code"] and "does not exist" in answer["error"] and err.startswith("error: none")
 
 
+def test_json_of_a_wrong_option_has_the_error(ran):
+    code, out, err = ran("validate", "--json")
+    assert code == 2 and "Missing argument" in one_object(out)["error"] and err.startswith("error: Missing argument")
+
+
 def test_quiet_prints_errors_only(ran, made):
     assert ran("validate", made / "bag", "--quiet") == (0, "", "")
     assert ran("-q", "validate", made / "bag") == (0, "", "")

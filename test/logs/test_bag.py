@@ -206,7 +206,7 @@ def test_topics_that_cannot_be_told_apart(tmp_path):
         read_log(write(tmp_path / "twice", twice))
     with pytest.raises(InputError, match="choose with the parameter topics"):
         read_log(write(tmp_path / "mixed", [*lines, *odometry(crossing())]))
-    with pytest.raises(InputError, match="speeds but no positions for a, b"):
+    with pytest.raises(InputError, match="there are speeds but no positions of a, b"):
         read_log(write(tmp_path / "speeds", [line for line in lines if line.type == TWIST]))
 
 

@@ -42,7 +42,7 @@ def test_nan_and_zero_fixes(tmp_path):
     assert drops(result) == {
         "position is not a number": (1, "42"),
         "position is (0, 0)": (2, "62"),
-        "position is off the globe": (1, "88"),
+        "position is not on Earth": (1, "88"),
         "speed is not a number": (1, "82"),
         "speed is negative": (1, "86"),
         "speed is above 70 m/s": (1, "84"),

@@ -245,7 +245,7 @@ def test_positions_beyond_the_earth_are_dropped(tmp_path, value):
     rows = crossing()
     rows.loc[50, "x_m"] = value
     (drop,) = read_log(save(rows, tmp_path)).quality.dropped
-    assert (drop.reason, drop.count) == ("position is off the globe", 1)
+    assert (drop.reason, drop.count) == ("position is not on Earth", 1)
 
 
 def test_numbers_of_any_length_and_names_of_any_length(tmp_path):

@@ -53,7 +53,7 @@ def test_a_vehicle_may_arrive_late_and_leave_early(tmp_path):
     (encounter,) = result.encounters
     assert encounter.position[2, 80] == pytest.approx([84.0, 0.0], abs=0.1)
     assert (encounter.position[3, 91:] == encounter.position[3, 90]).all()
-    assert "vehicle 3 is there from 8.0 to 20.0 s of 20.0 s" in result.quality.notes
+    assert "vehicle 3 is recorded from 8.0 to 20.0 s of 20.0 s" in result.quality.notes
     assert any("vehicle 4 from 5.0 to 9.0 s" in line for line in result.quality.lines())
 
 

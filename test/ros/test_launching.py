@@ -89,7 +89,7 @@ def test_the_nodes_that_are_started(tmp_path):
 def test_a_road_of_an_installed_package_can_be_named(monkeypatch):
     monkeypatch.setattr("scenario_gen.cli.launching.installed", lambda group: {"plaza": group})
     assert launched(log=LOG, road="plaza")
-    with pytest.raises(InputError, match=r"road:=nowhere: neither one of straight, .*, corridor, plaza nor a map_server"):
+    with pytest.raises(InputError, match=r"road:=nowhere: choose one of straight, .*, corridor, plaza, or give a map_server"):
         launched(log=LOG, road="nowhere")
 
 
@@ -113,15 +113,15 @@ def test_arguments_are_declared_as_the_nodes_declare_them():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"count": "abc"}, "count:=abc: .*int"),
+        ({"count": "abc"}, "count:=abc: .*whole number"),
         ({"count": "0"}, "count:=0: .*at least 1"),
         ({"seed": "1.5"}, "seed:=1.5"),
         ({"rate": "fast"}, "rate:=fast"),
         ({"encounter": "[1"}, r"encounter:=\[1"),
-        ({"road": "nowhere"}, "road:=nowhere: neither one of straight"),
+        ({"road": "nowhere"}, "road:=nowhere: choose one of straight"),
         ({"road": "no_such.yaml"}, "road:=no_such.yaml"),
-        ({"log": "no_such.csv"}, "log:=no_such.csv: there is no such file"),
-        ({"log": ""}, f"no log is named: give log:=FILE, or log:={LIVE}"),
+        ({"log": "no_such.csv"}, "log:=no_such.csv: it does not exist"),
+        ({"log": ""}, f"no log is given: write log:=FILE, or log:={LIVE}"),
         ({"starts": "1: 2 3"}, "starts"),
         ({"goals": "1: 2 3 x"}, "goals"),
         ({"log_level": "loud"}, "log_level:=loud: .*debug, info"),

@@ -47,7 +47,7 @@ class Reindexed:
 
     def lines(self) -> list[str]:
         """Return what was lost, where, and what can be done about it, line by line; no line if nothing was."""
-        lines = [f"{name} was not closed: what its recorder still held is not in it" for name in self.unclosed]
+        lines = [f"{name} was not closed: messages that its recorder had not written yet are missing" for name in self.unclosed]
         for name, gap in self.gaps:
             known = f", {gap.messages} messages by its index" if gap.messages else ""
             lines.append(f"lost: {name}, {gap.size} bytes from byte {gap.offset}{known} ({gap.problem})")

@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from itertools import count
 import json
 from pathlib import Path
 
@@ -68,6 +69,7 @@ def export_bag(
     *,
     namespace: str | None = None,
     indices: Collection[int] = (),
+    progress: Callable[[int, int], None] = lambda *_: None,
 ) -> Export:
     """Write the scenarios of a bag to a folder, in another format: the same bytes for the same bag.
 
@@ -79,6 +81,7 @@ def export_bag(
         config: what is read of the bag at most.
         namespace: only this one.
         indices: only scenarios of these, as in `scenarios/info`.
+        progress: called with the number of scenarios written, and of all.
 
     Raises:
         InputError: the bag cannot be read, or not what is asked for of it; `out` may not be replaced.
@@ -88,6 +91,7 @@ def export_bag(
     cases = read_cases(bag, export, config, namespace=namespace, indices=indices)
     notes: list[str] = []
     entries: list[dict[str, object]] = []
+    done, total = count(), sum(len(case.scenarios) for case in cases)
     with replaced_folder(out, EXPORTED, [bag]) as folder:
         for case in cases:
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
@@ -95,6 +99,7 @@ def export_bag(
             for name, data in to.shared(case).items():
                 (folder / name).write_bytes(data)
             for exported in case.scenarios:
+                progress(next(done), total)
                 try:
                     message = to.write(folder, case, exported, export)
                 except RefusedError as error:

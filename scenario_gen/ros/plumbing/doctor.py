@@ -45,6 +45,10 @@ class Finding:
     subject: str
     message: str
 
+    def line(self) -> str:
+        """Return the finding in one line."""
+        return f"{self.level:<8} {self.subject:<12} {self.message}"
+
 
 def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
     """Yield the findings, quick ones first; variables are those of `environment`, this process's if None."""
@@ -260,7 +264,7 @@ def main() -> int:
     """Print the findings; return 1 if one is an error."""
     worst = 0
     for finding in examine():
-        print(f"{finding.level:<8} {finding.subject:<12} {finding.message}", flush=True)
+        print(finding.line(), flush=True)
         worst |= finding.level == ERROR
     return worst
 
