@@ -36,8 +36,8 @@ def generate(
 
     Args:
         encounter: the template.
-        road: the target, of `build_road`, or the name or path that this takes; a template of right-hand traffic is mirrored on
-            a map of left-hand traffic, and the other way round.
+        road: the target, of `build_road`, the name or path that this takes, or "auto": the first built-in road that suits. A
+            template of right-hand traffic is mirrored on a map of left-hand traffic, and the other way round.
         config: the parameters of every stage.
         count: valid scenarios wanted.
         seed: of all randomness.

@@ -46,7 +46,8 @@ STAGES = {
     "evaluation": set(),
     "config": {"segmentation", "fitting", "routing", "validity", "sampling", "evaluation"},
     "attempt": {"config", "fitting", "routing", "sampling", "evaluation"},
-    "nearest": {"attempt", "segmentation", "fitting", "sampling"},
+    "suitable_roads": {"config", "segmentation", "fitting"},
+    "nearest": {"attempt", "segmentation", "fitting", "sampling", "suitable_roads"},
 }
 # Rooms and stages that others enter by their packages alone; behind the door stand what an extra brings, and what is slow.
 DOORS = {"types", "template", "roads", "logs", *(f"method.{stage}" for stage in STAGES)}

@@ -4,22 +4,24 @@
 """The nearest request that is possible: what an impossible one is answered with, each suggestion tried out before it is made."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, wraps
 from inspect import signature
+from itertools import islice
 from typing import ParamSpec
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError, ScenarioGenError
 from scenario_gen.method.attempt import Attempt
-from scenario_gen.method.fitting import fit_template, LostConflictError
+from scenario_gen.method.fitting import LostConflictError
 from scenario_gen.method.sampling import Cancelled, TargetError
 from scenario_gen.method.segmentation import segment
+from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road, suitable_roads, with_suitable_roads
 from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads import build_road, BUILT_IN, draw_route, footprint_fits, nearest_pose_with_room, road_and_template
+from scenario_gen.roads import draw_route, footprint_fits, nearest_pose_with_room, road_and_template
 from scenario_gen.template import footprint_gap
 from scenario_gen.types import ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
 
@@ -81,18 +83,25 @@ class ImpossibleError(RefusedError):
 
 
 def suggest_nearest(generate: Callable[P, GenerationResult]) -> Callable[P, GenerationResult]:
-    """Wrap `pipeline.generate`: what it refuses is answered with the nearest requests that are possible."""
+    """Wrap `pipeline.generate`: what it refuses is answered with what is possible; road "auto" is the first one that suits."""
 
     @wraps(generate)
     def answered(*args: P.args, **kwargs: P.kwargs) -> GenerationResult:
+        call = signature(generate).bind(*args, **kwargs)
+        call.apply_defaults()
+        config, request, count, seed = (call.arguments[name] for name in ("config", "request", "count", "seed"))
+        if isinstance(call.arguments["road"], str) and call.arguments["road"] == AUTO:
+
+            def on(road: str) -> GenerationResult:
+                call.arguments["road"] = road
+                return generate(*call.args, **call.kwargs)
+
+            return on_first_suitable_road(on, call.arguments["encounter"], config, seed)
         try:
             return generate(*args, **kwargs)
         except RefusedError as error:
-            call = signature(generate).bind(*args, **kwargs)
-            call.apply_defaults()
-            config, request, count, seed = (call.arguments[name] for name in ("config", "request", "count", "seed"))
-            if not request.moves and not isinstance(error, LostConflictError):
-                raise
+            if not request.moves and not isinstance(error, LostConflictError | TargetError):
+                raise with_suitable_roads(error, call.arguments["encounter"], call.arguments["road"], config, seed) from None
             road, encounter = road_and_template(call.arguments["road"], call.arguments["encounter"], config.road)
             segmentation = segment(encounter, config.segmentation, seed)
             with nearest_if_impossible(Attempt(encounter, segmentation, road, config, request, count, seed)):
@@ -126,16 +135,7 @@ def nearest_if_impossible(requested: Attempt, cancelled: Cancelled = lambda: Fal
 
 def roads_that_keep(requested: Attempt) -> list[str]:
     """Names of the built-in roads that the template fits with all its conflicts, two at most; else `corridor`, its own road."""
-    encounter, config = requested.encounter, requested.config
-    roads: list[str] = []
-    for name in BUILT_IN:
-        with suppress(RefusedError):
-            road = build_road(name, encounter, config.road)
-            fit_template(encounter, requested.segmentation, road, replace(config.fitting, allow=""))
-            roads.append(name)
-        if len(roads) == _NAMED:
-            break
-    return roads or ["corridor"]
+    return list(islice(suitable_roads(requested.encounter, requested.segmentation, requested.config), _NAMED)) or ["corridor"]
 
 
 class _Search:

@@ -4,7 +4,7 @@
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
 from scenario_gen.roads.arms import Arm, arms_of, reverse, ring_of, unused_arms
-from scenario_gen.roads.build import build_road, BUILT_IN, DrawRoad, road_and_template
+from scenario_gen.roads.build import build_road, BUILT_IN, DrawRoad, road_and_template, ROADS
 from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.roads.clearance import (
     clearance_field,
@@ -31,6 +31,7 @@ from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, fl
 __all__ = [
     "BUILT_IN",
     "CONTACT",
+    "ROADS",
     "Arm",
     "Course",
     "DrawRoad",

@@ -37,7 +37,13 @@ WITHOUT_UNITS = (  # mathematics of any quantity
 NOT_REPORTED = {"NotImplementedError", "AssertionError", "StopIteration", "KeyboardInterrupt", "SystemExit"}
 NO_UNIT = "no unit"
 Function = ast.FunctionDef | ast.AsyncFunctionDef
-UNDOCUMENTED = ("overload", "override", "app.command", "commands.command", "installation.command")  # or their docstring is the help of a command
+UNDOCUMENTED = (
+    "overload",
+    "override",
+    "app.command",
+    "commands.command",
+    "installation.command",
+)  # or their docstring is the help of a command
 
 
 def lacking(path: Path) -> Iterator[tuple[int, str, str]]:

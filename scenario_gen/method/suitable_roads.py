@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The built-in roads that take a template: one is chosen for `road="auto"`, and a refusal of a road names them."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.segmentation import segment
+from scenario_gen.roads import road_and_template, ROADS
+from scenario_gen.template import refuse_too_large
+from scenario_gen.types import Encounter, GenerationResult, Road, Segmentation
+
+AUTO = "auto"
+
+
+def takes(road: Road | str, encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> bool:
+    """Whether the template fits a road with all of its conflicts."""
+    try:
+        there, template = road_and_template(road, encounter, config.road)
+        fit_template(template, segmentation, there, replace(config.fitting, allow=""))
+    except (RefusedError, InputError):
+        return False
+    return True
+
+
+def suitable_roads(encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> Iterator[str]:
+    """Yield the names of the built-in roads that take the template; `corridor`, its own road, is the last."""
+    return (name for name in ROADS.built_in if takes(name, encounter, segmentation, config))
+
+
+def on_first_suitable_road(
+    generate: Callable[[str], GenerationResult], encounter: Encounter, config: PipelineConfig, seed: int
+) -> GenerationResult:
+    """Return what is generated on the first built-in road that takes the template; the result says which it is.
+
+    Raises:
+        RefusedError: the encounter is too large, or nothing can be generated on any of them.
+    """
+    refuse_too_large(encounter)
+    for name in suitable_roads(encounter, segment(encounter, config.segmentation, seed), config):
+        with suppress(RefusedError):
+            return _noted(generate(name), name)
+    raise RefusedError(f"{encounter.name}: no built-in road takes this encounter; give the path of a map")
+
+
+def with_suitable_roads(
+    error: RefusedError, encounter: Encounter, road: Road | str, config: PipelineConfig, seed: int
+) -> RefusedError:
+    """Return a refusal with the names of the built-in roads that take the template, if the road is why it was refused."""
+    with suppress(RefusedError):
+        refuse_too_large(encounter)
+        segmentation = segment(encounter, config.segmentation, seed)
+        if not takes(road, encounter, segmentation, config):
+            names = ", ".join(suitable_roads(encounter, segmentation, config))
+            return RefusedError(f"{error}. Roads that take it: {names}" if names else str(error))
+    return error
+
+
+def _noted(result: GenerationResult, name: str) -> GenerationResult:
+    """Return a result that says which road was chosen."""
+    note = f"road auto: {name}, the first built-in road that keeps all conflicts of the template"
+    return replace(result, generated=replace(result.generated, adaptations=(note, *result.generated.adaptations)))

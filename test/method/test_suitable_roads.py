@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which built-in roads take a template: `road="auto"`, and what a refusal names."""
+
+from pathlib import Path
+
+import pytest
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.logs import read_log
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.suitable_roads import suitable_roads
+from scenario_gen.pipeline import generate, PipelineConfig
+
+LOG = Path(__file__).resolve().parents[2] / "examples" / "my_log.csv"
+
+
+@pytest.fixture(scope="module")
+def crossing():
+    """The log that the README starts with: a plain crossing of two vehicles."""
+    (encounter,) = read_log([LOG]).encounters
+    return encounter
+
+
+def test_auto_takes_the_first_road_that_keeps_the_conflict_and_says_so(crossing):
+    result = generate(crossing, "auto", count=2, seed=7)
+    assert result.road.name == "four_way" and len(result.generated.scenarios) == 2
+    assert result.generated.adaptations[0].startswith("road auto: four_way")
+    plain = generate(crossing, "four_way", count=2, seed=7)
+    assert all(
+        (a.position == b.position).all() for a, b in zip(plain.generated.scenarios, result.generated.scenarios, strict=True)
+    )
+
+
+def test_a_refusal_names_the_roads_that_suit_without_a_chain_of_errors(crossing):
+    config = PipelineConfig()
+    names = list(suitable_roads(crossing, segment(crossing, config.segmentation, 7), config))
+    assert "four_way" in names and names[-1] == "corridor" and "t_intersection" not in names
+    with pytest.raises(RefusedError, match=f"choose another road. Roads that take it: {', '.join(names)}$") as caught:
+        generate(crossing, "t_intersection", count=2, seed=7)
+    assert caught.value.__suppress_context__ and caught.value.__cause__ is None
