@@ -166,9 +166,9 @@ def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int =
         say(table)
         return
     for row in rows:
-        say(", ".join(row[:names]), wrap=True)
-        pairs = [f"{name} {text}" for name, text in zip(columns[names:], row[names:], strict=True) if text]
-        say("  " + "  ".join(pairs), wrap=True)
+        pairs = [f"{name} {text}" for name, text in zip(columns, row, strict=True) if text]
+        say(", ".join(pairs[:names]), wrap=True)
+        say("  " + ", ".join(pairs[names:]), wrap=True)
 
 
 def bars() -> AbstractContextManager[Callable[[str, int, int], None]]:

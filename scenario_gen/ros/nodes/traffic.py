@@ -215,7 +215,7 @@ class Traffic(Node):  # type: ignore[misc]
             write_verdicts(Path(self.config.results), self.outcomes, f"{self.get_name()} over ROS 2", self.config.drive)
         if self._at + 1 < len(self._trials):
             if not self.config.follow_on:
-                self.get_logger().info(f"scenario {self._trials[self._at + 1].name} waits for a call of {self._service('next')}")
+                self.get_logger().info(f"the next scenario waits for a call of {self.get_fully_qualified_name()}/next")
             elif self.config.lock_step:
                 self._load_at = monotonic() + FOLLOWS_ON
             else:
@@ -225,10 +225,6 @@ class Traffic(Node):  # type: ignore[misc]
             self.get_logger().info(
                 f"that was the last scenario of {self.config.bag}: {passed} of {len(self.outcomes)} drives passed"
             )
-
-    def _service(self, name: str) -> str:
-        """Return the full name of a service of this node."""
-        return f"{self.get_fully_qualified_name()}/{name}"
 
     async def _serve_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Go one step, with a command that came after the one before; after the patience, without one."""
@@ -315,11 +311,6 @@ class Traffic(Node):  # type: ignore[misc]
         """Whether the topic has subscribers; messages that are slow to encode are left out without."""
         return int(self._out[topic].get_subscription_count()) > 0
 
-    def _over(self) -> str:
-        """Return the verdict of a drive that is over, and what the next one waits for; "" while it is driven."""
-        waits = self._verdict and not self.config.follow_on and self._at + 1 < len(self._trials)
-        return f"{self._verdict}; the next scenario waits for {self._service('next')}" if waits else self._verdict
-
     def _report_status(self, level: Level, message: str, subject: str) -> None:
         self.diagnostics.status(level, message, subject, {}, log=False)
 
@@ -330,7 +321,8 @@ class Traffic(Node):  # type: ignore[misc]
             self._report_status(Level.WARN, f"there is no scenario yet{waiting}", "driving")
             return
         state, trial = self._states[-1], self._trials[self._at]
-        doing = self._over() or ("paused" if self._paused else "waiting for the ego" if self._waits_for_ego else "driving")
+        over = f"{self._verdict}; ~/next begins the next scenario" if self._verdict else ""
+        doing = over or ("paused" if self._paused else "waiting for the ego" if self._waits_for_ego else "driving")
         self._report_status(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
         if self._waits_for_ego and not self._verdict:
             self._publish_state()  # for planners that started late

@@ -197,4 +197,4 @@ def test_a_log_and_a_road_are_searched_as_the_bag_made_of_them(bag, tmp_path):
     refused = runner.invoke(
         app, ["search", str(LOG), "--road", ROAD, "--encounter", "none", *words, "--out", str(tmp_path / "b")]
     )
-    assert isinstance(refused.exception, InputError) and "no encounter 'none'" in str(refused.exception)
+    assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(refused.exception)
