@@ -265,7 +265,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag,
     over_dds, in_process = (json.loads((tmp_path / out / "drives.json").read_text()) for out in ("over_dds", "in_process"))
     assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
     for command, said in (
-        (f"{sys.executable} -c 'print(7)'", "it ended with code 0; it said: 7"),
+        (f"{sys.executable} -c 'print(7)'", "ended with code 0; its last output: 7"),
         ("no_such_program", "No such"),
     ):
         refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", command])
