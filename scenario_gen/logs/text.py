@@ -47,7 +47,7 @@ def layout_of(path: Path) -> Layout:
     if separator not in header and len(header.split()) > 1:
         separator = r"\s+"
     names = re.split(separator if separator == r"\s+" else re.escape(separator), header.strip())
-    if sum(NUMBER.fullmatch(name.strip()) is not None for name in names) > len(names) / 2:
+    if len([name for name in names if NUMBER.fullmatch(name.strip())]) > len(names) / 2:
         raise InputError(f"{path}: line 1 has numbers instead of column names; put a line such as {EXAMPLE} above it")
     has_comma = separator != "," and any(
         WITH_COMMA.fullmatch(field.strip()) for line in lines for field in re.split(separator.replace("|", r"\|"), line)

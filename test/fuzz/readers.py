@@ -46,6 +46,7 @@ OF_TARGETS = {
     "message_fit": ("fits.py",),
 }
 OWN = {  # modules that parse, but no file that a user is given by others, and why that is so
+    "cli/bags.py": "figures that it has just computed",
     "cli/launching.py": "parameter files, through `documents`",
     "cli/suite.py": "what its own processes write",
     "corpus/batch.py": "its own notes in its own folder, through `documents`",

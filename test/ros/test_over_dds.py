@@ -98,7 +98,7 @@ def test_concurrent_requests_get_their_own_answers(suite, client):
 def test_bad_requests_are_refused_with_a_reason_and_the_next_one_is_served(suite, client):
     client.hear("/scenarios/info")
     client.wait("/scenarios/info", 5)
-    for values, reason in (({"count": -1}, "count"), ({"no_such": 1}, "no_such"), ({"count": "many"}, "type int")):
+    for values, reason in (({"count": -1}, "count"), ({"no_such": 1}, "no_such"), ({"count": "many"}, "whole number")):
         future = _generate(client, **values)
         client.until(future.done, "an answer")
         assert not future.result().result.successful

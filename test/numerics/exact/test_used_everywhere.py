@@ -36,6 +36,7 @@ COUNTS = {  # sum() of whole numbers
     "scenario_gen/logs/parquet.py",
     "scenario_gen/ros/nodes/evaluator.py",
     "scenario_gen/bags/storage/bag.py",
+    "scenario_gen/cli/output.py",
     "scenario_gen/closed_loop/bounded.py",
     "scenario_gen/closed_loop/reacting.py",
     "scenario_gen/closed_loop/results.py",
