@@ -105,6 +105,9 @@ class Encounter(Tracks):
     Its attributes are those of `Tracks`.
     """
 
+    def __repr__(self) -> str:
+        return f"Encounter({self.name!r}, {len(self.vehicles)} vehicles, {self.duration:.1f} s)"
+
     def __post_init__(self) -> None:
         n, t = np.shape(self.speed)
         if n < 2 or t < 2:

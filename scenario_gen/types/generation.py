@@ -3,10 +3,10 @@
 
 """What one generation came to."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.coverage import Coverage
@@ -16,8 +16,11 @@ from scenario_gen.types.fit import Fit
 from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import Scenario, ScenarioSet
+from scenario_gen.types.scenario import dataframe, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 WITH, WITHOUT, UNIFORM, ORACLE = "with changepoints", "without changepoints", "uniform changepoints", "oracle"
 NARROW = "with changepoints, narrow"
@@ -67,6 +70,24 @@ class GenerationResult:
     valid: int | None = None
     coverage: Coverage | None = None
     apart: str = ""
+
+    def __repr__(self) -> str:
+        road = self.road.name if self.road is not None else "no road"
+        vehicles = f"{len(self.encounter.vehicles)} vehicles, {self.encounter.duration:.1f} s"
+        return f"GenerationResult({len(self)} of {self.generated.candidates} candidates, {road}, {vehicles}, seed {self.seed})"
+
+    def __len__(self) -> int:
+        return len(self.generated)
+
+    def __iter__(self) -> Iterator[Scenario]:
+        return iter(self.generated)
+
+    def __getitem__(self, k: int) -> Scenario:
+        return self.generated[k]
+
+    def to_dataframe(self) -> "DataFrame":
+        """Return all scenarios as one table: a row for each scenario, vehicle and instant; columns as `Scenario.to_dataframe`."""
+        return dataframe(self)
 
     @property
     def compared(self) -> tuple[str, ...]:

@@ -61,6 +61,10 @@ class Road:
                 f"road {self.name!r} has origin {self.origin}; at most {FARTHEST:g} m from the frame's origin are read"
             )
 
+    def __repr__(self) -> str:
+        height, width = (self.resolution * cells for cells in self.drivable.shape)
+        return f"Road({self.name!r}, {width:g} x {height:g} m)"
+
     @cached_property
     def cleared(self) -> "Road":
         """The same road with nothing in the way; itself, if nothing is."""

@@ -4,9 +4,10 @@
 """A scenario: what is generated, checked and published."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 FACTS = ("weight", "target.", "order", "passing_order", "reactions", "search.")
 """How the names of a scenario's facts begin."""
@@ -64,6 +68,9 @@ class Scenario:
         for name in ("position", "speed", "acceleration"):
             freeze(self, **{name: held(frozen(getattr(self, name)), present)})
 
+    def __repr__(self) -> str:
+        return f"Scenario({self.index}, {len(self.vehicles)} vehicles, {self.time[-1]:.1f} s)"
+
     @property
     def all_present(self) -> bool:
         """Whether every vehicle is there throughout."""
@@ -73,6 +80,39 @@ class Scenario:
     def there(self) -> Bools:
         """(N, T) whether each vehicle is there at each instant."""
         return mask(self.present, len(self.time))
+
+    def to_dataframe(self) -> "DataFrame":
+        """Return a row for each vehicle and instant at which it is there.
+
+        Columns: scenario (its index), vehicle (id), time [s], x, y [m], heading [rad], speed [m/s], acceleration [m/s²].
+        """
+        return dataframe([self])
+
+
+def dataframe(scenarios: Iterable[Scenario]) -> "DataFrame":
+    """Return scenarios as one table, as `Scenario.to_dataframe` does."""
+    import pandas as pd
+
+    tables = []
+    for scenario in scenarios:
+        n, at = np.nonzero(scenario.there)
+        ids = np.array([vehicle.id for vehicle in scenario.vehicles], dtype=object)
+        tables.append(
+            pd.DataFrame(
+                {
+                    "scenario": scenario.index,
+                    "vehicle": ids[n],
+                    "time": scenario.time[at],
+                    "x": scenario.position[n, at, 0],
+                    "y": scenario.position[n, at, 1],
+                    "heading": scenario.heading[n, at],
+                    "speed": scenario.speed[n, at],
+                    "acceleration": scenario.acceleration[n, at],
+                }
+            )
+        )
+    names = ("scenario", "vehicle", "time", "x", "y", "heading", "speed", "acceleration")
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +221,18 @@ class ScenarioSet:
     chosen: int = 0
     reactions: tuple[Reaction, ...] = ()
     graph: ReactionGraph | None = None
+
+    def __repr__(self) -> str:
+        return f"ScenarioSet({len(self.scenarios)} of {self.candidates} candidates)"
+
+    def __len__(self) -> int:
+        return len(self.scenarios)
+
+    def __iter__(self) -> Iterator[Scenario]:
+        return iter(self.scenarios)
+
+    def __getitem__(self, k: int) -> Scenario:
+        return self.scenarios[k]
 
     @property
     def acceptance(self) -> float:

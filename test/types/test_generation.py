@@ -5,12 +5,13 @@
 
 from dataclasses import replace
 
+from bag_examples import hand_made_run
 import numpy as np
 import pytest
 
 from scenario_gen.types.evaluation import Evaluation, Interval, Row
 from scenario_gen.types.generation import GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
-from scenario_gen.types.scenario import ScenarioSet
+from scenario_gen.types.scenario import dataframe, ScenarioSet
 
 
 def result(**figures):
@@ -61,3 +62,18 @@ def test_what_was_asked_of_the_delivered_set_alone_takes_it_out_of_the_compariso
     assert list(similar["compared"]) == [WITH] and list(similar["beside"]) == [WITHOUT, UNIFORM, NARROW, ORACLE]
     assert similar["best"] == {}
     assert similar["said"] == ["nothing is compared: only the delivered set was drawn with target as asked"]
+
+
+def test_results_are_counted_indexed_and_made_a_table():
+    """A row for each scenario, vehicle and instant at which it is there; short representations."""
+    result = hand_made_run()
+    assert len(result) == len(list(result)) == len(result.generated.scenarios) and result[1] is result.generated.scenarios[1]
+    table = result.to_dataframe()
+    assert len(table) == sum(int(scenario.there.sum()) for scenario in result)
+    assert list(table.columns) == ["scenario", "vehicle", "time", "x", "y", "heading", "speed", "acceleration"]
+    first = result[0]
+    own = table[(table.scenario == first.index) & (table.vehicle == first.vehicles[0].id)]
+    assert (own[["x", "y"]].to_numpy() == first.position[0][first.there[0]]).all()
+    assert list(dataframe([]).columns) == list(table.columns)
+    for thing in (result, result.generated, first, result.encounter, result.road):
+        assert len(repr(thing)) < 120 and repr(thing).startswith(type(thing).__name__)
