@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The code that pages show runs: README, tutorial, and the how-to on data; the table of columns is the code's."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from source_files import ROOT
+
+from scenario_gen.logs.columns import NAMES, UNITS
+
+FAILS = "my_planner:MyPlanner"  # the tutorial's bad planner: the command's exit code is 1
+
+
+def blocks(page):
+    """Return (language, text) of each block of code."""
+    return re.findall(r"^```(sh|python)\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+
+
+def run(command, folder):
+    """Run a command in a folder, with this tree's package and modules of the folder."""
+    paths = os.pathsep.join([str(ROOT), str(folder)])
+    return subprocess.run(
+        command, check=False, cwd=folder, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True
+    )
+
+
+@pytest.mark.parametrize("page", ["docs/tutorial.md", "docs/howto_data.md"])
+def test_commands_of_a_page_run(page, tmp_path):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for language, text in blocks(page):
+        if language == "python":
+            (tmp_path / text.partition("\n")[0].removeprefix("# ")).write_text(text)
+            continue
+        for line in text.splitlines():
+            if line.startswith("scenario-gen "):
+                done = run([sys.executable, "-m", "scenario_gen", *line.split()[1:]], tmp_path)
+                assert done.returncode == int(FAILS in line), (line, done.stdout, done.stderr)
+
+
+def test_python_of_the_readme_runs(tmp_path):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    code = "\n".join(text for language, text in blocks("README.md") if language == "python")
+    done = run([sys.executable, "-c", code], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+def test_the_table_of_columns_is_the_code_s():
+    rows = re.findall(r"^\| (\w+) \| (`.*?) \| (.*?) \|$", (ROOT / "docs" / "columns.md").read_text(), re.MULTILINE)
+    shown = {quantity: tuple(tuple(re.findall(r"`(\w+)`", cell)) for cell in cells) for quantity, *cells in rows}
+    assert shown == {quantity: (names, tuple(UNITS[quantity])) for quantity, names in NAMES.items()}
