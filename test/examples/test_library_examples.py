@@ -8,7 +8,11 @@ from pathlib import Path
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+
+from benchmarks._driving_worlds import draw_scenario
+from scenario_gen.closed_loop.trials import Trial
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -38,3 +42,19 @@ def test_the_notebook_was_executed_and_runs(name, pictures, capsys):
         assert capsys.readouterr().out == shown, "execute the notebook again"
     pyplot.close("all")
     assert sum("image/png" in output.get("data", {}) for cell in cells for output in cell["outputs"]) == pictures
+
+
+def test_the_notebook_of_drive_env_was_executed_without_errors():
+    """Its training takes minutes, and stable-baselines3 is not in the locks: so it is not run here."""
+    cells = [cell for cell in json.loads((EXAMPLES / "drive_env.ipynb").read_text())["cells"] if cell["cell_type"] == "code"]
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    assert not [output for cell in cells for output in cell["outputs"] if output["output_type"] == "error"]
+    namespace = {}
+    for cell in cells:
+        code = "".join(cell["source"])
+        if "class Speed" in code:
+            exec(compile(code.partition("\nprint(")[0], "drive_env.ipynb", "exec"), namespace)
+    env = namespace["make"]([Trial("1", draw_scenario(1), 0, None)])
+    env.reset(seed=1)
+    seen, reward, *_ = env.step(np.zeros(1, dtype=np.float32))
+    assert env.observation_space.contains(seen) and reward >= -20.0
