@@ -5,7 +5,7 @@
 
 Sources: nuPlan's closed-loop score (Karnchanachari et al. 2024, "Towards learning-based planning: the nuPlan benchmark", and the
 metric configurations of nuplan-devkit 1.2); NAVSIM's predictive driver model score, PDMS (Dauner et al. 2024, "NAVSIM:
-data-driven non-reactive autonomous vehicle simulation and benchmarking"). Both multiply what must hold and weigh the rest:
+data-driven non-reactive autonomous vehicle simulation and benchmarking"). Both multiply what must hold and weigh the rest::
 
     nuPlan:  no at-fault collision · drivable area · driving direction · making progress
              · (5 TTC + 5 progress + 4 speed limit + 2 comfort) / 16
