@@ -45,6 +45,7 @@ def main() -> None:
             figure.savefig(PICTURES / f"{case}_{name}.png", dpi=70)
             pyplot.close(figure)
             words = "; ".join(told(result))
+            words = words[:1].upper() + words[1:]
             place = f"scenario_gen/resources/{log.name}"
             picture = f"![{len(result.generated.scenarios)} scenarios]({PICTURES.name}/{case}_{name}.png)"
             parts.append(
@@ -56,7 +57,7 @@ def main() -> None:
 
 def told(result: GenerationResult) -> list[str]:
     """Return who reacts to whom, in words."""
-    return [str(sentence) for sentence in result.reacting["sentences"]] or ["Nobody reacts to anybody"]
+    return [str(sentence) for sentence in result.reacting["sentences"]] or ["No vehicle is seen to react to another"]
 
 
 if __name__ == "__main__":

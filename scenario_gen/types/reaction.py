@@ -98,7 +98,7 @@ class ReactionGraph:
         free = "" if kept is None else ": the scenarios are not held to it"
         sentences = [edge.words(ids) if edge in (kept or ()) else f"{edge.words(ids)}{free}" for edge in self.edges]
         sentences += [f"{edge.words(ids)}: left out, for it closes a circle of reactions" for edge in self.cut]
-        return tuple(sentences) or ("nobody is seen to react to anybody",)
+        return tuple(sentences) or ("no vehicle is seen to react to another",)
 
     def document(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> dict[str, Any]:
         """Return the graph as a document: edges, those that were cut, sentences; and of each edge whether it is `kept`."""

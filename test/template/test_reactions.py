@@ -50,7 +50,7 @@ def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
 def test_who_leaves_long_after_waits_for_something_else():
     graph = reactions_of(crossing(14.0))
     assert graph.edges == ()
-    assert graph.sentences(("1", "2")) == ("nobody is seen to react to anybody",)
+    assert graph.sentences(("1", "2")) == ("no vehicle is seen to react to another",)
 
 
 def edge(who, whom, confidence):
