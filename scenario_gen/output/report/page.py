@@ -97,6 +97,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "rate": len(case.segmentation.changepoints) / duration,
         "errors": {key: _errors(case, key) for key in ERRORS},
         "best": {key: case.best(key) for key in ERRORS},
+        "verdict": _in_words(case),
         "reactions": case.reacting,
         "not_kept": case.lost_reactions,
         "outdone": case.similarity()["said"],
@@ -122,6 +123,14 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "lost": case.lost,
         "planned": routes_in_words(case.routes),
     }
+
+
+def _in_words(case: GenerationResult) -> str:
+    """Return what the set is: how many are valid, who reacts to whom, who goes first."""
+    orders = case.coverage.orders if case.coverage is not None else {}
+    first = f"{len(orders)} orders at the conflicts" if len(orders) > 1 else ""
+    kept = "; ".join(case.reacting["sentences"])
+    return "; ".join(filter(None, [f"{case.published} of {case.generated.requested} scenarios are valid", kept, first]))
 
 
 def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
