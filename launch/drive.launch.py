@@ -11,46 +11,31 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from scenario_gen.cli.launching import declared, DriveArguments, read_drive, refuse_misspelt
+
 SHARE = Path(get_package_share_directory("scenario_gen"))
-ARGUMENTS = {
-    "bag": ("", "bag with scenarios; empty: live from the topics scenarios and map"),
-    "ego": ("", "id of the vehicle in whose place the ego drives; empty: the first"),
-    "index": ("0", "number of the first scenario, from 0"),
-    "policy": ("reactive", "reactive or replay"),
-    "rate": ("1.0", "how many times as fast as real time"),
-    "lock_step": ("false", "one step for each call of traffic/step"),
-    "step": ("0.1", "seconds of a step"),
-    "results": ("", "folder for drives.json and junit.xml"),
-    "namespace": ("", "of the node"),
-    "params": ("", "a parameter file, read first"),
-    "rviz": ("false", "start RViz, too"),
-}
 IN_DRIVE = ("policy", "step")  # parameters of the drive, named drive.…
-NUMBERS = {"index": int, "rate": float, "step": float}
+OF_NODE = ("bag", "ego", "index", "policy", "rate", "lock_step", "step", "results")
 
 
-def drive(context):
-    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
-    values = {}
-    for name in ("bag", "ego", "index", "policy", "rate", "lock_step", "step", "results"):
-        value = given[name]
-        if name in NUMBERS:
-            value = NUMBERS[name](value)
-        elif name == "lock_step":
-            value = value.lower() in ("true", "1", "yes")
-        values[f"drive.{name}" if name in IN_DRIVE else name] = value
-    files = [given["params"]] if given["params"] else []
+def drive(context, given):
+    """Return the processes; whatever is wrong with an argument is said before there is one."""
+    arguments = read_drive(
+        {name: LaunchConfiguration(name).perform(context) for name in declared(DriveArguments) if name in given}
+    )
+    values = {f"drive.{name}" if name in IN_DRIVE else name: getattr(arguments, name) for name in OF_NODE if name in given}
+    files = [arguments.params] if arguments.params else []
     started = [
         Node(
             package="scenario_gen",
             executable="traffic",
             name="traffic",
-            namespace=given["namespace"],
+            namespace=arguments.namespace,
             parameters=[*files, values],
             output="screen",
         )
     ]
-    if given["rviz"].lower() in ("true", "1", "yes"):
+    if arguments.rviz:
         started.append(
             Node(
                 package="rviz2",
@@ -63,7 +48,16 @@ def drive(context):
 
 
 def generate_launch_description():
-    declared = [
-        DeclareLaunchArgument(name, default_value=default, description=text) for name, (default, text) in ARGUMENTS.items()
+    given = set()
+
+    def begin(context):
+        given.update(getattr(context, "launch_configurations", context))  # what the command line says, before any default
+        refuse_misspelt(given, DriveArguments)
+
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=text)
+        for name, (default, text) in declared(DriveArguments).items()
     ]
-    return LaunchDescription([*declared, OpaqueFunction(function=drive)])
+    return LaunchDescription(
+        [OpaqueFunction(function=begin), *arguments, OpaqueFunction(function=lambda context: drive(context, given))]
+    )

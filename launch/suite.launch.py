@@ -11,15 +11,14 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from scenario_gen.cli.launching import descriptions, read_arguments
+from scenario_gen.cli.launching import declared, NODES, read_arguments, refuse_misspelt
 
 SHARE = Path(get_package_share_directory("scenario_gen"))
-NODES = ("recorder", "road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_player")  # who listens comes first
 
 
-def suite(context):
+def suite(context, given):
     """Return the processes; whatever is wrong with an argument is said before there is one."""
-    launch = read_arguments({name: LaunchConfiguration(name).perform(context) for name in descriptions()})
+    launch = read_arguments({name: LaunchConfiguration(name).perform(context) for name in declared() if name in given})
     arguments = launch.arguments
     common = {
         "package": "scenario_gen",
@@ -32,7 +31,8 @@ def suite(context):
     if arguments.composed:  # without a name, for it would be that of every node in the process
         started = [Node(executable="suite", respawn=arguments.respawn, **common)]
     else:
-        started = [Node(executable=name, name=name, respawn=arguments.respawn, **common) for name in NODES[1:]]
+        names = [name for name in NODES[1:] if name not in launch.left_out]
+        started = [Node(executable=name, name=name, respawn=arguments.respawn, **common) for name in names]
         if launch.records:  # a bag is begun once
             started.insert(0, Node(executable=NODES[0], name=NODES[0], **common))
     if arguments.rviz:
@@ -47,5 +47,15 @@ def suite(context):
 
 
 def generate_launch_description():
-    declared = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in descriptions().items()]
-    return LaunchDescription([*declared, OpaqueFunction(function=suite)])
+    given = set()
+
+    def begin(context):
+        given.update(getattr(context, "launch_configurations", context))  # what the command line says, before any default
+        refuse_misspelt(given)
+
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=text) for name, (default, text) in declared().items()
+    ]
+    return LaunchDescription(
+        [OpaqueFunction(function=begin), *arguments, OpaqueFunction(function=lambda context: suite(context, given))]
+    )

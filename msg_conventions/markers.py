@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""visualization_msgs/Marker, written field by field: lines and boxes that RViz and Foxglove draw."""
+"""visualization_msgs/Marker, written field by field: lines, boxes and texts that RViz and Foxglove draw."""
 
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ from scenario_gen.numerics import Floats
 
 TYPE = "visualization_msgs/msg/Marker"
 ARRAY_TYPE = "visualization_msgs/msg/MarkerArray"
-CUBE, LINE_STRIP, LINE_LIST = 1, 4, 5  # types
+CUBE, LINE_STRIP, LINE_LIST, TEXT = 1, 4, 5, 9  # types; a text faces who looks, its scale's last number is its height
 ADD, DELETE, DELETE_ALL = 0, 2, 3  # actions
 
 
@@ -29,7 +29,7 @@ class Marker:
         scale: length, width, height of a box, or the width of a line first [m].
         colour: red, green, blue, alpha, from 0 to 1.
         points: (P, 2) [m] of lines.
-        text: for programs.
+        text: of a text; of others for programs.
     """
 
     name: str

@@ -69,6 +69,7 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "scenarios": (trajectory.TYPE, MANY),
     "scenarios/info": (diagnostics.TYPE, MANY),
     "markers": (markers.ARRAY_TYPE, LATCHED),
+    "preview": (markers.ARRAY_TYPE, LIVE),
     "report": (diagnostics.TYPE, LATCHED),
     "diagnostics": (diagnostics.TYPE, Quality(depth=100)),  # in a bag written without nodes: one message, which is latched
     "/diagnostics": (diagnostics.TYPE, Quality(depth=100, transient_local=False)),  # all is repeated every second

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Long work off the executor's thread: one thread per node, jobs in order, a newer job replaces a waiting one of its name."""
+"""Long work off the executor's thread: jobs in order, a newer job replaces a waiting one of its name."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -29,7 +29,7 @@ def stop_if_abandoned() -> None:
 
 
 class Worker:
-    """Runs jobs one after the other; each gets a function that says whether it has been cancelled.
+    """Runs jobs in the order in which they came; each gets a function that says whether it has been cancelled.
 
     A job that is cancelled before its turn still runs, at once, so that it can answer whoever waits for it: it looks first. So
     does one that comes when too many wait. A job that takes long asks `stop_if_cancelled` now and then.
@@ -40,16 +40,24 @@ class Worker:
         failed: Callable[[str, BaseException], None],
         owner: str = "node",
         done: Callable[[str], None] = lambda _: None,
+        threads: int = 1,
     ) -> None:
-        """Start the thread, named after its `owner`; `failed` gets a job's name and what it raised, `done` another's name."""
+        """Start the threads, one for each job at a time.
+
+        Args:
+            failed: gets a job's name and what it raised.
+            owner: after whom the threads are named.
+            done: gets the name of a job that has ended well.
+            threads: how many jobs run at a time; never two of one name.
+        """
         self._failed, self._done = failed, done
         self._waiting: OrderedDict[str, tuple[Job, threading.Event]] = OrderedDict()
-        self._running: tuple[str, threading.Event] | None = None
-        self._began = 0.0
+        self._running: dict[str, tuple[threading.Event, float]] = {}  # since when
         self._changed = threading.Condition()
         self.closed = False
-        self._thread = threading.Thread(target=self._run, daemon=True, name=f"worker of {owner}")
-        self._thread.start()
+        self._threads = [threading.Thread(target=self._run, daemon=True, name=f"worker of {owner}") for _ in range(threads)]
+        for thread in self._threads:
+            thread.start()
 
     def submit(self, name: str, job: Job) -> None:
         """Queue a job; one of the same name that still waits is replaced, one that runs is cancelled."""
@@ -58,60 +66,70 @@ class Worker:
             full = len(self._waiting) >= MOST_WAITING
             if not full:
                 self._waiting[name] = (job, threading.Event())
-                if self._running is not None and self._running[0] == name:
-                    self._running[1].set()
+                if name in self._running:
+                    self._running[name][0].set()
                 self._changed.notify()
         if full:
             self._failed(name, RefusedError(f"{MOST_WAITING} jobs wait already; ask again when some are done"))
             self._do(name, job, lambda: True)
 
     def cancel(self, only: str | None = None) -> list[str]:
-        """Cancel the running job and the waiting ones, or those of one name; return their names, the running one first.
+        """Cancel the running jobs and the waiting ones, or those of one name; return their names, the running ones first.
 
         Those that wait answer at once, on this thread, and not only when it would be their turn.
         """
         with self._changed:
-            running = [self._running] if self._running and only in (None, self._running[0]) else []
-            for _, cancelled in running:
-                cancelled.set()
+            running = [name for name in self._running if only in (None, name)]
+            for name in running:
+                self._running[name][0].set()
             waiting = [(name, self._waiting.pop(name)[0]) for name in list(self._waiting) if only in (None, name)]
         for name, job in waiting:
             self._do(name, job, lambda: True)
-        return [name for name, _ in running] + [name for name, _ in waiting]
+        return running + [name for name, _ in waiting]
 
     def account(self) -> dict[str, str]:
-        """Return what runs, for how many seconds, and how many jobs wait; nothing if none does."""
+        """Return what runs, for how many seconds (the longest), and how many jobs wait; nothing if none does."""
         with self._changed:
-            if self._running is None:
+            if not self._running:
                 return {}
+            began = min(since for _, since in self._running.values())
             return {
-                "job": self._running[0],
-                "seconds": f"{monotonic() - self._began:.0f}",
+                "job": ", ".join(self._running),
+                "seconds": f"{monotonic() - began:.0f}",
                 "waiting": str(len(self._waiting)),
             }
 
     def close(self, timeout: float = 0.5) -> None:
-        """Cancel everything and end the thread; a job that does not listen is abandoned after `timeout` seconds.
+        """Cancel everything and end the threads; a job that does not listen is abandoned after `timeout` seconds.
 
         What it still does has no effect: see `stop_if_abandoned`.
         """
         self.cancel()
         with self._changed:
             self.closed = True
-            self._changed.notify()
-        self._thread.join(timeout)
+            self._changed.notify_all()
+        deadline = monotonic() + timeout
+        for thread in self._threads:
+            thread.join(max(0.0, deadline - monotonic()))
+
+    def _next(self) -> str | None:
+        """Return the name of the first job that waits, and of whose name none runs."""
+        return next((name for name in self._waiting if name not in self._running), None)
 
     def _run(self) -> None:
         _own.worker = self
         while True:
             with self._changed:
-                self._running = None
-                self._changed.wait_for(lambda: self.closed or bool(self._waiting))
-                if not self._waiting:
+                self._changed.wait_for(lambda: self.closed or self._next() is not None)
+                name = self._next()
+                if name is None:
                     return
-                name, (job, cancelled) = self._waiting.popitem(last=False)
-                self._running, self._began = (name, cancelled), monotonic()
+                job, cancelled = self._waiting.pop(name)
+                self._running[name] = (cancelled, monotonic())
             self._do(name, job, cancelled.is_set)
+            with self._changed:
+                del self._running[name]
+                self._changed.notify()
 
     def _do(self, name: str, job: Job, cancelled: Callable[[], bool]) -> None:
         with suppress(CancelledError):  # nobody waits for it

@@ -54,3 +54,36 @@ def test_a_newer_job_ends_the_running_one_of_its_name_and_nobody_is_told():
     worker.close(60.0)
     assert done == [False] and failures == []
     assert issubclass(CancelledError, ScenarioGenError)
+
+
+def test_two_threads_run_jobs_of_two_names_at_a_time_and_never_two_of_one():
+    """Of three jobs, two of one name, the second of that name waits though a thread is free."""
+    worker = Worker(lambda *_: None, threads=2)
+    running, most, both = [], [], threading.Event()
+    lock = threading.Lock()
+
+    def job(name, until):
+        def run(cancelled):
+            with lock:
+                running.append(name)
+                most.append(sorted(running))
+            if len(most) == 2:
+                both.set()
+            until(cancelled)
+            with lock:
+                running.remove(name)
+
+        return run
+
+    def patient(cancelled):
+        while not cancelled():
+            both.wait(0.01)
+
+    worker.submit("a", job("a", patient))
+    worker.submit("b", job("b", lambda _: both.wait(60.0)))
+    assert both.wait(60.0) and most[1] == ["a", "b"]
+    ended = threading.Event()
+    worker.submit("a", job("a", lambda _: ended.set()))  # cancels the first, and waits for its end
+    assert ended.wait(60.0)
+    worker.close(60.0)
+    assert all(names.count("a") <= 1 for names in most) and running == []

@@ -18,10 +18,10 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
-from scenario_gen.cli.launching import ENTRIES, LIVE, OF_LAUNCH, OTHER_NAMES, ROADS
+from scenario_gen.cli.launching import declared, ENTRIES, LIVE, OF_LAUNCH, OTHER_NAMES, ROADS
 from scenario_gen.roads import BUILT_IN
 
-SUITE = ("road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_player")
+SUITE = ("road_server", "segmenter", "planner", "gp_sampler", "evaluator", "preview", "log_player")
 LOG = str(RESOURCES / "synthetic_c")
 
 
@@ -56,9 +56,10 @@ def launched(file: str = "suite.launch.py", **arguments: str) -> list[SimpleName
         scope: dict[str, object] = {}
         exec(compile(source, file, "exec"), scope)
         scope["generate_launch_description"]()
-        assert set(arguments) <= set(declared)
         try:
-            return functions[0](declared | arguments)
+            functions[0](dict(arguments))
+            assert set(arguments) <= set(declared)
+            return functions[1](declared | arguments)
         except InputError:
             assert not started, "nothing may be started before all is checked"
             raise
@@ -86,10 +87,44 @@ def test_the_nodes_that_are_started(tmp_path):
     assert launched(log=LOG, params=str(file))[0].executable == "recorder"
 
 
+def test_every_node_can_be_left_out(tmp_path):
+    for name in SUITE:
+        assert [node.executable for node in launched(log=LOG, without=name)] == [one for one in SUITE if one != name]
+    recorded = launched(log=LOG, bag=str(tmp_path / "bag"), without="recorder, evaluator")
+    assert [node.executable for node in recorded] == [one for one in SUITE if one != "evaluator"]
+
+
+def test_arguments_have_their_true_defaults_and_count_only_where_they_are_given():
+    assert declared()["count"][0] == "50" and declared()["autostart"][0] == "true" and declared()["road"][0] == "t_intersection"
+    (node, *_) = launched(log=LOG, count="50")
+    assert yaml.safe_load(Path(node.parameters[-1]).read_text())["/**/**"]["ros__parameters"]["count"] == 50
+    (node, *_) = launched(log=LOG)
+    assert "count" not in yaml.safe_load(Path(node.parameters[-1]).read_text())["/**/**"]["ros__parameters"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"rate": "abc"}, "rate:=abc"),
+        ({"bag": "no_such_bag"}, "bag:=no_such_bag: it does not exist"),
+        ({"policy": "brave"}, "policy:=brave: .*reactive, replay"),
+        ({"lock_step": "maybe"}, "lock_step:=maybe"),
+        ({"lockstep": "true"}, "lockstep:= is no argument .*did you mean lock_step"),
+        ({"params": "none.yaml"}, "params:=none.yaml: it does not exist"),
+    ],
+    ids=str,
+)
+def test_a_drive_that_cannot_be_is_refused_before_a_process_starts(given, said):
+    with pytest.raises(InputError, match=said):
+        launched("drive.launch.py", **given)
+
+
 def test_a_road_of_an_installed_package_can_be_named(monkeypatch):
     monkeypatch.setattr("scenario_gen.cli.launching.installed", lambda group: {"plaza": group})
     assert launched(log=LOG, road="plaza")
-    with pytest.raises(InputError, match=r"road:=nowhere: choose one of straight, .*, corridor, plaza, or give a map_server"):
+    with pytest.raises(
+        InputError, match=r"road:=nowhere: choose one of straight, .*, corridor, plaza, or give a map that exists"
+    ):
         launched(log=LOG, road="nowhere")
 
 
@@ -115,6 +150,9 @@ def test_arguments_are_declared_as_the_nodes_declare_them():
     [
         ({"count": "abc"}, "count:=abc: .*whole number"),
         ({"count": "0"}, "count:=0: .*at least 1"),
+        ({"cout": "3"}, "cout:= is no argument of this launch file; did you mean count"),
+        ({"without": "planer"}, "without:=planer: choose of .*did you mean planner"),
+        ({"without": "planner", "composed": "true"}, "cannot be combined with composed"),
         ({"seed": "1.5"}, "seed:=1.5"),
         ({"rate": "fast"}, "rate:=fast"),
         ({"encounter": "[1"}, r"encounter:=\[1"),

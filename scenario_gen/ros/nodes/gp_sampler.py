@@ -3,18 +3,22 @@
 
 """gp_sampler: road, tracks, changepoints, fit and routes of one template in; checked `scenarios` and their `scenarios/info` out.
 
-It generates when the inputs are complete, and on `~/generate`, whose parameters are the node's own, valid for that call only, and
-`request`, the caller's name for it. /diagnostics says how far it is; `~/cancel_request` ends one, `~/cancel` all.
+It generates when the inputs are complete, on the action `~/generate_scenarios`, and on the service `~/generate`. Their parameters
+are the node's own, valid for that request only, and `request`, the caller's name for it. /diagnostics says how far it is;
+`~/cancel_request` ends one, `~/cancel` all.
 """
 
 from collections.abc import Mapping
 from functools import partial
+import os
+import threading
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.method.sampling import Cancelled
+from scenario_gen.ros.plumbing.goals import action_type, Goals
 from scenario_gen.ros.plumbing.sampling_requests import Answer, answer_request, Config, OpenRequest, OpenRequests
 from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
 from scenario_gen.ros.plumbing.topics import unacknowledged
@@ -29,17 +33,27 @@ class GpSampler(StageNode):
     INPUTS = ("map", *ENDS, LANES, "tracks", "changepoints", "fit", "fit/info")
     STAGES = ("template", "roads", "method.fitting", "method.routing", "method.sampling", "method.validity")
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
+    THREADS = min(2, os.cpu_count() or 1)  # so that a small request need not wait for a large one
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
         paired = ("tracks", "changepoints", "fit", "fit/info", *(("map",) if self.config.pair_map else ()))
         self.inputs = Inputs(paired, () if self.config.pair_map else ("map",), (LANES,))
         self._routes: set[str] = set()
+        self._turn = threading.Lock()
         self._requests = OpenRequests(self)
+        action = action_type()
+        self._goals = Goals(self, self._requests, action) if action else None
 
     def stopped(self) -> None:
         """Forget the inputs: being latched, they come again."""
         self.inputs.clear()
+
+    def destroy_node(self) -> None:
+        """Withdraw the action, too."""
+        if self._goals:
+            self._goals.destroy()
+        super().destroy_node()
 
     def update_diagnostics(self) -> None:
         """Report how far the request at work is."""
@@ -51,6 +65,7 @@ class GpSampler(StageNode):
         self.inputs.put(topic, data)
         if topic == "tracks":
             self._follow(data)
+        self._requests.look()
         config = self.config
         if config.generate_on_input and (topic not in ENDS or config.moves) and not self.missing(config):
             messages = self.messages()
@@ -99,7 +114,7 @@ class GpSampler(StageNode):
             self._requests.begin(request)
             node, send = self.get_fully_qualified_name(), partial(self.outputs.send_paced, stop=stop)
             with self.outputs.paced(self.OUTPUTS[:2], config.patience, partial(self._report_pace, request.name)):
-                result, summary = answer_request(messages, config, request.name, node, request.progress, stop, send)
+                result, summary = answer_request(messages, config, request.name, node, request.progress, stop, send, self._turn)
             words = summary.status.message
             if summary.cancelled:
                 words = f"{self.given_up(messages, cancelled)}: {words}"

@@ -27,7 +27,6 @@ import numpy as np
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
@@ -49,6 +48,7 @@ from scenario_gen.ros.plumbing.topics import (
     create_publisher,
     create_subscription,
     message_class,
+    OVERRIDABLE,
     Pace,
     publish,
     qos,
@@ -128,7 +128,6 @@ class Frames:
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
 PATIENCE = 5.0  # seconds in which listeners have to take the last messages
 TICK = 0.01  # seconds between two clock messages
-KINDS = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
 
 
 @dataclass(frozen=True)
@@ -187,7 +186,7 @@ class Player(Node):  # type: ignore[misc]
                 continue
             try:
                 kind, quality = message_class(topic.type), qos(topic.quality)
-                publisher = self.create_publisher(kind, name, quality, qos_overriding_options=QoSOverridingOptions(KINDS))
+                publisher = self.create_publisher(kind, name, quality, qos_overriding_options=QoSOverridingOptions(OVERRIDABLE))
                 self._offered[topic.name] = (publisher, topic.quality.transient_local, topic.quality.depth)
                 self._paces[topic.name] = Pace(
                     publisher, publisher.qos_profile.depth, config.patience, partial(self._report_pace, name)

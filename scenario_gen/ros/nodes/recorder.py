@@ -177,15 +177,23 @@ class Recorder(Node):  # type: ignore[misc]
             self.diagnostics.status(Level.OK, str(self._bag.folder), "recorded", counts, log=False)
             lost = self._losses.summary()
             if lost:
-                message = "; ".join(f"{topic}: {text}" for topic, text in lost.items())
-                self.diagnostics.status(Level.WARN, f"{message}; {remedy(message)}", "losses", lost, log=False)
+                message = "; ".join(self._blamed(topic, text) for topic, text in lost.items())
+                self.diagnostics.status(Level.WARN, message, "losses", lost, log=False)
             self._warn(lost)
+
+    def _blamed(self, topic: str, text: str) -> str:
+        """Return what of a topic is not recorded, and what can be done: of two publishers one is to be ended."""
+        infos = self.get_publishers_info_by_topic(topic) if self.context.ok() else []
+        who = sorted(f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos)
+        if len(who) > 1:
+            return f"{topic}: {text}; {' and '.join(who)} publish it: end one of them, or give it another namespace"
+        return f"{topic}: {text}; {remedy(text)}"
 
     def _warn(self, lost: Mapping[str, str]) -> None:
         """Say on the terminal what is new of what is not recorded."""
         for topic in lost:
             if lost[topic] != self._warned.get(topic):
-                message = f"{topic}: {lost[topic]}; {remedy(lost[topic])}"
+                message = self._blamed(topic, lost[topic])
                 if self.context.ok():
                     self.get_logger().warning(message)
                 else:  # ended by a signal; /rosout is gone

@@ -28,7 +28,7 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.roads import build_road, FAULTY, RoadConfig
 from scenario_gen.ros.plumbing.stage_node import REQUESTS, StageNode
 
 
@@ -112,7 +112,9 @@ class RoadServer(StageNode):
         self._grid = messages["map"]
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
-        self.status(Level.OK, message, "road", stamp_ns, **template_hashes(messages | template))
+        faults = [note for note in (road.lanes.notes if road.lanes is not None else ()) if FAULTY in note]
+        level, message = (Level.WARN, "; ".join([message, *faults])) if faults else (Level.OK, message)
+        self.status(level, message, "road", stamp_ns, **template_hashes(messages | template))
 
     def _get_map(self, _request: Any, response: Any) -> Any:
         if self._grid is not None:

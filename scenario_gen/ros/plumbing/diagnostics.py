@@ -22,7 +22,7 @@ from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, 
 from scenario_gen.base.errors import printable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.ros.plumbing.start import emit
-from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, publish
+from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, others_on, own_topics, publish
 
 PERIOD = 1.0  # seconds of real time between two regular messages; what waits is published after half of it at most
 HOLD = 3.0  # seconds for which a finding is shown at least
@@ -61,6 +61,7 @@ class NodeDiagnostics:
         self._waiting = False  # something is to be published before the next regular message
         self._left, self._refilled = AT_ONCE, monotonic()
         self._regular = self._updating = False  # whether this tick's message is a regular one; whether `update` is running
+        self._twins: dict[str, list[str]] = {}  # nodes that publish the same topics, by topic
         self._publisher = create_publisher(node, "/diagnostics")
         node.create_timer(0.5 * PERIOD, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -172,6 +173,7 @@ class NodeDiagnostics:
         if self._regular:
             self._updating = True
             self._update()
+            self._look_for_twins()
         with self._lock:
             now, self._updating = monotonic(), False
             for name, entry in self._entries.items():
@@ -180,6 +182,19 @@ class NodeDiagnostics:
                     self._entries[name] = _Entry(Status(name, Level.OK, f"over: {entry.status.message}", values), now)
             if self._regular or self._waiting:
                 self._publish()
+
+    def _look_for_twins(self) -> None:
+        """Warn of other nodes that publish the node's own topics: who listens hears both and cannot tell them apart."""
+        found = {topic: who for topic in own_topics(self._node) if (who := others_on(self._node, topic))}
+        if found == self._twins:
+            return
+        self._twins = found
+        if not found:
+            self.resolve("twins")
+            return
+        said = "; ".join(f"{topic} is published by {' and '.join(who)}, too" for topic, who in found.items())
+        remedy = "who listens hears both: end one of the nodes, or give it another namespace"
+        self.status(Level.WARN, f"{said}; {remedy}", "twins", {topic: " ".join(who) for topic, who in found.items()})
 
     def _publish(self) -> None:
         """Publish all; findings of one name that no message has held yet stand beside the newest."""

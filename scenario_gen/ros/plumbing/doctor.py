@@ -24,7 +24,7 @@ OK, WARNING, ERROR = "ok", "warning", "error"
 PYTHONS = ((3, 11), (3, 13))
 MODULES = (
     *("numpy", "scipy", "numba", "ompl", "daqp", "clarabel", "mcap", "rosbags", "pandas", "pyarrow"),
-    *("shapely", "PIL", "yaml", "jinja2", "plotly", "typer", "rich"),
+    *("shapely", "PIL", "yaml", "jinja2", "typer", "rich"),
 )
 INTERFACES = (
     *("builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "lifecycle_msgs", "nav_msgs", "rcl_interfaces", "rosgraph_msgs"),
@@ -62,8 +62,17 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
         return
     yield installation(environment)
     yield packages("interfaces", INTERFACES, "install ros-jazzy-common-interfaces, or source a Jazzy installation")
+    yield _action()
     yield from variables(environment)
     yield from discovery(environment)
+
+
+def _action() -> Finding:
+    """Say whether the type of the sampler's action is here."""
+    found = importlib.util.find_spec("scenario_gen_interfaces")
+    here = found is not None and found.origin is not None  # a checkout holds a folder of that name
+    missing = "scenario_gen_interfaces is not built: gp_sampler has the service generate, and no action generate_scenarios"
+    return Finding(OK, "action", "scenario_gen_interfaces is here" if here else missing)
 
 
 def python(version: tuple[int, ...]) -> Finding:

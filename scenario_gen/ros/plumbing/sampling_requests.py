@@ -1,10 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sampler's requests: its parameters, the open requests and their services, and how a request is answered."""
+"""The sampler's requests: its parameters, the open requests and their services, and how a request is answered.
+
+A request comes by the service `~/generate`, or by the action `~/generate_scenarios` (goals.py).
+"""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from itertools import count
 import re
 import threading
@@ -12,18 +17,20 @@ from time import monotonic
 from typing import Any
 
 from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.hashes import template_hashes
 from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary, RequestSummary
-from scenario_gen.bags.recordings.provenance import parameter_texts, versions
 from scenario_gen.bags.recordings.sending import RequestSender, Send
 from scenario_gen.bags.recordings.template import decode_template
-from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
+from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter
+from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
@@ -31,10 +38,11 @@ from scenario_gen.method.sampling import Callbacks, sample_scenarios, SamplingCo
 from scenario_gen.method.validity import Limits
 from scenario_gen.ros.plumbing.ros_parameters import values_of_call
 from scenario_gen.ros.plumbing.stage_node import REQUESTS
-from scenario_gen.types import GenerationResult, Request
+from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Request, Scenario
 
 SHOWN = 20  # waiting requests that are named
 SILENCE = 10.0  # seconds after which a line on the terminal says how far a request is, though it is hardly farther
+LOOK = 0.1  # seconds between two looks whether those that wait can be served
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 Answer = tuple[GenerationResult, RequestSummary]  # the result of a request, whose scenarios are published by then
 
@@ -62,6 +70,27 @@ class Config(Request):
         super().__post_init__()
 
 
+class Code(IntEnum):
+    """How a request ended, as scenario_gen_interfaces/action/Generate has it."""
+
+    OK = 0
+    INVALID = 1
+    NOT_READY = 2
+    IMPOSSIBLE = 3
+    CANCELLED = 4
+    FAILED = 5
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a request ended, in words, too; `answer` if it came to its end."""
+
+    code: Code
+    reason: str
+    request: str = ""
+    answer: Answer | None = None
+
+
 @dataclass
 class OpenRequest:
     """An open request: its name, its job, and its progress."""
@@ -69,6 +98,8 @@ class OpenRequest:
     name: str
     job: str
     n_requested: int
+    waiting_for: list[str] = field(default_factory=list)  # topics that are missing
+    cancelled: bool = False  # while it waits for them
     began: float | None = None
     accepted: int = 0
     candidates: int = 0
@@ -103,7 +134,10 @@ class OpenRequests:
         self._open: dict[str, OpenRequest] = {}
         self._numbers = count(1)
         self._lock = threading.Lock()
+        self._waiters: list[tuple[Future, Callable[[], bool]]] = []
+        self._timer = node.create_timer(LOOK, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         node.create_service(SetParametersAtomically, "~/generate", self._generate, qos_profile=REQUESTS)
+        node.create_service(Trigger, "~/wait_until_ready", self._wait_until_ready, qos_profile=REQUESTS)
         node.serve(SetParametersAtomically, "~/cancel_request", self._cancel_request)
         node.serve(Trigger, "~/cancel", self._cancel_all)
 
@@ -144,9 +178,17 @@ class OpenRequests:
         """
         with self._lock:
             request, known = self._open.get(name), ", ".join(list(self._open)[:SHOWN])
-        if request is None or not self._node.cancel(request.job):
+        if request is None or not self.cancelled(request):
             raise InputError(f"no request {name!r} is open; open: {known or 'none'}")
         return f"request {name} is cancelled, {request.accepted} of {request.n_requested} scenarios were found"
+
+    def cancelled(self, request: OpenRequest) -> bool:
+        """Cancel a request; False if it has ended."""
+        if request.waiting_for:
+            request.cancelled = True
+            self.look()
+            return True
+        return bool(self._node.cancel(request.job))
 
     def report(self) -> None:
         """Report on /diagnostics how far the request at work is, and on the terminal, if it is a good deal farther."""
@@ -156,7 +198,7 @@ class OpenRequests:
         if running is None:
             self._node.diagnostics.status(Level.OK, "no request is at work", "progress", {}, log=False)
             return
-        values = running.values() | {"waiting": str(len(waiting))}
+        values = running.values() | {"at_work": str(len(self._open) - len(waiting)), "waiting": str(len(waiting))}
         values |= {f"waiting.{request.name}": f"{request.n_requested} scenarios" for request in waiting[:SHOWN]}
         found = f"{running.accepted} of {running.n_requested} scenarios from {running.candidates} candidates"
         message = f"request {running.name}: {found}, {running.seconds():.0f} s"
@@ -171,44 +213,113 @@ class OpenRequests:
         self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
         """Generate with the caller's parameters; the answer comes when the set is done."""
+        outcome = await self.answer(request.parameters)
+        response.result.successful, response.result.reason = outcome.code is Code.OK, outcome.reason
+        return response
+
+    async def answer(
+        self, parameters: Sequence[Any], wait: float = 0.0, opened: Callable[[OpenRequest], None] = lambda _: None
+    ) -> Outcome:
+        """Serve a request, on the executor's thread, to its end.
+
+        Args:
+            parameters: the sampler's, as messages of rcl_interfaces, valid for this request; `request` is its name.
+            wait: seconds to wait for the sampler's inputs.
+            opened: called with the request as soon as it is open.
+        """
         node = self._node
         try:
-            requested, name = _named(request.parameters)
-            opened = self.add(name)
+            requested, name = _named(parameters)
+            request = self.add(name)
         except ScenarioGenError as error:
             node.diagnostics.failed("generate", error)
             node.diagnostics.resolve("generate")
-            response.result.reason = str(error)
-            return response
+            return Outcome(Code.INVALID, str(error))
+        opened(request)
         try:
-            config, messages = self._inputs_of_call(requested)
-            opened.n_requested = config.count
+            config = values_of_call(node.config, requested)
+            request.n_requested = config.count
+            code, reason = await self._ready(request, config, wait)
         except ScenarioGenError as error:
-            self.end(opened, Level.ERROR, str(error), error=type(error).__name__)
-            response.result.reason = f"request {opened.name}: {error}"
-            return response
+            self.end(request, Level.ERROR, str(error), error=type(error).__name__)
+            return Outcome(Code.INVALID, f"request {request.name}: {error}", request.name)
+        if code is not Code.OK:
+            self.end(request, Level.WARN, reason)
+            return Outcome(code, f"request {request.name}: {reason}", request.name)
+        messages = node.messages()
 
-        def job(cancelled: Callable[[], bool]) -> tuple[bool, str]:
+        def job(cancelled: Callable[[], bool]) -> tuple[Code, str, Answer | None]:
             try:
-                result: Answer | None = node.generate(messages, opened, config, cancelled)
+                result: Answer | None = node.generate(messages, request, config, cancelled)
             except ScenarioGenError as error:  # which has been reported
-                return False, str(error)
+                return Code.INVALID if isinstance(error, InputError) else Code.IMPOSSIBLE, str(error), None
             if result is None:
-                return False, node.given_up(messages, lambda: True)
-            return bool(result[0].generated.scenarios), result[1].status.message
+                return Code.CANCELLED, node.given_up(messages, lambda: True), None
+            return Code.OK if result[0].generated.scenarios else Code.IMPOSSIBLE, result[1].status.message, result
 
-        answer = await node.result_of(opened.job, job, lambda error: (False, f"{type(error).__name__}: {error}"))
-        response.result.successful, reason = answer
-        response.result.reason = f"request {opened.name}: {reason}"
-        return response
+        def failed(error: Exception) -> tuple[Code, str, Answer | None]:
+            return Code.FAILED, f"{type(error).__name__}: {error}", None
 
-    def _inputs_of_call(self, parameters: Sequence[Any]) -> tuple[Any, Mapping[str, bytes]]:
+        code, reason, result = await node.result_of(request.job, job, failed)
+        return Outcome(code, f"request {request.name}: {reason}", request.name, result)
+
+    async def _ready(self, request: OpenRequest, config: Any, wait: float) -> tuple[Code, str]:
+        """Wait until the sampler is active and has its inputs; then the request is the last one in the queue."""
+        until = monotonic() + wait
+
+        def ready() -> bool:
+            request.waiting_for = self.missing(config)
+            return request.cancelled or not request.waiting_for or monotonic() >= until
+
+        await self._until(ready)
+        if request.cancelled:
+            return Code.CANCELLED, "cancelled"
         if not self._node.active:
-            raise RefusedError("the node is not active; activate it first")
-        config = values_of_call(self._node.config, parameters)
-        if missing := self._node.missing(config):
-            raise RefusedError(f"nothing to generate from yet: waiting for {', '.join(missing)}")
-        return config, self._node.messages()
+            return Code.NOT_READY, "the node is not active; activate it first"
+        if request.waiting_for:
+            return Code.NOT_READY, f"nothing to generate from yet: waiting for {', '.join(request.waiting_for)}"
+        with self._lock:
+            self._open[request.name] = self._open.pop(request.name)
+        return Code.OK, ""
+
+    async def _until(self, ready: Callable[[], bool]) -> None:
+        """Wait until `ready` says so; it is asked ten times a second, and when an input has come."""
+        if ready():
+            return
+        arrived = Future()
+        self._waiters.append((arrived, ready))
+        self._timer.reset()
+        await arrived
+        self._node.executor.create_task(self.look)  # when this one stands in the queue, it is the next one's turn
+
+    def missing(self, config: Any) -> list[str]:
+        """The topics that a request waits for; `activation` while the node is not active."""
+        missing: list[str] = self._node.missing(config) if self._node.active else ["activation"]
+        return missing
+
+    def position(self, request: OpenRequest) -> int:
+        """How many requests are served before this one; 0 if it is at work, or waits for its inputs."""
+        with self._lock:
+            served = [name for name, other in self._open.items() if not other.waiting_for]
+        return served.index(request.name) if request.began is None and request.name in served else 0
+
+    def look(self) -> None:
+        """Let the first one go on that waits for inputs and need not any more; called when an input has come."""
+        for waiter in list(self._waiters):
+            arrived, done = waiter
+            if done():
+                self._waiters.remove(waiter)
+                arrived.set_result(None)
+                break
+        if not self._waiters:
+            self._timer.cancel()
+
+    async def _wait_until_ready(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Answer once a request with the node's own parameters can be served, however long that takes."""
+        node = self._node
+        await self._until(lambda: not self.missing(node.config))
+        response.success, response.message = True, "ready"
+        return response
 
     def _cancel_request(
         self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
@@ -240,6 +351,7 @@ def answer_request(
     progress: Callable[[int, int, int], None],
     cancelled: Callable[[], bool],
     send: Send,
+    turn: AbstractContextManager[object],
 ) -> Answer:
     """Sample, check and publish; fit and plan anew if start or end states are requested.
 
@@ -251,6 +363,7 @@ def answer_request(
         progress: called with the scenarios and candidates so far, and the template's stamp [ns].
         cancelled: whether to stop early; what was published by then stays, and the summary says so.
         send: called with topic and CDR bytes of every message, scenarios as they are drawn.
+        turn: held while a scenario's messages, or those of the end, are sent, so that requests at the same time do not mix them.
 
     Raises:
         InputError: a message is damaged, or a vehicle that is named does not exist.
@@ -264,7 +377,12 @@ def answer_request(
 
     hashes = template_hashes(messages)
     sender = RequestSender(RequestMessages(encounter, request, node, hashes), road.frame_id, send)
-    callbacks = Callbacks(advance, cancelled, sender.scenario)
+
+    def in_turn(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
+        with turn:
+            sender.scenario(scenario, requested, ego)
+
+    callbacks = Callbacks(advance, cancelled, in_turn)
     if config.moves:
         from scenario_gen.method.attempt import Attempt  # these load all stages, and few requests need them
         from scenario_gen.method.config import PipelineConfig
@@ -283,5 +401,6 @@ def answer_request(
     provenance = parameter_texts(config) | versions() | hashes
     stopped = cancelled() and len(result.scenarios) < result.requested
     summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=outcome.reacting)
-    sender.close(result, summary)
+    with turn:
+        sender.close(result, summary)
     return outcome, summary

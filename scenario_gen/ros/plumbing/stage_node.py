@@ -179,6 +179,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     INPUTS: tuple[str, ...] = ()
     OUTPUTS: tuple[str, ...] = ()  # advertised while configuring, so that listeners are there before the first message
+    THREADS = 1  # jobs that run at a time
     STAGES: tuple[str, ...] = ()  # packages of scenario_gen whose kernels are compiled before it is configured
 
     def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
@@ -305,7 +306,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Subscribe to the inputs."""
-        self._worker = Worker(self.diagnostics.failed, self.get_name(), self.diagnostics.resolve)
+        self._worker = Worker(self.diagnostics.failed, self.get_name(), self.diagnostics.resolve, self.THREADS)
         self.outputs.activate()
         self.diagnostics.enable(True)
         self.diagnostics.state("active")

@@ -25,7 +25,7 @@ from typing import Any
 from scenario_gen.base.interrupts import hear
 
 PATIENCE = 20.0  # seconds that a node has to end by itself; far more than it needs, for machines that are busy
-NODES = ("recorder", "evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player", "player")
+NODES = ("recorder", "evaluator", "preview", "gp_sampler", "planner", "segmenter", "road_server", "log_player", "player")
 WATCHER = "watcher"  # reports to the runner of a suite; no executable
 SUITE = """\
 suite: all nodes in one process with one executor, for small machines: `ros2 run scenario_gen suite`.
@@ -76,6 +76,7 @@ gp_sampler = partial(start, "gp_sampler")
 road_server = partial(start, "road_server")
 log_player = partial(start, "log_player")
 evaluator = partial(start, "evaluator")
+preview = partial(start, "preview")
 recorder = partial(start, "recorder")
 player = partial(start, "player")
 traffic = partial(start, "traffic")

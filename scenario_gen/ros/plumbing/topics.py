@@ -21,7 +21,8 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from msg_conventions.topics import topic_entry
@@ -32,6 +33,10 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.types import Quality
 
+OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
+OWN_QUALITY = ("/diagnostics", "/tf", "/tf_static")  # as others expect them
+SHARED = ("/diagnostics", "/rosout", "/parameter_events", "/tf", "/tf_static", "/clock", "/footprint", "/transition_event")
+"""How the names of topics end that many nodes publish."""
 DEPTH = 1000  # messages that a subscription holds at least
 TICK = 0.002  # seconds between two looks for acknowledgements
 SLOWLY = 0.001  # seconds for each message while a subscriber is not waited for: for the sake of the others
@@ -88,9 +93,13 @@ def adapted_quality(topic: str, offers: Sequence[QoSProfile]) -> tuple[Quality, 
 
 
 def create_publisher(node: Node, topic: str, name: str = "") -> Any:
-    """Return a publisher of a topic of the suite, as `name` if that is another."""
+    """Return a publisher of a topic of the suite, as `name` if that is another.
+
+    Its quality can be overridden: `qos_overrides./topic.publisher.reliability`, `durability`, `depth`, `history`.
+    """
     kind, quality = topic_entry(topic)
-    return node.create_publisher(message_class(kind), name or topic, qos(quality))
+    options = None if topic in OWN_QUALITY else QoSOverridingOptions(OVERRIDABLE)
+    return node.create_publisher(message_class(kind), name or topic, qos(quality), qos_overriding_options=options)
 
 
 def create_subscription(node: Node, topic: str, callback: Callable[..., None], quality: Quality | None = None) -> Any:
@@ -123,6 +132,7 @@ class Outputs:
         self._lock = threading.RLock()
         self._active = False
         self._paces: dict[str, Pace] = {}
+        self._pacing = 0  # threads that do
 
     def activate(self) -> None:
         """Publish from now on."""
@@ -169,16 +179,25 @@ class Outputs:
 
     @contextmanager
     def paced(self, topics: Iterable[str], patience: float, report: Callable[[str, int], None]) -> Iterator[None]:
-        """Let `send_paced` pace these topics inside; `report` is called with the topic and what its `Pace` reports."""
-        for topic in topics:
-            self.advertise(topic)
-            depth = topic_entry(topic)[1].depth
-            self._paces[topic] = Pace(self._publishers[topic], depth, patience, partial(report, topic))
+        """Let `send_paced` pace these topics inside; `report` is called with the topic and what its `Pace` reports.
+
+        Several threads may pace the same topics, by one pace for each topic: that of the first one.
+        """
+        topics = tuple(topics)
+        with self._lock:
+            for topic in topics:
+                self.advertise(topic)
+                publisher = self._publishers[topic]
+                if topic not in self._paces:
+                    self._paces[topic] = Pace(publisher, publisher.qos_profile.depth, patience, partial(report, topic))
+            self._pacing += 1
         try:
             yield
         finally:
-            for topic in topics:
-                self._paces.pop(topic).end()
+            with self._lock:
+                self._pacing -= 1
+                for topic in topics if self._pacing == 0 else ():
+                    self._paces.pop(topic).end()
 
     def send_paced(self, topic: str, data: bytes, stop: Callable[[], bool]) -> None:
         """Publish as `send` does; on a topic that is paced, once its subscribers have room, or `stop` says so.
@@ -261,6 +280,25 @@ class Pace:
         with suppress(InvalidHandle):  # it was destroyed meanwhile
             return bool(self._publisher.wait_for_all_acked(Duration()))
         return True
+
+
+def own_topics(node: Node) -> list[str]:
+    """Return the full names of the topics that a node publishes and that are meant for one publisher."""
+    names = {publisher.topic_name for publisher in list(node.publishers)}
+    return sorted(name for name in names if not name.endswith(SHARED))
+
+
+def others_on(node: Node, topic: str) -> list[str]:
+    """Return the full names of other nodes that publish a topic; the node's own if there is another one of that name.
+
+    The log player and the segmenter share `tracks`: one plays a log, the other publishes what streams have brought.
+    """
+    names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in node.get_publishers_info_by_topic(topic)]
+    own = node.get_fully_qualified_name()
+    if own in names:
+        names.remove(own)
+    partner = {"log_player": "segmenter", "segmenter": "log_player"}.get(node.get_name())
+    return sorted(name for name in names if not (topic.endswith("/tracks") and name.rpartition("/")[2] == partner))
 
 
 def let_others_take(executor: Executor | None, stop: Callable[[], bool]) -> None:

@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""preview: the scenario that was published last, in motion: frames on /tf and markers on `preview`, again and again.
+
+It is for people who look: it keeps nobody waiting, and of many scenarios it takes the newest when the one that is shown ends.
+Frames are `preview/vehicle_<id>`, so that a player of the same vehicles is not disturbed.
+"""
+
+from dataclasses import dataclass
+from time import monotonic
+
+import numpy as np
+from rclpy.clock import Clock, ClockType
+
+from msg_conventions.fits import decode_fit
+from msg_conventions.frames import encode_frames
+from msg_conventions.markers import CUBE, DELETE_ALL, Marker, TEXT
+from msg_conventions.pictures import COLOURS, encode_markers
+from msg_conventions.scenario_info import decode_info, INFO, ScenarioEntry
+from msg_conventions.scenarios import decode_scenario, digest
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.numerics import Floats
+from scenario_gen.ros.plumbing.stage_node import StageNode
+from scenario_gen.ros.plumbing.topics import create_publisher
+from scenario_gen.template import find_conflicts
+from scenario_gen.types import Scenario, tokens
+
+HELD = 1000  # messages of scenarios whose entry has not come yet
+HIGH = 1.2  # metres of a letter
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The preview's parameters."""
+
+    frame_rate: float = parameter(20.0, "frames a second", unit="Hz", low=1.0, high=100.0)
+    pause: float = parameter(1.0, "how long the end is shown before it begins again", unit="s", low=0.0, high=60.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A scenario in motion: since when on the steady clock [s], who reacts to whom, by the vehicle that does, and its conflicts.
+
+    A conflict is a pose x, y [m], yaw [rad], that of the second one when it enters the shared area, and words.
+    """
+
+    scenario: Scenario
+    since: float
+    reactions: dict[str, str]
+    conflicts: tuple[tuple[tuple[float, float, float], str], ...]
+
+
+class Preview(StageNode):
+    """Shows the newest scenario."""
+
+    INPUTS = ("fit", "scenarios", INFO)
+    OUTPUTS = ("preview",)
+    STAGES = ("template",)
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("preview", Config(), namespace)
+        self._tf = create_publisher(self, "/tf")
+        self._messages: dict[str, bytes] = {}  # by SHA-256, oldest first
+        self._newest: tuple[Scenario, ScenarioEntry] | None = None
+        self._shown: Shown | None = None
+        self._anchors = np.zeros((0, 0, 3))
+        self.create_timer(1.0 / self.config.frame_rate, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def stopped(self) -> None:
+        """Forget what was shown."""
+        self._messages.clear()
+        self._newest = self._shown = None
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Take changepoints, and each scenario once its entry has come."""
+        if topic == "fit":
+            self._anchors = decode_fit(data)[3]
+        elif topic == "scenarios":
+            self._messages[digest(data)] = data
+            if len(self._messages) > HELD:
+                del self._messages[next(iter(self._messages))]
+        else:
+            for info in decode_info(data, topic):
+                if isinstance(info, ScenarioEntry):
+                    self._take(info)
+
+    def _take(self, entry: ScenarioEntry) -> None:
+        """Keep the scenario of an entry; one whose messages were lost is left out."""
+        if self._messages.keys() >= set(entry.messages):
+            data = b"".join(self._messages[sha256] for sha256 in entry.messages)
+            self._newest = decode_scenario(data, seed=entry.seed, index=entry.index)[1], entry
+            for sha256 in set(entry.messages):
+                del self._messages[sha256]
+
+    def _tick(self) -> None:
+        """Publish where everybody is."""
+        now, shown = monotonic(), self._shown
+        if shown is None or now - shown.since > float(shown.scenario.time[-1]) + self.config.pause:
+            if self._newest is None:
+                return
+            scenario, entry = self._newest
+            reactions = dict(
+                sorted((part.split(" ", 1)[0], part) for part in entry.status.values.get("reactions", "").split("; ") if part)
+            )
+            self._shown = shown = Shown(scenario, now, reactions, conflicts_of(scenario))
+        self._publish(shown, min(now - shown.since, float(shown.scenario.time[-1])))
+
+    def _publish(self, shown: Shown, time: float) -> None:
+        scenario, stamp_ns = shown.scenario, self.get_clock().now().nanoseconds
+        here, poses, speeds = states_at(scenario, time)
+        names = tokens(vehicle.id for vehicle in scenario.vehicles)
+        children = [f"preview/vehicle_{names[n]}" for n in here]
+        self.outputs.publish(self._tf, encode_frames(poses, children, scenario.frame_id, stamp_ns))
+        markers = [Marker("", CUBE, DELETE_ALL)]
+        for n, pose, speed in zip(here, poses.tolist(), speeds.tolist(), strict=True):
+            vehicle, colour = scenario.vehicles[n], (*COLOURS[n % len(COLOURS)], 0.9)
+            size = (vehicle.length, vehicle.width, 1.5)
+            markers.append(Marker(f"box_{names[n]}", CUBE, pose=(pose[0], pose[1], pose[2]), scale=size, colour=colour))
+            words = f"{shown.reactions.get(names[n], names[n])}, {speed:.1f} m/s"
+            place = (pose[0], pose[1] + vehicle.length, 0.0)
+            markers.append(Marker(f"text_{names[n]}", TEXT, pose=place, scale=(0.0, 0.0, HIGH), text=words))
+        for k, (pose, words) in enumerate(shown.conflicts):
+            markers.append(Marker(f"conflict_{k}", CUBE, pose=pose, scale=(2.0, 2.0, 0.1), colour=(0.9, 0.1, 0.1, 0.5)))
+            markers.append(Marker(f"conflict_text_{k}", TEXT, pose=pose, scale=(0.0, 0.0, HIGH), text=words))
+        for n, anchors in enumerate(self._anchors[:, 1:-1]):
+            for k, (x, y, yaw) in enumerate(anchors.tolist()):
+                colour = (*COLOURS[n % len(COLOURS)], 0.6)
+                dot = (0.6, 0.6, 0.2)
+                markers.append(Marker(f"changepoint_{n}_{k}", CUBE, pose=(x, y, yaw), scale=dot, colour=colour))
+        self.outputs.send("preview", encode_markers(markers, scenario.frame_id, stamp_ns))
+
+
+def conflicts_of(scenario: Scenario) -> tuple[tuple[tuple[float, float, float], str], ...]:
+    """Return where paths meet, and who goes first there."""
+    vehicles, time, names = scenario.vehicles, scenario.time, tokens(vehicle.id for vehicle in scenario.vehicles)
+    found = []
+    for conflict in find_conflicts(vehicles, time, scenario.position, scenario.heading, scenario.present):
+        n = conflict.second
+        x, y, yaw = (float(np.interp(conflict.entry_second, time, row)) for row in (*scenario.position[n].T, scenario.heading[n]))
+        first, second = names[conflict.first], names[n]
+        words = (
+            f"{second} behind {first}" if conflict.following else f"{first} first, {second} {conflict.encroachment:.1f} s later"
+        )
+        found.append(((x, y, yaw), words))
+    return tuple(found)
+
+
+def states_at(scenario: Scenario, time: float) -> tuple[list[int], Floats, Floats]:
+    """Return who is there at a time [s], their poses (M, 3) x, y [m], yaw [rad], and speeds (M,) [m/s], linearly."""
+    ends = scenario.time[scenario.present]
+    here = np.flatnonzero((ends[:, 0] <= time) & (time <= ends[:, 1])).tolist()
+    rows = [(*scenario.position[n].T, scenario.heading[n], scenario.speed[n]) for n in here]
+    values = np.array([[np.interp(time, scenario.time, row) for row in own] for own in rows]).reshape(-1, 4)
+    return here, values[:, :3], values[:, 3]

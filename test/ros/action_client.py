@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A client of the action: python action_client.py GOALS, a JSON list; it prints a JSON list of how each went.
+
+A goal is {"parameters": {…}, "wait": s, "cancel": s after which it is cancelled, "then": a node to activate when it waits for its
+inputs}; all are sent at once. Seconds count from then.
+It is a program of its own, for the libraries of an interface package are looked for where LD_LIBRARY_PATH said at the start.
+"""
+
+import hashlib
+import json
+import sys
+import time
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+import rclpy
+from rclpy.action import ActionClient
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from scenario_gen_interfaces.action import Generate
+
+
+def main(goals: list[dict]) -> list[dict]:
+    rclpy.init()
+    node = rclpy.create_node("action_client")
+    scenarios = []
+    quality = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.VOLATILE)
+    digests = []
+
+    def hear(data: bytes) -> None:
+        scenarios.append(time.monotonic())
+        digests.append(hashlib.sha256(data).hexdigest())
+
+    node.create_subscription(MultiDOFJointTrajectory, "scenarios", hear, quality, raw=True)
+    client = ActionClient(node, Generate, "gp_sampler/generate_scenarios")
+    assert client.wait_for_server(60.0)
+    ended, begun = [], time.monotonic()
+
+    def activate(name: str) -> None:
+        change = node.create_client(ChangeState, f"{name}/change_state")
+        assert change.wait_for_service(60.0)
+        for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+            change.call_async(ChangeState.Request(transition=Transition(id=transition)))
+
+    def send(k: int, goal: dict) -> None:
+        told = {"feedback": []}
+
+        def heard(message) -> None:
+            one = message.feedback
+            row = [time.monotonic() - begun, list(one.waiting_for), one.position, one.wanted, one.found, one.candidates]
+            told["feedback"].append(row)
+            if row[1] and "then" in goal:
+                activate(goal.pop("then"))
+
+        def accepted(future) -> None:
+            handle = future.result()
+            handle.get_result_async().add_done_callback(done)
+            if "cancel" in goal:
+                timer = node.create_timer(goal["cancel"], lambda: cancel(timer, handle))
+
+        def cancel(timer, handle) -> None:
+            timer.cancel()
+            told["cancelled"] = time.monotonic() - begun
+            handle.cancel_goal_async()
+
+        def done(future) -> None:
+            answer = future.result()
+            result = answer.result
+            words = {name: getattr(result, name) for name in ("code", "reason", "request", "requested", "published")}
+            more = {
+                "status": answer.status,
+                "first": result.first_index,
+                "last": result.last_index,
+                "account": {one.key: one.value for one in result.account},
+                "seconds": time.monotonic() - begun,
+            }
+            ended.append({"goal": k, **words, **more, **told})
+
+        given = [Parameter(name, value=value).to_parameter_msg() for name, value in goal.get("parameters", {}).items()]
+        message = Generate.Goal(parameters=given, wait=float(goal.get("wait", 60.0)))
+        client.send_goal_async(message, feedback_callback=heard).add_done_callback(accepted)
+
+    for k, goal in enumerate(goals):
+        send(k, goal)
+    while len(ended) < len(goals):
+        rclpy.spin_once(node, timeout_sec=1.0)
+    spare = time.monotonic()
+    while time.monotonic() - max([spare, *scenarios[-1:]]) < 1.0:  # what is still on its way
+        rclpy.spin_once(node, timeout_sec=0.05)
+    first = scenarios[0] - begun if scenarios else None
+    return [*ended, {"heard": len(scenarios), "first": first, "digests": digests}]
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(json.loads(sys.argv[1]))))

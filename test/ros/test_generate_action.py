@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The action: scenario_gen_interfaces as colcon builds it, a suite in a real process, and a client in another."""
+
+import json
+import os
+from pathlib import Path
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import sysconfig
+
+import pytest
+from suite_processes import ROOT
+
+from scenario_gen.base.ros_domain import free_domain, this_host_only
+from scenario_gen.ros.nodes.gp_sampler import GpSampler
+from scenario_gen.ros.plumbing.sampling_requests import Code
+
+pytestmark = pytest.mark.dds
+SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # action_msgs/GoalStatus
+PACKAGE = "scenario_gen_interfaces"
+NODES = "log_player,road_server,segmenter,planner,gp_sampler"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """What finds the package that colcon builds; the test skips where it cannot be built."""
+    base, prefix = tmp_path_factory.mktemp("interfaces"), os.environ["AMENT_PREFIX_PATH"]
+    programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    missing = [name for name in ("cmake", "c++") if not shutil.which(name, path=programs)]
+    missing += [] if Path(sysconfig.get_path("include"), "Python.h").exists() else ["Python.h"]
+    if missing:
+        pytest.skip(f"{', '.join(missing)} not here, with which colcon builds interfaces (apt-get install g++ python3-dev)")
+    environment = os.environ | {"CMAKE_PREFIX_PATH": prefix.replace(":", ";"), "PATH": programs}
+    settings = [f"-DCMAKE_PROJECT_INCLUDE={ROOT / 'test' / 'ros' / 'wheels.cmake'}", f"-DPython3_EXECUTABLE={sys.executable}"]
+    places = ["--base-paths", ROOT / PACKAGE, "--build-base", base / "build", "--install-base", base / "install"]
+    command = [Path(sys.executable).with_name("colcon"), "--log-base", base / "log", "build", *places, "--cmake-args", *settings]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    installed = base / "install" / PACKAGE
+    (modules,) = installed.glob("lib/python3*/site-packages")
+    paths = {"LD_LIBRARY_PATH": installed / "lib", "PYTHONPATH": modules, "AMENT_PREFIX_PATH": installed}
+    return {name: os.pathsep.join(filter(None, [str(path), os.environ.get(name, "")])) for name, path in paths.items()}
+
+
+@pytest.fixture(scope="module")
+def environment(built):
+    with free_domain() as domain:
+        yield os.environ | built | this_host_only() | {"ROS_DOMAIN_ID": str(domain)}
+
+
+@pytest.fixture(scope="module")
+def suite(environment, tmp_path_factory):
+    """A suite that generates on request only; it has no tracks until its log player is activated."""
+    log = tmp_path_factory.mktemp("suite") / "log.txt"
+    values = {
+        "log_player:autostart": "false",
+        "log_path": ROOT / "examples" / "my_log.csv",
+        "road_name": "four_way",
+        "generate_on_input": "false",
+    }
+    words = [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
+    command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "suite", "--nodes", NODES, "--ros-args", *words]
+    with log.open("w") as file:
+        process = subprocess.Popen(command, env=environment, stdout=file, stderr=file)
+        yield log
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) == 0, log.read_text()[-3000:]
+
+
+def ask(environment, *goals):
+    """Send goals at once; return how each went, by its place, and what was heard of scenarios."""
+    command = [sys.executable, ROOT / "test" / "ros" / "action_client.py", json.dumps(goals)]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300.0)
+    assert run.returncode == 0, run.stderr[-3000:]
+    *ended, heard = json.loads(run.stdout.splitlines()[-1])
+    return [one for _, one in sorted((one["goal"], one) for one in ended)], heard, [one["goal"] for one in ended]
+
+
+def test_the_codes_are_those_of_the_action():
+    text = (ROOT / PACKAGE / "action" / "Generate.action").read_text()
+    assert {name: int(code) for name, code in re.findall(r"^uint8 ([A-Z_]+)=(\d)", text, re.MULTILINE)} == dict(Code.__members__)
+
+
+def test_goals_wait_for_the_inputs_are_served_in_turn_and_one_that_does_not_wait_is_told(environment, suite):
+    wanted = [{"parameters": {"count": 200 - k, "seed": k, "request": f"r{k}"}} for k in range(3)]
+    (first, *others, hasty), heard, order = ask(environment, *wanted[:2], wanted[2] | {"then": "log_player"}, {"wait": 0.0})
+    assert (first["status"], first["code"], first["request"]) == (SUCCEEDED, Code.OK, "r0")
+    assert first["requested"] == first["published"] == 200 and 0 <= first["first"] < first["last"]
+    refused = sum(int(count) for cause, count in first["account"].items() if cause.startswith("refused."))
+    assert int(first["account"]["candidates"]) == first["last"] + 1 == 200 + refused
+    assert any("tracks" in row[1] for row in first["feedback"])
+    assert [one["published"] for one in others] == [199, 198] and [k for k in order if k < 3][-1] == 2
+    assert max(row[2] for row in others[1]["feedback"] if not row[1]) == 2, "two before it"
+    assert (hasty["status"], hasty["code"]) == (ABORTED, Code.NOT_READY) and re.search("not active|waiting for", hasty["reason"])
+    assert heard["heard"] == 597
+    assert "ERROR" not in suite.read_text()
+
+
+def test_what_is_wrong_is_said_with_its_code(environment, suite):
+    goals = [{"parameters": values} for values in ({"cout": 3}, {"count": 0}, {"request": "1 2"}, {"goals": "1: 9999 0 0 5"})]
+    answers, heard, _ = ask(environment, *goals)
+    assert [one["status"] for one in answers] == [ABORTED] * 4 and heard["heard"] == 0
+    assert [one["code"] for one in answers] == [Code.INVALID, Code.INVALID, Code.INVALID, Code.IMPOSSIBLE]
+    assert all(word in one["reason"] for word, one in zip(("cout", "count", "'1 2'", "vehicle"), answers, strict=True))
+
+
+def test_those_at_work_and_one_that_waits_are_cancelled_and_the_next_one_is_served(environment, suite):
+    many = {"parameters": {"count": 100_000}}
+    goals = [*[many | {"cancel": 2.0}] * GpSampler.THREADS, many | {"cancel": 0.5}, {"parameters": {"count": 3, "seed": 9}}]
+    (*running, waiting, last), heard, _ = ask(environment, *goals)
+    for one in (*running, waiting):
+        assert (one["status"], one["code"]) == (CANCELED, Code.CANCELLED) and "cancelled" in one["reason"]
+    assert all(one["published"] > 0 for one in running) and waiting["published"] == 0
+    assert waiting["seconds"] < min(one["seconds"] for one in running)
+    assert last["code"] == Code.OK and heard["heard"] == sum(one["published"] for one in running) + 3
+
+
+def test_requests_at_the_same_time_give_what_each_gives_alone(environment, suite):
+    goals = [{"parameters": {"count": 30, "seed": k, "ego": ego}} for k in range(3) for ego in ("", "2")]
+    _, together, _ = ask(environment, *goals)
+    alone = [digest for goal in goals for digest in ask(environment, goal)[1]["digests"]]
+    assert sorted(together["digests"]) == sorted(alone) and len(alone) >= 180
+
+
+def test_a_small_request_does_not_wait_for_a_large_one(environment, suite):
+    if GpSampler.THREADS < 2:
+        pytest.skip("one core: requests are served one after the other")
+    large, small = {"parameters": {"count": 100_000}, "cancel": 6.0}, {"parameters": {"count": 3, "seed": 9}}
+    _, _, order = ask(environment, large, small)
+    assert order == [1, 0]
+
+
+def test_the_same_request_is_the_same_by_action_and_service(environment, suite):
+    """What a request publishes does not depend on how it came."""
+    (by_action,), _, _ = ask(environment, {"parameters": {"count": 4, "seed": 5, "request": "same"}})
+    call = (
+        "import rclpy; from rclpy.parameter import Parameter; from rcl_interfaces.srv import SetParametersAtomically as Kind\n"
+        "rclpy.init(); node = rclpy.create_node('caller'); client = node.create_client(Kind, 'gp_sampler/generate')\n"
+        "assert client.wait_for_service(60.0)\n"
+        "given = [Parameter(n, value=v).to_parameter_msg() for n, v in (('count', 4), ('seed', 5), ('request', 'same'))]\n"
+        "future = client.call_async(Kind.Request(parameters=given)); rclpy.spin_until_future_complete(node, future)\n"
+        "print(future.result().result.reason)"
+    )
+    run = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=True, timeout=120.0)
+    assert run.stdout.strip() == by_action["reason"]
+
+
+def test_wait_until_ready_answers(environment, suite):
+    call = (
+        "import rclpy; from std_srvs.srv import Trigger\n"
+        "rclpy.init(); node = rclpy.create_node('caller'); client = node.create_client(Trigger, 'gp_sampler/wait_until_ready')\n"
+        "assert client.wait_for_service(60.0)\n"
+        "future = client.call_async(Trigger.Request()); rclpy.spin_until_future_complete(node, future); print(future.result())"
+    )
+    run = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=True, timeout=120.0)
+    assert "success=True" in run.stdout

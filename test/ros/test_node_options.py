@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What ROS lets a user change at a node, each with a real process; docs/interfaces.md has the table of all."""
+
+import re
+import time
+
+import pytest
+from source_files import ROOT
+
+from msg_conventions.cdr import stamp_of
+
+pytestmark = pytest.mark.dds
+LOG = ROOT / "examples" / "my_log.csv"
+
+
+def nodes_of(client):
+    return {f"{space.rstrip('/')}/{name}" for name, space in client.node.get_node_names_and_namespaces()}
+
+
+def test_topics_services_and_the_node_are_remapped(start, client):
+    client.hear("/lab/tracks")
+    remapped = ("tracks:=/lab/tracks", "~/play:=/lab/again", "__node:=logs", "__ns:=/b")
+    start("log_player", *(word for rule in remapped for word in ("-r", rule)), log_path=LOG)
+    client.wait("/lab/tracks")
+    assert "/b/logs" in nodes_of(client)
+    services = {name for name, _ in client.node.get_service_names_and_types()}
+    assert {"/lab/again", "/b/logs/get_parameters"} <= services and "/b/logs/play" not in services
+    assert client.node.count_publishers("/tracks") == client.node.count_publishers("/b/tracks") == 0
+
+
+def test_a_rule_for_one_node_leaves_the_others_of_its_process(start, client):
+    client.hear("/b/tracks")
+    start("suite", "-r", "log_player:tracks:=/b/tracks", log_path=LOG, road_name="straight")
+    client.wait("/b/tracks")
+    assert "segmenter" in {one.node_name for one in client.node.get_subscriptions_info_by_topic("/tracks")}
+    assert client.node.count_publishers("/tracks") == 0 and client.node.count_subscribers("/b/tracks") == 1
+
+
+def test_a_parameter_file_of_wildcards_names_and_namespaces(start, client, tmp_path):
+    file = tmp_path / "own.yaml"
+    file.write_text(
+        "/**:\n  ros__parameters: {road_name: straight}\n"
+        "/a/road_server:\n  ros__parameters: {road_name: curve}\n/b/road_server:\n  ros__parameters: {road_name: merge}\n"
+    )
+    start("road_server", "-r", "__ns:=/a", "--params-file", str(file))
+    start("road_server", "-r", "__ns:=/c", "--params-file", str(file))
+    from rcl_interfaces.srv import GetParameters
+
+    request = GetParameters.Request(names=["road_name"])
+    names = [client.call(GetParameters, f"/{space}/road_server/get_parameters", request).values[0] for space in "ac"]
+    assert [name.string_value for name in names] == ["curve", "straight"]
+
+
+def test_simulated_time_stamps_what_a_node_says(start, client):
+    client.hear("/diagnostics")
+    start("road_server", use_sim_time=True, road_name="straight")
+    from rosgraph_msgs.msg import Clock
+
+    clock, now = client.node.create_publisher(Clock, "/clock", 10), Clock()
+    now.clock.sec = 7
+
+    def told():
+        clock.publish(now)
+        return [stamp for data in client.heard["/diagnostics"] if (stamp := stamp_of(data, "diagnostics")) == 7_000_000_000]
+
+    deadline = time.monotonic() + 60.0
+    while not told():
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+
+
+def test_a_node_that_was_killed_and_starts_again_is_one_node_with_the_same_output(start, client):
+    client.hear("/map")
+    first = start("road_server", road_name="straight")
+    client.wait("/map")
+    first.kill()
+    first.wait(30.0)
+    client.heard["/map"].clear()
+    start("road_server", road_name="straight")  # as respawn does
+    client.wait("/map")
+    client.until(lambda: client.node.count_publishers("/map") == 1, "the killed one to be gone")
+
+
+def test_the_table_of_options_names_tests_that_are_there():
+    text = (ROOT / "docs" / "interfaces.md").read_text()
+    table = re.findall(r"^\| .* \| `(test_\w+\.py)` \|$", text, re.MULTILINE)
+    assert len(table) >= 8
+    assert all((ROOT / "test" / "ros" / name).is_file() for name in table)
