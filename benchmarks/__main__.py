@@ -10,14 +10,16 @@ import json
 import os
 import pkgutil
 import platform
+import signal
 import sys
+from typing import NoReturn
 
 import numpy
 import scipy
 
 import benchmarks
 from benchmarks._size import QUICK
-from benchmarks.row import Row
+from benchmarks.row import MADE, Row
 
 FRAME = {"__main__", "row"}
 
@@ -81,6 +83,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="next to nothing of each, to see that it runs; figures say nothing")
     arguments = parser.parse_args()
     known = names()
+    signal.signal(signal.SIGTERM, stop)
     if arguments.list or arguments.name is None:
         print("\n".join(known))
         return 0
@@ -92,13 +95,30 @@ def main() -> int:
     for name in known if arguments.name == "all" else [arguments.name]:
         run = importlib.import_module(f"benchmarks.{name}").run
         given = {key: value for key, value in vars(arguments).items() if value is not None}
-        rows: list[Row] = run(**{key: given[key] for key in inspect.signature(run).parameters if key in given})
-        if arguments.json:
-            report = {"benchmark": name, "quick": arguments.quick, "rows": [row.document() for row in rows], "machine": machine()}
-            print(json.dumps(report, allow_nan=False), flush=True)
-        else:
-            print(f"{name}\n{table(rows)}\n", flush=True)
+        MADE.clear()
+        stopped, rows = "", list[Row]()
+        try:
+            rows = run(**{key: given[key] for key in inspect.signature(run).parameters if key in given})
+        except BaseException as error:
+            stopped, rows = f"{type(error).__name__}: {error}".rstrip(": "), MADE
+            raise
+        finally:
+            report(name, rows, stopped, arguments)
     return 0
+
+
+def report(name: str, rows: list[Row], stopped: str, arguments: argparse.Namespace) -> None:
+    """Print the rows of a benchmark; of one that was stopped, those that were measured, and why it was."""
+    if arguments.json:
+        document = {"benchmark": name, "quick": arguments.quick, "rows": [row.document() for row in rows], "machine": machine()}
+        print(json.dumps(document | ({"stopped": stopped} if stopped else {}), allow_nan=False), flush=True)
+    else:
+        print(f"{name}{f' (stopped: {stopped})' if stopped else ''}\n{table(rows)}\n", flush=True)
+
+
+def stop(*_: object) -> NoReturn:
+    """End as Ctrl-C does, so that what was measured is printed."""
+    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":

@@ -13,6 +13,8 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from plotly.offline import get_plotlyjs
+
 from benchmarks._paper_chain import ROADS
 from benchmarks._paper_claims import Claim, claims_of
 from benchmarks._paper_measure import PaperCase, run_case
@@ -102,6 +104,7 @@ def _render(
         "paper.html.j2",
         ("paper.js",),
         drawings,
+        libraries=(get_plotlyjs(),),
         folder=ASSETS,
         cases=views,
         quality=quality,

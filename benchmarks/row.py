@@ -7,6 +7,9 @@ from dataclasses import asdict, dataclass
 import math
 from typing import Any, Literal
 
+MADE: "list[Row]" = []
+"""All rows of this process, as they are measured: a benchmark that is stopped keeps what it has."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -25,6 +28,7 @@ class Row:
     def __post_init__(self) -> None:  # numbers of numpy are no numbers of JSON
         object.__setattr__(self, "value", float(self.value))
         object.__setattr__(self, "target", None if self.target is None else float(self.target))
+        MADE.append(self)
 
     @property
     def met(self) -> bool | None:

@@ -21,7 +21,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from scenario_gen.bags.recordings.provenance import parameter_texts, versions
 from scenario_gen.bags.recordings.write import add_results, scenario_bytes
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.documents import read_json
@@ -30,6 +29,7 @@ from scenario_gen.base.folders import sha256_of, write_text
 from scenario_gen.base.folders.claim import alone
 from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.base.interrupts import ending
+from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.tasks import arriving, check_out, spread, Workers
 from scenario_gen.method.attempt import Attempt

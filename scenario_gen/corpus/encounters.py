@@ -22,7 +22,7 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.logs import encounters_of, Observations, RawLog, read_log, Segment
+from scenario_gen.logs import encounters_of, NoEncounterError, Observations, RawLog, read_log, Segment
 from scenario_gen.logs.tables import EPOCH_NS
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Encounter
@@ -109,7 +109,11 @@ def read_one_log(task: LogTask) -> None:
     """
     if task.target.exists():
         return
-    result = read_log(list(task.paths), task.config.log)
+    try:
+        result = read_log(list(task.paths), task.config.log)
+    except NoEncounterError as error:  # a result: the log is not read again
+        write_encounters(task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []})
+        return
     source = ", ".join(path.name for path in task.paths)
     rows = [row_of(encounter, source, task.config) for encounter in result.encounters]
     write_encounters(task.target, rows, {"refused": [], "quality": list(result.quality.lines())})

@@ -7,7 +7,7 @@ All from two tracks (T, 2) on one clock while both are near each other. The firs
 
 - *following*: for at least 70 % of the first and of the last quarter of the time one drives on the other's path: within 2.5 m of
   it, headings within 30°. A path goes on straight at both ends.
-- *merging*: so in the last quarter, and for less than 30 % of the first.
+- *merging*: so in the last quarter, and less in the first.
 - *turning*: one of them turns by 45° or more.
 - *crossing*: neither turns and their paths intersect at 30° to 150°.
 - *opposing*: where they are nearest to each other their headings differ by 150° or more.
@@ -24,7 +24,7 @@ from scenario_gen.numerics.kernels import F1, F2, kernel, OUTB1
 
 KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")
 BESIDE, ALIKE = 2.5, np.radians(30.0)  # m, rad: on the same path
-MOSTLY, HARDLY = 0.7, 0.3
+MOSTLY = 0.7
 TURNS, AGAINST = np.radians(45.0), np.radians(150.0)
 BEYOND = 150.0  # m by which a path goes on at both ends
 STEP = 4.0  # m between the points of a path
@@ -100,10 +100,8 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
         max(float(_on_path(motion.part(own), way).mean()) for motion, way in ((one, others), (other, path)))
         for own in (slice(None, quarter), slice(-quarter, None))
     )
-    if late >= MOSTLY and early >= MOSTLY:
-        return "following"
-    if late >= MOSTLY and early < HARDLY:
-        return "merging"
+    if late >= MOSTLY:
+        return "following" if early >= MOSTLY else "merging"
     if max(abs(turned(one)), abs(turned(other))) >= TURNS:
         return "turning"
     if _intersect(one.position, one.heading, other.position, other.heading):

@@ -28,7 +28,8 @@ BIN = 500_000  # µs
 SPREAD = 0.0006  # degrees, 65 m or so, between two messages of one vehicle in one bin: further, and there are two of them
 ASKEW = 0.37  # of the longitude, added to the latitude, so that one number tells two places apart
 ROW = 1 << 24  # cells in a row around the globe, at the most
-SHARED = 3  # such bins make an id one that is shared
+SHARED = 3  # such bins make an id one that may be shared
+TOGETHER = 10  # bins in which two vehicles send: fewer, and it is one whose fixes jump
 ELSEWHERE = 1 << 40  # added to a shared id for each further vehicle that bears it
 MARGIN = 3_000_000  # µs of messages that are kept before and after a meeting
 
@@ -152,8 +153,11 @@ def _bins(base: Any) -> dict[str, int]:
         device, *columns = (rows.column(name).to_numpy() for name in ("device", "t", "lat", "lon", "speed"))
         who = np.zeros(len(device), dtype=np.int64)
         for first, last in runs_of(device):
-            who[first:last] = tell_apart(*(column[first:last] for column in columns))
-            shared[str(device[first])] = int(who[first:last].max()) + 1
+            own = tell_apart(*(column[first:last] for column in columns))
+            if _together(columns[0][first:last], own) < TOGETHER:
+                continue  # one vehicle whose fixes jump
+            who[first:last] = own
+            shared[str(device[first])] = int(own.max()) + 1
         base.register("split", rows.set_column(0, "device", pa.array(device + who * ELSEWHERE)))
         base.execute(
             f"CREATE TEMP VIEW told_apart AS SELECT * FROM messages WHERE device NOT IN {who_shares} "
@@ -176,6 +180,12 @@ def _bins(base: Any) -> dict[str, int]:
         f"(SELECT *, {row}::BIGINT AS r FROM binned))"
     )
     return shared
+
+
+def _together(t: Ints, who: Ints) -> int:
+    """Return in how many bins more than one of the vehicles of an id sends; t (M,) µs, who (M,)."""
+    pairs = np.unique(np.stack([t // BIN, who]), axis=1)
+    return int((np.diff(pairs[0]) == 0).sum())
 
 
 def _candidates(base: Any, config: CorpusConfig) -> dict[str, Ints]:

@@ -12,11 +12,12 @@ A file that is there is done, so a run that was killed goes on where it was.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tasks import arriving, check_out, spread, Workers
-from scenario_gen.logs import is_bag, is_commonroad, is_spmd, is_table
+from scenario_gen.logs import is_bag, is_commonroad, is_nocturne, is_spmd, is_table
 from scenario_gen.template import reactions_of
 
 ARCHIVE, PAGE = "archive.json", "encounters.html"
@@ -179,22 +180,34 @@ def inventory(archives: Sequence[Path]) -> tuple[list[Path], list[list[Path]], l
         if archive.is_file() or is_bag(archive):
             (messages.append(archive) if is_spmd(archive) else logs.append([archive]))
             continue
-        files = sorted(path for path in archive.rglob("*") if path.is_file() and not path.name.startswith("."))
-        spmd = [path for path in files if is_spmd(path)]
+        files = sorted(Path(folder, name) for folder, _, names in os.walk(archive) for name in names if not name.startswith("."))
+        spmd: list[Path] = []
+        rest: list[Path] = []
+        for path in files:
+            (spmd if is_spmd(path) else rest).append(path)
         messages += spmd
-        rest = [path for path in files if path not in set(spmd)]
-        bags = sorted({path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)})
-        tables = [path for path in rest if is_table(path) or is_commonroad(path)]
-        loose = [path for path in rest if path.suffix in (".mcap", ".db3") and path.parent not in bags]
+        bags = {path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)}
+        within = {path: not bags.isdisjoint(path.parents) for path in rest} if bags else dict.fromkeys(rest, False)
+        tables = [path for path in rest if not within[path] and (is_table(path) or is_commonroad(path) or is_nocturne(path))]
+        loose = [path for path in rest if path.suffix in (".mcap", ".db3") and not within[path]]
         if not spmd and not bags and not loose and tables and all(path.parent == archive and is_table(path) for path in tables):
             logs.append(tables)
         else:
-            logs += [[path] for path in (*tables, *bags, *loose)]
+            logs += [[path] for path in (*tables, *sorted(bags), *loose)]
         known = {*spmd, *tables, *loose}
-        others += [path for path in rest if path not in known and not any(path.is_relative_to(bag) for bag in bags)]
+        others += [path for path in rest if path not in known and not within[path]]
         if len(messages) + len(logs) == before:
             raise InputError(f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario")
     return messages, logs, others
+
+
+def resolved(paths: Iterable[Path]) -> Iterator[str]:
+    """Yield absolute names without links; folders are resolved once, for there may be 100,000 files."""
+    folders: dict[Path, Path] = {}
+    for path in paths:
+        if path.parent not in folders:
+            folders[path.parent] = path.parent.resolve()
+        yield str(path.resolve() if path.is_symlink() else folders[path.parent] / path.name)
 
 
 def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], config: CorpusConfig) -> None:
@@ -206,7 +219,9 @@ def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], 
     files = [*messages, *chain.from_iterable(logs)]
     document = {
         "format": 1,
-        "files": [[str(path.resolve()), path.stat().st_size if path.is_file() else 0] for path in files],
+        "files": [
+            [name, path.stat().st_size if path.is_file() else 0] for name, path in zip(resolved(files), files, strict=True)
+        ],
         "parameters": {name: value for name, (_, value) in flatten(config).items() if name not in ("memory", "task_rows")},
     }
     place = out / ARCHIVE

@@ -59,5 +59,5 @@ def write_page(path: Path, title: str, lead: str, cards: Sequence[Mapping[str, A
         cards: each with `title`, `lines` (texts) and `pictures`.
         notes: sentences at its end.
     """
-    page = render_page("corpus.html.j2", (), {}, plotly=False, title=title, lead=lead, cards=cards, notes=notes)
+    page = render_page("corpus.html.j2", (), {}, title=title, lead=lead, cards=cards, notes=notes)
     write_text(path, page)

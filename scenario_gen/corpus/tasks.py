@@ -7,10 +7,11 @@ A task writes to a temporary name, syncs and renames, so a file that is there is
 distribution, nothing else: it holds no state that a killed run would lose.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 import logging
 import multiprocessing
 import os
@@ -32,6 +33,10 @@ WORKERS = {  # their environment: one thread each; Dask's own has them return ev
     **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
     "DASK_LOGGING__DISTRIBUTED": "critical",
 }
+
+
+COMMON = ("config", "request")  # fields of tasks that are alike in all of them
+WAVE = 4  # tasks for each worker that the scheduler holds at a time
 
 
 @contextmanager
@@ -94,6 +99,7 @@ class Spread:
         self._workers = workers.count or os.cpu_count() or 1
         self._scheduler, self._told, self._stack = workers.scheduler, workers.told, stack
         self._client: Any = None
+        self._rounds = 0
 
     def __call__(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> list[str]:
         """Run tasks, none of which depends on another.
@@ -122,11 +128,48 @@ class Spread:
             self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
         from distributed import as_completed
 
-        futures = self._client.map(_guarded, [function] * len(tasks), tasks, pure=False)
-        names = {future.key: getattr(task, "name", "a task") for future, task in zip(futures, tasks, strict=True)}
-        for future in as_completed(futures):
+        client, waiting, names = self._client, iter(tasks), dict[str, str]()
+        common = _common(tasks)
+        self._rounds += 1
+        plugin = f"scenario_gen {os.getpid()} {self._rounds}"
+        client.register_plugin(_plugin(common), name=plugin)  # of later workers, too
+
+        def submitted(count: int) -> Iterator[Any]:
+            for task in islice(waiting, count):
+                less: Any = replace(task, **dict.fromkeys(common)) if common else task  # type: ignore[type-var]
+                future = client.submit(_completed, function, less, plugin, pure=False)
+                names[future.key] = getattr(task, "name", "a task")
+                yield future
+
+        running = as_completed(list(submitted(WAVE * max(len(client.nthreads()), self._workers))))
+        for future in running:
             lost = future.status != "finished"  # every worker that tried it died
-            yield f"{names[future.key]}: {future.exception()}" if lost else future.result()
+            yield f"{names.pop(future.key)}: {future.exception()}" if lost else future.result()
+            for more in submitted(1):
+                running.add(more)
+
+
+def _common(tasks: Sequence[Any]) -> dict[str, Any]:
+    """Return the fields that are one object in all tasks (the configuration): they are sent to each worker once."""
+    shared = {name: getattr(tasks[0], name) for name in COMMON if hasattr(tasks[0], name)}
+    return {name: value for name, value in shared.items() if all(getattr(task, name) is value for task in tasks)}
+
+
+def _plugin(common: Mapping[str, Any]) -> Any:
+    """Return what gives every worker, also one that is started later, what tasks have in common."""
+    from distributed import WorkerPlugin
+
+    plugin = WorkerPlugin()
+    plugin.common = common
+    return plugin
+
+
+def _completed(function: Callable[[Any], Any], task: Any, plugin: str) -> str:
+    """Run a task, on a worker, with what it has in common with the others."""
+    from distributed import get_worker
+
+    common = get_worker().plugins[plugin].common
+    return _guarded(function, replace(task, **common) if common else task)
 
 
 @contextmanager

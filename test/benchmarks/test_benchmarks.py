@@ -60,3 +60,32 @@ def test_a_row_takes_the_numbers_of_numpy(value):
 def test_what_is_not_finite_is_null(value):
     row = Row("a", value, "", "lower", 1.0)
     assert row.document()["value"] is None and row.document()["met"] is (value == -math.inf)
+
+
+STOPPED = """
+import os, signal, sys, types
+from benchmarks import __main__ as main
+from benchmarks.row import Row
+
+def run():
+    Row("first", 1.0, "s", "lower")
+    {how}
+    return [Row("never", 2.0, "s", "lower")]
+
+sys.modules["benchmarks.validity"] = types.SimpleNamespace(run=run)
+sys.argv = ["benchmarks", "validity", "--json"]
+sys.exit(main.main())
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "why"),
+    [("os.kill(os.getpid(), signal.SIGTERM)", "KeyboardInterrupt"), ("raise ValueError('peer')", "ValueError: peer")],
+    ids=["signal", "error"],
+)
+def test_a_benchmark_that_is_stopped_keeps_what_it_has_measured(how, why):
+    command = [sys.executable, "-c", STOPPED.replace("{how}", how)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    report = json.loads(run.stdout.splitlines()[-1])
+    assert run.returncode != 0 and report["stopped"] == why
+    assert [row["id"] for row in report["rows"]] == ["first"]

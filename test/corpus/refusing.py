@@ -3,6 +3,8 @@
 
 """A task for worker processes, in a module that loads next to nothing."""
 
+from dataclasses import dataclass
+
 from scenario_gen.base.errors import InputError
 
 
@@ -11,3 +13,16 @@ def refuse(name):
         raise InputError(f"{name} is none")
     if name == "c":
         raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class Shared:
+    """A task with something that all tasks have in common."""
+
+    name: str
+    config: object
+
+
+def need_config(task):
+    if task.config is None:
+        raise InputError(f"{task.name} lacks its configuration")

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What lies in an archive: SPMD files, logs, bags, others; and a log without an encounter is a result."""
+
+import pytest
+from source_files import ROOT
+
+from scenario_gen.corpus.mine import inventory, mine
+from scenario_gen.logs.read import is_spmd
+
+SPMD = ",".join(["1"] * 19) + "\n"
+
+
+def test_each_file_of_an_archive_is_one_thing(tmp_path):
+    for name, text in {
+        "a/one.csv": SPMD,
+        "a/deep/two.txt": SPMD,
+        "b/log.csv": "id,time,x,y\n",
+        "b/readme.md": "",
+        ".hidden.csv": SPMD,
+        "bag/metadata.yaml": "rosbag2_bagfile_information: {relative_file_paths: [bag_0.mcap]}\n",
+        "bag/bag_0.mcap": "",
+        "bag/notes.txt": "words",
+        "c/loose.mcap": "",
+        "c/d/log.csv": "id,time,x,y\n",
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    messages, logs, others = inventory([tmp_path])
+    names = [[path.relative_to(tmp_path).as_posix() for path in own] for own in (messages, *logs, others)]
+    assert names == [["a/deep/two.txt", "a/one.csv"], ["b/log.csv"], ["c/d/log.csv"], ["bag"], ["c/loose.mcap"], ["b/readme.md"]]
+
+
+def test_each_file_is_looked_at_once(tmp_path, monkeypatch):
+    """A set that was built again for each file took an hour for 100,000."""
+    for k in range(300):
+        (tmp_path / f"{k:03}.csv").write_text(SPMD)
+    seen = []
+    monkeypatch.setattr("scenario_gen.corpus.mine.is_spmd", lambda path: seen.append(path) or is_spmd(path))
+    hashed = []
+    monkeypatch.setattr("pathlib.PurePath.__hash__", lambda path: hashed.append(path) or hash(str(path)))
+    messages, logs, others = inventory([tmp_path])
+    assert (len(messages), logs, others) == (300, [], []) and len(seen) == 300
+    assert len(hashed) < 10 * 300
+
+
+def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, monkeypatch):
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    (logs / "sub").mkdir()
+    (logs / "sub" / "good.csv").write_text((ROOT / "examples" / "my_log.csv").read_text())
+    rows = [f"{n},{k / 10:.1f},{500.0 * n + k:.1f},0.0,10.0" for n in (1, 2) for k in range(100)]
+    (logs / "apart.csv").write_text("\n".join(["vehicle_id,time,x,y,speed", *rows]) + "\n")
+    made = mine([logs], tmp_path / "corpus")
+    assert made.encounters == 1 and not made.failed
+    assert [one["why"].rpartition("; ")[2] for one in made.refused] == ["--set log.proximity=510 takes two"]
+    monkeypatch.setattr("scenario_gen.corpus.encounters.read_log", lambda *_: pytest.fail("it is read again"))
+    assert mine([logs], tmp_path / "corpus").encounters == 1
