@@ -4,16 +4,17 @@
 """Raw files and bags -> encounters (paper II-A)."""
 
 from scenario_gen.logs.adapters.commonroad import is_commonroad
+from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.geodesy import latitude_longitude, local_frame
 from scenario_gen.logs.groups import APART, LAG, SHARED, shortest, ticks, windows
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment
-from scenario_gen.logs.read import encounters_of, is_bag, is_spmd, is_table, LogFormat, LogResult, read_log
+from scenario_gen.logs.read import encounters_of, is_bag, is_spmd, is_table, LogFormat, LogResult, NoEncounterError, read_log
 from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
-    "APART", "CASES", "LAG", "SHARED", "LogConfig", "LogFormat", "LogResult", "Observations", "RawLog", "Rows",
-    "Segment", "Streams", "bundled", "encounters_of", "is_bag", "is_commonroad", "is_spmd", "is_table", "latitude_longitude",
-    "local_frame", "read_log", "shortest", "ticks", "windows",
+    "APART", "CASES", "LAG", "SHARED", "LogConfig", "LogFormat", "LogResult", "NoEncounterError", "Observations", "RawLog",
+    "Rows", "Segment", "Streams", "bundled", "encounters_of", "is_bag", "is_commonroad", "is_nocturne", "is_spmd", "is_table",
+    "latitude_longitude", "local_frame", "read_log", "shortest", "ticks", "windows",
 ]  # fmt: skip

@@ -13,19 +13,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, needs, reading
 from scenario_gen.base.registry import Registry
 from scenario_gen.logs.adapters.commonroad import is_commonroad
+from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
-from scenario_gen.logs.groups import distances, find_groups, Group
+from scenario_gen.logs.groups import distances, driven, find_groups, Group, ticks
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.logs.units import remarks_on_units
+from scenario_gen.numerics import runs
 from scenario_gen.types import cut, Encounter, Vehicle
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
@@ -59,14 +62,19 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
     except InputError as error:  # some errors, e.g. on a vehicle's clock, do not name the file
         if str(error).startswith(("parameter ", *(str(known)[:100] for known in paths))):
             raise
-        raise InputError(f"{paths[0]}: {error}") from error
+        raise type(error)(f"{paths[0]}: {error}") from error
+
+
+class NoEncounterError(InputError):
+    """A log can be read and holds no encounter; the message says how near to one it comes."""
 
 
 def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     """Cut a raw log, from files or streams, into encounters, as `read_log` does.
 
     Raises:
-        InputError: there is no encounter in it; the message says why.
+        NoEncounterError: there is no encounter in it; the message says why.
+        InputError: fewer than two vehicles have usable positions.
     """
     if log.encounters:
         return as_recorded(log, config)
@@ -87,7 +95,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         vehicles.append(quality)
     groups, notes = find_groups(pieces, config)
     if not groups:
-        raise InputError(explain_no_encounter(log, pieces, config))
+        raise NoEncounterError(explain_no_encounter(log, pieces, config))
     notes += notes_on_vehicles(
         vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.members}, config
     )
@@ -230,15 +238,40 @@ def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
 
 def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig) -> str:
     """Return the error message on a log without encounters."""
-    pairs = [(a, b) for a, b in combinations(pieces, 2) if a.track.id != b.track.id and len(distances(a, b))]
-    who = "no two vehicles are recorded at the same time"
-    if pairs:
-        nearest, (a, b) = min(((float(distances(a, b).min()), (a, b)) for a, b in pairs), key=lambda pair: pair[0])
-        who = f"{a.track.id} and {b.track.id} come closest, to {nearest:.0f} m"
-    return (
+    rule = (
         f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.min_duration:g} s while one "
-        f"drives {config.travel:g} m ({who}); change --set log.proximity=…, log.min_duration=…, log.travel=… or log.longest_gap=…"
+        f"drives {config.travel:g} m"
     )
+    pairs = [(a, b) for a, b in combinations(pieces, 2) if a.track.id != b.track.id and len(distances(a, b))]
+    if not pairs:
+        return f"{rule}: no two vehicles are recorded at the same time"
+    met = [(*time_near(a, b, config), a.track.id, b.track.id) for a, b in pairs]
+    seconds, travel, nearest, first, second = max(met, key=lambda one: (one[0], one[1], -one[2]))
+    if seconds <= 0.0:
+        nearest, first, second = min(one[2:] for one in met)
+        long_enough = [apart for a, b in pairs if len(apart := distances(a, b)) > ticks(config.min_duration, config)]
+        remedy = "none is recorded beside another for that long"
+        if long_enough:
+            width = ticks(config.min_duration, config) + 2
+            reach = min(float(sliding_window_view(np.pad(apart, 1, "edge"), width).max(axis=1).min()) for apart in long_enough)
+            remedy = f"--set log.proximity={math.ceil(reach / 10.0 + 1e-9) * 10} takes two"
+        return f"{rule}. Vehicles {first} and {second} come closest, to {nearest:.0f} m; {remedy}"
+    near = (
+        f"Vehicles {first} and {second} are within {config.proximity:g} m for {seconds:.1f} s and come as near as {nearest:.0f} m"
+    )
+    if seconds < config.min_duration:
+        return f"{rule}. {near}; --set log.min_duration={math.floor(10.0 * seconds) / 10.0:g} takes them"
+    if travel < config.travel:
+        return f"{rule}. {near}, and the faster one drives {travel:.1f} m; --set log.travel={math.floor(travel):g} takes them"
+    return f"{rule}. {near}, but one after the other; --set log.proximity=… or log.longest_gap=… may take them"
+
+
+def time_near(a: Piece, b: Piece, config: LogConfig) -> tuple[float, float, float]:
+    """Return how long two pieces are near each other at a stretch [s], how far one drives in it, how near they come [m]."""
+    apart, begin = distances(a, b), max(a.first, b.first)
+    spans = [(last - 1 - first, begin + first, begin + last) for first, last in runs(apart < config.proximity)]
+    near, first, last = max(spans, default=(0, begin, begin))
+    return near * config.period, max(driven(a, first, last, config), driven(b, first, last, config)), float(apart.min())
 
 
 def is_bag(path: Path) -> bool:
@@ -312,6 +345,7 @@ FORMATS = Registry[LogFormat](
     {  # tried in this order: a table without a header is SPMD
         "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
         "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
+        "nocturne": LogFormat(is_nocturne, late("adapters.nocturne")),
         "spmd": LogFormat(is_spmd, late("tables", spmd=True)),
         **{
             name: LogFormat(partial(is_known, name=name), late("adapters.tracks", name=name))
@@ -339,7 +373,8 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
     if known is None:
         raise InputError(
             f"{paths[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad scenarios, rosbag2 folders, .mcap, .db3. If its name misleads: --set log.format=table"
+            "CommonRoad scenarios, scenes of Nocturne and GPUDrive (.json), rosbag2 folders, .mcap, .db3. "
+            "If its name misleads: --set log.format=table"
         )
     with reading(files[0]):
         return known.read(files, config)

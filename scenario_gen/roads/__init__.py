@@ -25,16 +25,20 @@ from scenario_gen.roads.obstacles import read_obstacles
 from scenario_gen.roads.shaped import bent_axis
 from scenario_gen.roads.vector.ground import along_lanes, drives_against, own_ground
 from scenario_gen.roads.vector.match import Course
-from scenario_gen.roads.vector.place import placements, tracks_on
+from scenario_gen.roads.vector.network import FAULTY
+from scenario_gen.roads.vector.place import Place, placements, places, tracks_on
+from scenario_gen.roads.vector.read import is_vector_map, read_network, split
 from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, flare_begins, line_between, relative
 
 __all__ = [
     "BUILT_IN",
     "CONTACT",
+    "FAULTY",
     "ROADS",
     "Arm",
     "Course",
     "DrawRoad",
+    "Place",
     "RoadConfig",
     "along_lanes",
     "arms_of",
@@ -53,11 +57,14 @@ __all__ = [
     "flare_begins",
     "footprint_fits",
     "free_length",
+    "is_vector_map",
     "layout_for",
     "line_between",
     "nearest_pose_with_room",
     "own_ground",
     "placements",
+    "places",
+    "read_network",
     "read_obstacles",
     "relative",
     "reverse",
@@ -65,6 +72,7 @@ __all__ = [
     "road_and_template",
     "segment_free",
     "segments_free",
+    "split",
     "to_cells",
     "to_metres",
     "tracks_on",

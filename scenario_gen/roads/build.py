@@ -16,18 +16,20 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
+from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, PLAIN_LINE
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, vector_road
 from scenario_gen.template import clean_tracks, main_line, mirrored, refuse_too_large, to_frenet, traffic_side
 from scenario_gen.types import Encounter, MIRRORED, Road
 
 
-def build_road(name_or_path: str, encounter: Encounter | None = None, config: RoadConfig = RoadConfig()) -> Road:
+def build_road(name_or_path: str | Shape, encounter: Encounter | None = None, config: RoadConfig = RoadConfig()) -> Road:
     """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
         name_or_path: one of `ROADS`, or the path of a nav2 map_server YAML or of a vector map (.osm, .xodr, .xml), of which
-            `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
+            `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part; or what is drivable, as an array (H, W) of bool or
+            a shapely polygon, as `road_of_shape` takes it.
         encounter: the template, to which built-in roads are sized (None: plain sizes), and for which the best place on a vector
             map is searched; `corridor` cannot do without.
         config: how it is drawn.
@@ -36,7 +38,10 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
         InputError: no such road, a map that cannot be used, or an obstacle that stands nowhere on it.
         RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be separated.
     """
-    return with_obstacles(_bare_road(name_or_path, encounter, config), read_obstacles(config.obstacles))
+    obstacles = read_obstacles(config.obstacles)
+    if not isinstance(name_or_path, str):
+        return with_obstacles(road_of_shape(name_or_path, config), obstacles)
+    return with_obstacles(_bare_road(name_or_path, encounter, config), obstacles)
 
 
 def road_and_template(

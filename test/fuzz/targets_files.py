@@ -15,7 +15,7 @@ from small_scenarios import crossing
 from targets_bags import JSON
 from targets_logs import PARQUET, safety_messages, SHORT
 from targets_maps import MAP
-from test_adapters import argoverse2, commonroad, highd, ind, interaction
+from test_adapters import argoverse2, commonroad, highd, ind, interaction, nocturne
 from test_commonroad import case_of
 
 from scenario_gen.corpus.batch import CASE_COLUMNS, SCENARIO_COLUMNS
@@ -152,6 +152,7 @@ TARGETS = (
     files_target("ind", ind, read_all),
     files_target("highd", highd, read_all),
     files_target("commonroad_log", commonroad, read_all),
+    files_target("nocturne", nocturne, read_all),
     files_target("import_commonroad", scenario_file(".xml"), import_all),
     files_target("import_openscenario", scenario_file(".xosc"), import_all),
     files_target("corpus", corpus_tables, read_corpus),

@@ -3,6 +3,7 @@
 
 """Public recordings: small files written to their definitions give the positions, speeds, headings and sizes that went in."""
 
+import json
 import math
 
 import numpy as np
@@ -111,6 +112,33 @@ def commonroad(folder):
     return path, {"pedestrian"}
 
 
+def nocturne(folder, unit=math.degrees):
+    """A scene as Nocturne has it; headings in the unit that `unit` makes of rad, and vehicle 8 absent at the end."""
+    objects = []
+    for track, kind in (("7", "vehicle"), ("8", "vehicle"), ("9", "pedestrian")):
+        x, y, vx, vy, heading = motion(track, T)
+        length, width = SIZES.get(track, (0.5, 0.5))
+        there = [track != "8" or k < len(T) - 3 for k in range(len(T))]
+        objects.append(
+            {
+                "position": [{"x": float(a), "y": float(b)} if at else ABSENT for a, b, at in zip(x, y, there, strict=True)],
+                "width": width,
+                "length": length,
+                "heading": [unit(heading) if at else -10000.0 for at in there],
+                "velocity": [{"x": float(vx), "y": float(vy)} if at else ABSENT for at in there],
+                "valid": there,
+                "type": kind,
+                "id": int(track),
+            }
+        )
+    path = folder / "scene.json"
+    path.write_text(json.dumps({"name": "scene.json", "objects": objects, "roads": []}))
+    return path, {"pedestrian"}
+
+
+ABSENT = {"x": -10000.0, "y": -10000.0}
+
+
 def tracked(folder):
     """Write a bag of autoware_perception_msgs/TrackedObjects."""
     from rosbags.rosbag2 import StoragePlugin, Writer
@@ -176,7 +204,7 @@ def tracked(folder):
     return path, {"pedestrian"}
 
 
-MADE = {f.__name__: f for f in (argoverse2, interaction, ind, highd, commonroad, tracked)}
+MADE = {f.__name__: f for f in (argoverse2, interaction, ind, highd, commonroad, nocturne, tracked)}
 
 
 @pytest.mark.parametrize("name", MADE)
@@ -271,3 +299,34 @@ def test_a_broken_scenario_is_named_with_its_line(tmp_path):
 def test_the_parameter_format_offers_every_built_in_format():
     assert set(config.FORMATS) == {"auto", *read.FORMATS.built_in}
     assert read.FORMATS.group == LogConfig.__dataclass_fields__["format"].metadata["group"]
+
+
+def test_the_unit_of_headings_of_a_scene_is_told_from_its_velocities(tmp_path):
+    in_degrees = read_log(nocturne(tmp_path)[0])
+    in_radians = read_log(nocturne(tmp_path, float)[0])
+    assert any("headings in degrees" in note for note in in_degrees.quality.notes)
+    assert any("headings in rad" in note for note in in_radians.quality.notes)
+    (one,), (other,) = in_degrees.encounters, in_radians.encounters
+    assert np.allclose(one.heading, other.heading, atol=1e-6) and np.allclose(one.position, other.position, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda scene: scene["objects"][0].pop("valid"), "object 1 has no 'valid'"),
+        (lambda scene: scene["objects"][1]["heading"].pop(), "object 2: position, velocity, heading and valid have"),
+        (lambda scene: scene["objects"][1]["position"].__setitem__(0, {"x": "a", "y": 0}), "object 2: .*no list of numbers"),
+        (lambda scene: scene.update(objects=scene["objects"][2:]), "no object of type vehicle"),
+    ],
+    ids=["key", "length", "numbers", "vehicles"],
+)
+def test_a_broken_scene_is_named_with_its_object(tmp_path, change, said):
+    path, _ = nocturne(tmp_path)
+    scene = json.loads(path.read_text())
+    change(scene)
+    path.write_text(json.dumps(scene))
+    with pytest.raises(InputError, match=f"scene.json.*{said}"):
+        read_log(path)
+    path.write_text(path.read_text()[:-20])
+    with pytest.raises(InputError, match=r"scene\.json is no JSON"):
+        read_log(path)

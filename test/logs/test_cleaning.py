@@ -3,6 +3,9 @@
 
 """What cannot be true is dropped, counted and named; what cannot be repaired is refused."""
 
+from dataclasses import replace
+import re
+
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
 from log_builders import crossing, geographic, save
@@ -11,7 +14,7 @@ import pandas as pd
 import pytest
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs import LogConfig, NoEncounterError, read_log
 
 PLAIN = LogConfig()
 
@@ -144,7 +147,7 @@ def test_what_cannot_be_used_is_refused(tmp_path, damage, words):
         (LogConfig(start=100.0), "only 12.0 s long"),
         (LogConfig(start=5.0, end=4.0), "must be after start"),
         (LogConfig(start=8.0, end=9.0), "no two vehicles"),
-        (LogConfig(proximity=2.0), "change --set log.proximity"),
+        (LogConfig(proximity=2.0), r"--set log\.proximity=\d+ takes two"),
     ],
 )
 def test_parameters_that_leave_nothing(tmp_path, config, words):
@@ -192,3 +195,23 @@ def test_whatever_the_damage_no_nan_leaves(tmp_path, seed, noise, lost, repeated
         time = (encounter.start_ns * 1e-9 - 1000.0) + encounter.time
         error = encounter.position[0] - np.column_stack([-40.0 + 8.0 * time, np.zeros(len(time))])
         assert np.sqrt((error**2).sum(axis=1).mean()) < 0.5 + noise
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        (LogConfig(proximity=2.0), r"come closest, to 12 m; --set log\.proximity=\d+ takes two"),
+        (
+            LogConfig(min_duration=30.0),
+            r"are within 100 m for \d+\.\d s and come as near as 12 m; --set log\.min_duration=[\d.]+ takes",
+        ),
+        (LogConfig(travel=1000.0), r"the faster one drives \d+\.\d m; --set log\.travel=\d+ takes them"),
+    ],
+    ids=["never near", "too short", "hardly driven"],
+)
+def test_why_two_are_no_encounter_is_said_with_what_would_take_them(tmp_path, config, words):
+    path = save(crossing(), tmp_path)
+    with pytest.raises(NoEncounterError, match=words) as error:
+        read_log(path, config)
+    name, value = re.search(r"--set log\.(\w+)=([\d.]+)", str(error.value)).groups()
+    assert len(read_log(path, replace(config, **{name: float(value)})).encounters) == 1, "what it says helps"

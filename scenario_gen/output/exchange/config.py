@@ -13,6 +13,9 @@ class ExportConfig(Parameters):
     """Parameters of `scenario-gen export`."""
 
     ego: str = parameter("", "id of a vehicle that becomes the ego: of a set without an ego slot")
+    map: str = parameter(
+        "", "OpenSCENARIO: the map that the scenarios were made on (.xodr, .osm); it is copied and named as their road"
+    )
     run_out: float = parameter(
         50.0,
         "how far lanes are continued straight on beyond the road, so that a planner sees road ahead",

@@ -3,16 +3,20 @@
 
 """`scenario-gen export`: a folder of files for other software, with notes on them."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 import json
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely import contains_xy, make_valid, Polygon, prepare, union_all
 
 from scenario_gen.bags.recordings.autoware import add_autoware
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
-from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
 from scenario_gen.base.registry import Registry
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
@@ -20,9 +24,13 @@ from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonro
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
+from scenario_gen.output.exchange.scenarionet import dataset_files, description, file_name, pickled
+from scenario_gen.roads import read_network
 
 EXPORTED = Kind("exported")
 MANIFEST = "export.json"
+MAPS = (".xodr", ".osm")  # endings of the names of maps that OpenSCENARIO can name
+ON_LANES = 0.9  # share of positions that lie on lanes of the map on which they were made, at least
 
 
 @dataclass(frozen=True)
@@ -35,13 +43,18 @@ class Export:
 
 @dataclass(frozen=True)
 class Written:
-    """Names of the files of one scenario, in the folder of the export, with notes on it."""
+    """Names of the files of one scenario, in the folder of the export, with notes on it, and what `closing` is to know of it."""
 
     names: tuple[str, ...]
     notes: tuple[str, ...] = ()
+    content: Any = None
 
 
-def _nothing_shared(_: Case) -> Mapping[str, bytes]:
+def _nothing_shared(_: Case, __: ExportConfig) -> Mapping[str, bytes]:
+    return {}
+
+
+def _nothing_at_the_end(_: Sequence[tuple[str, Any]]) -> Mapping[str, bytes]:
     return {}
 
 
@@ -52,12 +65,16 @@ class ExportFormat:
     Attributes:
         write: writes one scenario of a case into the folder; it raises RefusedError for what the format cannot hold.
         shared: files that all scenarios of a case have in common, by name.
+        closing: files about all scenarios, by name: of the first file and the `content` of each.
+        takes_map: whether `ExportConfig.map` is written in place of lanes.
         own_lanes: whether the lanes of a vector map are written; if not, ones derived from the scenarios are in their place.
     """
 
     write: Callable[[Path, Case, Exported, ExportConfig], Written]
-    shared: Callable[[Case], Mapping[str, bytes]] = _nothing_shared
+    shared: Callable[[Case, ExportConfig], Mapping[str, bytes]] = _nothing_shared
     own_lanes: bool = False
+    takes_map: bool = False
+    closing: Callable[[Sequence[tuple[str, Any]]], Mapping[str, bytes]] = _nothing_at_the_end
 
 
 def export_bag(
@@ -88,15 +105,20 @@ def export_bag(
         RefusedError: no scenario can be written in that format.
     """
     to = EXPORTS[target]
+    if export.map and not to.takes_map:
+        raise InputError(f"map: --to {target} writes lanes of its own; a map can be given with --to openscenario")
+    if export.map and Path(export.map).suffix.lower() not in MAPS:
+        raise InputError(f"map {export.map}: OpenSCENARIO names a road of OpenDRIVE (.xodr) or Lanelet2 (.osm)")
     cases = read_cases(bag, export, config, namespace=namespace, indices=indices)
     notes: list[str] = []
     entries: list[dict[str, object]] = []
+    contents: list[tuple[str, Any]] = []
     done, total = count(), sum(len(case.scenarios) for case in cases)
     with replaced_folder(out, EXPORTED, [bag]) as folder:
         for case in cases:
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
-            notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, to)}")
-            for name, data in to.shared(case).items():
+            notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, to, export)}")
+            for name, data in to.shared(case, export).items():
                 (folder / name).write_bytes(data)
             for exported in case.scenarios:
                 progress(next(done), total)
@@ -106,9 +128,12 @@ def export_bag(
                     notes.append(f"{about}: left out: {error}")
                     continue
                 notes += [f"{about}, scenario {exported.index}: {sentence}" for sentence in message.notes]
-                entries.append(_entry(case, exported, message.names, to))
+                entries.append(_entry(case, exported, message.names, to, export))
+                contents.append((message.names[0], message.content))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
+        for name, data in to.closing(contents).items():
+            (folder / name).write_bytes(data)
         digests = {str(p.relative_to(folder)): sha256_of(p) for p in sorted(folder.rglob("*")) if p.is_file()}
         document = {"format": target, "notes": notes, "scenarios": entries, "sha256": digests}
         write_text(folder / MANIFEST, json.dumps(document, indent=2) + "\n")
@@ -120,17 +145,19 @@ def _has_own_lanes(case: Case, to: ExportFormat) -> bool:
     return to.own_lanes and bool(case.lane_map.network)
 
 
-def _origin(case: Case, to: ExportFormat) -> str:
+def _origin(case: Case, to: ExportFormat, export: ExportConfig) -> str:
+    if export.map:
+        return "; ".join((f"the lanes of {Path(export.map).name}", *read_network(Path(export.map)).notes))
     return case.lane_map.network_origin if _has_own_lanes(case, to) else case.lane_map.origin
 
 
-def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFormat) -> dict[str, object]:
+def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFormat, export: ExportConfig) -> dict[str, object]:
     """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
     return {
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
-        "lanes": "derived" if case.lane_map.derived and not _has_own_lanes(case, to) else "true",
+        "lanes": "derived" if case.lane_map.derived and not _has_own_lanes(case, to) and not export.map else "true",
         "index": exported.index,
         "seed": exported.seed,
         "sha256": exported.sha256,
@@ -146,14 +173,14 @@ def _to_commonroad(folder: Path, case: Case, exported: Exported, export: ExportC
     return Written((name,), notes)
 
 
-def _road_file(case: Case) -> str:
-    return f"case_{case.number}.xodr"
+def _road_file(case: Case, export: ExportConfig) -> str:
+    return Path(export.map).name if export.map else f"case_{case.number}.xodr"
 
 
 def _to_openscenario(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
     name = f"case_{case.number}_{exported.index}.xosc"
-    (folder / name).write_bytes(write_openscenario(case, exported, _road_file(case), export))
-    return Written((name, _road_file(case)))
+    (folder / name).write_bytes(write_openscenario(case, exported, _road_file(case, export), export))
+    return Written((name, _road_file(case, export)))
 
 
 def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Written:
@@ -164,16 +191,44 @@ def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) 
     return Written((name,), notes)
 
 
-def _roads(case: Case) -> Mapping[str, bytes]:
-    return {_road_file(case): write_opendrive(case.lane_map, case.road_name, case.start_ns)}
+def _to_scenarionet(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
+    described = description(case, exported, export)
+    name = file_name(case, exported)
+    (folder / name).write_bytes(pickled(described))
+    return Written((name,), content={"metadata": described["metadata"]})
+
+
+def _roads(case: Case, export: ExportConfig) -> Mapping[str, bytes]:
+    if export.map:
+        refuse_other_map(case, Path(export.map))
+        return {_road_file(case, export): Path(export.map).read_bytes()}
+    return {_road_file(case, export): write_opendrive(case.lane_map, case.road_name, case.start_ns)}
+
+
+def refuse_other_map(case: Case, path: Path) -> None:
+    """Refuse a map that is not the one on which the scenarios of a case drive.
+
+    Raises:
+        InputError: it cannot be read, or more than a tenth of the positions lie on none of its lanes.
+    """
+    lanes = union_all([make_valid(Polygon(lane.outline)) for lane in read_network(path).lanes])
+    prepare(lanes)
+    places = np.concatenate([one.others.position[one.others.there] for one in case.scenarios])
+    share = float(contains_xy(lanes, places).mean())
+    if share < ON_LANES:
+        raise InputError(
+            f"map {path}: {100.0 * share:.0f} % of the positions of {case.road_name} lie on its lanes; name the map that the "
+            "scenarios were made on"
+        )
 
 
 EXPORTS = Registry[ExportFormat](
     "scenario_gen.exports",
     {
         "commonroad": ExportFormat(_to_commonroad, own_lanes=True),
-        "openscenario": ExportFormat(_to_openscenario, _roads),
+        "openscenario": ExportFormat(_to_openscenario, _roads, takes_map=True),
         "autoware": ExportFormat(_to_autoware),
+        "scenarionet": ExportFormat(_to_scenarionet, own_lanes=True, closing=dataset_files),
     },
     ExportFormat,
 )

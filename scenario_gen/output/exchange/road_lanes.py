@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.bags.recordings.provenance import read_parameters
 from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.provenance import read_parameters
 from scenario_gen.output.exchange.derived_lanes import derived_lanes, with_all_vehicles, with_network
 from scenario_gen.output.exchange.drawn_lanes import drawn_lanes
 from scenario_gen.output.exchange.lanes import LaneMap

@@ -10,10 +10,11 @@ import math
 
 import numpy as np
 
+from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, finite
+from scenario_gen.base.markup import Element
 from scenario_gen.numerics import Floats
-from scenario_gen.roads.vector.network import Draft, MapLanes, refuse_too_many_lanes
+from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_many_lanes, speed_of
 
 SKIPPED = frozenset(
     ("obstacle", "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem", "scenarioTags")
@@ -30,10 +31,11 @@ def lanes_of(root: Element) -> MapLanes:
     Raises:
         InputError: it is broken; names file and line.
     """
-    lanelets = {element.get("id"): element for element in root.all("lanelet")}
+    faults = Faults()
+    lanelets = by_id(root.all("lanelet"), faults)
     refuse_too_many_lanes(len(lanelets), root.file)
-    limits = _speed_signs(root)
-    junctions = _junctions(root, set(lanelets))
+    limits = _speed_signs(root, faults)
+    junctions = _junctions(root, set(lanelets), faults)
     for_cars = {
         name: lanelet
         for name, lanelet in lanelets.items()
@@ -41,22 +43,23 @@ def lanes_of(root: Element) -> MapLanes:
     }
     drafts = []
     for name, lanelet in for_cars.items():
-        successors = tuple(after.get("ref") for after in lanelet.all("successor"))
-        unknown = next((after for after in successors if after not in lanelets), None)
-        if unknown is not None:
-            raise InputError(f"{lanelet.place}: lanelet {name} leads to lanelet {unknown}, which is not there")
-        beside = tuple(
-            side.get("ref")
-            for tag in ("adjacentLeft", "adjacentRight")
-            for side in lanelet.all(tag)
-            if side.attributes.get("drivingDir") == "same"
-        )
-        left, right = (_points(lanelet.one(tag)) for tag in ("leftBound", "rightBound"))
-        limit, junction = _speed_limit(lanelet, limits), junctions.get(name, "")
-        drafts.append(Draft(name, left, right, successors, beside, limit, junction, lanelet.place))
+        with faults.leaving_out("lanelet", name):
+            left, right = (_points(lanelet.one(tag)) for tag in ("leftBound", "rightBound"))
+            successors = tuple(after.get("ref") for after in lanelet.all("successor"))
+            for unknown in (after for after in successors if after not in lanelets):
+                reason = f"{lanelet.place}: lanelet {name} leads to lanelet {unknown}, which is not there"
+                faults.found.append(("link", f"{name} to {unknown}", reason))
+            beside = tuple(
+                side.get("ref")
+                for tag in ("adjacentLeft", "adjacentRight")
+                for side in lanelet.all(tag)
+                if side.attributes.get("drivingDir") == "same"
+            )
+            limit, junction = _speed_limit(lanelet, limits), junctions.get(name, "")
+            drafts.append(Draft(name, left, right, successors, beside, limit, junction, lanelet.place))
     version = root.attributes.get("commonRoadVersion", "?")
     notes = (f"CommonRoad {version}: coordinates as they stand, in metres", *_georeference(root))
-    return MapLanes(drafts, notes, len(lanelets) - len(for_cars))
+    return MapLanes(drafts, notes, len(lanelets) - len(for_cars), faults)
 
 
 def _georeference(root: Element) -> list[str]:
@@ -69,14 +72,18 @@ def _points(bound: Element) -> Floats:
     return np.array(points, dtype=np.float64).reshape(-1, 2)
 
 
-def _speed_signs(root: Element) -> dict[str, float]:
-    """Speed limits [m/s] by the id of their sign."""
+def _speed_signs(root: Element, faults: Faults) -> dict[str, float]:
+    """Speed limits [m/s] by the id of their sign; those of converters of data sets may have a unit: `50kmh`."""
     limits = {}
     for sign in root.all("trafficSign"):
         for element in sign.all("trafficSignElement"):
             kind, value = element.first("trafficSignID"), element.first("additionalValue")
             if kind is not None and value is not None and kind.text.strip() in _MAX_SPEED:
-                limits[sign.get("id")] = finite(value.text.strip(), value.place)
+                with faults.leaving_out("speed sign", sign.attributes.get("id", "?")):
+                    limit = speed_of(value.text, "m/s")
+                    if math.isnan(limit):
+                        raise InputError(f"{value.place}: {shown(value.text.strip(), 40)!r} is no speed")
+                    limits[sign.get("id")] = limit
     return limits
 
 
@@ -89,14 +96,15 @@ def _speed_limit(lanelet: Element, signs: dict[str, float]) -> float:
     )
 
 
-def _junctions(root: Element, known: set[str]) -> dict[str, str]:
+def _junctions(root: Element, known: set[str], faults: Faults) -> dict[str, str]:
     """The intersection of each lanelet that lies in one: those that follow its incoming lanelets."""
     junctions: dict[str, str] = {}
     for intersection in root.all("intersection"):
         for incoming in intersection.all("incoming"):
             for tag in ("successorsLeft", "successorsRight", "successorsStraight"):
                 for ref in incoming.all(tag):
-                    if ref.get("ref") not in known:
-                        raise InputError(f"{ref.place}: lanelet {ref.get('ref')} is not there")
-                    junctions[ref.get("ref")] = intersection.get("id")
+                    with faults.leaving_out("link of an intersection", ref.attributes.get("ref", "?")):
+                        if ref.get("ref") not in known:
+                            raise InputError(f"{ref.place}: lanelet {ref.get('ref')} is not there")
+                        junctions[ref.get("ref")] = intersection.get("id")
     return junctions

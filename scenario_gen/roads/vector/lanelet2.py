@@ -8,7 +8,7 @@ Autoware's on `local_x`, `local_y`, `turn_direction` and `intersection_area`.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 import math
@@ -20,7 +20,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite
 from scenario_gen.logs import local_frame
 from scenario_gen.numerics import exact, Floats
-from scenario_gen.roads.vector.network import by_id, Draft, MapLanes, refuse_too_long, refuse_too_many_lanes
+from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_long, refuse_too_many_lanes, speed_of
 
 _FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named
 _KMH = 1.0 / 3.6
@@ -31,7 +31,6 @@ _LIMITS = {  # m/s by subtype and location, where no sign says: Lanelet2's Germa
     ("highway", "nonurban"): 130.0 * _KMH,
     ("play_street", "urban"): 7.0 * _KMH,
 }
-_UNITS = {"": _KMH, "km/h": _KMH, "kmh": _KMH, "mph": 0.44704, "m/s": 1.0, "mps": 1.0}
 _FARTHEST = 50_000.0  # metres from the middle of a map in latitude and longitude, as far as the local frame is exact
 _CHANGE = {"dashed": (True, True), "dashed_solid": (True, False), "solid_dashed": (False, True)}  # from its left, from its right
 
@@ -76,8 +75,9 @@ def lanes_of(root: Element) -> MapLanes:
     Raises:
         InputError: it is broken, has no usable coordinates, or no lanelet for cars; names file and line.
     """
+    faults = Faults()
     nodes, ways, relations = (  # without what editors have marked as deleted
-        by_id(element for element in root.all(tag) if element.attributes.get("action") != "delete")
+        by_id((element for element in root.all(tag) if element.attributes.get("action") != "delete"), faults)
         for tag in ("node", "way", "relation")
     )
     tagged = [(relation, _tags(relation)) for relation in relations.values()]
@@ -86,30 +86,41 @@ def lanes_of(root: Element) -> MapLanes:
     if not for_cars:
         raise InputError(f"{root.file}: none of its {len(lanelets)} lanelets is for cars")
     refuse_too_many_lanes(len(for_cars), root.file)
-    refs = [ref for relation, _ in for_cars for ref in _refs(relation, ways)]
-    refuse_too_long(sum(len(ways[ref].children) for ref in refs), root.file)
-    borders, note = _borders({ref: ways[ref] for ref in refs}, nodes, root.file)
+    sides: dict[str, list[str]] = {}
+    for relation, _ in for_cars:
+        with faults.leaving_out("lanelet", relation.get("id")):
+            refs = _refs(relation, ways)
+            for ref in refs:
+                _nodes(ways[ref], nodes)
+            sides[relation.get("id")] = refs
+    used = [ref for refs in sides.values() for ref in refs]
+    refuse_too_long(sum(len(ways[ref].children) for ref in used), root.file)
+    names = {ref: _nodes(ways[ref], nodes) for ref in used}
+    positions, note = _positions([nodes[name] for name in dict.fromkeys(chain(*names.values()))], root.file, faults)
     drawn = []
     for relation, tags in for_cars:
-        lanelet = _lanelet(relation, tags, [borders[ref] for ref in _refs(relation, ways)])
-        drawn.append(lanelet)
-        if tags.get("one_way") in ("no", "false"):
-            drawn.append(lanelet.turned())
+        if relation.get("id") not in sides:
+            continue
+        with faults.leaving_out("lanelet", relation.get("id")):
+            borders = [_border(ways[ref], names[ref], positions) for ref in sides[relation.get("id")]]
+            lanelet = _lanelet(relation, tags, borders)
+            drawn.append(lanelet)
+            if tags.get("one_way") in ("no", "false"):
+                drawn.append(lanelet.turned())
     limits = {relation.get("id"): _sign_limit(relation, tags, ways) for relation, tags in tagged}
-    return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), len(lanelets) - len(for_cars))
+    return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), len(lanelets) - len(for_cars), faults)
 
 
-def _borders(ways: dict[str, Element], nodes: dict[str, Element], file: str) -> tuple[dict[str, _Border], str]:
-    """The ways as borders, and a sentence on how their positions were found.
+def _border(way: Element, names: Sequence[str], positions: Mapping[str, Floats]) -> _Border:
+    """A way as a border.
 
     Raises:
-        InputError: a way has less than two nodes, a node is not in the map, or its position is not known.
+        InputError: the position of one of its nodes is not known.
     """
-    names = {ref: _nodes(way, nodes) for ref, way in ways.items()}
-    positions, note = _positions([nodes[name] for name in dict.fromkeys(chain(*names.values()))], file)
-    return {
-        ref: _Border(way, tuple(names[ref]), np.array([positions[name] for name in names[ref]])) for ref, way in ways.items()
-    }, note
+    for name in names:
+        if name not in positions:
+            raise InputError(f"{way.place}: way {way.get('id')} goes through node {name}, whose position is faulty")
+    return _Border(way, tuple(names), np.array([positions[name] for name in names]))
 
 
 def _tags(element: Element) -> dict[str, str]:
@@ -155,35 +166,45 @@ def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
     return refs
 
 
-def _positions(nodes: list[Element], file: str) -> tuple[dict[str, Floats], str]:
+def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[str, Floats], str]:
     """Metres of each node by its id, and a sentence on how they were found.
 
+    Local coordinates are taken if most nodes have them; nodes of the other frame are faulty.
+
     Raises:
-        InputError: a node has neither local coordinates nor a latitude and longitude, or they are far apart.
+        InputError: no node has a position, or the nodes are far apart.
     """
     ids, tags = [node.get("id") for node in nodes], [_tags(node) for node in nodes]
-    lacking = [node for node, own in zip(nodes, tags, strict=True) if not {"local_x", "local_y"} <= own.keys()]
-    if lacking and len(lacking) < len(nodes):
-        raise InputError(
-            f"{lacking[0].place}: node {lacking[0].get('id')} has no tags local_x and local_y, but "
-            f"{len(nodes) - len(lacking)} of {len(nodes)} have; two frames cannot be mixed"
-        )
-    if not lacking:
-        metres = [
-            np.array([finite(own[key], f"{node.place}, tag {key}") for key in ("local_x", "local_y")])
-            for node, own in zip(nodes, tags, strict=True)
-        ]
-        return dict(zip(ids, metres, strict=True)), "coordinates are the tags local_x and local_y, in metres"
-    degrees = np.array([[_degrees(node, key, most) for key, most in (("lat", 90.0), ("lon", 180.0))] for node in nodes])
+    has_local = [{"local_x", "local_y"} <= own.keys() for own in tags]
+    local = has_local.count(True) * 2 > len(nodes)
+    found: dict[str, Floats] = {}
+    for node, name, own, has in zip(nodes, ids, tags, has_local, strict=True):
+        with faults.leaving_out("node", name):
+            if local and not has:
+                raise InputError(
+                    f"{node.place}: node {name} has no tags local_x and local_y, but {has_local.count(True)} of {len(nodes)} "
+                    "have; two frames cannot be mixed"
+                )
+            if local:
+                found[name] = np.array([finite(own[key], f"{node.place}, tag {key}") for key in ("local_x", "local_y")])
+            else:
+                found[name] = np.array([_degrees(node, key, most) for key, most in (("lat", 90.0), ("lon", 180.0))])
+    if not found:
+        raise InputError(faults.found[0][2] if faults.found else f"{file}: no lanelet for cars has borders")
+    if local:
+        return found, "coordinates are the tags local_x and local_y, in metres"
+    degrees = np.array(list(found.values()))
     latitude, longitude = np.round((degrees.min(axis=0) + degrees.max(axis=0)) / 2.0, 7).tolist()
-    local = local_frame(degrees[:, 0], degrees[:, 1], (latitude, longitude))
-    size = float(exact.hypot(local[:, 0], local[:, 1]).max())
+    metres = local_frame(degrees[:, 0], degrees[:, 1], (latitude, longitude))
+    size = float(exact.hypot(metres[:, 0], metres[:, 1]).max())
     if not size <= _FARTHEST:
+        if faults.found:  # degrees that are none: most likely metres
+            raise InputError(faults.found[0][2])
         raise InputError(
             f"{file}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read"
         )
     note = f"latitude and longitude in metres east and north of {latitude:.7f}, {longitude:.7f} (azimuthal equidistant, WGS84)"
-    return dict(zip(ids, local, strict=True)), note
+    return dict(zip(found, metres, strict=True)), note
 
 
 def _degrees(node: Element, key: str, most: float) -> float:
@@ -260,12 +281,6 @@ def _may_change(border: _Border, *, to_right: bool) -> bool:
     return from_left if to_right else from_right
 
 
-def _speed(text: str) -> float:
-    """Metres per second of a text such as "50", "50 km/h" or "30 mph"; NaN if it is none."""
-    match = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]+)?)\s*([a-zA-Z/]*)\s*", text[:40])
-    return float(match[1]) * _UNITS.get(match[2].lower(), math.nan) if match else math.nan
-
-
 def _sign_limit(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> float:
     """The limit [m/s] that a regulatory element sets, by its `sign_type` or its signs' subtypes (de274-50), NaN if none."""
     if tags.get("type") != "regulatory_element" or tags.get("subtype") != "speed_limit":
@@ -274,14 +289,14 @@ def _sign_limit(relation: Element, tags: dict[str, str], ways: dict[str, Element
     signs = [ways[member.get("ref")] for member in relation.all("member") if member.attributes.get("ref") in ways]
     for text in (*texts, *(_tags(sign).get("subtype", "") for sign in signs)):
         sign = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
-        speed = float(sign[1]) * _KMH if sign else _speed(text)
+        speed = float(sign[1]) * _KMH if sign else speed_of(text, "km/h")
         if not math.isnan(speed):
             return speed
     return math.nan
 
 
 def _speed_limit(lanelet: _Lanelet, limits: dict[str, float]) -> float:
-    own = _speed(lanelet.tags.get("speed_limit", ""))
+    own = speed_of(lanelet.tags.get("speed_limit", ""), "km/h")
     if not math.isnan(own):
         return own
     members = [member.attributes.get("ref", "") for member in lanelet.relation.all("member")]

@@ -4,8 +4,10 @@
 """From borders to lanes: cross-sections, junctions that a map does not name, and the part of a network inside a box."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 import math
+import re
 
 import numpy as np
 import shapely
@@ -21,10 +23,51 @@ _SHORTEST = 0.05  # metres of a border
 MOST_SECTIONS = 2_000_000  # of a whole map
 MOST_LANES = 30_000  # a city of some 1000 km of streets
 MOST_LINKS = 100  # of a lane to lanes that follow it, or lie beside it
+FAULTY = "faulty"  # in notes on elements that were left out
+_NAMED = 5  # faulty elements that a note names
 _CHUNK = 16  # edges of a middle that are looked at together
 _QUERIED = 64  # chunks whose neighbours are looked up at once
 _COMPARED = 2_000  # pairs of chunks that are compared at once
 _MOST_COMPARED = 400_000  # pairs of chunks
+
+
+class TooLargeError(InputError):
+    """A map, or what is joined in it, exceeds a bound."""
+
+
+@dataclass
+class Faults:
+    """Elements of a map that cannot be used and are left out, each with its reason.
+
+    Attributes:
+        found: kind of the element, its name, and the reason with its place.
+    """
+
+    found: list[tuple[str, str, str]] = field(default_factory=list)
+
+    @contextmanager
+    def leaving_out(self, kind: str, name: str) -> Iterator[None]:
+        """Leave out an element that the body refuses.
+
+        Raises:
+            TooLargeError: the body exceeds a bound.
+        """
+        try:
+            yield
+        except TooLargeError:
+            raise
+        except InputError as error:
+            self.found.append((kind, name, str(error)))
+
+    def notes(self) -> tuple[str, ...]:
+        """Return a sentence for each kind: how many were left out, which, and why the first one was."""
+        kinds = dict.fromkeys(kind for kind, _, _ in self.found)
+        sentences = []
+        for kind in kinds:
+            own = [(name, reason) for each, name, reason in self.found if each == kind]
+            names = ", ".join(name for name, _ in own[:_NAMED]) + (", …" if len(own) > _NAMED else "")
+            sentences.append(f"{len(own)} {FAULTY} {kind}{'s' if len(own) > 1 else ''} left out ({names}), first: {own[0][1]}")
+        return tuple(sentences)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +99,7 @@ class Draft:
     def __post_init__(self) -> None:
         for names, what in ((self.successors, "follow it"), (self.beside, "lie beside it")):
             if len(names) > MOST_LINKS:
-                raise InputError(f"{self.place}: lane {self.id}: {len(names)} lanes {what}; at most {MOST_LINKS} are read")
+                raise TooLargeError(f"{self.place}: lane {self.id}: {len(names)} lanes {what}; at most {MOST_LINKS} are read")
 
 
 @dataclass(frozen=True)
@@ -67,24 +110,27 @@ class MapLanes:
         drafts: its lanes for cars.
         notes: how it was read.
         left_out: how many lanes for others were passed over.
+        faults: what else was left out.
     """
 
     drafts: Sequence[Draft]
     notes: tuple[str, ...]
     left_out: int = 0
+    faults: Faults = field(default_factory=Faults)
 
 
-def by_id(elements: Iterable[Element]) -> dict[str, Element]:
-    """Return elements by their attribute `id`.
-
-    Raises:
-        InputError: an id is there twice.
-    """
+def by_id(elements: Iterable[Element], faults: Faults) -> dict[str, Element]:
+    """Return elements by their attribute `id`; those without one, and all but the first of an id, are left out."""
     seen: dict[str, Element] = {}
     for element in elements:
-        first = seen.setdefault(element.get("id"), element)
-        if first is not element:
-            raise InputError(f"{element.place}: {element.tag} {element.get('id')} is there twice, first on line {first.line}")
+        name = element.attributes.get("id")
+        if name is None:
+            faults.found.append((element.tag, "?", f"{element.place} has no attribute id"))
+        elif name in seen:
+            twice = f"{element.place}: {element.tag} {name} is there twice, first on line {seen[name].line}"
+            faults.found.append((element.tag, name, twice))
+        else:
+            seen[name] = element
     return seen
 
 
@@ -95,7 +141,7 @@ def refuse_too_many_lanes(count: int, place: str) -> None:
         InputError: it has more than `MOST_LANES`.
     """
     if count > MOST_LANES:
-        raise InputError(f"{place}: more than {MOST_LANES} lanes; cut the map")
+        raise TooLargeError(f"{place}: more than {MOST_LANES} lanes; cut the map")
 
 
 def refuse_too_long(sections: int, place: str) -> None:
@@ -105,39 +151,59 @@ def refuse_too_long(sections: int, place: str) -> None:
         InputError: it has more than `MOST_SECTIONS`.
     """
     if sections > MOST_SECTIONS:
-        raise InputError(
+        raise TooLargeError(
             f"{place}: lanes of more than {MOST_SECTIONS} points, about {MOST_SECTIONS * _SECTION / 1000.0:g} km; cut the map"
         )
 
 
+_UNITS = {"km/h": 1.0 / 3.6, "kmh": 1.0 / 3.6, "kph": 1.0 / 3.6, "mph": 0.44704, "m/s": 1.0, "mps": 1.0}
+
+
+def speed_of(text: str, unit: str) -> float:
+    """Return the m/s of a text such as "50", "50 km/h" or "30mph"; NaN if it is none.
+
+    Args:
+        text: a number, with or without a unit.
+        unit: of a number without one: "km/h", "mph" or "m/s".
+    """
+    match = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]+)?)\s*([a-zA-Z/]*)\s*", text[:40])
+    return float(match[1]) * _UNITS.get(match[2].lower() or unit, math.nan) if match else math.nan
+
+
 def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
-    """Return the network of what a reader found; neighbours that are no lanes for cars are left out.
+    """Return the network of what a reader found; neighbours that are no lanes for cars, and faulty lanes, are left out.
 
     Raises:
-        InputError: there is no lane, an id is there twice, or a border is no line.
+        InputError: there is no lane; with the first fault, if there is one.
     """
-    drafts, notes = draft_lanes.drafts, draft_lanes.notes
-    if not drafts:
-        raise InputError(f"map {name}: no lane that cars may use")
-    index: dict[str, int] = {}
-    for k, draft in enumerate(drafts):
-        if draft.id in index:
-            raise InputError(f"{draft.place}: lane {draft.id} is there twice, first at {drafts[index[draft.id]].place}")
-        index[draft.id] = k
-    lanes, total = [], 0
-    for draft in drafts:
-        left, right = (draft.left, draft.right) if draft.paired else cross_sections(draft.left, draft.right, draft.place)
-        longest = max(float(edge_lengths(border).sum()) for border in (left, right))
-        if not longest <= MOST_SECTIONS * _SECTION:  # nor is it NaN
-            raise InputError(f"{draft.place}: lane {draft.id} has a border of {longest / 1000.0:.3g} km; check the coordinates")
-        total += max(len(left), math.ceil(longest / _SECTION))
-        refuse_too_long(total, f"map {name}")
+    notes, faults = draft_lanes.notes, draft_lanes.faults
+    drawn: dict[str, tuple[Draft, Floats, Floats]] = {}
+    total = 0
+    for draft in draft_lanes.drafts:
+        with faults.leaving_out("lane", draft.id):
+            if draft.id in drawn:
+                raise InputError(f"{draft.place}: lane {draft.id} is there twice, first at {drawn[draft.id][0].place}")
+            left, right = (draft.left, draft.right) if draft.paired else cross_sections(draft.left, draft.right, draft.place)
+            longest = max(float(edge_lengths(border).sum()) for border in (left, right))
+            if not longest <= MOST_SECTIONS * _SECTION:  # nor is it NaN
+                raise InputError(
+                    f"{draft.place}: lane {draft.id} has a border of {longest / 1000.0:.3g} km; check the coordinates"
+                )
+            total += max(len(left), math.ceil(longest / _SECTION))
+            refuse_too_long(total, f"map {name}")
+            drawn[draft.id] = draft, left, right
+    if not drawn:
+        raise InputError(faults.found[0][2] if faults.found else f"map {name}: no lane that cars may use")
+    index = {name: k for k, name in enumerate(drawn)}
+    lanes = []
+    for draft, left, right in drawn.values():
         after, beside = (
             tuple(dict.fromkeys(index[other] for other in names if other in index)) for names in (draft.successors, draft.beside)
         )
         lanes.append(Lane(draft.id, left, right, after, beside, draft.speed_limit, draft.junction))
     if draft_lanes.left_out:
         notes += (f"{draft_lanes.left_out} lanelets are for others than cars and were left out",)
+    notes += faults.notes()
     network = LaneNetwork(name, tuple(lanes), notes)
     return network if any(lane.junction for lane in lanes) else with_junctions(network)
 

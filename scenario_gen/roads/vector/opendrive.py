@@ -21,11 +21,13 @@ from scenario_gen.numerics.plane import unit_left
 from scenario_gen.roads.vector.network import (
     by_id,
     Draft,
+    Faults,
     MapLanes,
     MOST_LINKS,
     MOST_SECTIONS,
     refuse_too_long,
     refuse_too_many_lanes,
+    TooLargeError,
 )
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, reference_line, ReferenceLine
 
@@ -101,24 +103,29 @@ def lanes_of(root: Element) -> MapLanes:
     version = ".".join(header.attributes.get(name, "?") for name in ("revMajor", "revMinor"))
     roads: dict[str, _Road] = {}
     total, lanes, points = 0.0, 0, 0
-    for name, element in by_id(root.all("road")).items():
-        line = reference_line(element)
-        total += line.length
-        if total > MOST_SECTIONS * _STEP:
-            raise InputError(f"{element.place}: roads of more than {MOST_SECTIONS * _STEP / 1000.0:g} km; cut the map")
-        roads[name] = _road(element, name, line)
+    faults = Faults()
+    for name, element in by_id(root.all("road"), faults).items():
+        with faults.leaving_out("road", name):
+            line = reference_line(element)
+            total += line.length
+            if total > MOST_SECTIONS * _STEP:
+                raise TooLargeError(f"{element.place}: roads of more than {MOST_SECTIONS * _STEP / 1000.0:g} km; cut the map")
+            roads[name] = _road(element, name, line)
+        if name not in roads:
+            continue
         lanes += sum(len(section.lanes) for section in roads[name].sections)
         refuse_too_many_lanes(lanes, root.file)
         points += sum(len(section.lanes) * len(section.s) for section in roads[name].sections)
         refuse_too_long(points, root.file)
     if not roads:
-        raise InputError(f"{root.file}: no <road>")
-    joints = _Joints(roads)
+        raise InputError(faults.found[0][2] if faults.found else f"{root.file}: no <road>")
+    joints = _Joints(roads, faults)
     for road in roads.values():
         joints.along(road)
     for junction in root.all("junction"):
         joints.through(junction)
-    return MapLanes(list(_drafts(roads, joints)), (f"OpenDRIVE {version}: {_projection(header)}", *joints.notes()))
+    notes = (f"OpenDRIVE {version}: {_projection(header)}", *joints.notes())
+    return MapLanes(list(_drafts(roads, joints)), notes, faults=faults)
 
 
 def _projection(header: Element) -> str:
@@ -187,8 +194,9 @@ def _lane_id(lane: Element, sign: int) -> int:
 class _Joints:
     """Which ends of lanes are joined: by links between sections and roads, and by the connections of junctions."""
 
-    def __init__(self, roads: dict[str, _Road]) -> None:
+    def __init__(self, roads: dict[str, _Road], faults: Faults) -> None:
         self.roads = roads
+        self.faults = faults
         self.of: dict[End, list[End]] = defaultdict(list)
         self.apart: list[str] = []  # places of links that join lanes whose ends are apart
 
@@ -218,7 +226,7 @@ class _Joints:
             if other not in self.of[end]:
                 self.of[end].append(other)
                 if len(self.of[end]) > MOST_LINKS:
-                    raise InputError(f"{place}: more than {MOST_LINKS} lanes are joined to lane {lane.name}")
+                    raise TooLargeError(f"{place}: more than {MOST_LINKS} lanes are joined to lane {lane.name}")
 
     def along(self, road: _Road) -> None:
         """Join a road's sections, and it to the roads before and after it."""
@@ -227,11 +235,12 @@ class _Joints:
                 for tag, at in (("predecessor", 0), ("successor", 1)):
                     beyond = k + (1 if at else -1)
                     for link in [child for group in lane.element.all("link") for child in group.all(tag)]:
-                        other = int(link.number("id"))
-                        if 0 <= beyond < len(road.sections):
-                            self.join((lane.key, at), ((road.id, beyond, other), 1 - at), link.place)
-                        else:
-                            self._to_road(road, (lane.key, at), tag, other)
+                        with self.faults.leaving_out("link", f"{tag} of lane {lane.name}"):
+                            other = int(link.number("id"))
+                            if 0 <= beyond < len(road.sections):
+                                self.join((lane.key, at), ((road.id, beyond, other), 1 - at), link.place)
+                            else:
+                                self._to_road(road, (lane.key, at), tag, other)
 
     def _to_road(self, road: _Road, end: End, tag: str, lane: int) -> None:
         link = road.element.first("link", tag)
@@ -259,24 +268,28 @@ class _Joints:
     def through(self, junction: Element) -> None:
         """Join incoming lanes to those of the connecting roads."""
         for connection in junction.all("connection"):
-            name = "connectingRoad" if "connectingRoad" in connection.attributes else "linkedRoad"
-            if "incomingRoad" not in connection.attributes or name not in connection.attributes:
-                continue  # a virtual connection
-            incoming, connecting = self.road(connection, "incomingRoad"), self.road(connection, name)
-            contact = connection.attributes.get("contactPoint", "start")
-            for link in connection.all("laneLink"):
-                target = self.end_of(connecting, contact, int(link.number("to")))
-                goal = self.lane(target[0])
-                if goal is None:
-                    continue
-                distance = {}  # the incoming road may touch the junction with either end
-                for side in ("start", "end"):
-                    source = self.end_of(incoming, side, int(link.number("from")))
-                    lane = self.lane(source[0])
-                    if lane is not None:
-                        distance[source] = float(exact.hypot(*(lane.middle(source[1]) - goal.middle(target[1]))))
-                if distance:
-                    self.join(min(distance, key=distance.__getitem__), target, link.place)
+            with self.faults.leaving_out("connection", connection.attributes.get("id", "?")):
+                self._through(connection)
+
+    def _through(self, connection: Element) -> None:
+        name = "connectingRoad" if "connectingRoad" in connection.attributes else "linkedRoad"
+        if "incomingRoad" not in connection.attributes or name not in connection.attributes:
+            return  # a virtual connection
+        incoming, connecting = self.road(connection, "incomingRoad"), self.road(connection, name)
+        contact = connection.attributes.get("contactPoint", "start")
+        for link in connection.all("laneLink"):
+            target = self.end_of(connecting, contact, int(link.number("to")))
+            goal = self.lane(target[0])
+            if goal is None:
+                continue
+            distance = {}  # the incoming road may touch the junction with either end
+            for side in ("start", "end"):
+                source = self.end_of(incoming, side, int(link.number("from")))
+                lane = self.lane(source[0])
+                if lane is not None:
+                    distance[source] = float(exact.hypot(*(lane.middle(source[1]) - goal.middle(target[1]))))
+            if distance:
+                self.join(min(distance, key=distance.__getitem__), target, link.place)
 
 
 def _drafts(roads: dict[str, _Road], joints: _Joints) -> Iterator[Draft]:
@@ -309,13 +322,16 @@ def _draft(road: _Road, section: _Section, lane: _Lane, joints: _Joints, *, alon
         neighbour = section.lanes.get(other)
         if neighbour is not None and neighbour.forth == along and _crossable(lane if abs(other) > abs(number) else neighbour):
             beside.append(neighbour.name)
+    limit = math.nan
+    with joints.faults.leaving_out("speed limit", lane.name):
+        limit = _speed_limit(road, lane.element, float(section.s[0]))
     return Draft(
         id=lane.name + ("" if along == lane.forth else "r"),
         left=left,
         right=right,
         successors=tuple(after),
         beside=tuple(beside),
-        speed_limit=_speed_limit(road, lane.element, float(section.s[0])),
+        speed_limit=limit,
         junction=road.junction,
         place=lane.element.place,
         paired=True,

@@ -5,7 +5,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
 
@@ -96,27 +96,58 @@ def tracks_on(placement: Match, tracks: Sequence[Track], scale: float) -> tuple[
     return tuple(placed)
 
 
-def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> tuple[Floats, str]:
-    """Return the box (2, 2) [m] around the best place of a template on a map, and a sentence that names it.
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a template fits on a map.
+
+    Attributes:
+        box: (2, 2) [m] lowest and highest x, y of the part of the map around it.
+        where: the junctions or the lane there.
+        cost: [m²] how little it resembles the template; 0 is at home.
+        paths: of each vehicle, (M, 2) [m] its way along the lanes.
+    """
+
+    box: Floats
+    where: str
+    cost: float
+    paths: tuple[Floats, ...]
+
+    @property
+    def part(self) -> str:
+        """The part of the map, to be put behind its name."""
+        return f"#box={','.join(f'{value:g}' for value in self.box.ravel())}"
+
+
+def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> Iterator[Place]:
+    """Yield the places of a template on a map, the best first; arguments as of `placements`.
 
     Raises:
-        RefusedError: there is no place for it.
+        RefusedError: there is none.
     """
-    reason = ""
+    reason, found = "", False
     for placement, scale in placements(network, tracks, lanes):
         try:
             separate(tracks_on(placement, tracks, scale), 0.0, _SHIFT, sideways=0.0)
         except RefusedError as error:
             reason = reason or str(error)
             continue
-        points = np.concatenate(
-            [c.curve.at(np.linspace(c.start - _FORTH, c.end + _FORTH, 200))[:, :2] for c in placement.courses]
-        )
+        found = True
+        paths = tuple(c.curve.at(np.linspace(c.start - _FORTH, c.end + _FORTH, 200))[:, :2] for c in placement.courses)
+        points = np.concatenate(paths)
         box = np.round(np.stack((points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE)))
         names = dict.fromkeys(network.lanes[k].junction for course in placement.courses for k in course.lanes)
         first = network.lanes[placement.courses[0].lanes[0]]
         where = ", ".join(f"junction {name}" for name in names if name) or f"lane {first.id}"
-        (x0, y0), (x1, y1) = box.tolist()
-        part = f"#box={x0:g},{y0:g},{x1:g},{y1:g} (cost {placement.cost:.1f} m²)"
-        return box, f"the best place for the template is at {where}: {part}"
-    raise RefusedError(f"the template fits no place on map {network.name}: {reason}")
+        yield Place(frozen(box), where, placement.cost, paths)
+    if not found:
+        raise RefusedError(f"the template fits no place on map {network.name}: {reason}")
+
+
+def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> tuple[Floats, str]:
+    """Return the box (2, 2) [m] around the best place of a template on a map, and a sentence that names it.
+
+    Raises:
+        RefusedError: there is no place for it.
+    """
+    best = next(places(network, tracks, lanes))
+    return best.box, f"the best place for the template is at {best.where}: {best.part} (cost {best.cost:.1f} m²)"

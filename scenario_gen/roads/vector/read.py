@@ -16,7 +16,7 @@ from scenario_gen.base.markup import Element, finite, read_xml
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
-from scenario_gen.roads.vector.network import extent, MapLanes, network_of, part_of
+from scenario_gen.roads.vector.network import extent, FAULTY, MapLanes, network_of, part_of
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.template import Track
@@ -103,7 +103,10 @@ def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
         if not rows:
             known = list(dict.fromkeys(value for value in own if value))
             listed = ", ".join(known[:_NAMED]) + (f" and {len(known) - _NAMED} more" if len(known) > _NAMED else "")
-            raise InputError(f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {listed or 'none'}")
+            faulty = "".join(f"; {note}" for note in network.notes if FAULTY in note)
+            raise InputError(
+                f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {listed or 'none'}{faulty}"
+            )
         chosen += rows
     return tuple(dict.fromkeys(chosen))
 

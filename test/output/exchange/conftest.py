@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from scenario_gen.bags.recordings.provenance import parameter_texts
 from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.base.provenance import parameter_texts
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import generate, PipelineConfig

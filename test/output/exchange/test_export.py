@@ -4,7 +4,9 @@
 """scenario-gen export and import as commands: every format, the same bytes twice, some scenarios, an ego, and what is refused."""
 
 import json
+import xml.etree.ElementTree as ET
 
+from map_builders import opendrive
 import numpy as np
 import pytest
 from rosbags.rosbag2 import Reader
@@ -19,6 +21,7 @@ from scenario_gen.output.exchange.cases import read_cases
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.export import export_bag, EXPORTS, MANIFEST
 from scenario_gen.output.exchange.importing import import_file
+from scenario_gen.pipeline import generate
 
 
 def bytes_of(folder):
@@ -87,7 +90,7 @@ def test_round_trips_close(small_bag, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--to", "lanelet2"], "choose one of commonroad, openscenario, autoware"),
+        (["--to", "lanelet2"], "choose one of commonroad, openscenario, autoware, scenarionet"),
         (["--to", "commonroad", "--ego", "9"], "has no vehicle '9' to be the ego; there are: 1, 2"),
         (["--to", "commonroad", "--index", "77"], "no scenario of index"),
         (["--to", "commonroad", "--namespace", "x"], "no scenarios in namespace 'x'"),
@@ -104,3 +107,40 @@ def test_what_cannot_be_is_refused_by_name(small_bag, tmp_path, options, said):
 def test_a_bag_may_not_be_replaced_by_its_export(small_bag):
     with pytest.raises(InputError):
         export_bag(small_bag, small_bag, "commonroad", ExportConfig())
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """A map of the user's, and a bag of scenarios on it."""
+    folder = tmp_path_factory.mktemp("town")
+    path = folder / "town.xodr"
+    path.write_text(opendrive())
+    log = folder / "log.csv"
+    rows = [f"1,{k / 10:.1f},{-50.0 + k:.2f},-1.75,10.0" for k in range(95)]
+    rows += [f"2,{k / 10:.1f},{-30.0 + k * 0.9:.2f},-1.75,9.0" for k in range(95)]
+    log.write_text("\n".join(["vehicle_id,time,x,y,speed", *rows]) + "\n")
+    (encounter,) = read_log(str(log)).encounters
+    made = generate(encounter, str(path), count=2, seed=1)
+    return path, made.save(folder / "bag")
+
+
+def test_scenarios_are_exported_on_the_map_of_the_user(town, tmp_path):
+    path, bag = town
+    made = export_bag(bag, tmp_path / "out", "openscenario", ExportConfig(map=str(path)))
+    assert made.scenarios == 2 and "the lanes of town.xodr" in made.notes[0]
+    assert sorted(file.name for file in (tmp_path / "out").glob("*.xodr")) == ["town.xodr"]
+    assert (tmp_path / "out" / "town.xodr").read_bytes() == path.read_bytes()
+    files = sorted((tmp_path / "out").glob("*.xosc"))
+    assert [ET.parse(file).find("RoadNetwork/LogicFile").attrib["filepath"] for file in files] == ["town.xodr"] * 2
+    assert {entry["lanes"] for entry in json.loads((tmp_path / "out" / MANIFEST).read_text())["scenarios"]} == {"true"}
+
+
+def test_another_map_is_refused(town, small_bag, tmp_path):
+    path, bag = town
+    with pytest.raises(InputError, match=r"town\.xodr: \d+ % of the positions of .* lie on its lanes; name the map"):
+        export_bag(small_bag, tmp_path / "out", "openscenario", ExportConfig(map=str(path)))
+    with pytest.raises(InputError, match="a map can be given with --to openscenario"):
+        export_bag(bag, tmp_path / "out", "commonroad", ExportConfig(map=str(path)))
+    with pytest.raises(InputError, match=r"OpenDRIVE \(\.xodr\) or Lanelet2"):
+        export_bag(bag, tmp_path / "out", "openscenario", ExportConfig(map=str(bag / "metadata.yaml")))
+    assert not (tmp_path / "out").exists()

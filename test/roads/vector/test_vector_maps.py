@@ -5,6 +5,7 @@
 
 from dataclasses import replace
 import math
+import re
 
 from map_builders import ARM, at, FORMATS, HALF, lanelet2, lanes, LIMIT, opendrive, WIDTH, write
 import numpy as np
@@ -162,6 +163,10 @@ BROKEN = [  # suffix, text, what is said, with its place
     (".osm", lanelet2(lambda x, y: f'lat="{91 + x}" lon="{y}">'), "degrees up to 90 are needed"),
     (".osm", lanelet2(lambda x, y: f'lat="{x / 10}" lon="{y / 10}">'), "km from their middle"),
     (".osm", lanelet2(lambda x, y: 'lat="1" lon="2">'), "no length"),
+]
+
+
+ODD = [  # one odd element: suffix, text, the note with its reason
     (".osm", lanelet2().replace('<tag k="local_x"', '<tag k="local_z"', 1), "two frames cannot be mixed"),
     (".osm", lanelet2().replace('<nd ref="1"/>', '<nd ref="77777"/>', 1), "goes through node 77777, which is not in the map"),
     (".osm", lanelet2().replace('role="left"', 'role="middle"', 1), "has 0 members with role left"),
@@ -182,10 +187,42 @@ BROKEN = [  # suffix, text, what is said, with its place
     ),
     (".xml", FORMATS[".xml"]().replace("<x>-60.0</x>", "<x>west</x>", 1), r"line 1, <x>: 'west' is no number"),
     (".xml", FORMATS[".xml"]().replace("leftBound", "left", 2), "has no <leftBound>"),
+    (
+        ".osm",
+        lanelet2().replace("</relation>", '<member type="way" ref="1002" role="left"/></relation>', 1),
+        r"1 faulty lanelet left out \(2000\), first: .*lanelet 2000 has 2 members with role left",
+    ),
+    (".xml", FORMATS[".xml"]().replace("8.333333333333334", "fast"), "faulty speed sign left out .*'fast' is no speed"),
+    (".xodr", opendrive().replace('id="1" junction', 'id="0" junction', 1), "road 0 is there twice"),
 ]
 
 
-@pytest.mark.parametrize(("suffix", "text", "said"), BROKEN)
+@pytest.mark.parametrize(("suffix", "text", "said"), ODD, ids=range(len(ODD)))
+def test_one_odd_element_is_left_out_and_said(tmp_path, suffix, text, said):
+    """As the formats' own libraries do, which open the rest."""
+    (tmp_path / "odd").mkdir()
+    whole, rest = read_network(write(tmp_path, suffix, FORMATS[suffix]())), read_network(write(tmp_path / "odd", suffix, text))
+    assert [note for note in rest.notes if re.search(said, note)], rest.notes
+    assert 0.5 * len(whole.lanes) <= len(rest.lanes) <= len(whole.lanes)
+    assert not [note for note in whole.notes if "left out" in note]
+
+
+@pytest.mark.parametrize("unit", ["kmh", " km/h", "KMH"])
+def test_a_speed_sign_may_have_a_unit(tmp_path, unit):
+    """As converters of data sets write them."""
+    network = read_network(write(tmp_path, ".xml", FORMATS[".xml"]().replace("8.333333333333334", f"50{unit}")))
+    assert [lane.speed_limit for lane in network.lanes] == pytest.approx([50.0 / 3.6] * len(network.lanes))
+
+
+def test_what_is_asked_for_and_was_left_out_is_refused_with_the_reason(tmp_path):
+    text = lanelet2().replace("</relation>", '<member type="way" ref="1002" role="left"/></relation>', 1)
+    path = write(tmp_path, ".osm", text)
+    assert build_road(f"{path}#lanelet=2001").lanes is not None
+    with pytest.raises(InputError, match=r"no lanelet '2000' .*2 members with role left"):
+        build_road(f"{path}#lanelet=2000")
+
+
+@pytest.mark.parametrize(("suffix", "text", "said"), BROKEN, ids=range(len(BROKEN)))
 def test_a_broken_map_is_refused_with_its_name_and_place(tmp_path, suffix, text, said):
     path = write(tmp_path, suffix, text)
     with pytest.raises(InputError, match=said) as error:

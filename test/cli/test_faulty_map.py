@@ -1,0 +1,21 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What was left out of a map because it is faulty is said on the terminal."""
+
+from dataclasses import replace
+
+from bag_examples import hand_made_run
+from map_builders import lanelet2
+
+from scenario_gen.cli.folder import faults_of
+from scenario_gen.roads import build_road
+
+
+def test_faulty_elements_of_a_map_are_said(tmp_path):
+    extra = '<member type="way" ref="1002" role="left"/></relation>'
+    (tmp_path / "town.osm").write_text(lanelet2().replace("</relation>", extra, 1))
+    case = replace(hand_made_run(), road=build_road(str(tmp_path / "town.osm")))
+    (said,) = faults_of([case, case])
+    assert said.startswith("map town: 1 faulty lanelet left out (2000), first: ")
+    assert faults_of([hand_made_run()]) == []
