@@ -25,7 +25,7 @@ demo: $(RUN)
 test: $(TEST) tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n 3 --dist loadgroup --durations=10; tests=$$?; wait $$types && exit $$tests
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n 3 --dist loadgroup --timeout 600 --durations=10; tests=$$?; wait $$types && exit $$tests
 
 # Long tests: `make soak PART=kills` runs one part; a part that was stopped goes on where it was. One table at the end.
 soak: $(TEST)
@@ -101,12 +101,13 @@ $(TEST): $(READY) requirements/test.lock requirements/ros-test.lock
 	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(TEST)
 
-# The report's tests drive Chromium, package.xml is checked by xmllint; where they are missing and cannot be installed here, those tests
-# skip with that reason.
+# The report's tests drive Chromium, package.xml is checked by xmllint, and the package of interfaces is compiled; where what they need
+# is missing and cannot be installed here, those tests skip with that reason.
 tools:
 	@need=""; \
 	command -v chromium >/dev/null || command -v chromium-browser >/dev/null || need="chromium"; \
 	command -v xmllint >/dev/null || need="$$need libxml2-utils"; \
+	command -v c++ >/dev/null || need="$$need g++"; \
 	[ -z "$$need" ] || { \
 	  [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && \
 	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $$need >/dev/null; } || \

@@ -9,7 +9,19 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "scenario_gen"
-NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player", "traffic", "suite")
+NODES = (
+    "segmenter",
+    "planner",
+    "gp_sampler",
+    "road_server",
+    "log_player",
+    "evaluator",
+    "preview",
+    "recorder",
+    "player",
+    "traffic",
+    "suite",
+)
 
 # ROS itself comes from a Jazzy installation, or from wheels as an extra.
 
@@ -31,7 +43,7 @@ EXTRAS["segmentation"] = [
     wanted for wanted in CORE if wanted.startswith(("numpy", "scipy", "numba"))
 ]  # all that it needs of the core
 EXTRAS["cli"] += [*EXTRAS["bags"], *EXTRAS["parquet"], *EXTRAS["report"]]
-EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["planners"], *EXTRAS["gym"], *EXTRAS["corpus"]]
+EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["plot"], *EXTRAS["planners"], *EXTRAS["gym"], *EXTRAS["corpus"]]
 EXTRAS["corpus"] += EXTRAS["cli"]  # whose commands it adds to
 EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("ros.in").values())]
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-from scenario_gen.bags.recordings.read import read_recording as read_recording
+from scenario_gen.bags.recordings.read import load as load, read_recording as read_recording
 from scenario_gen.bags.recordings.write import write_recording as write_recording
 from scenario_gen.base.errors import (
     InputError as InputError,
@@ -9,6 +9,8 @@ from scenario_gen.base.errors import (
     RefusedError as RefusedError,
     ScenarioGenError as ScenarioGenError,
 )
+from scenario_gen.closed_loop.trials import rates as rates, run_trials as run_trials, trials_of as trials_of
+from scenario_gen.corpus.many import generate_many as generate_many
 from scenario_gen.logs import LogConfig as LogConfig, read_log as read_log
 from scenario_gen.logs.read import LogResult as LogResult
 from scenario_gen.logs.synthetic import bundled as bundled
@@ -23,6 +25,8 @@ from scenario_gen.method.routing import plan_routes as plan_routes, PlanningConf
 from scenario_gen.method.sampling import sample_scenarios as sample_scenarios, SamplingConfig as SamplingConfig
 from scenario_gen.method.segmentation import segment as segment, SegmentationConfig as SegmentationConfig
 from scenario_gen.method.validity import Checker as Checker, Limits as Limits
+from scenario_gen.output.plot import plot as plot
+from scenario_gen.output.table import filter_scenarios as filter_scenarios, measures as measures
 from scenario_gen.pipeline import generate as generate
 from scenario_gen.roads import build_road as build_road, RoadConfig as RoadConfig
 from scenario_gen.types.encounter import Encounter as Encounter, Vehicle as Vehicle

@@ -6,6 +6,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+from scenario_gen.base.provenance import what_makes_it_again
 from scenario_gen.method.attempt import with_references
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, MEASURES
@@ -54,7 +55,8 @@ def generate(
     segmentation = segment(encounter, config.segmentation, seed)
     fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
     routes = plan_routes(road, fit, config.planning, seed)
-    planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
+    again = what_makes_it_again(config, request)
+    planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed, provenance=again)
     sampled = sample_scenarios(
         planned, config.sampling, config.limits, request, count=count, callbacks=Callbacks(progress), measures=MEASURES
     )

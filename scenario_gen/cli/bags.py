@@ -101,13 +101,19 @@ def validate(
 @commands.command("export", panel=OTHER)
 def export_scenarios(
     bag: Annotated[Path, typer.Argument(help="A bag with the topic `scenarios`, from this suite or another.")],
-    to: Annotated[str, typer.Option(help="commonroad, openscenario (with OpenDRIVE) or autoware.")],
+    to: Annotated[str, typer.Option(help="commonroad, openscenario (with OpenDRIVE), autoware or scenarionet (MetaDrive).")],
     out: Annotated[Path | None, typer.Option(help="Folder for the files. Default: BAG_commonroad etc. beside the bag.")] = None,
     index: Annotated[
         list[int] | None, typer.Option(min=0, help="Index of a scenario, as in scenarios/info. Repeatable; default: all.")
     ] = None,
     namespace: Annotated[str | None, typer.Option(help="Only the scenarios in this namespace.")] = None,
     ego: Annotated[str, typer.Option(help="Id of the vehicle that becomes the ego, e.g. CommonRoad's planning problem.")] = "",
+    road_map: Annotated[
+        str,
+        typer.Option(
+            "--map", help="openscenario: the map the scenarios were made on (.xodr, .osm). It is copied and named as their road."
+        ),
+    ] = "",
     options: Annotated[
         list[str] | None,
         typer.Option(
@@ -115,7 +121,7 @@ def export_scenarios(
         ),
     ] = None,
 ) -> None:
-    """Write scenarios for other software: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware."""
+    """Write scenarios for other software: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware, ScenarioNet."""
     from scenario_gen.bags.storage.config import BagConfig
     from scenario_gen.base.parameters import assigned
     from scenario_gen.output.exchange.config import ExportConfig
@@ -123,7 +129,7 @@ def export_scenarios(
 
     if to not in EXPORTS:
         raise InputError(f"--to {to}: choose one of {', '.join(EXPORTS.names())}{did_you_mean(to, EXPORTS.names())}")
-    config, bag_config = ExportConfig(ego=ego), BagConfig()
+    config, bag_config = ExportConfig(ego=ego, map=road_map), BagConfig()
     for option in options or []:
         if option.startswith("bag."):
             bag_config = assigned(bag_config, option.removeprefix("bag."))

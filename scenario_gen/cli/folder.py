@@ -11,9 +11,10 @@ from pathlib import Path
 
 from scenario_gen.base.errors import did_you_mean, InputError, RefusedError
 from scenario_gen.base.folders import replaced_folder
-from scenario_gen.logs import LogResult, read_log
+from scenario_gen.logs import LogResult, NoEncounterError, read_log
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.roads import FAULTY
 from scenario_gen.types import Encounter, GenerationResult, Request
 
 Select = Callable[[GenerationResult], GenerationResult]
@@ -90,18 +91,25 @@ def generate_folder(
     """
     logs, roads, config, count, seed = requested.logs, requested.roads, requested.config, requested.count, requested.seed
     with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *requested.also_read]) as folder:
-        readings = []
+        readings, read = [], list[int]()
         with progress() as advance:
             for k, (group, _) in enumerate(requested.jobs):
                 advance("logs read", k, len(requested.jobs))
-                readings.append(read_log(group, config.log))
+                try:
+                    readings.append(read_log(group, config.log))
+                except NoEncounterError as error:
+                    if len(requested.jobs) == 1:
+                        raise
+                    tell(f"no encounter: {error}")  # a result; the other logs may have some
+                    continue
+                read.append(k)
         for line in notes_of(readings):
             tell(line)
         pairs = [
             (encounter, road)
-            for log, (_, names) in zip(readings, requested.jobs, strict=True)
+            for log, k in zip(readings, read, strict=True)
             for encounter in chosen(log.encounters, requested.encounters)
-            for road in names
+            for road in requested.jobs[k][1]
         ]
         with progress() as advance:
             cases, refusals = generate_all(
@@ -115,6 +123,8 @@ def generate_folder(
             )
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
+        for line in faults_of(cases):
+            tell(line)
         unlooking = [] if not requested.request.ego else unlooking_said(cases)
         for sentence in unlooking:
             tell(sentence)
@@ -129,6 +139,12 @@ def generate_folder(
             provenance=provenance_of(logs, seed, count, roads, config, requested.request),
         )
     return cases, refusals
+
+
+def faults_of(cases: Sequence[GenerationResult]) -> list[str]:
+    """Return what was left out of the cases' maps, because it is faulty."""
+    maps = {case.road.name: case.road.lanes.notes for case in cases if case.road is not None and case.road.lanes is not None}
+    return [f"map {name}: {note}" for name, notes in maps.items() for note in notes if FAULTY in note]
 
 
 def notes_of(readings: Sequence[LogResult]) -> list[str]:

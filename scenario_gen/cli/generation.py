@@ -30,8 +30,10 @@ class Generate:
     road: Annotated[
         list[str],
         typer.Option(
-            help="straight, curve, t_intersection, four_way, merge, roundabout, corridor, a nav2 map (.yaml) or a vector map "
-            "(.osm, .xodr, .xml). Repeatable."
+            help="straight, curve, t_intersection, four_way, merge, roundabout, corridor (drawn around the recording), auto (the "
+            "first of these that suits), a nav2 map (.yaml), or a vector map: Lanelet2 (.osm), OpenDRIVE (.xodr), CommonRoad "
+            "(.xml). Of a vector map a part can be named: MAP#box=x0,y0,x1,y1, #lanelet=ID, #junction=ID. `scenario-gen roads` "
+            "draws a map with the places that fit. Repeatable."
         ),
     ]
     count: Annotated[int, typer.Option(min=1, max=MOST, help="Scenarios per encounter and road.")] = 50
@@ -100,6 +102,45 @@ def generate(options: Generate) -> None:
         for_testing=options.for_testing,
     )
     conclude(*generate_folder(options.out, request, progress=bars, tell=say), options.out)
+
+
+@commands.command()
+def roads(
+    road: Annotated[str, typer.Argument(help="A map, or the name of a built-in road; without it all of these are listed.")] = "",
+    log: Annotated[Path | None, typer.Option(help="A recording: the roads or places that fit its encounter are named.")] = None,
+    encounter: Annotated[list[str] | None, typer.Option(help="Name of the encounter in the log; default: the first.")] = None,
+    out: Annotated[Path, typer.Option(help="The picture to write, SVG.")] = Path("roads.svg"),
+    assignments: SetOption = None,
+    parameter_file: ParametersOption = None,
+) -> None:
+    """Draw a map with its lanes, arms and the places where a recording fits; or list the built-in roads."""
+    from scenario_gen.base.errors import InputError
+    from scenario_gen.base.folders import write_text
+    from scenario_gen.cli.folder import chosen
+    from scenario_gen.logs import read_log
+    from scenario_gen.method.segmentation import segment
+    from scenario_gen.method.suitable_roads import suitable_roads
+    from scenario_gen.output.map_picture import map_picture
+    from scenario_gen.roads import BUILT_IN
+
+    config = configured(parameter_file, assignments)
+    template = None if log is None else chosen(read_log(log, config.log).encounters, encounter or [])[0]
+    if not road:
+        names = [*BUILT_IN, "corridor"]
+        if template is not None:
+            names = list(suitable_roads(template, segment(template, config.segmentation, 0), config))
+        give(roads=names)
+        say(f"{'roads' if template is None else f'roads that take {template.name}'}: {', '.join(names)}")
+        return
+    if out.suffix.lower() != ".svg":
+        raise InputError(f"--out {out}: name a file that ends with .svg")
+    if out.exists() and not out.read_bytes()[:4] == b"<svg":
+        raise InputError(f"--out {out} is there and no picture of a map; name another file")
+    picture, said = map_picture(road, template)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_text(out, picture)
+    give(picture=out, notes=said)
+    say("\n".join([*said, f"picture: {out}"]))
 
 
 @commands.command()

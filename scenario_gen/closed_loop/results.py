@@ -146,7 +146,6 @@ def as_page(
         "drives.html.j2",
         ("scene.js", "drives.js"),
         data,
-        plotly=False,
         planner=planner,
         found=rates(outcomes),
         rows=rows,

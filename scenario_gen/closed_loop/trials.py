@@ -30,7 +30,7 @@ from scenario_gen.closed_loop.origin import Origin, origins, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
 from scenario_gen.method.evaluation import clustered_wilson
-from scenario_gen.types import Interval, join_ego, Road, Scenario, token
+from scenario_gen.types import GenerationResult, Interval, join_ego, Road, Scenario, token
 
 MakePlanner = Callable[[], Planner]
 
@@ -160,6 +160,17 @@ def trial_of(name: str, scenario: Scenario, entry: ScenarioEntry | None, road: R
         InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
     """
     return Trial(name, join_ego(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road)
+
+
+def trials_of(result: GenerationResult, ego: str = "") -> list[Trial]:
+    """Return the scenarios of a result as trials; `ego` as in `read_trials`.
+
+    Raises:
+        InputError: a scenario has no vehicle `ego`, or a slot for another.
+    """
+    name = result.encounter.name
+    trials = [trial_of(str(one.index), one, None, result.road, ego, f"scenario {one.index}") for one in result]
+    return [replace(trial, encounter=name) for trial in trials]
 
 
 def _encounter_of(entry: ScenarioEntry | None) -> str:

@@ -9,14 +9,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from scenario_gen.bags.recordings.provenance import parameter_texts, versions
 from scenario_gen.bags.recordings.read import INFO, read_recording
 from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, sha256_of, write_text
-from scenario_gen.base.parameters import flatten
+from scenario_gen.base.provenance import what_makes_it_again
 from scenario_gen.method.evaluation import read_evaluations
 from scenario_gen.output.report.page import ReportInput, write_report
 from scenario_gen.pipeline import PipelineConfig
@@ -51,7 +50,7 @@ def write_results(
         names = namespaces(len(cases))
         with BagWriter(folder / BAG) as bag:
             add_results(bag, {name: replace(case, provenance=provenance) for name, case in zip(names, cases, strict=True)})
-    write_report(folder / REPORT, ReportInput(cases, title, quality, provenance))
+    write_report(folder / REPORT, ReportInput(cases, title, quality, provenance, BAG))
     figures = {"provenance": dict(provenance), "cases": [_figures(case) for case in cases]}
     write_text(folder / FIGURES, json.dumps(figures, indent=2) + "\n")
 
@@ -80,7 +79,7 @@ def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path,
     write_text(folder / TABLE, as_table(cases) + "\n")
     write_text(folder / FIGURES, json.dumps({"cases": [_figures(case) for case in cases]}, indent=2) + "\n")
     facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | read_recording(bag, config, (INFO,)).provenance
-    write_report(folder / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
+    write_report(folder / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts, bag=bag.name))
 
 
 def as_table(cases: Sequence[GenerationResult]) -> str:
@@ -136,5 +135,4 @@ def provenance_of(
     """Return everything needed to do it again: log hashes, seed, versions, the request and all parameters."""
     facts = {f"log {path.name}": f"sha256 {sha256_of(path)}" for path in logs}
     facts |= {"roads": ", ".join(roads), "seed": str(seed), "count": str(count)}
-    facts |= {name: value for name, (_, value) in flatten(request).items() if value}
-    return facts | versions() | parameter_texts(config)
+    return facts | what_makes_it_again(config, request)

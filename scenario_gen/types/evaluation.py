@@ -101,6 +101,7 @@ class Metric:
         better: which direction is better, "" where neither is.
         group: heading under which it stands.
         meaning: one sentence.
+        cap: a larger value counts as this; None: there is no such value.
     """
 
     id: str
@@ -109,6 +110,7 @@ class Metric:
     better: Better
     group: str
     meaning: str
+    cap: float | None = None
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,7 @@ class Evaluation:
         """Return JSON; what is not a number is null, figures have six significant digits."""
         document = {_KEYS.get(name, name): value for name, value in vars(self).items()} | {
             "duration_s": _number(self.duration),
-            "metrics": [vars(metric) for metric in self.metrics],
+            "metrics": [{key: value for key, value in vars(metric).items() if value is not None} for metric in self.metrics],
             "rows": [
                 {
                     "name": row.name,
@@ -198,7 +200,9 @@ class Evaluation:
         """Return the evaluation that a document says, which keeps `SCHEMA`."""
         fields = {name: document[_KEYS.get(name, name)] for name in cls.__dataclass_fields__}
         fields["vehicles"] = tuple(document["vehicles"])
-        fields["metrics"] = tuple(Metric(**{key: metric[key] for key in METRIC_KEYS}) for metric in document["metrics"])
+        fields["metrics"] = tuple(
+            Metric(**{key: metric[key] for key in METRIC_KEYS}, cap=metric.get("cap")) for metric in document["metrics"]
+        )
         fields["rows"] = tuple(_row(row) for row in document["rows"])
         return cls(**fields)
 
@@ -219,7 +223,7 @@ class Evaluation:
                 group = metric.group
                 lines.append(f"| **{group}** | |" + " |" * len(self.rows))
             unit = f" [{metric.unit}]" if metric.unit else ""
-            cells = [formatted(row.values.get(metric.id), metric.unit) for row in self.rows]
+            cells = [formatted(row.values.get(metric.id), metric.unit, cap=metric.cap) for row in self.rows]
             lines.append(f"| {metric.label}{unit} | {metric.better} | " + " | ".join(cells) + " |")
         notes = [f"- {row.name}: {note}" for row in self.rows for note in row.notes]
         return "\n".join([*lines, "", *notes]).rstrip() + "\n"
@@ -230,10 +234,15 @@ def as_markdown(name: str) -> str:
     return re.sub(r"([\\`*\[\]<>|]|^[_#]|_$)", r"\\\1", printable(name).replace("\n", " "))
 
 
-def formatted(estimate: Interval | None, unit: str, *, bounds: bool = True) -> str:
-    """Lay out an estimate for people: three significant digits, the interval in brackets, a dash if there is none."""
+def formatted(estimate: Interval | None, unit: str, *, bounds: bool = True, cap: float | None = None) -> str:
+    """Lay out an estimate for people: three significant digits, the interval in brackets, a dash if there is none.
+
+    Where nothing lies below `cap` (see `Metric`), this is said.
+    """
     if estimate is None or not math.isfinite(estimate.value):
         return "–"
+    if cap is not None and estimate.value >= cap:
+        return f"none below {cap:g}" + (f" {unit}" if unit else "")
     factor = 100.0 if unit == "%" else 1.0
 
     def figure(value: float) -> str:

@@ -5,7 +5,9 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 import math
+from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from scenario_gen.base.errors import InputError
@@ -16,10 +18,11 @@ from scenario_gen.types.fit import Fit
 from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import dataframe, Scenario, ScenarioSet
+from scenario_gen.types.scenario import causes_in_words, dataframe, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from pandas import DataFrame
 
 WITH, WITHOUT, UNIFORM, ORACLE = "with changepoints", "without changepoints", "uniform changepoints", "oracle"
@@ -88,6 +91,48 @@ class GenerationResult:
     def to_dataframe(self) -> "DataFrame":
         """Return all scenarios as one table: a row for each scenario, vehicle and instant; columns as `Scenario.to_dataframe`."""
         return dataframe(self)
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook, with who reacts to whom and what was refused."""
+        refused = ", ".join(f"{count} {cause}" for cause, count in causes_in_words(self.generated.refused)) or "none"
+        lines = [*self.reacting["sentences"], f"refused candidates: {refused}", *self.generated.adaptations]
+        return f"<b>{escape(repr(self))}</b><ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
+
+    def measures(self) -> "DataFrame":
+        """Return how critical each scenario is, as `scenario_gen.measures` does."""
+        import scenario_gen
+
+        return scenario_gen.measures(self)
+
+    def filter(self, condition: str) -> "GenerationResult":
+        """Return the result with the scenarios for which a condition holds, as `scenario_gen.filter_scenarios` does.
+
+        Raises:
+            InputError: the condition cannot be evaluated.
+        """
+        import scenario_gen
+
+        return scenario_gen.filter_scenarios(self, condition)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw all scenarios on their road, as `scenario_gen.plot` does.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        import scenario_gen
+
+        return scenario_gen.plot(self, ax)
+
+    def save(self, folder: Path | str) -> Path:
+        """Write the result to a new bag; return its folder. `scenario_gen.load` reads it.
+
+        Raises:
+            InputError: the folder is something else.
+        """
+        import scenario_gen
+
+        return scenario_gen.write_recording(Path(folder), self)
 
     @property
     def compared(self) -> tuple[str, ...]:

@@ -61,7 +61,7 @@ class Reaction:
             text = f"{who} follows {whom}, {self.headway[1]:.1f} s behind, and answers its speed after {self.lag:.1f} s"
         else:
             verb = "waits for" if self.stands else "slows down for"
-            when = f"{self.lag:.1f} s after" if self.lag >= 0.0 else f"{-self.lag:.1f} s before it has"
+            when = f"{self.lag:.1f} s after" if self.lag >= 0.0 else f"{-self.lag:.1f} s before {whom} has passed"
             text = f"{who} {verb} {whom} to pass and leaves {when}"
         return f"{text} (doubtful)" if self.doubtful else text
 

@@ -18,6 +18,7 @@ from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from pandas import DataFrame
 
 FACTS = ("weight", "target.", "order", "passing_order", "reactions", "search.")
@@ -87,6 +88,16 @@ class Scenario:
         Columns: scenario (its index), vehicle (id), time [s], x, y [m], heading [rad], speed [m/s], acceleration [m/s²].
         """
         return dataframe([self])
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the vehicles' paths, as `scenario_gen.plot` does.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        import scenario_gen
+
+        return scenario_gen.plot(self, ax)
 
 
 def dataframe(scenarios: Iterable[Scenario]) -> "DataFrame":
@@ -209,6 +220,7 @@ class ScenarioSet:
     The scenarios of a large set are not in memory but drawn again whenever they are looked at. `reached` says what sampling
     towards a target came to, `chosen` from how many valid candidates the set was chosen (0: as they were drawn).
     `graph` says who reacts to whom in the template (None: nobody looked), `reactions` are those that every scenario keeps.
+    `examples` are the first refused candidates of each cause, to be looked at.
     """
 
     requested: int
@@ -221,6 +233,7 @@ class ScenarioSet:
     chosen: int = 0
     reactions: tuple[Reaction, ...] = ()
     graph: ReactionGraph | None = None
+    examples: tuple[tuple[Cause, Scenario], ...] = ()
 
     def __repr__(self) -> str:
         return f"ScenarioSet({len(self.scenarios)} of {self.candidates} candidates)"

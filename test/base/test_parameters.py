@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from scenario_gen.bags.recordings.provenance import read_parameters
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import assigned, flatten, parameter, Parameters, updated
+from scenario_gen.base.provenance import read_parameters
 
 
 @dataclass(frozen=True)

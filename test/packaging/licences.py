@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Licences of every locked package, from the metadata of what is installed: `make licences` writes docs/licences.md."""
+"""Licences of every locked package, from the metadata of what is installed: `make licences` writes docs/licences.csv."""
 
 from collections.abc import Iterator, Mapping, Sequence
+import csv
 from importlib.metadata import Distribution, distributions, PackageNotFoundError
 from itertools import chain
 from pathlib import Path
@@ -16,7 +17,7 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[2]
 REQUIREMENTS = ROOT / "requirements"
 LOCKS = tuple(REQUIREMENTS / f"{name}.lock" for name in ("core", "run", "extras", "test", "ros", "ros-test"))
-PAGE = ROOT / "docs" / "licences.md"
+TABLE = ROOT / "docs" / "licences.csv"
 TOLD = {  # what metadata does not say, or says only on Windows; looked up in the projects themselves
     "colorama": "BSD-3-Clause",
     "coloredlogs": "MIT",
@@ -27,6 +28,7 @@ TOLD = {  # what metadata does not say, or says only on Windows; looked up in th
     "arviz-plots": "Apache-2.0",
     "arviz-stats": "Apache-2.0",
     "lazy-loader": "BSD-3-Clause",
+    "axe-playwright-python": "MIT; axe-core MPL-2.0",
     "apsw": "any OSI-approved licence",
     "empy": "BSD",
     "setuptools": "MIT",
@@ -47,22 +49,6 @@ SHORT = {
     "GNU GENERAL PUBLIC LICENSE": "GPL",
 }
 COPYLEFT = re.compile(r"\bA?GPL")
-INTRO = """# Licences
-
-Which licence has each package? The project itself is under Apache-2.0. It ships the code of one other project: plotly.js (MIT),
-in the HTML pages that it writes. Everything else is installed from wheels.
-
-The table lists every package that `make demo`, `make install` and `make test` install, with the licence that its metadata
-states. `make licences` writes it, and a test compares it with the locks in `requirements/`. *Run time*: `setup.py` requires it,
-directly or through an extra. *To test*: it builds or tests. Two linters and one file of docutils are under the GPL; no user
-needs them. Nothing is under the AGPL.
-
-Not listed: packages that only `make bench`, `make judges`, `make audit` and `make docs` install (`bench.lock`, `judges-*.lock`,
-`audit.lock`, `docs.lock`). None of them is shipped.
-
-| package | version | licence | needed |
-|---|---|---|---|
-"""
 
 
 def locked() -> dict[str, str]:
@@ -139,16 +125,17 @@ def needed_at_run_time(known: Mapping[str, Distribution], wanted: Sequence[Requi
     return found
 
 
-def page() -> str:
-    """Return the text of docs/licences.md."""
+def write() -> None:
+    """Write the table."""
     known = installed()
     needed = needed_at_run_time(known)
-    rows = []
+    rows = [("package", "version", "licence", "needed")]
     for name, version in locked().items():
         stated, need = licence(name, known.get(name)) or "unknown", "run time" if name in needed else "to test"
-        rows.append(f"| {name} | {version} | {stated} | {need} |")
-    return INTRO + "\n".join(rows) + "\n"
+        rows.append((name, version, stated, need))
+    with TABLE.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    write()

@@ -16,7 +16,20 @@ from scenario_gen import bundled, MissingExtraError, read_log
 from scenario_gen.base.errors import needs
 
 EXTRA_MODULES = (
-    *("dask", "distributed", "duckdb", "gymnasium", "jinja2", "lz4", "mcap", "ompl", "plotly", "pyarrow", "rich", "rosbags"),
+    *(
+        "dask",
+        "distributed",
+        "duckdb",
+        "gymnasium",
+        "jinja2",
+        "lz4",
+        "matplotlib",
+        "mcap",
+        "ompl",
+        "pyarrow",
+        "rich",
+        "rosbags",
+    ),
     *("typer", "zstandard"),
 )
 MODULES = {"pillow": "PIL", "pyyaml": "yaml"}  # by distribution, where they differ

@@ -50,6 +50,7 @@ KEYS = {  # rosdep's, of what the lists in requirements/ name; looked up in rosd
     "jinja2": "python3-jinja2",
     "typer": "python3-typer",
     "jsonschema": "python3-jsonschema",
+    "matplotlib": "python3-matplotlib",
     "rich": "python3-rich",
 }
 

@@ -3,6 +3,7 @@
 
 """The code that pages show runs: README, tutorial, and the how-to on data; the table of columns is the code's."""
 
+import doctest
 import os
 import re
 import subprocess
@@ -54,3 +55,15 @@ def test_the_table_of_columns_is_the_code_s():
     rows = re.findall(r"^\| (\w+) \| (`.*?) \| (.*?) \|$", (ROOT / "docs" / "columns.md").read_text(), re.MULTILINE)
     shown = {quantity: tuple(tuple(re.findall(r"`(\w+)`", cell)) for cell in cells) for quantity, *cells in rows}
     assert shown == {quantity: (names, tuple(UNITS[quantity])) for quantity, names in NAMES.items()}
+
+
+def test_the_tasks_of_the_library_run_and_are_short(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib").use("Agg")
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    found = [text for language, text in blocks("docs/library.md") if language == "python" and text.startswith(">>> ")]
+    assert len(found) > 12 and max(text.count(">>> ") for text in found) <= 6
+    page = doctest.DocTestParser().get_doctest("\n".join(found), {}, "library.md", None, 0)
+    told = []
+    doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(page, out=told.append)
+    assert not told, "".join(told)

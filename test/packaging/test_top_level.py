@@ -12,7 +12,7 @@ ALLOWED = {
     ".pre-commit-config.yaml",
     *("package.xml", "setup.py", "setup.cfg", "pyproject.toml", "MANIFEST.in", "Makefile", ".gitignore", ".ci", "requirements*"),
     *("README.md", "CHANGELOG.rst", "CONTRIBUTING.md", "LICENSE", "config", "docs", "examples", "launch", "resource"),
-    *("scenario_gen", "msg_conventions", "test", "benchmarks"),
+    *("scenario_gen", "scenario_gen_interfaces", "msg_conventions", "test", "benchmarks"),
 }
 MADE = (".git", ".venv", ".venv-*", ".*_cache", ".hypothesis", "PKG-INFO", ".coverage*")  # beside what .gitignore names
 

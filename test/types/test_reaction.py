@@ -23,7 +23,7 @@ def test_every_edge_has_a_sentence_and_what_is_doubtful_or_cut_says_so():
 
 def test_who_leaves_before_the_other_has_passed_is_said_to():
     early = Reaction(YIELD, 1, 0, -0.3, 1.0, 0.6, 0.9, 3.0, 9.0)
-    assert early.words(IDS) == "vehicle b slows down for vehicle a to pass and leaves 0.3 s before it has"
+    assert early.words(IDS) == "vehicle b slows down for vehicle a to pass and leaves 0.3 s before vehicle a has passed"
 
 
 def test_edges_that_scenarios_do_not_keep_are_said():

@@ -28,7 +28,7 @@ from scenario_gen.bags.recordings.template import anchor_index, decode_routes, l
 from scenario_gen.bags.storage.bag import BagMessage, read_messages, within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import Encounter, Fit, Road, Route, Scenario, ScenarioSet, Segmentation
+from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, Scenario, ScenarioSet, Segmentation
 
 __all__ = [
     "INFO",
@@ -39,6 +39,7 @@ __all__ = [
     "Recording",
     "RequestSummary",
     "ScenarioEntry",
+    "load",
     "read_recording",
     "read_scenario_set",
 ]
@@ -296,3 +297,29 @@ def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = BagCo
         raise InputError(f"{path}: no request was closed on {namespace}/{INFO}")
     with within(path):
         return found.scenario_set()
+
+
+def load(path: Path | str, namespace: str = "", config: BagConfig = BagConfig()) -> GenerationResult:
+    """Return a result that a bag holds: its template and the scenarios of its last request, not evaluated.
+
+    Args:
+        path: of the bag, as `GenerationResult.save` or `scenario-gen generate` wrote it.
+        namespace: "" or e.g. "/case_2".
+        config: what is read at most.
+
+    Raises:
+        InputError: the bag cannot be read, the namespace is not there, or a scenario of the request is missing.
+    """
+    recording = read_recording(Path(path), config)
+    found = recording.namespaces.get(namespace)
+    if found is None or not {"tracks", SCENARIOS} <= found.messages.keys():
+        names = [repr(name) for name, one in recording.namespaces.items() if {"tracks", SCENARIOS} <= one.messages.keys()]
+        remedy = f"choose one of {', '.join(names)}" if names else "no namespace has any; is it a log?"
+        raise InputError(f"{path}: namespace {namespace!r} holds no template with scenarios; {remedy}")
+    with within(Path(path)):
+        fit, routes = found.fit
+        generated = found.scenario_set()
+        seed = next((scenario.seed for scenario in generated), 0)
+        return GenerationResult(
+            found.encounter, found.segmentation, found.road, fit, routes, generated, seed, provenance=recording.provenance
+        )

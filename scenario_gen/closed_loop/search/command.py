@@ -12,13 +12,13 @@ import os
 from pathlib import Path
 from typing import Any
 
-from scenario_gen.bags.recordings.provenance import versions
 from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder, sha256_of, write_text
 from scenario_gen.base.folders.marker import Kind
 from scenario_gen.base.parameters import assigned, flatten
+from scenario_gen.base.provenance import versions
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import as_junit, drawings, JUNIT
 from scenario_gen.closed_loop.search.estimate import Estimate, LEVEL, Search
@@ -268,7 +268,6 @@ def _page(result: SearchResult, request: SearchRequest) -> str:
         "search.html.j2",
         ("scene.js", "drives.js"),
         drawings(outcomes, trials, range(len(ordered))),
-        plotly=False,
         planner=request.planner,
         objective=str(request.objective),
         ego=request.ego_id(),

@@ -97,7 +97,7 @@ def comparison_table(differences: Sequence[Difference], names: tuple[str, str] =
                 "|---|---|---|---|",
             ]
         unit = f" [{entry.metric.unit}]" if entry.metric.unit else ""
-        cells = [formatted(estimate, entry.metric.unit) for estimate in (entry.first, entry.second)]
+        cells = [formatted(estimate, entry.metric.unit, cap=entry.metric.cap) for estimate in (entry.first, entry.second)]
         better = {"first": names[0], "second": names[1], "": "differs" if entry.clear else ""}[entry.better]
         lines.append(f"| {entry.metric.label}{unit} | {cells[0]} | {cells[1]} | {better} |")
     return "\n".join(lines).lstrip("\n") + "\n"

@@ -5,6 +5,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
+import math
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from scenario_gen.types import (
 MEASURED = 1000
 """Scenarios of a set that are measured; of a larger one this many, in RUNS evenly spaced runs of consecutive ones."""
 RUNS = 20
+LEAST_STEPS = 20  # instants of a feature matrix, however many vehicles there are
 Scenarios = Sequence[Scenario] | ScenarioSet
 
 
@@ -93,8 +95,9 @@ def evaluate_scenarios(
     rows = {name: given.scenarios if isinstance(given, ScenarioSet) else given for name, given in named.items()}
     sizes = {name: len(scenarios) for name, scenarios in rows.items()}
     rows = {name: measured(scenarios) for name, scenarios in rows.items()}
-    steps = min(encounter.speed.shape[1], config.max_steps)
     ids = shared_vehicles(encounter, rows)
+    pairs = max(math.comb(len(ids), 2), 1)
+    steps = min(encounter.speed.shape[1], config.max_steps, max(math.isqrt(config.max_entries // pairs), LEAST_STEPS))
     template = Template(encounter, ids, steps, next(iter(rows.get(oracle, ())), None), config, seed)
     own = _template_row(template)
     evaluated = [_row(name, sizes[name], Samples(scenarios, counts.get(name), template)) for name, scenarios in rows.items()]
@@ -107,7 +110,7 @@ def evaluate_scenarios(
         level=config.level,
         resamples=config.resamples,
         seed=seed,
-        metrics=catalogue(),
+        metrics=catalogue(config),
         rows=(own, *evaluated),
     )
 
@@ -150,7 +153,11 @@ def shared_vehicles(encounter: Encounter, rows: Mapping[str, Sequence[Scenario]]
 def _template_row(template: Template) -> Row:
     values = {key: Interval(value) for group in METRICS.values() for key, value in group.of_template(template).items()}
     resampled = template.steps < template.encounter.speed.shape[1]
-    notes = (f"longer than max_steps: the feature matrices have {template.steps} instants",) if resampled else ()
+    notes = (
+        (f"longer than max_steps and max_entries allow: the feature matrices have {template.steps} instants",)
+        if resampled
+        else ()
+    )
     return Row(TEMPLATE, 1, values, notes)
 
 

@@ -4,7 +4,7 @@
 """The metrics: what each figure is called, its unit and meaning, and how it is computed of a set of scenarios."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 import math
 
@@ -14,6 +14,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.registry import Registry
 from scenario_gen.method.evaluation import diversity, similarity
 from scenario_gen.method.evaluation.bootstrap import wilson
+from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.method.evaluation.samples import Samples, Template
@@ -93,14 +94,15 @@ def _similarity(samples: Samples) -> Estimates:
 
     Where nobody turns there is nothing of headings.
     """
+    unit = samples.pooled.unit
     compared = {
-        "position": [pair.similarity(0, "euclidean") for pair in samples.pairs],
-        "speed": [pair.similarity(1, "manhattan") for pair in samples.pairs],
-        "heading": [pair.similarity(2, "angle", TURNS) for pair in samples.pairs],
+        "position": [pair.similarity(0, "euclidean", unit=unit) for pair in samples.pairs],
+        "speed": [pair.similarity(1, "manhattan", unit=unit) for pair in samples.pairs],
+        "heading": [pair.similarity(2, "angle", TURNS, unit) for pair in samples.pairs],
     }
     if not any(pair.template[2] for pair in compared["heading"]):
         del compared["heading"]
-    interval = samples.bootstrap.interval
+    interval = samples.pooled.of_units().interval
     return {
         **{f"e_{what}": interval(partial(similarity.mean_error, of)) for what, of in compared.items()},
         **{f"correlation_{what}": interval(partial(similarity.mean_correlation, of)) for what, of in compared.items()},
@@ -262,13 +264,14 @@ METRICS = Registry[MetricGroup](
 """All groups of metrics, in the order in which they are computed; those of installed packages are in every evaluation."""
 
 
-def catalogue() -> tuple[Metric, ...]:
+def catalogue(config: EvaluationConfig = EvaluationConfig()) -> tuple[Metric, ...]:
     """Return all metrics in the order in which they are shown, by heading.
 
     Raises:
         InputError: two metrics have one id, or a plugin cannot be loaded.
     """
-    metrics = [metric for group in METRICS.values() for metric in group.metrics]
+    caps = {"min_ttc": config.ttc_horizon}
+    metrics = [replace(metric, cap=caps.get(metric.id)) for group in METRICS.values() for metric in group.metrics]
     for k, metric in enumerate(metrics):
         if metric.id in {other.id for other in metrics[:k]}:
             raise InputError(

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
-from scenario_gen.types import ALWAYS, always, Encounter, mask, Scenario, together, Vehicle
+from scenario_gen.types import ALWAYS, always, Encounter, mask, once_per_object, Scenario, together, Vehicle
 
 COMMON = 1.0
 """Seconds that two vehicles must be there together to be compared."""
@@ -64,6 +64,7 @@ class Motion:
         return frozen(np.arange(self.speed.shape[1]) * self.dt)
 
 
+@once_per_object
 def at_period(source: Encounter | Scenario, dt: float) -> Motion:
     """Bring an encounter or a scenario to the period dt [s] (a tail shorter than dt is left out).
 

@@ -20,6 +20,8 @@ from scenario_gen.method.evaluation.similarity import pair_similarity, PairSimil
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.types import CheckCounts, Encounter, Scenario
 
+MOST_UNITS = 128  # of a bootstrap of E
+
 
 @dataclass(frozen=True, eq=False)
 class Template:
@@ -107,6 +109,13 @@ class Samples:
         return Bootstrap.draw(antithetic_pairs(self.scenarios), config.resamples, config.level, self.template.seed)
 
     @cached_property
+    def pooled(self) -> Bootstrap:
+        """The same of at most MOST_UNITS units, neighbours drawn together: the cost of E grows with their square."""
+        unit, config = self.bootstrap.unit, self.template.config
+        size = -(-(int(unit.max(initial=0)) + 1) // MOST_UNITS)
+        return self.bootstrap if size == 1 else Bootstrap.draw(unit // size, config.resamples, config.level, self.template.seed)
+
+    @cached_property
     def pairs(self) -> tuple["VehiclePair", ...]:
         """The pairs of vehicles that are there together, for COMMON s, in the template and in all samples."""
         template, steps = self.template.motion, self.template.steps
@@ -138,13 +147,13 @@ class VehiclePair:
     template: tuple[Floats, ...]
     samples: tuple[Floats, ...]
 
-    def similarity(self, k: int, distance: Distance, least: float = 0.0) -> PairSimilarity:
-        """Compare one of the three, as `pair_similarity` does."""
+    def similarity(self, k: int, distance: Distance, least: float = 0.0, unit: Ints | None = None) -> PairSimilarity:
+        """Compare one of the three, as `pair_similarity` does; `unit` (S,) as there."""
         target, series = self.template[k], self.samples[k]
         if target.ndim == 2:
             target, series = target[..., None], series[..., None]
         target, series = np.moveaxis(target, -1, -2), np.moveaxis(series, -1, -2)
-        return pair_similarity((target[0], target[1]), (series[:, 0], series[:, 1]), distance, least)
+        return pair_similarity((target[0], target[1]), (series[:, 0], series[:, 1]), distance, least, unit)
 
 
 def chosen(motion: Motion, ids: Sequence[str]) -> Motion:

@@ -5,7 +5,8 @@
 
 For a pair of vehicles let M_s be the feature matrix of sample s and T the template's. E is the Frobenius norm of the mean
 of M_s - T over the norm of T. With D_s = M_s - T flattened and weights w summing to 1, its square is w'Gw / |T|² with the
-Gram matrix G = D D'; so a bootstrap of E needs the matrices once and then only G.
+Gram matrix G = D D'; so a bootstrap of E needs the matrices once and then only G. Samples that are always drawn together (units)
+enter by their sums, which makes G a quarter as large where they come in pairs.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.method.evaluation.dtw import blocks, Distance, feature_extents, feature_rows
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import exact, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,27 +23,33 @@ class PairSimilarity:
     """Sums over the feature matrices of one pair of vehicles, enough for E and the correlation under any weights.
 
     Attributes:
-        gram: (S, S) inner products of D_r and D_s.
-        cross: (S,) inner products of D_s and T.
-        total: (S,) sums of the entries of D_s.
+        gram: (U, U) inner products of D_r and D_s, where D_s is the sum over the samples of unit s.
+        cross: (U,) inner products of D_s and T.
+        total: (U,) sums of the entries of D_s.
         template: number of entries, their sum, and their sum of squares in T.
+        count: (U,) samples of each unit.
     """
 
     gram: Floats
     cross: Floats
     total: Floats
     template: tuple[int, float, float]
+    count: Floats
+
+    def _shares(self, weights: Floats) -> Floats:
+        """Return weights (B, U) divided by the weight of all samples."""
+        return np.asarray(weights / exact.matmul(weights, self.count)[:, None])
 
     def error(self, weights: Floats) -> Floats:
-        """Return E (B,) under weights (B, S); NaN if T is zero (both vehicles stand throughout)."""
-        shares = weights / weights.sum(axis=1, keepdims=True)
+        """Return E (B,) under weights (B, U); NaN if T is zero (both vehicles stand throughout)."""
+        shares = self._shares(weights)
         square = (exact.matmul(shares, self.gram) * shares).sum(axis=1)
         norm = self.template[2]
         return np.sqrt(np.maximum(square, 0.0) / norm) if norm > 0.0 else np.full(len(weights), np.nan)
 
     def correlation(self, weights: Floats) -> Floats:
         """Return Pearson's r (B,) of the mean matrix and T; NaN if one of them is constant."""
-        shares = weights / weights.sum(axis=1, keepdims=True)
+        shares = self._shares(weights)
         count, first, second = self.template
         variance = second - first * first / count
         total = exact.matmul(shares, self.total)
@@ -55,7 +62,11 @@ class PairSimilarity:
 
 
 def pair_similarity(
-    template: tuple[Floats, Floats], generated: tuple[Floats, Floats], distance: Distance, least: float = 0.0
+    template: tuple[Floats, Floats],
+    generated: tuple[Floats, Floats],
+    distance: Distance,
+    least: float = 0.0,
+    unit: Ints | None = None,
 ) -> PairSimilarity:
     """Compare the feature matrices of one pair of vehicles.
 
@@ -64,25 +75,34 @@ def pair_similarity(
         generated: series of the two vehicles in S samples, (S, D, T) each.
         distance: of the feature; the paper takes Euclidean for position, Manhattan for speed.
         least: a template whose distances spread by less counts as constant: scaled to [0, 1] it would show its noise.
+        unit: (S,) the number, from 0, of the unit of each sample; None: each is one of its own.
     """
     a, b = (np.ascontiguousarray(series) for series in generated)
     left, right = (np.ascontiguousarray(series)[None] for series in template)
     extents, own = feature_extents(a, b, distance), feature_extents(left, right, distance)
     samples, _, steps = a.shape
-    gram, cross, total = np.zeros((samples, samples)), np.zeros(samples), np.zeros(samples)
+    unit = np.arange(samples) if unit is None else unit
+    units = int(unit.max()) + 1 if samples else 0
+    gram, cross, total = np.zeros((units, units)), np.zeros(units), np.zeros(units)
+    count = np.bincount(unit, minlength=units).astype(np.float64)
     first = second = 0.0
     if own[0, 1] - own[0, 0] < least:
-        return PairSimilarity(gram, cross, total, (steps * steps, first, second))
+        return PairSimilarity(gram, cross, total, (steps * steps, first, second), count)
     for rows in blocks(steps, samples * steps):
         target = feature_rows(left, right, own, rows, distance)[0]
         difference = feature_rows(a, b, extents, rows, distance)
         difference -= target
+        if units < samples:
+            pooled = np.zeros((units, difference.shape[1]))
+            for own_unit, row in zip(unit, difference, strict=True):
+                pooled[own_unit] += row
+            difference = pooled
         gram += exact.gram(difference)
         cross += exact.matmul(difference, target)
         total += difference.sum(axis=1)
         first += float(target.sum())
         second += float(np.square(target).sum())
-    return PairSimilarity(gram, cross, total, (steps * steps, first, second))
+    return PairSimilarity(gram, cross, total, (steps * steps, first, second), count)
 
 
 def pair_similarities(template: Floats, generated: Floats, distance: Distance, least: float = 0.0) -> list[PairSimilarity]:

@@ -33,6 +33,7 @@ from scenario_gen.types import Cause, EgoSlot, Measures, NOT_KEPT, Reached, Requ
 
 KEPT = 1000  # scenarios up to which a set stays in memory
 LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried
+EXAMPLES = 3  # refused candidates of each cause that are kept to be looked at
 PILOT = 2 * BLOCK  # candidates by which a level is judged
 DIRECTED_BUDGET = 10  # times the budget of a request without a target
 HOPELESS = 20 * BLOCK  # candidates of a proposal after which it is given up if none of them is valid and in the range
@@ -90,6 +91,7 @@ def draw_scenarios(
         notes = (*prepared.adaptations, *lost, *loop.adaptations)
         drawn = ScenarioSet(
             count, loop.scenarios(), loop.candidates, loop.refused, notes, slot, loop.reached, loop.chosen_from, kept,
+            examples=tuple(loop.examples),
         )  # fmt: skip
     if request.moves and not drawn.scenarios and not callbacks.cancelled():
         causes = ", ".join(f"{number} × {cause.value}" for cause, number in drawn.refused.most_common())
@@ -144,6 +146,7 @@ class _Loop:
     kept: list[Scenario] = field(default_factory=list)  # the first KEPT
     index: Any = field(default_factory=lambda: array("q"))  # of all that are valid
     refused: Counter[Cause] = field(default_factory=Counter)
+    examples: list[tuple[Cause, Scenario]] = field(default_factory=list)
     candidates: int = 0
     adaptations: list[str] = field(default_factory=list)
     aim: Aim | None = None
@@ -290,6 +293,8 @@ class _Loop:
                     self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
                 else:
                     self.refused[cause or Cause.SPEED_PROFILE] += 1
+                    if scenario is not None and cause is not None and self.refused[cause] <= EXAMPLES:
+                        self.examples.append((cause, scenario))
             self.callbacks.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good

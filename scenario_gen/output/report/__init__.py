@@ -5,4 +5,4 @@
 
 from scenario_gen.base.errors import needs
 
-needs("report", "jinja2", "plotly")
+needs("report", "jinja2")

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.method.evaluation import at_common, at_count, mean_feature
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Bools, exact, Floats
 from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, Scenario, Segmentation, UNIFORM, WITHOUT
 
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""
-MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS = 240, 900, 72, 10, 200
+MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS, MAX_BORDERS = 240, 900, 72, 10, 200, 400
 MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
 """Speed and accelerations over time are stored more finely than the animation, of fewer samples."""
 
@@ -36,6 +36,9 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     if case.oracle is not None:
         arms["oracle"] = (case.oracle,)
     longest = max([case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)])
+    refused = case.generated.examples
+    if refused:
+        arms["refused"] = tuple(scenario for _, scenario in refused)
     frames = min(MAX_FRAMES, int(np.ceil(longest / FRAME_PERIOD)) + 1)
     return {
         "row": case.row,
@@ -45,9 +48,13 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "template": _template(case.encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
         "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
+        "causes": [cause.value.replace("_", " ") for cause, _ in refused],
+        "turn": _turn(case.encounter, case.fit),
         "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
         "coverage": None if covered is None else covered.document(),
-        "features": _features(case.encounter, arms, case.evaluation.vehicles),
+        "features": _features(
+            case.encounter, {name: group for name, group in arms.items() if name != "refused"}, case.evaluation.vehicles
+        ),
     }
 
 
@@ -90,7 +97,25 @@ def road_data(road: Road) -> dict[str, Any]:
         "origin": [_short(v) for v in road.origin],
         "size": [width, height],
         "runs": runs(coarse),
+        "lanes": _lane_borders(road),
     }
+
+
+def _lane_borders(road: Road) -> list[list[float]]:
+    """Return the borders of the road's lanes, each x, y, x, y … [m]; none where no lanes are known, or too many."""
+    lanes = road.lanes.lanes if road.lanes is not None else ()
+    borders = [border for lane in lanes for border in (lane.left, lane.right)]
+    step = max(1, -(-len(borders) * 2 // MAX_BORDERS))
+    kept = [np.linspace(0, len(border) - 1, min(len(border), 25)).round().astype(np.int64) for border in borders]
+    return [np.round(border[rows].ravel(), 1).tolist() for border, rows in zip(borders[::step], kept[::step], strict=True)]
+
+
+def _turn(encounter: Encounter, fit: Fit | None) -> float:
+    """Return the angle [rad] that turns the record as it lies on the road: the mean over its vehicles' first headings."""
+    if fit is None or not fit.fitted:
+        return 0.0
+    turned = np.array([fitted.anchors[0, 2] - heading[0] for fitted, heading in zip(fit.fitted, encounter.heading, strict=True)])
+    return _short(float(exact.arctan2(exact.sin(turned).sum(), exact.cos(turned).sum())))
 
 
 def states(source: Encounter | Scenario, frames: int) -> Floats:

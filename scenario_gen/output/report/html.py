@@ -18,21 +18,20 @@ from typing import Any
 
 import jinja2
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from scenario_gen.types import formatted
 
 
 def render_page(
-    template: str, scripts: Sequence[str], data: Any, *, plotly: bool = True, folder: Path | None = None, **values: Any
+    template: str, scripts: Sequence[str], data: Any, *, libraries: Sequence[str] = (), folder: Path | None = None, **values: Any
 ) -> str:
     """Return a page as text; the same input gives the same bytes.
 
     Args:
         template: name of a Jinja template among the assets.
-        scripts: names of scripts among the assets, in the order in which they run, after plotly.js.
+        scripts: names of scripts among the assets, in the order in which they run, after the libraries.
         data: what the scripts draw, put into the page as JSON; all numbers finite.
-        plotly: whether the scripts need plotly.js, which is 4 MB.
+        libraries: scripts of others, as text.
         folder: of further templates and scripts.
         **values: what else the template asks for.
     """
@@ -49,8 +48,8 @@ def render_page(
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters["estimate"] = lambda value, unit="", bounds=True: formatted(value, unit, bounds=bounds)
-    texts = [*([get_plotlyjs()] if plotly else ()), *map(asset, scripts)]
+    environment.filters["estimate"] = lambda value, unit="", bounds=True, cap=None: formatted(value, unit, bounds=bounds, cap=cap)
+    texts = [*libraries, *map(asset, scripts)]
     return environment.get_template(template).render(
         css=Markup(asset("report.css")),
         policy=Markup(content_policy(texts)),
@@ -63,7 +62,7 @@ def render_page(
 def content_policy(scripts: Sequence[str]) -> str:
     """Return the policy of a page with these inline scripts, each given as it stands between its tags.
 
-    Styles stay free ('unsafe-inline'): plotly.js makes style elements and attributes that no hash could name beforehand.
+    Styles stay free ('unsafe-inline'): widths of bars and colours of vehicles are style attributes.
     """
     hashes = " ".join(f"'sha256-{b64encode(sha256(text.encode('utf-8')).digest()).decode('ascii')}'" for text in scripts)
     return (

@@ -5,7 +5,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
+import shlex
 from typing import Any
 
 from scenario_gen.base.folders import write_text
@@ -40,12 +42,14 @@ class ReportInput:
         title: heading and window title.
         quality: the log's data quality, in lines.
         provenance: log, its hash, seed, versions, parameters, by name.
+        bag: path of the bag that holds the scenarios, by which a command names them; "": none does.
     """
 
     cases: Sequence[GenerationResult]
     title: str = "Generated encounters"
     quality: Sequence[str] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
+    bag: str = ""
 
 
 def write_report(path: Path, report: ReportInput) -> None:
@@ -58,11 +62,12 @@ def render(report: ReportInput) -> str:
     views = [_view(index, case) for index, case in enumerate(report.cases)]
     return render_page(
         "report.html.j2",
-        ("scene.js", "charts.js", "page.js"),
+        ("scene.js", "plots.js", "charts.js", "page.js"),
         [case_data(case, MAX_SAMPLES) for case in report.cases],
         report=report,
         views=views,
         verdict=_verdict(views),
+        bag=shlex.quote(report.bag) if report.bag else "",
         significant=SIGNIFICANT,
         facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
         parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
@@ -130,7 +135,23 @@ def _in_words(case: GenerationResult) -> str:
     orders = case.coverage.orders if case.coverage is not None else {}
     first = f"{len(orders)} orders at the conflicts" if len(orders) > 1 else ""
     kept = "; ".join(case.reacting["sentences"])
-    return "; ".join(filter(None, [f"{case.published} of {case.generated.requested} scenarios are valid", kept, first]))
+    valid = f"{case.published} of {case.generated.requested} scenarios are valid"
+    return "; ".join(filter(None, [valid, kept, first, _criticality(case)]))
+
+
+def _criticality(case: GenerationResult) -> str:
+    """Return the least time to collision and PET of all scenarios, in words; "" if nothing was measured."""
+    if case.coverage is None or not case.coverage.index:
+        return ""
+    cap = next((metric.cap for metric in case.evaluation.metrics if metric.id == "min_ttc"), None)
+    said = []
+    for name, words in (("ttc", "time to collision"), ("pet", "PET")):
+        least = min(filter(math.isfinite, case.coverage.spreads[name].values), default=math.nan)
+        if least < (math.inf if name == "pet" or cap is None else cap):
+            said.append(f"least {words} {least:.1f} s")
+        elif name == "ttc" and cap is not None:
+            said.append(f"{words}: none below {cap:g} s")
+    return ", ".join(said)
 
 
 def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:

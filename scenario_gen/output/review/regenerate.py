@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from scenario_gen.bags.recordings.provenance import read_parameters, versions
 from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, RequestSummary, ScenarioEntry
 from scenario_gen.bags.recordings.template import decode_template, missing_topics
 from scenario_gen.bags.recordings.write import add_message, same_tracks, scenario_bytes
@@ -16,6 +15,7 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
+from scenario_gen.base.provenance import read_parameters, versions
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import fit_template, FittingConfig

@@ -27,12 +27,13 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import decode_info
 from msg_conventions.scenarios import decode_scenario, digest, messages_of
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags.recordings.read import read_recording, read_scenario_set
+from scenario_gen.bags.recordings.read import load, read_recording, read_scenario_set
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.reindex import reindex
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs.synthetic import bundled
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.generation import GenerationResult
 
@@ -282,3 +283,20 @@ def test_scenarios_of_vehicles_that_come_and_go_are_read_back_whole(run, tmp_pat
     (info, (entry,)), summary = found.infos[2], found.summaries[0]
     alone = found.messages_of(info, entry, summary)
     assert [message.data for message in alone if message.topic == "/scenarios"] == list(messages_of(found.data("scenarios")[2]))
+
+
+def test_a_saved_result_is_loaded_with_the_same_scenarios(run, tmp_path):
+    found = load(run.save(tmp_path / "bag"))
+    assert (len(found), found.seed, found.generated.candidates) == (5, 7, 8) and found.generated.refused == run.generated.refused
+    assert all(np.array_equal(a.position, b.position) for a, b in zip(found, run, strict=True))
+    assert found.road is not None and np.array_equal(found.road.drivable, run.road.drivable)
+    assert np.array_equal(found.segmentation.changepoints, run.segmentation.changepoints) and not found.evaluation.rows
+
+
+def test_what_holds_no_result_cannot_be_loaded(run, tmp_path):
+    folder = write_recording(tmp_path / "bag", {"/case_1": run, "/case_2": run})
+    assert len(load(str(folder), "/case_2")) == 5
+    with pytest.raises(InputError, match="choose one of '/case_1', '/case_2'"):
+        load(folder)
+    with pytest.raises(InputError, match="no namespace has any"):
+        load(bundled("a"))

@@ -15,7 +15,7 @@ from scipy.spatial.distance import jensenshannon
 from shapely import affinity
 from shapely.geometry import box
 
-from scenario_gen.method.evaluation import diversity, similarity
+from scenario_gen.method.evaluation import diversity, evaluate_scenarios, similarity
 from scenario_gen.method.evaluation.bootstrap import Bootstrap, wilson
 from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.distributions import compare, jensen_shannon, QUANTITIES, values_of
@@ -223,3 +223,17 @@ def test_motion_on_another_clock():
     assert coarse.speed.shape[1] == 49 and coarse.position[0, -1, 0] == pytest.approx(70.0)
     even = at_count(encounter, 7)
     np.testing.assert_allclose(even.position[0, :, 0], np.linspace(-50, 70, 7), atol=1e-6)
+
+
+def test_a_large_set_has_the_same_error_and_nearly_the_same_interval_with_pooled_units(monkeypatch):
+    """At most MOST_UNITS units are drawn, and the value does not depend on how they are pooled."""
+    encounter = crossing()
+    scenarios = samples(encounter, 150)
+    whole = evaluate_scenarios(encounter, {"set": scenarios}).row("set").values
+    monkeypatch.setattr("scenario_gen.method.evaluation.samples.MOST_UNITS", 40)
+    pooled = evaluate_scenarios(encounter, {"set": scenarios}).row("set").values
+    for name in ("e_position", "e_speed", "correlation_speed"):
+        assert pooled[name].value == pytest.approx(whole[name].value, rel=1e-9)
+        width, before = (one[name].high - one[name].low for one in (pooled, whole))
+        assert 0.5 < width / before < 2.0, name
+    assert pooled["min_ttc"] == whole["min_ttc"], "others are drawn as before"

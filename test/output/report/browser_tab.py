@@ -29,7 +29,7 @@ class Tab:
     """A page with a record of what went wrong and what was asked of the network."""
 
     def __init__(self, browser, file, size):
-        self.page = browser.new_page(viewport=size)
+        self.page = browser.new_page(viewport=size, accept_downloads=False)  # they are told, and nothing waits for their end
         self.troubles, self.requests = [], []
         self.page.on(
             "console", lambda message: self.troubles.append(message.text) if message.type in ("error", "warning") else None

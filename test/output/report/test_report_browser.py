@@ -12,6 +12,7 @@ from evaluation_worlds import ego_case, report_case
 from PIL import Image
 import pytest
 
+from scenario_gen.logs import read_log
 from scenario_gen.output.report.page import ReportInput, write_report
 
 
@@ -60,7 +61,7 @@ def test_it_loads_without_errors_or_requests(tab, report):
     tab.page.wait_for_timeout(300)
     assert tab.troubles == []
     assert tab.asked() == [report.as_uri()]
-    assert tab.page.locator('[data-case="0"] .js-plotly-plot').count() == 10  # template, two arms, motion, six matrices
+    assert tab.page.locator('[data-case="0"] .plot').count() == 10  # template, two arms, motion, six matrices
     for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
         pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
         assert len(pixels.getcolors(1_000_000)) > 10, role
@@ -187,3 +188,50 @@ def test_who_arrives_late_is_not_shown_before(browser, tmp_path):
     tab.part("scrub").fill("800")
     assert "not there" not in tab.part("readout").inner_text() and tab.troubles == []
     tab.page.close()
+
+
+def test_the_record_plays_beside_the_scenario(tab):
+    before = tab.picture("record")
+    tab.part("scrub").fill("500")
+    assert tab.picture("record") != before
+    left, right = (tab.part(role).bounding_box() for role in ("record", "stage"))
+    assert left["y"] == right["y"] and min(left["width"], right["width"]) > 400 and min(left["height"], right["height"]) > 300
+
+
+def test_a_scenario_is_downloaded_and_its_command_copied(browser, tmp_path):
+    write_report(tmp_path / "report.html", ReportInput([report_case(3)], bag="my bag"))
+    tab = Report(browser, tmp_path / "report.html", DESKTOP)
+    tab.page.evaluate(
+        "() => { const made = URL.createObjectURL; URL.createObjectURL = (blob) => made.call(URL, (window.given = blob)); }"
+    )
+    tab.part("next").click()
+    with tab.page.expect_download() as csv:
+        tab.part("csv").click()
+    assert csv.value.suggested_filename == "scenario_1.csv"
+    (tmp_path / "scenario_1.csv").write_text(tab.page.evaluate("given.text()"))
+    (encounter,) = read_log(str(tmp_path / "scenario_1.csv")).encounters  # our own reader takes it
+    assert {vehicle.id for vehicle in encounter.vehicles} == {"west", "south"} and encounter.duration == pytest.approx(
+        12.0, abs=0.5
+    )
+    with tab.page.expect_download() as png:
+        tab.part("png").click()
+    assert png.value.suggested_filename == "scenario_1.png"
+    drawn = tab.page.evaluate("given.arrayBuffer().then((bytes) => [...new Uint8Array(bytes)])")
+    assert Image.open(io.BytesIO(bytes(drawn))).size[0] > 400
+    tab.part("copy").click()
+    assert tab.part("said").inner_text() == "copied: scenario-gen regenerate 'my bag' 1 --out scenario_1"
+    assert tab.troubles == []
+    tab.page.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_axe_finds_nothing_wrong(browser, report, scheme, size):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
+    context = browser.new_context(bypass_csp=True, color_scheme=scheme, viewport=size)  # axe runs in the page
+    page = context.new_page()
+    page.goto(report.as_uri())
+    page.wait_for_timeout(200)
+    found = axe.Axe().run(page).response["violations"]
+    context.close()
+    assert not [(one["id"], one["impact"], one["nodes"][0]["html"][:200]) for one in found]

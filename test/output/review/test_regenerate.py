@@ -155,3 +155,12 @@ def test_a_missing_or_changed_log_is_said(bag, tmp_path):
     (tmp_path / "other.csv").write_text("t,x\n")
     with pytest.raises(InputError, match="it is another file, or was changed"):
         regenerate_scenario(bag, 0, namespace="/plain", log=tmp_path / "other.csv")
+
+
+def test_what_the_library_saved_is_made_again(tmp_path):
+    """`generate` keeps with its result what makes it again."""
+    (encounter,) = read_log(LOG).encounters
+    made = generate(encounter, ROAD, count=2, seed=4, request=Request(order="free"))
+    bag = made.save(tmp_path / "bag")
+    for scenario in made:
+        assert regenerate_scenario(bag, scenario.index).sha256

@@ -1,25 +1,7 @@
 "use strict";
-// The still figures of one case: maps on canvases, the rest with plotly.
+// The still figures of one case: maps on canvases, the rest as charts.
 
-const PLOT = { displayModeBar: false, scrollZoom: false };
-const LAYOUT = {
-  margin: { l: 46, r: 10, t: 10, b: 38 },
-  paper_bgcolor: "rgba(0,0,0,0)",
-  plot_bgcolor: "rgba(0,0,0,0)",
-  font: { family: "system-ui, sans-serif", size: 12, color: "#334155" },
-  showlegend: false,
-  hovermode: "closest",
-};
-const HEAT = ["#313695", "#4575b4", "#74add1", "#abd9e9", "#ffffbf", "#fdae61", "#f46d43", "#d73027", "#a50026"].map((c, i) => [i / 8, c]);
-const GRID = { gridcolor: "#e2e8f0", zeroline: false };
-
-/** A name or sentence out of the data for plotly, which takes some HTML and %{…} in its texts: all of it is shown as it is. */
-const PLAIN = { "&": "&amp;", "<": "&lt;", ">": "&gt;", "{": "&#123;" };
-const plain = (text) => text.replace(/[&<>{]/g, (sign) => PLAIN[sign]);
-
-function plot(place, traces, layout) {
-  if (place) Plotly.newPlot(place, traces, { ...LAYOUT, ...layout }, PLOT);
-}
+const HEAT = ["#313695", "#4575b4", "#74add1", "#abd9e9", "#ffffbf", "#fdae61", "#f46d43", "#d73027", "#a50026"].map((c) => [1, 3, 5].map((i) => parseInt(c.slice(i, i + 2), 16)));
 
 /** Time of each frame of a sample. */
 function clock(set, sample) {
@@ -34,112 +16,102 @@ function speeds(set, sample, vehicle) {
 /** How one figure is distributed over the set, with the template's place in it. */
 function drawSpread(place, figure) {
   const values = figure.values.filter((value) => value !== null);
-  const unit = plain(figure.unit);
-  const shapes = figure.template === null ? [] : [{
-    type: "line", xref: "x", yref: "paper", x0: figure.template, x1: figure.template, y0: 0, y1: 1, line: { color: "#0f172a", width: 2, dash: "dash" },
-  }];
-  plot(place, [{ x: values, type: "histogram", nbinsx: 20, marker: { color: "#2563eb", opacity: 0.75 }, hovertemplate: `%{y} at %{x} ${unit}<extra></extra>` }], {
-    shapes, margin: { l: 34, r: 8, t: 6, b: 40 }, bargap: 0.06,
-    xaxis: { ...GRID, title: { text: `${plain(figure.label)} [${unit}], ${values.length} of ${figure.values.length}`, standoff: 6, font: { size: 11 } } },
-    yaxis: { ...GRID, rangemode: "tozero" },
-  });
+  const [low, high] = values.length ? extent(values) : [0, 1];
+  const count = high > low ? 20 : 1;
+  const step = (high - low || 1) / count;
+  const bars = Array.from({ length: count }, (_, k) => ({ from: low + k * step, to: low + (k + 1) * step, count: 0 }));
+  values.forEach((value) => { bars[Math.min(count - 1, Math.floor((value - low) / step))].count += 1; });
+  const title = `${figure.label} [${figure.unit}], ${values.length} of ${figure.values.length}`;
+  const marks = figure.template === null ? [] : [figure.template];
+  const range = extent([...marks, low, high === low ? low + 1 : high]);
+  chart(place, { label: title, x: { title, range }, panels: [{ title: "", share: 1, lines: [], bars: bars.filter((bar) => bar.count), marks }] });
 }
 
 /** Figure 3: speed over time on the colours of its primitives, and the probability of a changepoint below. */
 function drawTemplate(place, data, template) {
   const { bounds, labels, descriptions, probability, probability_step: step } = data.template;
-  const traces = data.vehicles.map((vehicle, n) => ({
-    x: clock(template, 0), y: speeds(template, 0, n), name: plain(vehicle.id), mode: "lines",
-    line: { color: vehicleColour(n), width: 2.5 }, hovertemplate: "%{y:.1f} m/s at %{x:.1f} s<extra>" + plain(vehicle.id) + "</extra>",
+  const lines = data.vehicles.map((vehicle, n) => ({
+    x: clock(template, 0), y: speeds(template, 0, n), name: vehicle.id, colour: vehicleColour(n), width: 2.5,
   }));
-  traces.push({
-    x: probability.map((_, i) => +(i * step).toFixed(2)), y: probability, yaxis: "y2", name: "changepoint probability",
-    mode: "lines", fill: "tozeroy", line: { color: "#475569", width: 1, shape: "hvh" }, hovertemplate: "p = %{y:.2f} at %{x:.1f} s<extra></extra>",
-  });
-  const shapes = labels.map((label, k) => ({
-    type: "rect", xref: "x", yref: "paper", x0: bounds[k], x1: bounds[k + 1], y0: 0.3, y1: 1,
-    fillcolor: primitiveColour(label), opacity: 0.2, line: { width: 0 }, layer: "below",
-  }));
-  bounds.slice(1, -1).forEach((time) => shapes.push({
-    type: "line", xref: "x", yref: "paper", x0: time, x1: time, y0: 0, y1: 1, line: { color: "#334155", width: 1, dash: "dot" },
-  }));
-  traces.push({
-    x: labels.map((_, k) => (bounds[k] + bounds[k + 1]) / 2), y: labels.map(() => 0), mode: "markers",
-    marker: { size: 14, opacity: 0 }, text: descriptions.map(plain), hovertemplate: "%{text}<extra></extra>",
-  });
-  plot(place, traces, {
-    shapes,
-    xaxis: { ...GRID, anchor: "y2", title: { text: "time [s]", standoff: 6 }, range: [0, bounds[bounds.length - 1]] },
-    yaxis: { ...GRID, title: { text: "speed [m/s]", standoff: 6 }, domain: [0.3, 1], rangemode: "tozero" },
-    yaxis2: { ...GRID, title: { text: "p", standoff: 6 }, domain: [0, 0.22], range: [0, 1.05] },
+  const bands = labels.map((label, k) => ({ from: bounds[k], to: bounds[k + 1], colour: primitiveColour(label), name: descriptions[k] }));
+  const marks = bounds.slice(1, -1);
+  const likely = { x: probability.map((_, i) => +(i * step).toFixed(2)), y: probability, width: 1, fill: true, name: "probability of a changepoint" };
+  chart(place, {
+    label: "recorded speeds, and below them the probability of a changepoint",
+    x: { title: "time [s]", range: [0, bounds[bounds.length - 1]] },
+    panels: [
+      { title: "speed [m/s]", share: 0.75, zero: true, lines, bands, marks },
+      { title: "p", share: 0.25, range: [0, 1.05], lines: [likely], marks },
+    ],
   });
 }
 
 /** Figure 4, lower half: the speeds of all samples, the template's dashed. */
 function drawSpeeds(place, data, set, template, top) {
-  const traces = [];
-  data.vehicles.forEach((_, n) => {
+  const lines = [];
+  data.vehicles.forEach((vehicle, n) => {
     const x = [];
     const y = [];
     for (let s = 0; s < (isEgo(data, n) ? 1 : set.samples); s += 1) {
       x.push(...clock(set, s), null);
       y.push(...speeds(set, s, n), null);
     }
-    const line = { color: vehicleColour(n), width: isEgo(data, n) ? 2 : 1, dash: isEgo(data, n) ? "dash" : "solid" };
-    traces.push({ x, y, mode: "lines", line, opacity: Math.max(0.3, 1 - set.samples / 30), hoverinfo: "skip" });
+    lines.push({ x, y, colour: vehicleColour(n), width: isEgo(data, n) ? 2 : 1, dash: isEgo(data, n) ? "7 5" : "", opacity: Math.max(0.3, 1 - set.samples / 30), name: vehicle.id });
   });
-  data.vehicles.forEach((_, n) => traces.push({
-    x: clock(template, 0), y: speeds(template, 0, n), mode: "lines",
-    line: { color: "#0f172a", width: 1.5, dash: "dash" }, hoverinfo: "skip",
-  }));
-  plot(place, traces, {
-    xaxis: { ...GRID, title: { text: "time [s]", standoff: 6 } },
-    yaxis: { ...GRID, title: { text: "speed [m/s]", standoff: 6 }, range: [0, top] },
-  });
+  data.vehicles.forEach((vehicle, n) => lines.push({ x: clock(template, 0), y: speeds(template, 0, n), width: 1.5, dash: "6 4", name: `${vehicle.id}, recorded` }));
+  chart(place, { label: "speeds of all samples; dashed: recorded", x: { title: "time [s]" }, panels: [{ title: "speed [m/s]", share: 1, range: [0, top], lines }] });
 }
 
 /** One vehicle's speed, acceleration and lateral acceleration: the template bold, samples (all, or the one chosen) thin. */
 function drawMotion(place, motion, colour, chosen) {
-  const traces = [];
+  const lines = [[], [], []];
   const add = (packed, line) => {
     const { shape: [frames, channels], low, step, data } = packed.values;
     const whole = new Uint16Array(bytesOf(data).buffer);
     const x = Array.from({ length: frames }, (_, f) => +(packed.from + ((packed.to - packed.from) * f) / (frames - 1)).toFixed(2));
     for (let c = 0; c < channels; c += 1) {
-      const y = Array.from({ length: frames }, (_, f) => +(low[c] + step[c] * whole[f * channels + c]).toFixed(3));
-      traces.push({ x, y, yaxis: `y${c ? c + 1 : ""}`, mode: "lines", line, hoverinfo: "skip" });
+      lines[c].push({ ...line, x, y: Array.from({ length: frames }, (_, f) => +(low[c] + step[c] * whole[f * channels + c]).toFixed(3)) });
     }
   };
   motion.samples.forEach((sample, s) => {
-    if (chosen < 0 || chosen === s) add(sample, { color: colour, width: chosen < 0 ? 1 : 2 });
+    if (chosen < 0 || chosen === s) add(sample, { colour, width: chosen < 0 ? 1 : 2 });
   });
-  add(motion.template, { color: "#0f172a", width: 2.5 });
-  const axis = (title, domain) => ({ ...GRID, title: { text: title, standoff: 6, font: { size: 11 } }, domain });
-  plot(place, traces, {
-    xaxis: { ...GRID, anchor: "y3", title: { text: "time [s]", standoff: 6 } },
-    yaxis: { ...axis("speed [m/s]", [0.7, 1]), rangemode: "tozero" },
-    yaxis2: axis("acceleration [m/s²]", [0.35, 0.65]),
-    yaxis3: axis("lateral [m/s²]", [0, 0.3]),
-  });
+  add(motion.template, { width: 2.5, name: "recorded" });
+  const titles = ["speed [m/s]", "acceleration [m/s²]", "lateral [m/s²]"];
+  const panels = titles.map((title, c) => ({ title, share: 1 / 3, zero: c === 0, lines: lines[c] }));
+  chart(place, { label: "speed and accelerations over time; black: recorded", x: { title: "time [s]" }, panels });
 }
 
 /** Figure 5: the mean feature matrices. */
 function drawFeature(place, text, duration, vehicles) {
   const bytes = bytesOf(text);
   const side = Math.round(Math.sqrt(bytes.length));
-  const z = Array.from({ length: side }, (_, i) => Array.from(bytes.subarray(i * side, (i + 1) * side), (v) => +(v / 255).toFixed(3)));
-  const step = duration / (side - 1);
-  const trace = {
-    type: "heatmap", x0: 0, dx: step, y0: 0, dy: step, z, zmin: 0, zmax: 1, colorscale: HEAT, zsmooth: "fast", showscale: false,
-    hovertemplate: "%{y:.1f} s, %{x:.1f} s: %{z:.2f}<extra></extra>",
-  };
-  const short = (name) => (name.length > 9 ? `${name.slice(0, 8)}…` : name);
-  const axis = { ticks: "", showgrid: false, zeroline: false, nticks: 4, tickfont: { size: 10 } };
-  plot(place, [trace], {
-    margin: { l: 34, r: 4, t: 4, b: 32 },
-    xaxis: { ...axis, title: { text: `${plain(short(vehicles[1]))} [s]`, font: { size: 10 }, standoff: 2 } },
-    yaxis: { ...axis, title: { text: `${plain(short(vehicles[0]))} [s]`, font: { size: 10 }, standoff: 2 }, scaleanchor: "x", constrain: "domain" },
+  const canvas = document.createElement("canvas");
+  canvas.width = side;
+  canvas.height = side;
+  const context = canvas.getContext("2d");
+  const image = context.createImageData(side, side);
+  bytes.forEach((value, i) => {
+    const at = (value / 255) * (HEAT.length - 1);
+    const k = Math.min(Math.floor(at), HEAT.length - 2);
+    const colour = HEAT[k].map((c, j) => c + (HEAT[k + 1][j] - c) * (at - k));
+    image.data.set([...colour, 255], 4 * ((side - 1 - Math.floor(i / side)) * side + (i % side)));
   });
+  context.putImageData(image, 0, 0);
+  const short = (name) => (name.length > 9 ? `${name.slice(0, 8)}…` : name);
+  const [width, left, bottom] = [240, 34, 32];
+  const inner = width - left - 4;
+  const root = svgElement("svg", { viewBox: `0 0 ${width} ${width - 4}`, role: "img", class: "plot" });
+  svgElement("title", {}, root, `distance of ${vehicles.join(" and ")} at each pair of times`);
+  svgElement("image", { href: canvas.toDataURL(), x: left, y: 2, width: inner, height: inner, preserveAspectRatio: "none" }, root);
+  ticks(0, duration, 4).forEach((value) => {
+    const at = (inner * value) / duration;
+    svgElement("text", { x: left + at, y: inner + 14, "text-anchor": "middle" }, root, String(value));
+    svgElement("text", { x: left - 4, y: inner - at + 6, "text-anchor": "end" }, root, String(value));
+  });
+  svgElement("text", { x: left + inner / 2, y: inner + bottom - 6, "text-anchor": "middle" }, root, `${short(vehicles[1])} [s]`);
+  svgElement("text", { x: 9, y: inner / 2, transform: `rotate(-90 9 ${inner / 2})`, "text-anchor": "middle" }, root, `${short(vehicles[0])} [s]`);
+  place.replaceChildren(root);
 }
 
 /** The template over the ground it was recorded on, coloured by primitive. */
@@ -159,7 +131,7 @@ function drawTemplateMap(view, data, template) {
     template.path(context, view, 0, n);
     bounds.slice(1, -1).forEach((time) => {
       const at = template.state(0, n, time / end);
-      view.dot(at.x, at.y, "#1e293b", 3.5);
+      view.dot(at.x, at.y, themed("ink"), 3.5);
     });
   });
   data.vehicles.forEach((vehicle, n) => {

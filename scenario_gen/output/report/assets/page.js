@@ -2,13 +2,21 @@
 // The page: which case is shown, and the player.
 
 const CASES = JSON.parse(document.getElementById("data").textContent);
-const ARM_NAMES = { oracle: "fitted template", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints" };
+const ARM_NAMES = { oracle: "fitted template", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints", refused: "refused candidates" };
 
 function option(value, text) {
   const element = document.createElement("option");
   element.value = value;
   element.textContent = text;
   return element;
+}
+
+function download(name, blob) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000); // browsers may read it after the click
 }
 
 /** A list entry with a vehicle's colour and name. */
@@ -22,13 +30,16 @@ function chipLine(vehicle, n, ...rest) {
 
 /** The animation: play, pause, scrub, choose the set and the sample, or see all samples at once. */
 class Player {
-  constructor(section, data, sets, picture, box) {
+  constructor(section, data, sets, picture, box, record) {
     this.data = data;
+    this.record = record;
     this.sets = sets;
     this.picture = picture;
     this.find = (role) => section.querySelector(`[data-role="${role}"]`);
     this.view = new View(this.find("stage"), box, 8);
     this.whole = this.view.box;
+    this.recordView = new View(this.find("record"), record.grow([Infinity, Infinity, -Infinity, -Infinity]), 8);
+    this.recordWhole = this.recordView.box;
     this.find("follow").checked = Math.max(box[2] - box[0], box[3] - box[1]) > 160; // from farther away a car is a dot
     this.time = 0;
     this.playing = false;
@@ -45,6 +56,8 @@ class Player {
     this.find("previous").addEventListener("click", () => this.step(-1));
     this.find("next").addEventListener("click", () => this.step(1));
     this.find("stage").addEventListener("click", () => this.toggle());
+    ["csv", "png"].forEach((kind) => this.find(kind).addEventListener("click", () => this.save(kind)));
+    if (this.find("copy")) this.find("copy").addEventListener("click", (event) => this.copy(event.currentTarget));
     this.readouts = data.vehicles.map((vehicle, n) => {
       const value = document.createElement("b");
       this.find("readout").append(chipLine(vehicle, n, value));
@@ -59,9 +72,46 @@ class Player {
   listSamples() {
     const list = this.find("sample");
     const before = Math.max(0, list.selectedIndex);
-    list.replaceChildren(...this.set.index.map((index) => option(index, this.arm === "oracle" ? "the template" : `sample ${index}`)));
+    list.replaceChildren(...this.set.index.map((index) => option(index, this.name(index, this.set.index.indexOf(index)))));
     list.selectedIndex = Math.min(before, this.set.samples - 1);
     this.time = Math.min(this.time, this.duration);
+  }
+
+  name(index, k) {
+    if (this.arm === "oracle") return "the template";
+    return this.arm === "refused" ? `${this.data.causes[k]} (candidate ${index})` : `sample ${index}`;
+  }
+
+  /** Give the shown scenario as a file: every 0.2 s or so as CSV, or the picture as PNG. */
+  save(kind) {
+    const name = `${this.arm === "with" ? "scenario" : this.arm}_${this.set.index[this.sample]}.${kind}`;
+    if (kind === "png") {
+      this.find("stage").toBlob((blob) => download(name, blob));
+      return;
+    }
+    const rows = ["vehicle_id,time,x,y,heading,speed"];
+    this.data.vehicles.forEach((vehicle, n) => {
+      const id = /[",\n]/.test(vehicle.id) ? `"${vehicle.id.replace(/"/g, '""')}"` : vehicle.id;
+      for (let f = 0; f < this.set.frames; f += 1) {
+        const share = f / (this.set.frames - 1);
+        const { x, y, yaw, speed } = this.set.state(this.sample, n, share);
+        if (this.set.there(this.sample, n, share)) rows.push([id, (share * this.duration).toFixed(3), ...[x, y, yaw, speed].map((value) => value.toFixed(3))].join(","));
+      }
+    });
+    download(name, new Blob([`${rows.join("\n")}\n`], { type: "text/csv" }));
+  }
+
+  /** Copy the command that makes the shown scenario again, as a bag. */
+  copy(button) {
+    const index = this.set.index[this.sample];
+    const area = document.createElement("textarea");
+    area.value = `${button.dataset.command} ${index} --out scenario_${index}`;
+    document.body.append(area);
+    area.select();
+    document.execCommand("copy"); // navigator.clipboard is not there in a page of a file
+    area.remove();
+    button.focus();
+    this.find("said").textContent = `copied: ${area.value}`;
   }
 
   step(by) {
@@ -113,8 +163,8 @@ class Player {
   }
 
   /** The part of the road that is shown: all of it, or the vehicles with some room around them. */
-  frame(states) {
-    if (!this.find("follow").checked) return this.whole;
+  frame(states, whole) {
+    if (!this.find("follow").checked || !states.length) return whole;
     const xs = states.map((state) => state.x);
     const ys = states.map((state) => state.y);
     const room = 18;
@@ -126,7 +176,8 @@ class Player {
     const share = this.time / this.duration;
     const states = data.vehicles.map((_, n) => set.state(sample, n, share));
     const here = data.vehicles.map((_, n) => set.there(sample, n, share));
-    view.box = this.frame(states.filter((_, n) => here[n]));
+    view.box = this.frame(states.filter((_, n) => here[n]), this.whole);
+    this.drawRecord(share);
     const context = view.begin();
     view.road(data.road, this.picture);
     const ghosts = this.find("ghosts").checked;
@@ -154,13 +205,38 @@ class Player {
       if (isEgo(data, n)) {
         view.outline(states[n], vehicle, vehicleColour(n));
         view.label(states[n].x, states[n].y, "ego", vehicleColour(n));
-      } else view.footprint(states[n], vehicle, vehicleColour(n), 1, true);
+      } else {
+        view.footprint(states[n], vehicle, vehicleColour(n), 1, true);
+        view.label(states[n].x, states[n].y, vehicle.id, vehicleColour(n));
+      }
       this.readouts[n].textContent = `${states[n].speed.toFixed(1)} m/s`;
     });
     view.ruler();
     this.find("scrub").value = Math.round(1000 * share);
     this.find("clock").textContent = `${this.time.toFixed(1)} / ${this.duration.toFixed(1)} s`;
     this.sayPrimitive(share);
+  }
+
+  /** The record at the same moment of its clock, on strips as wide as lanes, for what it was driven on is not known. */
+  drawRecord(share) {
+    const { data, record, recordView: view } = this;
+    const there = data.vehicles.map((_, n) => record.there(0, n, share));
+    const states = data.vehicles.map((_, n) => record.state(0, n, share));
+    view.box = this.frame(states.filter((_, n) => there[n]), this.recordWhole);
+    const context = view.begin();
+    context.strokeStyle = "rgb(100 116 139 / 28%)";
+    context.lineWidth = 3.5 * view.scale;
+    data.vehicles.forEach((_, n) => record.path(context, view, 0, n));
+    data.vehicles.forEach((vehicle, n) => {
+      if (!there[n]) return;
+      context.globalAlpha = 0.9;
+      context.lineWidth = 2.5;
+      context.strokeStyle = vehicleColour(n);
+      record.path(context, view, 0, n, Math.max(0, share - 3 / record.durations[0]), share);
+      view.footprint(states[n], vehicle, vehicleColour(n), 1, true);
+      view.label(states[n].x, states[n].y, vehicle.id, vehicleColour(n));
+    });
+    view.ruler();
   }
 
   /** Samples share the template's clock, so the same share of the duration is the same primitive. */
@@ -184,7 +260,7 @@ function open(section, data) {
     box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
   }));
   const find = (role) => section.querySelector(`[data-role="${role}"]`);
-  const player = Object.keys(sets).length ? new Player(section, data, sets, picture, box) : null;
+  const player = Object.keys(sets).length ? new Player(section, data, sets, picture, box, template.turned(data.turn)) : null;
   const ground = template.grow([Infinity, Infinity, -Infinity, -Infinity]);
   const maps = [
     [new View(find("template-map"), ground, 6), (view) => drawTemplateMap(view, data, template)],
@@ -247,7 +323,7 @@ document.querySelectorAll("[data-show]").forEach((row) => {
 new ResizeObserver(() => {
   if (shown < 0) return;
   opened.get(shown).draw();
-  document.querySelectorAll(`[data-case="${shown}"] .js-plotly-plot`).forEach((place) => Plotly.Plots.resize(place));
+  redraw(document.querySelector(`[data-case="${shown}"]`));
 }).observe(document.querySelector("main"));
 document.addEventListener("keydown", (event) => {
   const player = shown >= 0 && opened.get(shown).player;
@@ -256,6 +332,7 @@ document.addEventListener("keydown", (event) => {
   if (event.key === "ArrowRight") player.step(1);
   if (event.key === "ArrowLeft") player.step(-1);
 });
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (shown >= 0) opened.get(shown).draw(); });
 show(0);
 document.querySelectorAll("[data-primitive]").forEach((chip) => { chip.style.background = primitiveColour(Number(chip.dataset.primitive)); });
 document.querySelectorAll("[data-vehicle]").forEach((chip) => { chip.style.background = vehicleColour(Number(chip.dataset.vehicle)); });

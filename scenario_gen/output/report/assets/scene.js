@@ -7,6 +7,9 @@ const vehicleColour = (n) => VEHICLE_COLOURS[n % VEHICLE_COLOURS.length];
 const isEgo = (data, n) => data.left_out.includes(n);
 const primitiveColour = (label) => PRIMITIVE_COLOURS[label % PRIMITIVE_COLOURS.length];
 
+/** A colour of the style sheet, which knows whether the page is dark. */
+const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+
 function bytesOf(text) {
   const raw = atob(text);
   const bytes = new Uint8Array(raw.length);
@@ -58,6 +61,17 @@ class Trajectories {
     return box;
   }
 
+  /** The same motion, turned about the origin. */
+  turned(angle) {
+    const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+    const turned = Object.assign(Object.create(Trajectories.prototype), this, { values: Float32Array.from(this.values) });
+    for (let i = 0; i < this.values.length; i += 4) {
+      const [x, y, yaw] = this.values.subarray(i, i + 3);
+      turned.values.set([cos * x - sin * y, sin * x + cos * y, yaw + angle], i);
+    }
+    return turned;
+  }
+
   path(context, view, sample, vehicle, from = 0, to = 1) {
     const first = Math.ceil(from * (this.frames - 1));
     const last = Math.floor(to * (this.frames - 1));
@@ -86,7 +100,7 @@ function roadPicture(road) {
   road.runs.forEach((length, run) => {
     for (const end = cell + length; cell < end; cell += 1) {
       const pixel = 4 * ((height - 1 - Math.floor(cell / width)) * width + (cell % width));
-      image.data.set(run % 2 ? [212, 217, 226, 255] : [0, 0, 0, 0], pixel);
+      image.data.set(run % 2 ? [100, 116, 139, 72] : [0, 0, 0, 0], pixel);
     }
   });
   context.putImageData(image, 0, 0);
@@ -133,6 +147,14 @@ class View {
     const top = this.y(road.origin[1] + road.size[1] * road.cell);
     this.context.imageSmoothingEnabled = true;
     this.context.drawImage(picture, this.x(road.origin[0]), top, road.size[0] * side, road.size[1] * side);
+    this.context.globalAlpha = 1;
+    this.context.lineWidth = 1;
+    this.context.strokeStyle = themed("lane");
+    this.context.beginPath();
+    (road.lanes || []).forEach((border) => {
+      for (let i = 0; i < border.length; i += 2) this.context[i ? "lineTo" : "moveTo"](this.x(border[i]), this.y(border[i + 1]));
+    });
+    this.context.stroke();
   }
 
   /** A bar that says how long some metres are. */
@@ -141,7 +163,7 @@ class View {
     const context = this.context;
     const y = this.height - 12;
     context.globalAlpha = 1;
-    context.strokeStyle = context.fillStyle = "#475569";
+    context.strokeStyle = context.fillStyle = themed("soft");
     context.lineWidth = 1.5;
     context.beginPath();
     context.moveTo(12, y - 4);
@@ -209,7 +231,7 @@ class View {
     context.globalAlpha = 1;
     context.font = "600 12px system-ui, sans-serif";
     context.lineWidth = 3;
-    context.strokeStyle = "rgba(255,255,255,0.9)";
+    context.strokeStyle = themed("card");
     context.strokeText(text, this.x(x) + 8, this.y(y) - 8);
     context.fillStyle = colour;
     context.fillText(text, this.x(x) + 8, this.y(y) - 8);

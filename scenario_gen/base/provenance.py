@@ -28,6 +28,12 @@ def parameter_texts(config: Any) -> dict[str, str]:
     return {name: str(value) for name, (_, value) in flatten(config).items()}
 
 
+def what_makes_it_again(config: Any, request: Any) -> dict[str, str]:
+    """Return versions, all parameters, and what a request asks for."""
+    asked = {name: text for name, text in parameter_texts(request).items() if text}
+    return asked | versions() | parameter_texts(config)
+
+
 def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what: str) -> Config:
     """Return `config` with the values that `texts` has under `prefix`, e.g. "sampling.".
 

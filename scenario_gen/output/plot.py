@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Results, scenarios and encounters drawn from above with matplotlib (extra `plot`)."""
+
+from collections.abc import Sequence
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
+from scenario_gen.base.errors import needs
+from scenario_gen.types import Encounter, GenerationResult, Road, Scenario
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MOST = 200  # scenarios drawn: with more, one hides the other
+
+
+def plot(shown: GenerationResult | Scenario | Encounter, ax: "Axes | None" = None, *, road: Road | None = None) -> "Axes":
+    """Draw the paths of all vehicles from above, each vehicle in a colour of its own; a dot is where it starts.
+
+    Args:
+        shown: a result (its first 200 scenarios, on its road), one scenario, or a recorded encounter.
+        ax: what to draw on; None: the axes of a new figure.
+        road: drawn below a scenario or an encounter.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+    """
+    needs("plot", "matplotlib")
+    import matplotlib.pyplot as plt
+
+    axes = plt.subplots()[1] if ax is None else ax
+    drawn: Sequence[Scenario | Encounter] = list(shown)[:_MOST] if isinstance(shown, GenerationResult) else [shown]
+    road = shown.road if isinstance(shown, GenerationResult) and road is None else road
+    if road is not None:
+        _draw_road(axes, road)
+    limits: list[Any] = []
+    for k, scenario in enumerate(drawn):
+        for n, vehicle in enumerate(scenario.vehicles):
+            path = scenario.position[n, scenario.there[n]]
+            label = f"vehicle {vehicle.id}" if k == 0 else "_"
+            axes.plot(*path.T, color=f"C{n}", alpha=max(0.1, 1.0 / np.sqrt(len(drawn))), label=label)
+            axes.plot(*path[0], "o", color=f"C{n}", markersize=4)
+            limits.append([path.min(axis=0), path.max(axis=0)])
+    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=_title(shown))
+    if limits:
+        low, high = np.min([low for low, _ in limits], axis=0) - 5.0, np.max([high for _, high in limits], axis=0) + 5.0
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        legend = axes.legend()
+        for line in legend.get_lines():
+            line.set_alpha(1.0)
+    return axes
+
+
+def _draw_road(axes: "Axes", road: Road) -> None:
+    """Draw the drivable cells of a road in grey."""
+    height, width = (cells * road.resolution for cells in road.drivable.shape)
+    x, y = road.origin
+    shade = np.where(road.drivable, 0.85, 1.0)
+    axes.imshow(shade, cmap="gray", vmin=0.0, vmax=1.0, origin="lower", extent=(x, x + width, y, y + height), zorder=0)
+
+
+def _title(shown: GenerationResult | Scenario | Encounter) -> str:
+    if isinstance(shown, GenerationResult):
+        return f"{len(shown)} scenarios, {shown.title}" + (f" (the first {_MOST})" if len(shown) > _MOST else "")
+    return f"scenario {shown.index}" if isinstance(shown, Scenario) else f"encounter {shown.name}"

@@ -1,0 +1,99 @@
+"use strict";
+// Charts as SVG: panels below each other on one axis of time, each with lines, bands and bars; colours are those of the style sheet.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+function svgElement(name, attributes, parent, text) {
+  const element = document.createElementNS(SVG, name);
+  Object.entries(attributes).forEach(([key, value]) => element.setAttribute(key, value));
+  if (text !== undefined) element.textContent = text;
+  if (parent) parent.append(element);
+  return element;
+}
+
+/** Round numbers between low and high, about `count` of them. */
+function ticks(low, high, count) {
+  const rough = Math.max(high - low, 1e-9) / count;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((n) => n * power).find((s) => s >= rough * 0.999);
+  const found = [];
+  for (let value = Math.ceil(low / step - 1e-9) * step; value <= high + 1e-9 * step; value += step) found.push(+value.toPrecision(6));
+  return found;
+}
+
+function extent(values, low = Infinity, high = -Infinity) {
+  values.forEach((value) => { if (value !== null) { low = Math.min(low, value); high = Math.max(high, value); } });
+  return [low, high];
+}
+
+/**
+ * Draw a chart into a place.
+ * @param spec {label, x: {title, range?}, panels: [{title, share, range?, lines, bands?, marks?, bars?}]}
+ *   lines: {x, y (null parts it), colour, width, dash?, opacity?, fill?, name?}; bands: {from, to, colour, name}; marks: [x]; bars: {from, to, count}.
+ */
+function chart(place, spec) {
+  if (!place) return;
+  place.chart = spec;
+  const width = Math.max(place.clientWidth, 240);
+  const height = Math.max(place.clientHeight, 120);
+  const root = svgElement("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", class: "plot" });
+  svgElement("title", {}, root, spec.label);
+  const [left, right, top, bottom] = [48, 10, 8, 38];
+  const all = spec.panels.flatMap((panel) => [...panel.lines.map((line) => line.x), ...(panel.bars || []).map((bar) => [bar.from, bar.to])]);
+  const [x0, x1] = spec.x.range || all.reduce((grown, x) => extent(x, ...grown), [Infinity, -Infinity]);
+  const px = (x) => left + ((width - left - right) * (x - x0)) / (x1 - x0 || 1);
+  const gap = 16;
+  const room = height - top - bottom - gap * (spec.panels.length - 1);
+  let upper = top;
+  spec.panels.forEach((panel) => {
+    const tall = room * panel.share;
+    const bars = panel.bars || [];
+    let [y0, y1] = panel.range || panel.lines.reduce((grown, line) => extent(line.y, ...grown), extent(bars.map((bar) => bar.count), 0, 1));
+    if (!(y1 > y0)) [y0, y1] = [y0 - 1, y0 + 1];
+    if (!panel.range) [y0, y1] = [panel.zero || bars.length ? Math.min(0, y0) : y0 - 0.05 * (y1 - y0), y1 + 0.05 * (y1 - y0)];
+    const base = upper;
+    const py = (y) => base + tall - (tall * (y - y0)) / (y1 - y0);
+    (panel.bands || []).forEach((band) => {
+      const rectangle = { x: px(band.from), y: base, width: px(band.to) - px(band.from), height: tall, fill: band.colour, "fill-opacity": 0.2 };
+      svgElement("title", {}, svgElement("rect", rectangle, root), band.name);
+    });
+    ticks(y0, y1, Math.max(2, tall / 45)).forEach((value) => {
+      svgElement("line", { x1: left, x2: width - right, y1: py(value), y2: py(value), class: "grid" }, root);
+      svgElement("text", { x: left - 6, y: py(value) + 4, "text-anchor": "end" }, root, String(value));
+    });
+    (panel.marks || []).forEach((at) => svgElement("line", { x1: px(at), x2: px(at), y1: base, y2: base + tall, class: "mark" }, root));
+    bars.forEach((bar) => {
+      const shape = svgElement("rect", { x: px(bar.from) + 0.5, y: py(bar.count), width: Math.max(px(bar.to) - px(bar.from) - 1, 1), height: py(0) - py(bar.count), class: "bar" }, root);
+      svgElement("title", {}, shape, `${bar.count} from ${+bar.from.toPrecision(3)} to ${+bar.to.toPrecision(3)}`);
+    });
+    panel.lines.forEach((line) => {
+      let path = "";
+      let pen = false;
+      line.x.forEach((x, i) => {
+        const y = line.y[i];
+        if (y === null || x === null) { pen = false; return; }
+        path += `${pen ? "L" : "M"}${px(x).toFixed(1)} ${py(y).toFixed(1)}`;
+        pen = true;
+      });
+      const style = { d: path, fill: "none", "stroke-width": line.width, "stroke-opacity": line.opacity || 1, class: line.colour ? "" : "ink" };
+      if (line.colour) style.stroke = line.colour;
+      if (line.dash) style["stroke-dasharray"] = line.dash;
+      if (line.fill) svgElement("path", { d: `${path}V${py(0).toFixed(1)}H${px(line.x[0]).toFixed(1)}Z`, class: "area" }, root);
+      const drawn = svgElement("path", style, root);
+      if (line.name) svgElement("title", {}, drawn, line.name);
+    });
+    svgElement("text", { x: 12, y: base + tall / 2, transform: `rotate(-90 12 ${base + tall / 2})`, "text-anchor": "middle" }, root, panel.title);
+    upper += tall + gap;
+  });
+  ticks(x0, x1, Math.max(2, (width - left - right) / 80)).forEach((value) => {
+    svgElement("line", { x1: px(value), x2: px(value), y1: top, y2: height - bottom, class: "grid" }, root);
+    svgElement("text", { x: px(value), y: height - bottom + 14, "text-anchor": "middle" }, root, String(value));
+  });
+  svgElement("text", { x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, root, spec.x.title);
+  place.replaceChildren(root);
+}
+
+/** Draw every chart below an element again, in the size of its place. */
+function redraw(section) {
+  section.querySelectorAll(".chart").forEach((place) => { if (place.chart) chart(place, place.chart); });
+}

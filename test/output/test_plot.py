@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Results, scenarios and encounters drawn with matplotlib."""
+
+from bag_examples import hand_made_run
+import numpy as np
+import pytest
+
+from scenario_gen import MissingExtraError, plot
+
+matplotlib = pytest.importorskip("matplotlib")
+matplotlib.use("Agg")
+
+
+def lines(axes):
+    return [line for line in axes.get_lines() if len(line.get_xdata()) > 1]
+
+
+def test_each_vehicle_of_each_scenario_is_a_line_in_its_colour_on_the_road():
+    made = hand_made_run()
+    axes = made.plot()
+    drawn = lines(axes)
+    assert len(drawn) == 10 and len({line.get_color() for line in drawn}) == 2
+    assert np.array_equal(np.transpose(drawn[0].get_data()), made[0].position[0])
+    assert list(axes.get_images()[0].get_extent()) == pytest.approx([-10.0, 50.0, -5.0, 5.0])
+    assert axes.get_title() == "5 scenarios, made by hand on straight"
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["vehicle 1", "vehicle bus 2"]
+
+
+def test_one_scenario_or_the_record_is_drawn_on_axes_that_are_given():
+    made = hand_made_run()
+    own = matplotlib.figure.Figure().add_subplot()
+    assert made[3].plot(own) is own and len(lines(own)) == 2 and not own.get_images()
+    assert plot(made.encounter, road=made.road).get_title() == "encounter made by hand"
+
+
+def test_without_matplotlib_the_extra_is_named(monkeypatch):
+    monkeypatch.setattr("scenario_gen.base.errors.find_spec", lambda name: None)
+    with pytest.raises(MissingExtraError, match=r"scenario_gen\[plot\]"):
+        hand_made_run().plot()

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Measures of each scenario as a table, and the scenarios for which a condition holds."""
+
+from dataclasses import replace
+
+from bag_examples import hand_made_run
+import pytest
+
+from scenario_gen import InputError, measures
+
+
+def run_with_distances():
+    """Scenario i has its first vehicle i metres nearer to the other one's path."""
+    made = hand_made_run()
+    scenarios = []
+    for i, scenario in enumerate(made):
+        position = scenario.position.copy()
+        position[0, :, 1] += 0.3 * i
+        scenarios.append(replace(scenario, position=position))
+    return replace(made, generated=replace(made.generated, scenarios=tuple(scenarios)))
+
+
+def test_each_scenario_has_a_row_with_its_figures():
+    table = measures(run_with_distances())
+    assert list(table.scenario) == [0, 1, 2, 3, 4] and (table.seconds == 6.0).all() and (table.speed == 6.0).all()
+    lateral = 4.0 - (1.9 + 2.5) / 2.0
+    assert list(table.distance.round(2)) == pytest.approx([lateral - 0.3 * i for i in range(5)], abs=0.02)
+    assert table.pet.isna().all()  # nobody crosses
+
+
+def test_a_condition_keeps_the_scenarios_it_holds_for_and_says_so():
+    made = run_with_distances()
+    near = made.filter("distance < 1.0")
+    assert [scenario.index for scenario in near] == [3, 4]
+    assert near.generated.adaptations[-1] == "filtered by 'distance < 1.0': 2 of 5 scenarios"
+    assert not near.evaluation.rows and near.coverage is None and len(made) == 5
+    assert len(made.filter("pet < 2")) == 0 and len(made.filter("distance < 1.0 or ttc > 1")) == 5
+
+
+@pytest.mark.parametrize("condition", ["", "nearness < 1", "ttc <", "1 + 1", "scenario.sum()", "__import__('os')", "ttc = 2"])
+def test_what_is_no_condition_is_refused_with_the_columns(condition):
+    with pytest.raises(InputError, match=r"condition .*; the columns are scenario, seconds, ttc, pet"):
+        run_with_distances().filter(condition)
