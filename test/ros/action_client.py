@@ -3,8 +3,8 @@
 
 """A client of the action: python action_client.py GOALS, a JSON list; it prints a JSON list of how each went.
 
-A goal is {"parameters": {…}, "wait": s, "cancel": s after which it is cancelled, "then": a node to activate when it waits for its
-inputs}; all are sent at once. Seconds count from then.
+A goal is {"parameters": {…}, "wait": s, "cancel": s after which it is cancelled, "then": a node to activate when it waits for
+tracks}; all are sent at once. Seconds count from then.
 It is a program of its own, for the libraries of an interface package are looked for where LD_LIBRARY_PATH said at the start.
 """
 
@@ -53,7 +53,7 @@ def main(goals: list[dict]) -> list[dict]:
             one = message.feedback
             row = [time.monotonic() - begun, list(one.waiting_for), one.position, one.wanted, one.found, one.candidates]
             told["feedback"].append(row)
-            if row[1] and "then" in goal:
+            if "tracks" in row[1] and "then" in goal:
                 activate(goal.pop("then"))
 
         def accepted(future) -> None:

@@ -109,9 +109,9 @@ def test_lanes_of_a_vector_map_travel_from_the_road_server_to_the_sampler(suite,
     assert client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=str(tmp_path / "lanes.xml"))).result == 0
     own = hash_of("map", client.wait("/map", before + 1)[-1])
     client.until(lambda: _closed(client, own), "a set on the lanes")
-    network = decode_lanes(client.heard["/road/lanes"][-1])[1]
+    network = decode_lanes(client.wait("/road/lanes")[-1])[1]
     assert len(network.lanes) == 4
-    together = decode_hashes(client.heard["/fit/info"][-1], "fit/info")
+    together = decode_hashes(client.wait("/fit/info")[-1], "fit/info")
     assert together["road/lanes"] == hash_of("road/lanes", client.heard["/road/lanes"][-1])
 
 

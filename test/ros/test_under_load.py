@@ -15,6 +15,7 @@ from suite_processes import Processes, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.scenarios import digest
+from scenario_gen.ros.nodes.gp_sampler import GpSampler
 
 pytestmark = pytest.mark.dds
 CALLER = """
@@ -125,7 +126,7 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
 
     client.hear("/diagnostics")
     client.until(lambda: _generate(client, count=1).result().result.successful, "the sampler's inputs")
-    running = _generate(client, wait=False, count=20_000)
+    running, *others = [_generate(client, wait=False, count=20_000) for _ in range(GpSampler.THREADS)]
     waiting = _generate(client, wait=False, count=2, seed=3)
     name = "/gp_sampler: progress"
     client.until(lambda: any(s.name == name and s.values.get("requested") == "20000" for s in _said(client)), "progress")
@@ -144,11 +145,11 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
 
     def ended() -> bool:  # the second request may come after the first call
         cancelled.update(re.findall(r"request \d+", client.call(Trigger, "/gp_sampler/cancel", Trigger.Request()).message))
-        return running.done() and waiting.done()
+        return all(future.done() for future in (running, *others, waiting))
 
     client.until(ended, "the answers of what was cancelled")
-    assert len(cancelled) == 2
-    for future in (running, waiting):
+    assert len(cancelled) == GpSampler.THREADS + 1
+    for future in (running, *others, waiting):
         assert not future.result().result.successful
         assert "cancelled" in future.result().result.reason
     assert not client.call(Trigger, "/gp_sampler/cancel", Trigger.Request()).success
