@@ -5,7 +5,9 @@
 
 One LINE_LIST draws all borders, the left one of a lane before its right one, lane after lane, each as pairs of neighbouring
 points. `text` is a JSON object: `name`, `notes`, and of every lane its `id`, the number of `points` of a border, `successors` and
-`beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Action 2 (delete) means that the road has no
+`beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Where the map has traffic rules there are also
+`rules`, of each its `id`, `kind`, `lanes`, `over` (places in the list of lanes) and `line` (points of the stop line), and
+`rules_kept`. Action 2 (delete) means that the road has no
 lanes. Stamp and frame: the map's. QoS: reliable, transient_local, depth 1.
 """
 
@@ -21,7 +23,7 @@ from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Lane, LaneNetwork
+from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
 
 TOPIC = "road/lanes"
 TAIL = 1  # bytes by which the message ends behind a multiple of 4
@@ -49,7 +51,14 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
         }
         for lane in network.lanes
     ]
-    return {"name": network.name, "notes": network.notes, "lanes": lanes}
+    document: dict[str, Any] = {"name": network.name, "notes": network.notes, "lanes": lanes}
+    if network.rules:
+        document["rules"] = [
+            {"id": rule.id, "kind": rule.kind, "lanes": rule.lanes, "over": rule.over, "line": rule.line.tolist()}
+            for rule in network.rules
+        ]
+        document["rules_kept"] = network.rules_kept
+    return document
 
 
 def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | None]:
@@ -85,9 +94,16 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
         document = json.loads(text)
         lanes = tuple(_lanes(document["lanes"], points, what))
         notes = tuple(str(note) for note in document["notes"])
-        return frame_id, LaneNetwork(str(document["name"]), lanes, notes)
+        rules = tuple(map(_rule, document.get("rules", ())))
+        return frame_id, LaneNetwork(str(document["name"]), lanes, notes, rules, document.get("rules_kept", True) is not False)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}") from None
+
+
+def _rule(document: dict[str, Any]) -> TrafficRule:
+    lanes, over = (tuple(int(k) for k in document[key]) for key in ("lanes", "over"))
+    line = np.array([(float(x), float(y)) for x, y in document["line"]]).reshape(-1, 2)
+    return TrafficRule(str(document["id"]), RuleKind(document["kind"]), lanes, over, line)
 
 
 def _lanes(documents: list[dict[str, Any]], points: Floats, what: str) -> Iterator[Lane]:

@@ -22,6 +22,8 @@ COLOURS = ("#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b", "#0
 STYLE = (
     "rect.ground{fill:#fff} .lane{fill:#d4d9e2;stroke:#94a3b8} .turn{fill:#c3cad6;stroke:#94a3b8} .arrow{fill:#64748b} "
     ".in{fill:#15803d} .out{fill:#b91c1c} .box{fill:none;stroke:#0f172a;stroke-dasharray:6 4} "
+    ".rule{fill:none;stroke-width:3;stroke:#15803d} .rule.stop{stroke:#b91c1c} .rule.priority{stroke:#ca8a04} "
+    ".rule.give_way{stroke:#d97706;stroke-dasharray:4 3} "
     "text{font-family:sans-serif;fill:#0f172a}"
 )
 
@@ -105,6 +107,9 @@ def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
     for kind, lanes, at in (("in", network.entries, 0), ("out", network.exits, -1)):
         for k in lanes:
             _arrow(sheet, network.lanes[k].centre, at, kind)
+    for rule in network.rules:
+        if len(rule.line):
+            sheet.shape("polyline", rule.line, **{"class": f"rule {rule.kind}"})
     for k, place in enumerate(found, 1):
         (x0, y0), (x1, y1) = place.box.tolist()
         sheet.shape("polygon", np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), **{"class": "box"})

@@ -28,6 +28,7 @@ from scenario_gen.roads.vector.match import Course
 from scenario_gen.roads.vector.network import FAULTY
 from scenario_gen.roads.vector.place import Place, placements, places, tracks_on
 from scenario_gen.roads.vector.read import is_vector_map, read_network, split
+from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, flare_begins, line_between, relative
 
 __all__ = [
@@ -40,6 +41,7 @@ __all__ = [
     "DrawRoad",
     "Place",
     "RoadConfig",
+    "RuleCheck",
     "along_lanes",
     "arms_of",
     "bent_axis",

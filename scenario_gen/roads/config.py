@@ -20,6 +20,11 @@ class RoadConfig(Parameters):
     corner_radius: float = parameter(6.0, "radius of the kerb at a corner", unit="m", low=1.0, high=1000.0)
     resolution: float = parameter(0.2, "cell size of the grid", unit="m", low=0.02, high=1.0)
     traffic_side: str = parameter("right", "side of the road that traffic keeps", choices=("right", "left"))
+    traffic_rules: str = parameter(
+        "kept",
+        "whether scenarios keep the stop lines and rights of way of a vector map",
+        choices=("kept", "ignored"),
+    )
     corridor_margin: float = parameter(
         1.0, "room on each side of the template's footprints in a corridor", unit="m", low=0.1, high=10.0
     )

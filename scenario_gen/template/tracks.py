@@ -45,6 +45,7 @@ class Track:
         deviation: largest distance [m] from a recorded position to the cleaned one.
         present: (2,) first and last sample at which it is there; before and after, progress and speed are those at these.
         recorded_turn: how far [rad, left positive] the recorded heading turns from start to end; NaN for one that stands.
+        dt: seconds between samples.
     """
 
     vehicle: Vehicle
@@ -55,6 +56,7 @@ class Track:
     deviation: float
     present: Ints
     recorded_turn: float
+    dt: float
 
     @cached_property
     def there(self) -> Bools:
@@ -119,6 +121,7 @@ def _clean(encounter: Encounter, i: int) -> Track:
         deviation=deviation,
         present=frozen_ints([first, last]),
         recorded_turn=math.nan if still else float(heading[-1] - heading[0]),
+        dt=encounter.dt,
     )
 
 

@@ -5,6 +5,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cached_property
 import math
 
@@ -70,6 +71,39 @@ class Lane:
         return frozen(np.concatenate((self.left, self.right[::-1])))
 
 
+class RuleKind(StrEnum):
+    """What traffic has to do."""
+
+    STOP = "stop"  # stop at the line, then give way
+    GIVE_WAY = "give_way"
+    PRIORITY = "priority"  # go first
+    TRAFFIC_LIGHT = "traffic_light"  # its state is not known
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficRule:
+    """What a sign, a light or a right of way means for the traffic of some lanes.
+
+    Attributes:
+        id: its name in the map.
+        kind: what they have to do.
+        lanes: indices of the lanes whose traffic it concerns.
+        over: indices of the lanes whose traffic goes first.
+        line: (K, 2) metres, K >= 2, the stop line; (0, 2): there is none.
+    """
+
+    id: str
+    kind: RuleKind
+    lanes: tuple[int, ...]
+    over: tuple[int, ...] = ()
+    line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __post_init__(self) -> None:
+        freeze(self, line=frozen(np.reshape(self.line, (-1, 2))))
+        if len(self.line) == 1 or not np.isfinite(self.line).all():
+            raise InputError(f"traffic rule {self.id}: its stop line is a single point, or not finite")
+
+
 @dataclass(frozen=True, eq=False)
 class LaneNetwork:
     """The lanes of a map that cars may use, or of a part of it; in metres in the map's own frame.
@@ -78,14 +112,21 @@ class LaneNetwork:
         name: of the map, for people.
         lanes: the lanes; `Lane.successors` and `Lane.beside` count in here.
         notes: how it was read: projection, what was left out, which part it is.
+        rules: its signs, lights and rights of way.
+        rules_kept: whether scenarios keep to the rules.
     """
 
     name: str
     lanes: tuple[Lane, ...]
     notes: tuple[str, ...] = field(default=())
+    rules: tuple[TrafficRule, ...] = ()
+    rules_kept: bool = True
 
     def __post_init__(self) -> None:
         count = len(self.lanes)
+        for rule in self.rules:
+            if any(not 0 <= k < count for k in (*rule.lanes, *rule.over)):
+                raise InputError(f"traffic rule {rule.id} of {self.name!r} names a lane that is not there")
         for lane in self.lanes:
             if any(not 0 <= k < count for k in (*lane.successors, *lane.beside)):
                 raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")

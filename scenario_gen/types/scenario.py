@@ -158,6 +158,7 @@ class Cause(StrEnum):
     CURVATURE = "curvature"
     PASSING_ORDER = "passing_order"  # not the template's order at a conflict
     STOP_NOT_KEPT = "stop_not_kept"  # a vehicle does not keep a stop of the template
+    TRAFFIC_RULE = "traffic_rule"  # a vehicle runs a stop line of the map, or takes another one's right of way
     REACTION = "reaction"  # who reacts in the template goes too early, too late, or at another distance
     CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     NOT_FINITE = "not_finite"

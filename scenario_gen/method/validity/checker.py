@@ -17,7 +17,7 @@ from scenario_gen.method.validity.dynamics import control_points, is_motion
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
 from scenario_gen.numerics import Bools, exact, Floats, runs
-from scenario_gen.roads import clearance_in_cells, drives_against
+from scenario_gen.roads import clearance_in_cells, drives_against, RuleCheck
 from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, required_orders, time_gaps, Wait
 from scenario_gen.types import (
     at_ends,
@@ -72,6 +72,8 @@ class Checker:
         if self.road is not None:
             self._clearance, self._blocked = clearance_in_cells(self.road), inside.blocked_before(self.road.drivable)
             self._grid = np.array((*self.road.origin, self.road.resolution))
+        lanes = self.road.lanes if self.road is not None else None
+        self._rules = RuleCheck(lanes) if lanes is not None and lanes.rules else None
 
     @classmethod
     def of_template(
@@ -112,7 +114,11 @@ class Checker:
             "passing_order: no template's conflicts are known": self.conflicts,
             "stop_not_kept: no template's waits are known": self.waits,
         }
-        return tuple(sentence for sentence, given in missing.items() if given is None)
+        sentences = tuple(sentence for sentence, given in missing.items() if given is None)
+        lanes = self.road.lanes if self.road is not None else None
+        if lanes is not None and lanes.rules and not lanes.rules_kept:
+            sentences += ("traffic_rule: the request ignores the map's rules",)
+        return sentences
 
     def check(self, scenarios: Sequence[Scenario]) -> list[Verdict]:
         """Return one verdict per scenario.
@@ -139,6 +145,7 @@ class Checker:
             *self._overlaps(scenario, control, half),
             *self._exits(scenario, control, half),
             *self._wrong_ways(scenario),
+            *self._broken_rules(scenario),
             *self._waits(scenario),
         ]
         conflicts = [conflict_of(scenario, conflict.first, conflict.second) for conflict in self.conflicts or ()]
@@ -309,6 +316,15 @@ class Checker:
             x, y = scenario.position[i, k].tolist()
             message = f"vehicle {i}: drives against its lane near ({x:.2f}, {y:.2f}), {int(against[i].sum())} samples in all"
             yield Violation(Cause.WRONG_WAY, float(scenario.time[k]), (i,), message)
+
+    def _broken_rules(self, scenario: Scenario) -> Iterator[Violation]:
+        """Stop lines that are run, and rights of way that are taken."""
+        if self._rules is None or not self._rules.rules:
+            return
+        arrays = scenario.time, scenario.position, scenario.heading, scenario.present
+        for breach in self._rules.breaches(scenario, find_conflicts(scenario.vehicles, *arrays)):
+            message = f"vehicle {scenario.vehicles[breach.vehicles[0]].id}: {breach.message}"
+            yield Violation(Cause.TRAFFIC_RULE, breach.time, breach.vehicles, message)
 
     def _passing_orders(self, scenario: Scenario, conflicts: Sequence[Conflict | None]) -> tuple[list[Violation], int, int]:
         """Violations, and how many of the template's conflicts are present and absent in the scenario, which has `conflicts`."""

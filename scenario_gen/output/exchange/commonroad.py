@@ -9,6 +9,7 @@ placeholder problem, for the format's schema demands one; a comment in the file 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from datetime import datetime, UTC
 import re
 
@@ -20,10 +21,12 @@ from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import Lane, stations
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
-from scenario_gen.output.exchange.xml import add, comment, Element, serialized
-from scenario_gen.types import is_truck, Scenario
+from scenario_gen.output.exchange.xml import add, comment, Element, number, serialized
+from scenario_gen.types import is_truck, LaneNetwork, RuleKind, Scenario
 
-OBSTACLES, PROBLEM, INTERSECTION = 100_000, 200_000, 300_000  # ids from here on; lanelets count from 1
+OBSTACLES, PROBLEM, INTERSECTION, SIGNS = 100_000, 200_000, 300_000, 400_000  # ids from here on; lanelets count from 1
+SIGN_IDS = {RuleKind.STOP: "206", RuleKind.GIVE_WAY: "205", RuleKind.PRIORITY: "301"}
+MAX_SPEED = "274"
 GOAL_TURN = 0.3  # rad by which an ego may be turned at its goal
 AUTHOR = "scenario_gen"
 
@@ -74,8 +77,11 @@ def write_commonroad(case: Case, exported: Exported, export: ExportConfig = Expo
     add(tags, "simulated")
     if any(lane.turn for lane in case.lanes):
         add(tags, "intersection")
+    signs = _signs(case.lane_map.vector)
     for lane in case.lanes:
-        _lanelet(root, lane)
+        _lanelet(root, lane, [sign for sign in signs if lane.id - 1 in sign.lanes])
+    for sign in signs:
+        _sign(root, sign)
     _intersection(root, case.lanes)
     for n, vehicle in enumerate(scenario.vehicles):
         comment(root, f"vehicle {vehicle.id}")
@@ -105,7 +111,49 @@ def _points(parent: Element, tag: str, points: Floats) -> None:
         add(point, "y", y)
 
 
-def _lanelet(root: Element, lane: Lane) -> None:
+@dataclass(frozen=True, eq=False)
+class _Sign:
+    """A sign or a light: of which lanes, with its number and value; a light has none. `line` (K, 2) [m] is its stop line."""
+
+    id: int
+    lanes: frozenset[int]
+    number: str
+    value: str = ""
+    line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+    @property
+    def tag(self) -> str:
+        """Of an element that refers to it."""
+        return "trafficSignRef" if self.number else "trafficLightRef"
+
+
+def _signs(network: LaneNetwork | None) -> list[_Sign]:
+    """Return the signs of a vector map, one for each of its speed limits, and its lights."""
+    if network is None:
+        return []
+    limits: dict[float, set[int]] = {}
+    for k, lane in enumerate(network.lanes):
+        if lane.speed_limit > 0.0:
+            limits.setdefault(lane.speed_limit, set()).add(k)
+    found = [(frozenset(rule.lanes), SIGN_IDS.get(rule.kind, ""), "", rule.line) for rule in network.rules]
+    found += [(frozenset(lanes), MAX_SPEED, number(limit), np.zeros((0, 2))) for limit, lanes in limits.items()]
+    return sorted((_Sign(SIGNS + k, *sign) for k, sign in enumerate(found, 1)), key=lambda sign: not sign.number)
+
+
+def _sign(root: Element, sign: _Sign) -> None:
+    """Append a sign, or a light that is off: no state of it is known."""
+    if sign.number:
+        element = add(add(root, "trafficSign", id=sign.id), "trafficSignElement")
+        add(element, "trafficSignID", sign.number)
+        if sign.value:
+            add(element, "additionalValue", sign.value)
+        return
+    state = add(add(add(root, "trafficLight", id=sign.id), "cycle"), "cycleElement")
+    add(state, "duration", 1)
+    add(state, "color", "inactive")
+
+
+def _lanelet(root: Element, lane: Lane, signs: Sequence[_Sign] = ()) -> None:
     lanelet = add(root, "lanelet", id=lane.id)
     _points(lanelet, "leftBound", lane.left)
     _points(lanelet, "rightBound", lane.right)
@@ -116,10 +164,20 @@ def _lanelet(root: Element, lane: Lane) -> None:
     for tag, beside in (("adjacentLeft", lane.left_of), ("adjacentRight", lane.right_of)):
         if beside is not None:
             add(lanelet, tag, ref=beside[0], drivingDir="same" if beside[1] else "opposite")
+    at_line = [sign for sign in signs if len(sign.line)]
+    if at_line:
+        stop = add(lanelet, "stopLine")
+        for x, y in at_line[0].line[[0, -1]].tolist():
+            point = add(stop, "point")
+            add(point, "x", x)
+            add(point, "y", y)
+        add(stop, "lineMarking", "solid")
     add(lanelet, "laneletType", "unknown" if lane.derived else "urban")
     if lane.turn:
         add(lanelet, "laneletType", "intersection")
     add(lanelet, "userOneWay", "vehicle")
+    for sign in signs:
+        add(lanelet, sign.tag, ref=sign.id)
 
 
 def _intersection(root: Element, lanes: Sequence[Lane]) -> None:

@@ -81,7 +81,7 @@ def with_network(
     origin = f"the lanes of map {network.name}"
     if missing:
         origin += f", and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
-    return replace(lane_map, network=lanes, network_origin=origin)
+    return replace(lane_map, network=lanes, network_origin=origin, vector=network)
 
 
 def _not_kept(lanes: Sequence[Lane], scenarios: Sequence[Scenario]) -> dict[str, Curve]:

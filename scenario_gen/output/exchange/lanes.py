@@ -88,6 +88,7 @@ class LaneMap:
         added: how many strips at the end are derived, among true ones.
         network: the lanes of a vector map, in place of those of the strips where a format has lanes alone; () for other roads.
         network_origin: what those are.
+        vector: the map whose lanes these are: lane k of it has the id k + 1.
     """
 
     strips: tuple[Strip, ...]
@@ -98,6 +99,7 @@ class LaneMap:
     added: int = 0
     network: tuple["Lane", ...] = ()
     network_origin: str = ""
+    vector: LaneNetwork | None = None
 
     def is_derived(self, strip: int) -> bool:
         """Whether the strip of an index is derived."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from scenario_gen.method.evaluation import at_common, at_count, mean_feature
 from scenario_gen.numerics import Bools, exact, Floats
-from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, Scenario, Segmentation, UNIFORM, WITHOUT
+from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, RuleKind, Scenario, Segmentation, UNIFORM, WITHOUT
 
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""
@@ -98,6 +98,7 @@ def road_data(road: Road) -> dict[str, Any]:
         "size": [width, height],
         "runs": runs(coarse),
         "lanes": _lane_borders(road),
+        "stops": _stop_lines(road),
     }
 
 
@@ -108,6 +109,12 @@ def _lane_borders(road: Road) -> list[list[float]]:
     step = max(1, -(-len(borders) * 2 // MAX_BORDERS))
     kept = [np.linspace(0, len(border) - 1, min(len(border), 25)).round().astype(np.int64) for border in borders]
     return [np.round(border[rows].ravel(), 1).tolist() for border, rows in zip(borders[::step], kept[::step], strict=True)]
+
+
+def _stop_lines(road: Road) -> list[list[float]]:
+    """Return the stop lines of the road's signs and lights, each x, y, x, y … [m]."""
+    rules = road.lanes.rules if road.lanes is not None else ()
+    return [np.round(rule.line.ravel(), 1).tolist() for rule in rules if len(rule.line) and rule.kind != RuleKind.PRIORITY]
 
 
 def _turn(encounter: Encounter, fit: Fit | None) -> float:

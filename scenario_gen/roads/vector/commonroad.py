@@ -6,6 +6,7 @@
 Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
 """
 
+from collections.abc import Iterator
 import math
 
 import numpy as np
@@ -15,6 +16,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_many_lanes, speed_of
+from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
+from scenario_gen.types import RuleKind
 
 SKIPPED = frozenset(
     ("obstacle", "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem", "scenarioTags")
@@ -59,7 +62,39 @@ def lanes_of(root: Element) -> MapLanes:
             drafts.append(Draft(name, left, right, successors, beside, limit, junction, lanelet.place))
     version = root.attributes.get("commonRoadVersion", "?")
     notes = (f"CommonRoad {version}: coordinates as they stand, in metres", *_georeference(root))
-    return MapLanes(drafts, notes, len(lanelets) - len(for_cars), faults)
+    rules = list(_rules(root, for_cars, faults))
+    others = [sign for sign in root.all("trafficSign") if not any(map(_means, _sign_names(sign)))]
+    return MapLanes(drafts, notes, len(lanelets) - len(for_cars), faults, rules, len(others))
+
+
+def _sign_names(sign: Element) -> list[str]:
+    ids = [element.first("trafficSignID") for element in sign.all("trafficSignElement")]
+    return [element.text.strip() for element in ids if element is not None]
+
+
+def _means(name: str) -> bool:
+    """Whether a sign is read."""
+    return name in _MAX_SPEED or kind_of_sign(name) is not None
+
+
+def _rules(root: Element, lanelets: dict[str, Element], faults: Faults) -> Iterator[DraftRule]:
+    """Yield the rules of the signs and lights to which lanelets refer, one for each lanelet."""
+    kinds: dict[tuple[str, str], RuleKind] = {}
+    for sign in root.all("trafficSign"):
+        known = [kind for kind in map(kind_of_sign, _sign_names(sign)) if kind is not None]
+        if known:
+            kinds["trafficSignRef", sign.attributes.get("id", "?")] = known[0]
+    for light in root.all("trafficLight"):
+        kinds["trafficLightRef", light.attributes.get("id", "?")] = RuleKind.TRAFFIC_LIGHT
+    for name, lanelet in lanelets.items():
+        with faults.leaving_out("stop line", name):
+            stop = lanelet.first("stopLine")
+            holders = [lanelet] if stop is None else [lanelet, stop]
+            line = _points(stop) if stop is not None and len(stop.all("point")) > 1 else np.zeros((0, 2))
+            refs = dict.fromkeys((tag, ref.get("ref")) for tag, _ in kinds for holder in holders for ref in holder.all(tag))
+            for ref in refs:
+                if ref in kinds:
+                    yield DraftRule(ref[1], kinds[ref], (name,), line=line)
 
 
 def _georeference(root: Element) -> list[str]:

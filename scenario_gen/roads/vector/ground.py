@@ -78,7 +78,7 @@ def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
     if road.lanes is None or not len(path):
         return road
     lanes = road.lanes.lanes
-    own = {k for k, lane in enumerate(lanes) if _uses(lane, path)}
+    own = {k for k, lane in enumerate(lanes) if on_lane(lane, path, 2)}
     own |= {other for k in own for other in lanes[k].beside}
     cells = np.zeros(road.drivable.shape, dtype=np.bool_)
     for k in sorted(own):
@@ -100,9 +100,9 @@ def along_lanes(road: Road, poses: Floats) -> Bools:
     return along
 
 
-def _uses(lane: Lane, path: Floats) -> bool:
-    """Whether part of a path lies in a lane, about its way."""
-    return bool(_along(lane, path[_in_box(lane, path)][::2]).any())
+def on_lane(lane: Lane, poses: Floats, every: int = 1) -> bool:
+    """Return whether one of `every` so many poses (M, 3) x, y [m], yaw [rad] about a lane lies in it, about its way."""
+    return bool(_along(lane, poses[_in_box(lane, poses)][::every]).any())
 
 
 def _in_box(lane: Lane, poses: Floats) -> Bools:

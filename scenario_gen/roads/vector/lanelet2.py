@@ -21,6 +21,8 @@ from scenario_gen.base.markup import Element, finite
 from scenario_gen.logs import local_frame
 from scenario_gen.numerics import exact, Floats
 from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_long, refuse_too_many_lanes, speed_of
+from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
+from scenario_gen.types import RuleKind
 
 _FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named
 _KMH = 1.0 / 3.6
@@ -96,7 +98,12 @@ def lanes_of(root: Element) -> MapLanes:
     used = [ref for refs in sides.values() for ref in refs]
     refuse_too_long(sum(len(ways[ref].children) for ref in used), root.file)
     names = {ref: _nodes(ways[ref], nodes) for ref in used}
-    positions, note = _positions([nodes[name] for name in dict.fromkeys(chain(*names.values()))], root.file, faults)
+    signed, lines = list(_regulations(tagged, for_cars, ways)), {}
+    for ref in dict.fromkeys(chain(*(refs for _, refs in signed))):
+        with faults.leaving_out("stop line", ref):
+            lines[ref] = _nodes(ways[ref], nodes)
+    all_names = dict.fromkeys(chain(*names.values(), *lines.values()))
+    positions, note = _positions([nodes[name] for name in all_names], root.file, faults)
     drawn = []
     for relation, tags in for_cars:
         if relation.get("id") not in sides:
@@ -108,7 +115,56 @@ def lanes_of(root: Element) -> MapLanes:
             if tags.get("one_way") in ("no", "false"):
                 drawn.append(lanelet.turned())
     limits = {relation.get("id"): _sign_limit(relation, tags, ways) for relation, tags in tagged}
-    return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), len(lanelets) - len(for_cars), faults)
+    at = {
+        ref: np.array([positions[name] for name in own]) for ref, own in lines.items() if all(name in positions for name in own)
+    }
+    rules = [replace(rule, line=line) for rule, refs in signed for line in [at[ref] for ref in refs if ref in at] or [rule.line]]
+    elements = [(relation, tags) for relation, tags in tagged if tags.get("type") == "regulatory_element"]
+    others = [relation for relation, tags in elements if tags.get("subtype") != "speed_limit" and not _kind(relation, tags, ways)]
+    left_out = len(lanelets) - len(for_cars)
+    return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), left_out, faults, rules, len(others))
+
+
+def _regulations(
+    relations: Sequence[tuple[Element, dict[str, str]]],
+    lanelets: Sequence[tuple[Element, dict[str, str]]],
+    ways: dict[str, Element],
+) -> Iterator[tuple[DraftRule, list[str]]]:
+    """Yield the rules of regulatory elements, without their lines, and the ways that are these."""
+    under: dict[str, list[str]] = defaultdict(list)
+    for lanelet, _ in lanelets:
+        for ref in _members(lanelet, "regulatory_element"):
+            under[ref].append(lanelet.get("id"))
+    for relation, tags in relations:
+        name, kind = relation.attributes.get("id", "?"), _kind(relation, tags, ways)
+        if kind is None:
+            continue
+        lanes = tuple(_members(relation, "yield")) or tuple(under[name])
+        lines = [ref for ref in _members(relation, "ref_line") if ref in ways]
+        yield DraftRule(name, kind, lanes, tuple(_members(relation, "right_of_way"))), lines
+
+
+def _members(relation: Element, role: str) -> list[str]:
+    members = (member.attributes for member in relation.all("member"))
+    return [own.get("ref", "") for own in members if own.get("role") == role]
+
+
+def _kind(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> RuleKind | None:
+    """What a regulatory element means for traffic; None if it is none that is known."""
+    if tags.get("type") != "regulatory_element":
+        return None
+    signs = [_tags(ways[ref]).get("subtype", "") for ref in _members(relation, "refers") if ref in ways]
+    kinds = [kind for kind in map(kind_of_sign, (tags.get("sign_type", ""), *signs)) if kind is not None]
+    match tags.get("subtype"):
+        case "traffic_light":
+            return RuleKind.TRAFFIC_LIGHT
+        case "all_way_stop":
+            return RuleKind.STOP
+        case "right_of_way":
+            return RuleKind.STOP if RuleKind.STOP in kinds else RuleKind.GIVE_WAY
+        case "traffic_sign":
+            return kinds[0] if kinds else None
+    return None
 
 
 def _border(way: Element, names: Sequence[str], positions: Mapping[str, Floats]) -> _Border:

@@ -15,12 +15,12 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import exact, Floats, runs, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template import pair_crossings, Track
-from scenario_gen.types import LaneNetwork
+from scenario_gen.template import pair_crossings, Track, WAIT_SPEED
+from scenario_gen.types import LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
 _HEADING = math.radians(60.0)  # and is turned from it by this at most
@@ -34,6 +34,8 @@ _YAW = 20.0  # m² per unit of 1 - cos
 _OWN_TURN = 40.0  # m² per rad²
 _CHANGING = 4  # chains, the most alike, between which a change of lanes is looked for
 _PRIOR, _CROSSED, _BEYOND, _FOLLOWED = 0.5, 1.0, 0.25, 2.0  # weights: the place; crossings driven, or beyond the ends; gaps
+_STOPPED = 4.0  # weight of a stop before a line
+_BEFORE, _PASSED = 0.7, 6.0  # metres before a stop line where one stops; beyond it, where a stop is taken for one at it
 _WORTH = 1.5  # m² that a change of lanes must gain
 _TURN = math.radians(40.0)  # a chain may turn by this much more or less than the vehicle in the template
 _CROSS = math.radians(15.0)  # least angle of a crossing
@@ -167,7 +169,7 @@ def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.
         if course is None:
             return Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
         courses.append(course)
-    courses = _tied(courses, tracks, scale)
+    courses = _tied(chains.network, courses, tracks, scale)
     return judged(chains, courses, tracks, spot)
 
 
@@ -254,8 +256,11 @@ def changed_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
     return Curve.through(mixed) if len(mixed) > 3 else None
 
 
-def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[Course]:
-    """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares)."""
+def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], scale: float) -> list[Course]:
+    """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares).
+
+    Who stops a little beyond a stop line in the template stops before it.
+    """
     one_each = np.eye(len(courses))
     rows = [(one_each[i], course.start, _PRIOR) for i, course in enumerate(courses)]  # factors, value, weight
     crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
@@ -277,9 +282,26 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
                 if abs(float(offset[0])) < _SAME:  # of `first`, its start lies so far along the course of `second`
                     shift = float(station[0]) - courses[first].start
                     rows.append((one_each[first] - one_each[second], scale * gap - shift, _FOLLOWED))
+    for i, (course, track) in enumerate(zip(courses, tracks, strict=True)):
+        rows += [(one_each[i], start, _STOPPED) for start in _starts_to_stop(network, course, track, scale)]
     factors, values, weights = (np.array(column) for column in zip(*rows, strict=True))
     solution = exact.lstsq(weights[:, None] * factors, weights * values)
     return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
+
+
+def _starts_to_stop(network: LaneNetwork, course: Course, track: Track, scale: float) -> Iterator[float]:
+    """Begins [m] of a course from which a vehicle stops before a stop line that it passes a little before it stops."""
+    rules = [rule for rule in network.rules if rule.kind == RuleKind.STOP and set(rule.lanes) & set(course.lanes)]
+    first = [a for a, _ in runs((track.speed < WAIT_SPEED) & track.there)] if rules and not track.still else []
+    for rule in rules:
+        station, offset = course.curve.project(rule.line.mean(axis=0)[None])
+        if abs(float(offset[0])) > _SAME:
+            continue
+        for k in first:
+            ahead = scale * float(track.progress[k]) + track.vehicle.length / 2.0
+            beyond = course.start + ahead - float(station[0])
+            if -_BEFORE < beyond < _PASSED:
+                yield float(station[0]) - ahead - _BEFORE
 
 
 def _follows(track: Track, leader: Track) -> float | None:

@@ -16,6 +16,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
 from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
 from scenario_gen.numerics.plane import edge_lengths, meeting_shares
+from scenario_gen.roads.vector.signs import DraftRule, rules_of_pieces, with_rules
 from scenario_gen.types import Lane, LaneNetwork
 
 _SECTION = 1.0  # metres between cross-sections at most
@@ -111,12 +112,16 @@ class MapLanes:
         notes: how it was read.
         left_out: how many lanes for others were passed over.
         faults: what else was left out.
+        rules: signs, lights and rights of way.
+        other_signs: how many signs and lights mean something else, and are not read.
     """
 
     drafts: Sequence[Draft]
     notes: tuple[str, ...]
     left_out: int = 0
     faults: Faults = field(default_factory=Faults)
+    rules: Sequence[DraftRule] = ()
+    other_signs: int = 0
 
 
 def by_id(elements: Iterable[Element], faults: Faults) -> dict[str, Element]:
@@ -203,9 +208,11 @@ def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
         lanes.append(Lane(draft.id, left, right, after, beside, draft.speed_limit, draft.junction))
     if draft_lanes.left_out:
         notes += (f"{draft_lanes.left_out} lanelets are for others than cars and were left out",)
+    if draft_lanes.other_signs:
+        notes += (f"{draft_lanes.other_signs} signs of other kinds than stop, give way, priority and speed limit are not read",)
     notes += faults.notes()
     network = LaneNetwork(name, tuple(lanes), notes)
-    return network if any(lane.junction for lane in lanes) else with_junctions(network)
+    return with_rules(network if any(lane.junction for lane in lanes) else with_junctions(network), draft_lanes.rules)
 
 
 def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Floats]:
@@ -350,14 +357,17 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
         raise InputError(
             f"map {network.name}: no lane in the box {box[0, 0]:g},{box[0, 1]:g},{box[1, 0]:g},{box[1, 1]:g}; {extent(network)}"
         )
-    some = {k: piece for piece, (k, *_) in reversed(list(enumerate(pieces)))}  # of a lane in several pieces, the first
+    of_lane: dict[int, list[int]] = {}
+    for piece, (k, *_) in enumerate(pieces):
+        of_lane.setdefault(k, []).append(piece)
     lanes = []
     for k, left, right, has_end in pieces:
         lane = network.lanes[k]
         after = tuple(begins[other] for other in lane.successors if other in begins) if has_end else ()
-        beside = tuple(some[other] for other in lane.beside if other in some)
+        beside = tuple(of_lane[other][0] for other in lane.beside if other in of_lane)
         lanes.append(replace(lane, left=left, right=right, successors=after, beside=beside))
-    return LaneNetwork(network.name, tuple(lanes), (*network.notes, note))
+    rules = rules_of_pieces(network.rules, of_lane)
+    return replace(network, lanes=tuple(lanes), notes=(*network.notes, note), rules=rules)
 
 
 def extent(network: LaneNetwork) -> str:

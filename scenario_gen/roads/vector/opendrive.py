@@ -30,6 +30,8 @@ from scenario_gen.roads.vector.network import (
     TooLargeError,
 )
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, reference_line, ReferenceLine
+from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
+from scenario_gen.types import RuleKind
 
 _FOR_CARS = frozenset(
     ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bidirectional", "mwyEntry", "mwyExit", "HOV")
@@ -37,6 +39,10 @@ _FOR_CARS = frozenset(
 _SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 _STEP = 0.5  # metres between cross-sections
 _LINKED = 3.0  # metres between the ends of lanes that are linked, at most
+_READ = ("294", "274", "1000002", "1000003")  # stop lines and speed limits; lights and crossings of pedestrians
+_STOP_LINE = "294"  # type of a signal that is a line on the ground
+_LIGHTS = ("1000001", "1000009", "1000010", "1000011", "1000012")  # for vehicles
+_SIGNED = 15.0  # metres between a sign and its stop line, at most
 _MARKED = ("solid", "solid solid", "curb", "grass", "botts dots")  # road marks that are not crossed
 
 Key = tuple[str, int, int]  # road, section, lane
@@ -125,7 +131,76 @@ def lanes_of(root: Element) -> MapLanes:
     for junction in root.all("junction"):
         joints.through(junction)
     notes = (f"OpenDRIVE {version}: {_projection(header)}", *joints.notes())
-    return MapLanes(list(_drafts(roads, joints)), notes, faults=faults)
+    rules = [*_signal_rules(root, roads, faults), *_priorities(root, roads)]
+    signals = [signal for road in roads.values() for group in road.element.all("signals") for signal in group.all("signal")]
+    others = [signal for signal in signals if signal.attributes.get("type") not in _READ and not _kind_of_signal(signal)]
+    return MapLanes(list(_drafts(roads, joints)), notes, faults=faults, rules=rules, other_signs=len(others))
+
+
+def _signal_rules(root: Element, roads: dict[str, _Road], faults: Faults) -> Iterator[DraftRule]:
+    """Yield the rules of signals: where they stand, and where roads refer to them."""
+    kinds: dict[str, RuleKind] = {}
+    placed: list[tuple[_Road, Element]] = []
+    for road in roads.values():
+        for group in road.element.all("signals"):
+            placed += [(road, element) for tag in ("signal", "signalReference") for element in group.all(tag)]
+    for _, signal in placed:
+        kind = _kind_of_signal(signal)
+        if signal.tag == "signal" and kind is not None:
+            kinds[signal.attributes.get("id", "?")] = kind
+    stop_lines = [(road, element) for road, element in placed if element.attributes.get("type") == _STOP_LINE]
+    for road, element in placed:
+        name = element.attributes.get("id", "?")
+        if name not in kinds:
+            continue
+        with faults.leaving_out("signal", name):
+            s = element.number("s")
+            lines = [other.number("s") for own, other in stop_lines if own is road and _same_way(element, other)]
+            nearest = min(lines, key=lambda at: abs(at - s), default=math.inf)
+            if abs(nearest - s) <= _SIGNED:
+                s = nearest
+            for lane in _lanes_under(road, element, s):
+                yield DraftRule(name, kinds[name], (lane.name,), line=_across(road, lane, s))
+
+
+def _kind_of_signal(signal: Element) -> RuleKind | None:
+    if signal.attributes.get("dynamic") == "yes":
+        return RuleKind.TRAFFIC_LIGHT if signal.attributes.get("type") in _LIGHTS else None
+    return kind_of_sign(signal.attributes.get("type", ""))
+
+
+def _same_way(a: Element, b: Element) -> bool:
+    """Whether two signals are for traffic of the same direction."""
+    return "none" in (ways := {signal.attributes.get("orientation", "none") for signal in (a, b)}) or len(ways) == 1
+
+
+def _lanes_under(road: _Road, signal: Element, s: float) -> Iterator[_Lane]:
+    """The lanes for whose traffic a signal is, of the section at s."""
+    sections = [section for section in road.sections if section.s[0] - 1e-6 <= s <= section.s[-1] + 1e-6]
+    bounds = [(int(v.number("fromLane")), int(v.number("toLane"))) for v in signal.all("validity")]
+    way = signal.attributes.get("orientation", "none")
+    for number, lane in sections[0].lanes.items() if sections else ():
+        valid = not bounds or any(min(pair) <= number <= max(pair) for pair in bounds)
+        if valid and lane.kind in _FOR_CARS and (way == "none" or lane.forth == (way == "+")):
+            yield lane
+
+
+def _across(road: _Road, lane: _Lane, s: float) -> Floats:
+    """(2, 2) [m] the cross-section of a lane at s."""
+    at = road.sections[lane.key[1]].s
+    return np.array([[np.interp(s, at, border[:, axis]) for axis in (0, 1)] for border in (lane.inner, lane.outer)])
+
+
+def _priorities(root: Element, roads: dict[str, _Road]) -> Iterator[DraftRule]:
+    """Yield the priorities of junctions between roads: traffic of the low one gives way."""
+    for junction in root.all("junction"):
+        for priority in junction.all("priority"):
+            high, low = (roads.get(priority.attributes.get(name, "")) for name in ("high", "low"))
+            if high is not None and low is not None:
+                first, last = (
+                    tuple(lane.name for section in road.sections for lane in section.lanes.values()) for road in (high, low)
+                )
+                yield DraftRule(f"junction {junction.attributes.get('id', '?')}", RuleKind.GIVE_WAY, last, first)
 
 
 def _projection(header: Element) -> str:

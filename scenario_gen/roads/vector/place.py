@@ -15,10 +15,11 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
+from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import at_home, find_spots
 from scenario_gen.roads.vector.street import along_streets
-from scenario_gen.template import separate, Track
-from scenario_gen.types import LaneNetwork
+from scenario_gen.template import Conflict, find_conflicts, separate, Track
+from scenario_gen.types import LaneNetwork, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
@@ -42,7 +43,9 @@ def placements(
 ) -> Iterator[tuple[Match, float]]:
     """Yield the ways of laying a template on lanes, with their scales: at home first, then those that resemble it most.
 
-    Those come last whose bends cannot be driven at the template's first and last speeds: smaller, it is slower too.
+    Where the map has rights of way, those come first in which somebody gives way who has to; those that break a rule are left
+    out, if the network's rules are kept. Those come last whose bends cannot be driven at the template's first and last speeds:
+    smaller, it is slower too.
 
     Args:
         network: a map or a part of it.
@@ -56,10 +59,15 @@ def placements(
     chains = chains_of(network)
     home = at_home(network, tracks)
     reasons: Counter[str] = Counter()
+    broken_rules: Counter[str] = Counter()
+    judged = _Judged(network, tracks)
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
-        if not own.reason:
+        broken = own.reason or judged.broken(own, 1.0)
+        if not broken:
             yield own, 1.0
+        elif not own.reason:
+            broken_rules[broken] += 1
     spots = find_spots(network, tracks, lanes)[:_SPOTS]
     streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
     pressed: list[tuple[Match, float]] = []
@@ -72,7 +80,10 @@ def placements(
                 reasons[placement.reason or "vehicles would be too far from where they are in the template"] += 1
             else:
                 matches.append(placement)
-        matches.sort(key=lambda placement: round(placement.cost, 3))
+        broken_by = [judged.broken(placement, scale) for placement in matches]
+        broken_rules.update(filter(None, broken_by))
+        matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
+        matches.sort(key=lambda placement: (-judged.kept(placement, scale), round(placement.cost, 3)))
         pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
         placed = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
         yield from placed
@@ -81,8 +92,52 @@ def placements(
     yield from pressed
     if pressed or placed:
         return
-    why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in reasons.most_common(2))
+    named = [*broken_rules.most_common(1), *reasons.most_common(2)]
+    why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in named)
     raise RefusedError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
+
+
+class _Judged:
+    """Whether placements keep the traffic rules of a network."""
+
+    def __init__(self, network: LaneNetwork, tracks: tuple[Track, ...]) -> None:
+        self._check = RuleCheck(network)
+        self._tracks = tracks
+
+    def broken(self, placement: Match, scale: float) -> str:
+        """Return what a placement breaks; "" if nothing."""
+        if not self._check.rules:
+            return ""
+        motion = _motion(tracks_on(placement, self._tracks, scale))
+        breach = next(iter(self._check.breaches(motion, _conflicts(motion))), None)
+        if breach is None:
+            return ""
+        return f"vehicle {motion.vehicles[breach.vehicles[0]].id} {breach.message}; road.traffic_rules=ignored allows it"
+
+    def kept(self, placement: Match, scale: float) -> bool:
+        """Return whether somebody gives way who has to."""
+        if not self._check.rules:
+            return False
+        motion = _motion(tracks_on(placement, self._tracks, scale))
+        return self._check.kept_orders(motion, _conflicts(motion)) > 0
+
+
+def _conflicts(motion: Scenario) -> tuple[Conflict, ...]:
+    return find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present)
+
+
+def _motion(tracks: Sequence[Track]) -> Scenario:
+    """The motion of tracks as it is, unchecked."""
+    poses = np.stack([track.poses for track in tracks])
+    return Scenario(
+        vehicles=tuple(track.vehicle for track in tracks),
+        time=frozen(np.arange(poses.shape[1]) * tracks[0].dt),
+        position=poses[..., :2],
+        heading=poses[..., 2],
+        speed=np.stack([track.speed for track in tracks]),
+        acceleration=np.zeros(poses.shape[:2]),
+        present=np.stack([track.present for track in tracks]),
+    )
 
 
 def tracks_on(placement: Match, tracks: Sequence[Track], scale: float) -> tuple[Track, ...]:

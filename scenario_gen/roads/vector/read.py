@@ -4,7 +4,7 @@
 """One door to vector maps: `map.osm`, `map.xodr` or `map.xml`, and which part of it, behind a `#`."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -152,6 +152,8 @@ def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig)
     path, part = split(name)
     refuse_unknown_part(path.name, part)
     network = read_network(path)
+    if config.traffic_rules == "ignored":
+        network = replace(network, rules_kept=False)
     lanes = chosen_lanes(network, part) if part and not part.startswith("box=") else None
     if part.startswith("box="):
         box, note = box_of(network, part), f"part {part} of the map"

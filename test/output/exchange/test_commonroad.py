@@ -16,7 +16,10 @@ from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import derived_lanes
 from scenario_gen.output.exchange.importing import read_scenario_file
+from scenario_gen.output.exchange.lanes import network_lanes
 from scenario_gen.output.exchange.motion import at_times
+from scenario_gen.roads import read_network
+from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
 
 
 def case_of(scenario, ego=None, lane_map=None):
@@ -143,3 +146,27 @@ def test_what_was_written_is_read_back(tmp_path):
         assert np.abs(track.rows[:, 1:3] - scenario.position[n, :last]).max() < 1e-6
         assert np.abs(track.rows[:, 3] - scenario.speed[n, :last]).max() < 1e-6
         assert (track.length, track.width) == pytest.approx((scenario.vehicles[n].length, scenario.vehicles[n].width), abs=1e-9)
+
+
+def test_signs_lights_and_stop_lines_of_a_vector_map_are_written_and_read_again(tmp_path):
+    """The light is off: no state of it is known. The schema wants signs before lights."""
+    x = np.linspace(-60.0, 60.0, 30)
+    border = [np.column_stack((x, np.full(30, y))) for y in (-2.0, 2.0)]
+    lanes = (Lane("in", border[1], border[0], (1,), (), 12.5), Lane("on", border[1] + (120.0, 0.0), border[0] + (120.0, 0.0)))
+    line = np.array([(50.0, 2.0), (50.0, 0.0), (50.0, -2.0)])
+    kinds = (RuleKind.TRAFFIC_LIGHT, RuleKind.STOP, RuleKind.GIVE_WAY, RuleKind.PRIORITY)
+    rules = tuple(TrafficRule(kind, kind, (k % 2,), (), line if k == 1 else np.zeros((0, 2))) for k, kind in enumerate(kinds))
+    network = LaneNetwork("town", lanes, (), rules)
+    made = derived_lanes([crossing()], None, 3.5, 20.0)
+    data, _ = write_commonroad(*case_of(crossing(), lane_map=replace(made, network=network_lanes(network), vector=network)))
+    root = ET.fromstring(data)
+    tags = list(dict.fromkeys(child.tag for child in root))
+    assert tags[:5] == ["location", "scenarioTags", "lanelet", "trafficSign", "trafficLight"]
+    assert [number.text for number in root.iter("trafficSignID")] == ["206", "205", "301", "274"]
+    assert {color.text for color in root.iter("color")} == {"inactive"}
+    assert [float(value.text) for value in root.find(".//stopLine").iter() if value.tag in "xy"] == [50.0, 2.0, 50.0, -2.0]
+    path = tmp_path / "again.xml"
+    path.write_bytes(data)
+    again = read_network(path)
+    assert sorted((rule.kind, rule.lanes) for rule in again.rules) == sorted((rule.kind, rule.lanes) for rule in rules)
+    assert again.lanes[0].speed_limit == 12.5

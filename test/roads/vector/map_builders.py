@@ -45,8 +45,8 @@ def lanes():
     return found
 
 
-def commonroad(offset=(0.0, 0.0), extra=""):
-    """Return the crossroads as CommonRoad 2020a."""
+def commonroad(offset=(0.0, 0.0), extra="", signs=None):
+    """Return the crossroads as CommonRoad 2020a; `signs` are numbers of signs by arm ("205"), "light" is a light."""
     found = lanes()
     number = {name: str(100 + k) for k, name in enumerate(found)}
     before = {name: [other for other in found if name in found[other][2]] for name in found}
@@ -58,15 +58,27 @@ def commonroad(offset=(0.0, 0.0), extra=""):
             + f"</{tag}>"
         )
 
+    def signed(name):
+        kind = (signs or {}).get(name.removesuffix("_in"))
+        tag = "trafficLightRef" if kind == "light" else "trafficSignRef"
+        return f'<{tag} ref="{50 + list(ARMS).index(name[0])}"/>' if kind and name.endswith("_in") else ""
+
     text = "".join(
         f'<lanelet id="{number[name]}">{bound("leftBound", left)}{bound("rightBound", right)}'
         + "".join(f'<predecessor ref="{number[other]}"/>' for other in before[name])
         + "".join(f'<successor ref="{number[other]}"/>' for other in after)
-        + '<laneletType>urban</laneletType><trafficSignRef ref="7"/></lanelet>'
+        + f'<laneletType>urban</laneletType><trafficSignRef ref="7"/>{signed(name)}</lanelet>'
         for name, (left, right, after) in found.items()
     )
     sign = "<trafficSign id='7'><trafficSignElement><trafficSignID>274</trafficSignID>"
     sign += f"<additionalValue>{LIMIT / 3.6!r}</additionalValue></trafficSignElement></trafficSign>"
+    for arm, kind in (signs or {}).items():
+        number_of = f"id='{50 + list(ARMS).index(arm)}'"
+        if kind == "light":
+            sign += f"<trafficLight {number_of}/>"
+        else:
+            sign += f"<trafficSign {number_of}><trafficSignElement><trafficSignID>{kind}</trafficSignID></trafficSignElement>"
+            sign += "</trafficSign>"
     crossing = "<intersection id='9'>" + "".join(
         f"<incoming id='{900 + k}'><incomingLanelet ref='{number[f'{arm}_in']}'/>"
         f"<successorsRight ref='{number[f'{arm}_right']}'/>"
@@ -79,8 +91,13 @@ def commonroad(offset=(0.0, 0.0), extra=""):
     )
 
 
-def lanelet2(place=lambda x, y: f'lat="0.0" lon="0.0"><tag k="local_x" v="{x!r}"/><tag k="local_y" v="{y!r}"/>', tags=""):
-    """Return the crossroads as Lanelet2; `place` writes a node's coordinates; every second border is written backwards."""
+def lanelet2(
+    place=lambda x, y: f'lat="0.0" lon="0.0"><tag k="local_x" v="{x!r}"/><tag k="local_y" v="{y!r}"/>', tags="", signs=None
+):
+    """Return the crossroads as Lanelet2; `place` writes a node's coordinates; every second border is written backwards.
+
+    `signs` as of `commonroad`; their stop lines are ways across the ends of lanes.
+    """
     nodes, ways, relations = {}, [], []
 
     def node(point):
@@ -92,24 +109,45 @@ def lanelet2(place=lambda x, y: f'lat="0.0" lon="0.0"><tag k="local_x" v="{x!r}"
         ways.append(f'<way id="{1000 + len(ways)}">' + "".join(f'<nd ref="{ref}"/>' for ref in refs) + "</way>")
         return 999 + len(ways)
 
-    for k, (left, right, _) in enumerate(lanes().values()):
-        members = (("left", way(left, k % 2)), ("right", way(right, k % 3 == 0)))
+    elements = []
+    for k, (name, (left, right, _)) in enumerate(lanes().items()):
+        members = [("left", way(left, k % 2)), ("right", way(right, k % 3 == 0))]
+        kind = (signs or {}).get(name.removesuffix("_in"))
+        element = ""
+        if kind and name.endswith("_in"):
+            element = f'<member type="relation" ref="{3000 + k}" role="regulatory_element"/>'
+            line = way([left[-1], right[-1]], False)
+            sign = way([right[-1], right[-2]], False)
+            ways[-1] = ways[-1].replace("</way>", f'<tag k="type" v="traffic_sign"/><tag k="subtype" v="de{kind}"/></way>')
+            elements.append(
+                f'<relation id="{3000 + k}"><member type="way" ref="{line}" role="ref_line"/>'
+                f'<member type="way" ref="{sign}" role="refers"/><tag k="type" v="regulatory_element"/>'
+                f'<tag k="subtype" v="{"traffic_light" if kind == "light" else "traffic_sign"}"/></relation>'
+            )
         relations.append(
             f'<relation id="{2000 + k}">'
             + "".join(f'<member type="way" ref="{ref}" role="{role}"/>' for role, ref in members)
+            + element
             + f'<tag k="type" v="lanelet"/><tag k="subtype" v="road"/><tag k="location" v="urban"/><tag k="one_way" v="yes"/>'
             f'<tag k="speed_limit" v="{LIMIT:g}"/>{tags}</relation>'
         )
     text = "".join(f'<node id="{number}" {place(*point)}</node>' for number, point in nodes.values())
-    return f'<?xml version="1.0"?><osm version="0.6">{text}{"".join(ways)}{"".join(relations)}</osm>'
+    return f'<?xml version="1.0"?><osm version="0.6">{text}{"".join(ways)}{"".join(relations + elements)}</osm>'
 
 
-def opendrive(reference=""):
-    """Return the crossroads as OpenDRIVE 1.6: an arm has the lanes -1 (in) and 1 (out), a turn -1."""
+def opendrive(reference="", signs=None):
+    """Return the crossroads as OpenDRIVE 1.6: an arm has the lanes -1 (in) and 1 (out), a turn -1; `signs` as of `commonroad`."""
     lane = '<lane id="{}" type="driving" level="false"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
     roads, connections = [], []
 
-    def road(number, junction, link, start, heading, length, shape, left, right):
+    def signal(arm, length):
+        kind = (signs or {}).get(arm)
+        if not kind:
+            return ""
+        what = 'type="1000001" dynamic="yes"' if kind == "light" else f'type="{kind}" dynamic="no"'
+        return f'<signals><signal s="{length - 1.0!r}" t="-4" id="{arm}" orientation="+" country="DE" {what}/></signals>'
+
+    def road(number, junction, link, start, heading, length, shape, left, right, extra=""):
         sides = "".join(
             f"<{tag}>{text}</{tag}>"
             for tag, text in (("left", left), ("center", '<lane id="0" type="none"/>'), ("right", right))
@@ -119,13 +157,14 @@ def opendrive(reference=""):
             f'<road name="" length="{length!r}" id="{number}" junction="{junction}"><link>{link}</link>'
             f'<type s="0" type="town"><speed max="{LIMIT:g}" unit="km/h"/></type><planView><geometry s="0" x="{start[0]!r}" '
             f'y="{start[1]!r}" hdg="{heading!r}" length="{length!r}">{shape}</geometry></planView>'
-            f'<lanes><laneSection s="0">{sides}</laneSection></lanes></road>'
+            f'<lanes><laneSection s="0">{sides}</laneSection></lanes>{extra}</road>'
         )
 
     for k, (arm, (dx, dy)) in enumerate(ARMS.items()):
         heading = math.atan2(dy, dx)
         to = '<successor elementType="junction" elementId="5"/>'
-        road(k, -1, to, at(arm, -ARM, 0.0), heading, ARM - HALF, "<line/>", lane.format(1, ""), lane.format(-1, ""))
+        sides = lane.format(1, ""), lane.format(-1, "")
+        road(k, -1, to, at(arm, -ARM, 0.0), heading, ARM - HALF, "<line/>", *sides, signal(arm, ARM - HALF))
         for j, (way, lead) in enumerate(LEADS.items()):
             number, out = 10 + 3 * k + j, list(ARMS).index(lead[arm])
             link = "".join(

@@ -150,9 +150,16 @@ class View {
     this.context.globalAlpha = 1;
     this.context.lineWidth = 1;
     this.context.strokeStyle = themed("lane");
+    this.lines(road.lanes);
+    this.context.lineWidth = 3;
+    this.lines(road.stops);
+  }
+
+  /** Draw lines, each x, y, x, y … in metres. */
+  lines(drawn) {
     this.context.beginPath();
-    (road.lanes || []).forEach((border) => {
-      for (let i = 0; i < border.length; i += 2) this.context[i ? "lineTo" : "moveTo"](this.x(border[i]), this.y(border[i + 1]));
+    (drawn || []).forEach((line) => {
+      for (let i = 0; i < line.length; i += 2) this.context[i ? "lineTo" : "moveTo"](this.x(line[i]), this.y(line[i + 1]));
     });
     this.context.stroke();
   }

@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Signs, lights and rights of way of a map, as rules for the traffic of its lanes.
+
+Source: the numbers of signs in CommonRoad's traffic sign ids, in Lanelet2's `LinestringTagging`, and in ASAM OpenDRIVE 1.8,
+"Signals", with the sign catalogues of Germany, the USA and Spain.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+import re
+
+import numpy as np
+
+from scenario_gen.numerics import Floats
+from scenario_gen.types import LaneNetwork, RuleKind, TrafficRule
+
+_SIGNS = {
+    "206": RuleKind.STOP,
+    "r1-1": RuleKind.STOP,
+    "r2": RuleKind.STOP,
+    "stop": RuleKind.STOP,
+    "stop_sign": RuleKind.STOP,
+    "205": RuleKind.GIVE_WAY,
+    "r1-2": RuleKind.GIVE_WAY,
+    "r1": RuleKind.GIVE_WAY,
+    "yield": RuleKind.GIVE_WAY,
+    "yield_sign": RuleKind.GIVE_WAY,
+    "give_way": RuleKind.GIVE_WAY,
+    "301": RuleKind.PRIORITY,
+    "306": RuleKind.PRIORITY,
+    "r3": RuleKind.PRIORITY,
+}
+_SUBJECT = (RuleKind.STOP, RuleKind.GIVE_WAY)
+_LEADS = 6  # lanes between a sign and its junction at most
+
+
+@dataclass(frozen=True, eq=False)
+class DraftRule:
+    """A rule as a reader finds it; fields as of `TrafficRule`, with the names of lanes, also of those that are not for cars.
+
+    Attributes:
+        line: (K, 2) metres.
+    """
+
+    id: str
+    kind: RuleKind
+    lanes: tuple[str, ...]
+    over: tuple[str, ...] = ()
+    line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+
+def kind_of_sign(name: str) -> RuleKind | None:
+    """Return what a sign means, by its number or name with or without its country (206, de206, usR1-1); None: another sign."""
+    text = name.strip().lower()
+    return _SIGNS.get(text, _SIGNS.get(re.sub(r"^[a-z]{2}(?=[r0-9])", "", text)))
+
+
+def with_rules(network: LaneNetwork, drafts: Sequence[DraftRule]) -> LaneNetwork:
+    """Return a network with its rules, whose lanes are found by name.
+
+    A stop sign without a line gets the end of each lane as its line. A stop or give-way sign whose map does not say who goes
+    first gets the lanes that lead into the same junction and have no such sign.
+    """
+    index = {lane.id: k for k, lane in enumerate(network.lanes)}
+    rules: list[TrafficRule] = []
+    for draft in drafts:
+        lanes, over = (
+            tuple(dict.fromkeys(index[name] for name in names if name in index)) for names in (draft.lanes, draft.over)
+        )
+        if not lanes:
+            continue
+        if draft.kind == RuleKind.STOP and not len(draft.line):
+            ends = ((k, np.stack((network.lanes[k].left[-1], network.lanes[k].right[-1]))) for k in lanes)
+            rules += (TrafficRule(draft.id, draft.kind, (k,), over, line) for k, line in ends)
+        else:
+            rules.append(TrafficRule(draft.id, draft.kind, lanes, over, draft.line))
+    known = tuple(_over_others(network, rules))
+    notes = network.notes
+    if known:
+        counts = {kind: len({rule.id for rule in known if rule.kind == kind}) for kind in RuleKind}
+        words = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in counts.items() if count)
+        off = "; lights have no state, so signs hold as where lights are off" if counts[RuleKind.TRAFFIC_LIGHT] else ""
+        notes += (f"traffic rules: {words}{off}",)
+    return replace(network, rules=known, notes=notes)
+
+
+def _over_others(network: LaneNetwork, rules: Sequence[TrafficRule]) -> Iterator[TrafficRule]:
+    """Yield the rules, those without `over` with the lanes into the same junction that no stop or give-way sign concerns."""
+    subject = {lane for rule in rules if rule.kind in _SUBJECT for k in rule.lanes for lane in _mouths(network, k)}
+    into: dict[str, list[int]] = {}
+    for k, lane in enumerate(network.lanes):
+        for name in dict.fromkeys(network.lanes[after].junction for after in lane.successors):
+            if name and name != lane.junction:
+                into.setdefault(name, []).append(k)
+    for rule in rules:
+        if rule.kind not in _SUBJECT or rule.over:
+            yield rule
+            continue
+        mouths = [mouth for k in rule.lanes for mouth in _mouths(network, k)]
+        names = dict.fromkeys(network.lanes[after].junction for mouth in mouths for after in network.lanes[mouth].successors)
+        over = dict.fromkeys(k for name in names for k in into.get(name, ()) if k not in subject)
+        yield replace(rule, over=tuple(over))
+
+
+def _mouths(network: LaneNetwork, first: int) -> list[int]:
+    """Return the lanes by which traffic of a lane comes into the next junction."""
+    mouths: list[int] = []
+    level = [first]
+    for _ in range(_LEADS):
+        mouths += [k for k in level if any(network.lanes[after].junction for after in network.lanes[k].successors)]
+        level = [
+            after for k in level if k not in mouths for after in network.lanes[k].successors if not network.lanes[after].junction
+        ]
+    return list(dict.fromkeys(mouths))
+
+
+def rules_of_pieces(rules: Sequence[TrafficRule], pieces: Mapping[int, Sequence[int]]) -> tuple[TrafficRule, ...]:
+    """Return the rules of a part of a network.
+
+    Args:
+        rules: of the whole.
+        pieces: of each lane of which something is left, the lanes of the part.
+    """
+
+    def kept(lanes: Sequence[int]) -> tuple[int, ...]:
+        return tuple(piece for k in lanes for piece in pieces.get(k, ()))
+
+    parts = (replace(rule, lanes=kept(rule.lanes), over=kept(rule.over)) for rule in rules)
+    return tuple(rule for rule in parts if rule.lanes)
