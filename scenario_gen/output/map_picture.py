@@ -14,7 +14,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact, Floats
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
 from scenario_gen.template import clean_tracks
-from scenario_gen.types import Encounter, LaneNetwork, Road
+from scenario_gen.types import Encounter, LaneNetwork, Road, RuleKind
 
 PLACES = 8  # that are shown
 WIDE = 1200.0  # pixels
@@ -107,7 +107,7 @@ def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
     for kind, lanes, at in (("in", network.entries, 0), ("out", network.exits, -1)):
         for k in lanes:
             _arrow(sheet, network.lanes[k].centre, at, kind)
-    for rule in network.rules:
+    for rule in sorted(network.rules, key=lambda rule: rule.kind != RuleKind.TRAFFIC_LIGHT):  # a sign lies over its light
         if len(rule.line):
             sheet.shape("polyline", rule.line, **{"class": f"rule {rule.kind}"})
     for k, place in enumerate(found, 1):

@@ -60,7 +60,7 @@ class SamplingConfig(Parameters):
     max_deceleration: float = parameter(8.0, "strongest braking", unit="m/s²", low=0.1)
     max_lateral_acceleration: float = parameter(5.0, "largest speed² times curvature", unit="m/s²", low=0.1)
     max_jerk: float = parameter(
-        0.0, "largest jerk along the route; 0: 1.2 times the template's, 1.5 m/s³ at least", unit="m/s³", low=0.0, high=100.0
+        0.0, "largest jerk along the route; 0: 1.2 times the template's, 1.0 m/s³ at least", unit="m/s³", low=0.0, high=100.0
     )
     bend_acceleration: float = parameter(
         0.0,
