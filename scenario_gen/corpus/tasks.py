@@ -134,19 +134,20 @@ class Spread:
         plugin = f"scenario_gen {os.getpid()} {self._rounds}"
         client.register_plugin(_plugin(common), name=plugin)  # of later workers, too
 
-        def submitted(count: int) -> Iterator[Any]:
-            for task in islice(waiting, count):
-                less: Any = replace(task, **dict.fromkeys(common)) if common else task  # type: ignore[type-var]
-                future = client.submit(_completed, function, less, plugin, pure=False)
-                names[future.key] = getattr(task, "name", "a task")
-                yield future
+        def submitted(count: int) -> list[Any]:
+            wave: list[Any] = list(islice(waiting, count))
+            less = [replace(task, **dict.fromkeys(common)) for task in wave] if common else wave
+            futures: list[Any] = client.map(partial(_completed, function, plugin), less, pure=False) if wave else []
+            names.update((future.key, getattr(task, "name", "a task")) for future, task in zip(futures, wave, strict=True))
+            return futures
 
-        running = as_completed(list(submitted(WAVE * max(len(client.nthreads()), self._workers))))
-        for future in running:
+        each = max(len(client.nthreads()), self._workers)
+        running = as_completed(submitted(WAVE * each))
+        for done, future in enumerate(running, start=1):
             lost = future.status != "finished"  # every worker that tried it died
             yield f"{names.pop(future.key)}: {future.exception()}" if lost else future.result()
-            for more in submitted(1):
-                running.add(more)
+            if done % each == 0:  # together: the scheduler spends less on a task
+                running.update(submitted(each))
 
 
 def _common(tasks: Sequence[Any]) -> dict[str, Any]:
@@ -164,7 +165,7 @@ def _plugin(common: Mapping[str, Any]) -> Any:
     return plugin
 
 
-def _completed(function: Callable[[Any], Any], task: Any, plugin: str) -> str:
+def _completed(function: Callable[[Any], Any], plugin: str, task: Any) -> str:
     """Run a task, on a worker, with what it has in common with the others."""
     from distributed import get_worker
 

@@ -205,14 +205,14 @@ def test_tasks_are_submitted_in_waves_without_what_they_share():
         Client(cluster) as client,
     ):
         sizes, held = [], []
-        submit = client.submit
+        submit = client.map
 
-        def watched(run, function, task, plugin, **options):
-            sizes.append(len(pickle.dumps((function, task, plugin))))
-            held.append(len(client.futures))
-            return submit(run, function, task, plugin, **options)
+        def watched(run, tasks, **options):
+            sizes.extend(len(pickle.dumps((run, task))) for task in tasks)
+            held.append(len(client.futures) + len(tasks))
+            return submit(run, tasks, **options)
 
-        client.submit = watched
+        client.map = watched
         go = Spread(Workers(1, cluster.scheduler_address), ExitStack())
         go._client = client
         config = CorpusConfig()

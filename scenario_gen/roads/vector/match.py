@@ -10,6 +10,7 @@ to crossings and between vehicles on one lane (least squares, weighted).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import islice, product
 import math
 
@@ -19,7 +20,7 @@ from scenario_gen.numerics import exact, Floats, runs, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template import pair_crossings, Track, WAIT_SPEED
+from scenario_gen.template import find_conflicts, pair_crossings, Track, WAIT_SPEED
 from scenario_gen.types import LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -33,7 +34,13 @@ _CAPPED = 100.0  # m²
 _YAW = 20.0  # m² per unit of 1 - cos
 _OWN_TURN = 40.0  # m² per rad²
 _CHANGING = 4  # chains, the most alike, between which a change of lanes is looked for
-_PRIOR, _CROSSED, _BEYOND, _FOLLOWED = 0.5, 1.0, 0.25, 2.0  # weights: the place; crossings driven, or beyond the ends; gaps
+_PRIOR, _CROSSED, _MET, _BEYOND, _FOLLOWED = (
+    0.5,
+    1.0,
+    3.0,
+    0.25,
+    2.0,
+)  # weights: the place; crossings driven, or beyond the ends; gaps
 _STOPPED = 4.0  # weight of a stop before a line
 _BEFORE, _PASSED = 0.7, 6.0  # metres before a stop line where one stops; beyond it, where a stop is taken for one at it
 _WORTH = 1.5  # m² that a change of lanes must gain
@@ -264,6 +271,7 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
     one_each = np.eye(len(courses))
     rows = [(one_each[i], course.start, _PRIOR) for i, course in enumerate(courses)]  # factors, value, weight
     crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
+    met = _met(tuple(tracks))
     for a in range(len(tracks)):
         for b in range(a):
             crossing = crossing_of.get((a, b))
@@ -272,7 +280,7 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
                 along = scale * np.array([crossing.first, crossing.second])
                 target = np.array([courses[a].start, courses[b].start]) + along
                 at = crossing_points[int(np.argmin(np.abs(crossing_points - target).sum(axis=1)))] - along
-                weight = _CROSSED if crossing.driven else _BEYOND
+                weight = _CROSSED if crossing.driven else _MET if (b, a) in met else _BEYOND
                 rows += [(one_each[a], float(at[0]), weight), (one_each[b], float(at[1]), weight)]
             for first, second in ((a, b), (b, a)):
                 gap = _follows(tracks[first], tracks[second])
@@ -287,6 +295,14 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
     factors, values, weights = (np.array(column) for column in zip(*rows, strict=True))
     solution = exact.lstsq(weights[:, None] * factors, weights * values)
     return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
+
+
+@lru_cache(maxsize=2)  # of one template many places are looked at
+def _met(tracks: tuple[Track, ...]) -> frozenset[tuple[int, int]]:
+    """The pairs of vehicles, the lower index first, that are in conflict in the template."""
+    time, poses = np.arange(len(tracks[0].progress), dtype=np.float64), np.stack([track.poses for track in tracks])
+    conflicts = find_conflicts(tuple(track.vehicle for track in tracks), time, poses[..., :2], poses[..., 2])
+    return frozenset((min(c.first, c.second), max(c.first, c.second)) for c in conflicts if not c.following)
 
 
 def _starts_to_stop(network: LaneNetwork, course: Course, track: Track, scale: float) -> Iterator[float]:

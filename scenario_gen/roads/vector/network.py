@@ -258,7 +258,7 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
         return k
 
     crossing: set[int] = set()
-    for a, b in _crossing(network):
+    for a, b in crossing_lanes(network):
         crossing |= {a, b}
         root[find(b)] = find(a)
     for before in network.lanes:  # who parts from a lane that crosses others turns at the same junction
@@ -275,7 +275,7 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
     return replace(network, lanes=tuple(named))
 
 
-def _crossing(network: LaneNetwork) -> Iterator[tuple[int, int]]:
+def crossing_lanes(network: LaneNetwork) -> Iterator[tuple[int, int]]:
     """Yield the pairs of lanes whose middles cross between their ends, some of them more than once.
 
     Middles are cut into chunks of a few edges, whose boxes are looked up in a tree.

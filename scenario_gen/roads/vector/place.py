@@ -16,7 +16,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import at_home, find_spots
+from scenario_gen.roads.vector.search import at_home, crossing_spots, find_spots
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import Conflict, find_conflicts, separate, Track
 from scenario_gen.types import LaneNetwork, Scenario
@@ -43,9 +43,9 @@ def placements(
 ) -> Iterator[tuple[Match, float]]:
     """Yield the ways of laying a template on lanes, with their scales: at home first, then those that resemble it most.
 
-    Where the map has rights of way, those come first in which somebody gives way who has to; those that break a rule are left
-    out, if the network's rules are kept. Those come last whose bends cannot be driven at the template's first and last speeds:
-    smaller, it is slower too.
+    Those come first on which all whose paths cross or merge meet; of these, where the map has rights of way, those on which
+    somebody gives way who has to. Those that break a rule are left out, if the network's rules are kept. Those come last whose
+    bends cannot be driven at the template's first and last speeds: smaller, it is slower too.
 
     Args:
         network: a map or a part of it.
@@ -69,6 +69,7 @@ def placements(
         elif not own.reason:
             broken_rules[broken] += 1
     spots = find_spots(network, tracks, lanes)[:_SPOTS]
+    spots += crossing_spots(network, tracks)[:_SPOTS] if lanes is None else []
     streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
     pressed: list[tuple[Match, float]] = []
     for scale in scales:
@@ -83,7 +84,7 @@ def placements(
         broken_by = [judged.broken(placement, scale) for placement in matches]
         broken_rules.update(filter(None, broken_by))
         matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
-        matches.sort(key=lambda placement: (-judged.kept(placement, scale), round(placement.cost, 3)))
+        matches.sort(key=lambda placement: (*judged.rank(placement, scale), round(placement.cost, 3)))
         pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
         placed = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
         yield from placed
@@ -103,6 +104,8 @@ class _Judged:
     def __init__(self, network: LaneNetwork, tracks: tuple[Track, ...]) -> None:
         self._check = RuleCheck(network)
         self._tracks = tracks
+        met = (conflict for conflict in _conflicts(_motion(tracks)) if not conflict.following)
+        self._met = {frozenset((conflict.first, conflict.second)) for conflict in met}
 
     def broken(self, placement: Match, scale: float) -> str:
         """Return what a placement breaks; "" if nothing."""
@@ -114,12 +117,14 @@ class _Judged:
             return ""
         return f"vehicle {motion.vehicles[breach.vehicles[0]].id} {breach.message}; road.traffic_rules=ignored allows it"
 
-    def kept(self, placement: Match, scale: float) -> bool:
-        """Return whether somebody gives way who has to."""
-        if not self._check.rules:
-            return False
+    def rank(self, placement: Match, scale: float) -> tuple[int, bool]:
+        """Return how many that meet in the template do not, and whether nobody gives way who has to."""
+        if not self._met and not self._check.rules:
+            return 0, True
         motion = _motion(tracks_on(placement, self._tracks, scale))
-        return self._check.kept_orders(motion, _conflicts(motion)) > 0
+        conflicts = _conflicts(motion)
+        lost = self._met - {frozenset((conflict.first, conflict.second)) for conflict in conflicts}
+        return len(lost), not self._check.kept_orders(motion, conflicts)
 
 
 def _conflicts(motion: Scenario) -> tuple[Conflict, ...]:

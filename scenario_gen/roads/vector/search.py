@@ -17,6 +17,8 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
+from scenario_gen.numerics.curve import crossings, Curve
+from scenario_gen.roads.vector.network import crossing_lanes
 from scenario_gen.template import pair_crossings, Track
 from scenario_gen.types import LaneNetwork, once_per_object
 
@@ -33,6 +35,9 @@ _MOST_SAMPLES = 40  # of a path
 _REFINED = 60  # placements
 _ELSEWHERE = 15.0  # metres and
 _TURNED = math.radians(30.0)  # by which placements differ that are not the same
+_PAIRS = 3  # of vehicles whose crossing is laid onto one of lanes
+_ANGLE = math.radians(50.0)  # by which the angle of a crossing may differ
+_LEAST_ANGLE = math.radians(15.0)  # of two lanes that cross
 _TOGETHER = 2_000_000  # samples looked up at once
 
 
@@ -139,6 +144,42 @@ def find_spots(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[
     centre = poses[:, :2].mean(axis=0)
     chosen = _distinct(spots, centre, _REFINED)
     return _distinct([_refined(field, poses, weight, spot) for spot in chosen], centre, _REFINED)
+
+
+def crossing_spots(network: LaneNetwork, tracks: tuple[Track, ...]) -> list[Spot]:
+    """Return placements that lay the place where two paths cross onto one where two lanes do so at about that angle, best first.
+
+    Roads of another width shift paths against each other: such a place need not be among those that resemble all paths most.
+    """
+    point, yaw = _lane_crossings(network)
+    placements = []
+    for a, b, crossing in islice(pair_crossings(tracks), _PAIRS):
+        own, other = tracks[a].curve.at(crossing.first), tracks[b].curve.at(crossing.second)
+        turn = wrap_angle(yaw - np.array([own[2], other[2]]))  # of each of both
+        apart = wrap_angle(turn[:, 1] - turn[:, 0])
+        alike = np.abs(apart) <= _ANGLE
+        turned = turn[alike, 0] + apart[alike] / 2.0
+        placements.append(np.column_stack((point[alike] - _turned(own[:2], turned), turned)))
+    if not placements or not sum(map(len, placements)):
+        return []
+    poses, weight = _samples(tracks)
+    moved = np.concatenate(placements)
+    cost = _costs(_field(network), poses, weight, moved)
+    spots = [Spot(*row) for row in np.column_stack((cost, moved[:, [2, 0, 1]])).tolist()]
+    return _distinct(spots, poses[:, :2].mean(axis=0), _REFINED)
+
+
+@once_per_object
+def _lane_crossings(network: LaneNetwork) -> tuple[Floats, Floats]:
+    """Points (C, 2) [m] where two lanes cross, and the directions (C, 2) [rad] of both; each crossing in both orders."""
+    points, yaws = [np.zeros((0, 2))], [np.zeros((0, 2))]
+    for k, j in sorted({(min(pair), max(pair)) for pair in crossing_lanes(network)}):
+        one, other = (Curve.through(network.lanes[n].centre) for n in (k, j))
+        for along, along_other in crossings(one, other, _LEAST_ANGLE).tolist():
+            first, second = one.at(along), other.at(along_other)
+            points += [first[None, :2], first[None, :2]]
+            yaws += [np.array([[first[2], second[2]]]), np.array([[second[2], first[2]]])]
+    return np.concatenate(points), np.concatenate(yaws)
 
 
 def at_home(network: LaneNetwork, tracks: tuple[Track, ...]) -> Spot:

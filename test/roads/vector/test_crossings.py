@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Who crosses another one's path in the template does so on the map, also where its roads are of another width."""
+
+from itertools import islice
+
+from conftest import recorded_folder
+from lengths import DATA
+from map_builders import FORMATS, write
+import numpy as np
+import pytest
+
+from scenario_gen.logs import read_log
+from scenario_gen.numerics import exact
+from scenario_gen.roads import placements, read_network, tracks_on
+from scenario_gen.template import clean_tracks, find_conflicts
+from scenario_gen.types import Encounter, Vehicle
+
+STEPS, DT = 100, 0.1
+
+
+def left_turn(median, start):
+    """One turns left, 76° of it, after an oncoming one has passed, whose lane lies `median` metres to the left."""
+    arc = np.minimum(np.maximum(np.arange(STEPS) * DT * 4.0 - 11.0, 0.0), 24.0) / 18.0
+    yaw = arc
+    turning = np.cumsum(0.4 * np.column_stack((exact.cos(yaw), exact.sin(yaw))), axis=0) - (11.0, 0.0)
+    oncoming = np.column_stack((start - 0.8 * np.arange(STEPS), np.full(STEPS, median)))[:40]
+    oncoming = np.concatenate((oncoming, np.repeat(oncoming[-1:], STEPS - 40, axis=0)))
+    speed = np.stack((np.full(STEPS, 4.0), np.where(np.arange(STEPS) < 39, 8.0, 0.0)))
+    heading = np.stack((yaw, np.full(STEPS, np.pi)))
+    vehicles = (Vehicle("turns", 4.0, 1.8), Vehicle("oncoming", 4.0, 1.8))
+    return Encounter("left turn", vehicles, 0, round(DT * 1e9), np.stack((turning, oncoming)), heading, speed)
+
+
+def meet(tracks):
+    """Whether two are in conflict."""
+    poses = np.stack([track.poses for track in tracks])
+    return bool(find_conflicts(tuple(t.vehicle for t in tracks), np.arange(poses.shape[1]) * DT, poses[..., :2], poses[..., 2]))
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize(("median", "start"), [(4.0, 12.0), (7.0, 15.5), (10.0, 18.0)])
+def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
+    tracks = clean_tracks(left_turn(median, start))
+    assert meet(tracks)
+    placed = list(islice(placements(read_network(write(tmp_path, suffix)), tracks), 2))
+    assert placed
+    for match, scale in placed:
+        assert meet(tracks_on(match, tracks, scale))
+
+
+@pytest.mark.recorded
+@pytest.mark.parametrize("name", ["simple_4way_intersection", "fabriksgatan", "multi_intersections"])
+def test_a_recorded_left_turn_crosses_the_oncoming_lane(name):
+    """Of a wide crossroads: as one piece it resembles right turns of a narrow one more."""
+    folder = recorded_folder(DATA)
+    log = next((folder / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
+    tracks = clean_tracks(read_log(log).encounters[0])
+    match, scale = next(placements(read_network(folder / "maps" / "opendrive" / f"{name}.xodr"), tracks))
+    assert meet(tracks_on(match, tracks, scale))
