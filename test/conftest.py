@@ -64,6 +64,12 @@ def data(request: pytest.FixtureRequest) -> Path:
     return request.getfixturevalue("made_data") if request.param == "made" else recorded_folder(DATA)
 
 
+@pytest.fixture(scope="session")
+def recorded() -> Path:
+    """The folder of recorded data."""
+    return recorded_folder(DATA)
+
+
 @pytest.fixture(scope="session", params=JUDGES)
 def crashes(request: pytest.FixtureRequest) -> Path:
     """The folder of files that break a reader, first made here, then those that once did."""

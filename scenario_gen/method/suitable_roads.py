@@ -11,7 +11,7 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.segmentation import segment
-from scenario_gen.roads import road_and_template, ROADS
+from scenario_gen.roads import NoPlaceError, road_and_template, ROADS
 from scenario_gen.template import refuse_too_large
 from scenario_gen.types import Encounter, GenerationResult, Road, Segmentation
 
@@ -55,7 +55,7 @@ def with_suitable_roads(
     with suppress(RefusedError):
         refuse_too_large(encounter)
         segmentation = segment(encounter, config.segmentation, seed)
-        if not takes(road, encounter, segmentation, config):
+        if isinstance(error, NoPlaceError) or not takes(road, encounter, segmentation, config):
             names = ", ".join(suitable_roads(encounter, segmentation, config))
             return RefusedError(f"{error}. Roads that take it: {names}" if names else str(error))
     return error

@@ -112,14 +112,23 @@ def _near(xy: Floats, line: Floats, size: Floats) -> Ints:
 def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
     """Stations (K, 2) at which `first` crosses `second` at an angle of at least `min_angle` [rad], in order along `first`."""
     a, b = first.points[:, :2], second.points[:, :2]
-    u, v = np.diff(a, axis=0), np.diff(b, axis=0)
-    t, q, det = meeting_shares(a[:-1, None], u[:, None], b[None, :-1], v[None])
+    near = _edges_in(a, b)  # edges that lie in the other one's box
+    near_other = _edges_in(b, a[np.union1d(near, near + 1)]) if len(near) else near
+    u, v = np.diff(a, axis=0)[near], np.diff(b, axis=0)[near_other]
+    t, q, det = meeting_shares(a[near, None], u[:, None], b[None, near_other], v[None])
     sine = np.abs(det) / (exact.hypot(u[:, 0], u[:, 1])[:, None] * exact.hypot(v[:, 0], v[:, 1])[None, :])
     hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= exact.sin(min_angle))
     i, j = np.nonzero(hit)
+    k, n = near[i], near_other[j]
     return np.column_stack(
         (
-            first.station[i] + t[i, j] * np.diff(first.station)[i],
-            second.station[j] + q[i, j] * np.diff(second.station)[j],
+            first.station[k] + t[i, j] * np.diff(first.station)[k],
+            second.station[n] + q[i, j] * np.diff(second.station)[n],
         )
     )
+
+
+def _edges_in(points: Floats, others: Floats) -> Ints:
+    """Indices of the edges of a polyline (M, 2) [m] whose boxes meet that of other points (K, 2)."""
+    low, high = np.minimum(points[:-1], points[1:]), np.maximum(points[:-1], points[1:])
+    return np.flatnonzero(((high >= others.min(axis=0)) & (low <= others.max(axis=0))).all(axis=1))

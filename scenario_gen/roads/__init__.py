@@ -26,7 +26,7 @@ from scenario_gen.roads.shaped import bent_axis
 from scenario_gen.roads.vector.ground import along_lanes, drives_against, own_ground
 from scenario_gen.roads.vector.match import Course
 from scenario_gen.roads.vector.network import FAULTY
-from scenario_gen.roads.vector.place import Place, placements, places, tracks_on
+from scenario_gen.roads.vector.place import NoPlaceError, Place, placements, places, tracks_on
 from scenario_gen.roads.vector.read import is_vector_map, read_network, split
 from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, flare_begins, line_between, relative
@@ -39,6 +39,7 @@ __all__ = [
     "Arm",
     "Course",
     "DrawRoad",
+    "NoPlaceError",
     "Place",
     "RoadConfig",
     "RuleCheck",

@@ -18,9 +18,9 @@ from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, PLAIN_LINE
-from scenario_gen.roads.vector.read import FORMATS, is_vector_map, vector_road
+from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
 from scenario_gen.template import clean_tracks, main_line, mirrored, refuse_too_large, to_frenet, traffic_side
-from scenario_gen.types import Encounter, MIRRORED, Road
+from scenario_gen.types import Encounter, LaneNetwork, MIRRORED, Road
 
 
 def build_road(name_or_path: str | Shape, encounter: Encounter | None = None, config: RoadConfig = RoadConfig()) -> Road:
@@ -67,7 +67,7 @@ def road_and_template(
     try:
         road = build_road(name_or_path, encounter, config)
     except RefusedError as error:
-        if not is_vector_map(name_or_path):
+        if not is_vector_map(name_or_path) or not _differs(encounter, read_network(split(name_or_path)[0])):
             raise
         refusal = error
     else:
@@ -85,9 +85,13 @@ def road_and_template(
 
 
 def _on_other_side(encounter: Encounter, road: Road) -> bool:
-    """Whether a map's traffic keeps to the other side of the road than the template's."""
-    side = road.lanes.traffic_side if road.lanes is not None else ""
-    return side not in ("", traffic_side(encounter) or "right")
+    """Whether a road's traffic keeps to the other side than the template's."""
+    return road.lanes is not None and _differs(encounter, road.lanes)
+
+
+def _differs(encounter: Encounter, network: LaneNetwork) -> bool:
+    """Whether the traffic of lanes keeps to the other side of the road than the template's."""
+    return network.traffic_side not in ("", traffic_side(encounter) or "right")
 
 
 class DrawRoad(Protocol):

@@ -32,6 +32,10 @@ _FORTH = 20.0  # metres of the lanes before and after it
 _SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
 
 
+class NoPlaceError(RefusedError):
+    """A map has no place for a template."""
+
+
 @lru_cache(maxsize=4)  # `once_per_object` would keep a network for good, for its chains refer to it
 def chains_of(network: LaneNetwork) -> Chains:
     """Return the chains of a network, the same for the same network."""
@@ -54,7 +58,7 @@ def placements(
         scales: s of eq 9, tried in this order where none before could be had.
 
     Raises:
-        RefusedError: there is none; says what is lost most often.
+        NoPlaceError: there is none; says what is lost most often.
     """
     chains = chains_of(network)
     home = at_home(network, tracks)
@@ -95,7 +99,7 @@ def placements(
         return
     named = [*broken_rules.most_common(1), *reasons.most_common(2)]
     why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in named)
-    raise RefusedError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
+    raise NoPlaceError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
 
 
 class _Judged:
@@ -182,7 +186,7 @@ def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int]
     """Yield the places of a template on a map, the best first; arguments as of `placements`.
 
     Raises:
-        RefusedError: there is none.
+        NoPlaceError: there is none.
     """
     reason, found = "", False
     for placement, scale in placements(network, tracks, lanes):
@@ -200,14 +204,14 @@ def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int]
         where = ", ".join(f"junction {name}" for name in names if name) or f"lane {first.id}"
         yield Place(frozen(box), where, placement.cost, paths)
     if not found:
-        raise RefusedError(f"the template fits no place on map {network.name}: {reason}")
+        raise NoPlaceError(f"the template fits no place on map {network.name}: {reason}")
 
 
 def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> tuple[Floats, str]:
     """Return the box (2, 2) [m] around the best place of a template on a map, and a sentence that names it.
 
     Raises:
-        RefusedError: there is no place for it.
+        NoPlaceError: there is no place for it.
     """
     best = next(places(network, tracks, lanes))
     return best.box, f"the best place for the template is at {best.where}: {best.part} (cost {best.cost:.1f} m²)"

@@ -160,10 +160,10 @@ def crossing_spots(network: LaneNetwork, tracks: tuple[Track, ...]) -> list[Spot
         alike = np.abs(apart) <= _ANGLE
         turned = turn[alike, 0] + apart[alike] / 2.0
         placements.append(np.column_stack((point[alike] - _turned(own[:2], turned), turned)))
-    if not placements or not sum(map(len, placements)):
+    moved = np.concatenate([np.zeros((0, 3)), *placements])
+    if not len(moved):
         return []
     poses, weight = _samples(tracks)
-    moved = np.concatenate(placements)
     cost = _costs(_field(network), poses, weight, moved)
     spots = [Spot(*row) for row in np.column_stack((cost, moved[:, [2, 0, 1]])).tolist()]
     return _distinct(spots, poses[:, :2].mean(axis=0), _REFINED)

@@ -5,8 +5,6 @@
 
 from itertools import islice
 
-from conftest import recorded_folder
-from lengths import DATA
 from map_builders import FORMATS, write
 import numpy as np
 import pytest
@@ -52,10 +50,9 @@ def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
 
 @pytest.mark.recorded
 @pytest.mark.parametrize("name", ["simple_4way_intersection", "fabriksgatan", "multi_intersections"])
-def test_a_recorded_left_turn_crosses_the_oncoming_lane(name):
+def test_a_recorded_left_turn_crosses_the_oncoming_lane(recorded, name):
     """Of a wide crossroads: as one piece it resembles right turns of a narrow one more."""
-    folder = recorded_folder(DATA)
-    log = next((folder / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
+    log = next((recorded / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
     tracks = clean_tracks(read_log(log).encounters[0])
-    match, scale = next(placements(read_network(folder / "maps" / "opendrive" / f"{name}.xodr"), tracks))
+    match, scale = next(placements(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr"), tracks))
     assert meet(tracks_on(match, tracks, scale))
