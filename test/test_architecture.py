@@ -59,6 +59,7 @@ BESIDE_THE_DOOR = {
 # What may be imported inside a function, and why: libraries, and modules of ours that load such.
 LATE = {
     "arviz": "tests alone install it",
+    "betterosi": "extra osi",
     "ast": "read when the first public name is used",
     "dask": "extra corpus",
     "distributed": "extra corpus",
@@ -68,6 +69,7 @@ LATE = {
     "matplotlib": "extra plot",
     "multiprocessing": "slow to load",
     "pandas": "slow to load",
+    "protobuf": "extra osi",
     "pyarrow": "extra parquet",
     "rclpy": "extra ros",
     "rich": "extra cli",

@@ -9,12 +9,24 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.geodesy import latitude_longitude, local_frame
 from scenario_gen.logs.groups import APART, LAG, SHARED, shortest, ticks, windows
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment
-from scenario_gen.logs.read import encounters_of, is_bag, is_spmd, is_table, LogFormat, LogResult, NoEncounterError, read_log
+from scenario_gen.logs.read import (
+    encounters_of,
+    is_bag,
+    is_known,
+    is_osi,
+    is_spmd,
+    is_table,
+    LogFormat,
+    LogResult,
+    NoEncounterError,
+    read_log,
+    read_raw,
+)
 from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
     "APART", "CASES", "LAG", "SHARED", "LogConfig", "LogFormat", "LogResult", "NoEncounterError", "Observations", "RawLog",
-    "Rows", "Segment", "Streams", "bundled", "encounters_of", "is_bag", "is_commonroad", "is_nocturne", "is_spmd", "is_table",
-    "latitude_longitude", "local_frame", "read_log", "shortest", "ticks", "windows",
+    "Rows", "Segment", "Streams", "bundled", "encounters_of", "is_bag", "is_commonroad", "is_known", "is_nocturne", "is_osi",
+    "is_spmd", "is_table", "latitude_longitude", "local_frame", "read_log", "read_raw", "shortest", "ticks", "windows",
 ]  # fmt: skip

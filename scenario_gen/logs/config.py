@@ -9,7 +9,20 @@ from dataclasses import dataclass
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
 
-FORMATS = ("auto", "spmd", "table", "bag", "argoverse2", "interaction", "ind", "highd", "commonroad", "nocturne")
+FORMATS = (
+    "auto",
+    "spmd",
+    "table",
+    "bag",
+    "argoverse2",
+    "interaction",
+    "ind",
+    "highd",
+    "commonroad",
+    "nocturne",
+    "osi",
+    "omega_prime",
+)
 
 
 @dataclass(frozen=True)

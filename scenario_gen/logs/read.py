@@ -32,6 +32,9 @@ from scenario_gen.numerics import runs
 from scenario_gen.types import cut, Encounter, Vehicle
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
+MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
+OSI = (b"net.asam.osi", b"osi3.", b"ground_truth")  # what is near the beginning or the end of a trace of OSI
+NEAR = 65_536  # bytes
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
 
 
@@ -279,6 +282,18 @@ def is_bag(path: Path) -> bool:
     return bool(files_of(path).files)
 
 
+def is_osi(path: Path) -> bool:
+    """Return whether a file is an MCAP file of no ROS recorder, with a name of ASAM OSI near its beginning or end."""
+    if path.suffix.lower() != ".mcap" or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        head = file.read(NEAR)
+        file.seek(max(path.stat().st_size - NEAR, 0))
+        tail = file.read(NEAR)
+    profile = head[17 : 17 + 8]  # after the header's length
+    return head.startswith(MCAP) and profile != b"\x04\0\0\0ros2" and any(sign in part for sign in OSI for part in (head, tail))
+
+
 def is_spmd(path: Path) -> bool:
     """Return whether the first line has 19 fields and all of them are numbers or empty."""
     if path.suffix.lower() not in (".csv", ".txt"):
@@ -342,14 +357,15 @@ class LogFormat:
 
 FORMATS = Registry[LogFormat](
     "scenario_gen.logs",
-    {  # tried in this order: a table without a header is SPMD
+    {  # tried in this order: a table without a header is SPMD, and a trace of OSI has the name of a bag's file
+        "osi": LogFormat(is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))),
         "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
         "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
         "nocturne": LogFormat(is_nocturne, late("adapters.nocturne")),
         "spmd": LogFormat(is_spmd, late("tables", spmd=True)),
         **{
             name: LogFormat(partial(is_known, name=name), late("adapters.tracks", name=name))
-            for name in ("argoverse2", "interaction", "ind", "highd")
+            for name in ("argoverse2", "interaction", "ind", "highd", "omega_prime")
         },
         "table": LogFormat(is_table, late("tables")),
     },
@@ -373,7 +389,7 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
     if known is None:
         raise InputError(
             f"{paths[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad scenarios, scenes of Nocturne and GPUDrive (.json), rosbag2 folders, .mcap, .db3. "
+            "CommonRoad scenarios, scenes of Nocturne and GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3. "
             "If its name misleads: --set log.format=table"
         )
     with reading(files[0]):

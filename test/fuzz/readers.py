@@ -17,6 +17,7 @@ OF_TARGETS = {
     "argoverse2": ("logs/adapters/tracks.py",),
     "commonroad_log": ("logs/adapters/commonroad.py",),
     "nocturne": ("logs/adapters/nocturne.py",),
+    "osi": ("logs/adapters/osi.py",),
     "mcap_log": ("bags/vehicles.py", "bags/storage/bag.py"),
     "sqlite_log": ("bags/storage/sqlite.py",),
     "mcap_reader": ("bags/storage/mcap.py", "bags/storage/records.py"),
@@ -49,6 +50,7 @@ OF_TARGETS = {
 OWN = {  # modules that parse, but no file that a user is given by others, and why that is so
     "cli/bags.py": "figures that it has just computed",
     "cli/generation.py": "the first bytes of a picture that it is about to replace",
+    "output/exchange/osi.py": "a map, which the reader of maps has read",
     "output/exchange/export.py": "copies a map, which the reader of maps has read",
     "cli/launching.py": "parameter files, through `documents`",
     "cli/suite.py": "what its own processes write",

@@ -9,13 +9,13 @@ import random
 import re
 
 from harness import Mutator, Target
-from mutators import header, TEXT, tree
+from mutators import BYTES, header, TEXT, tree
 import pandas as pd
 from small_scenarios import crossing
 from targets_bags import JSON
 from targets_logs import PARQUET, safety_messages, SHORT
 from targets_maps import MAP
-from test_adapters import argoverse2, commonroad, highd, ind, interaction, nocturne
+from test_adapters import argoverse2, commonroad, highd, ind, interaction, nocturne, omega_prime, osi
 from test_commonroad import case_of
 
 from scenario_gen.corpus.batch import CASE_COLUMNS, SCENARIO_COLUMNS
@@ -33,6 +33,7 @@ FILE = re.compile(rb"\n\x00FILE ([\w./=-]+)\x00\n")  # begins a file of an input
 WAYS: dict[str, Sequence[Mutator]] = {
     ".csv": (*TEXT, *[header] * 6),
     ".parquet": PARQUET,
+    ".mcap": BYTES,
     ".xml": MAP,
     ".xosc": (*MAP, *[tree] * 6),
     ".json": JSON,
@@ -83,7 +84,7 @@ def files_target(name: str, seeds: Callable[[Path], object], read: Callable[[Pat
 
 def read_all(folder: Path) -> None:
     """Read a folder of tables, or its only file, as a log."""
-    main = [path for path in sorted(folder.iterdir()) if path.suffix in (".parquet", ".xml")]
+    main = [path for path in sorted(folder.iterdir()) if path.suffix in (".parquet", ".xml", ".mcap")]
     read_log(main[0] if main else folder, SHORT)
 
 
@@ -153,6 +154,8 @@ TARGETS = (
     files_target("highd", highd, read_all),
     files_target("commonroad_log", commonroad, read_all),
     files_target("nocturne", nocturne, read_all),
+    files_target("omega_prime", omega_prime, read_all),
+    files_target("osi", osi, read_all),
     files_target("import_commonroad", scenario_file(".xml"), import_all),
     files_target("import_openscenario", scenario_file(".xosc"), import_all),
     files_target("corpus", corpus_tables, read_corpus),

@@ -136,6 +136,49 @@ def nocturne(folder, unit=math.degrees):
     return path, {"pedestrian"}
 
 
+def omega_prime(folder):
+    """A table of omega-prime: numbers for the kinds of objects."""
+    rows = []
+    for track, (kind, more) in (("7", (2, 4)), ("8", (2, 12)), ("9", (3, -1))):
+        x, y, vx, vy, heading = motion(track, T)
+        length, width = SIZES.get(track, (0.5, 0.5))
+        after = (vx, vy, heading, length, width, kind, more, -1)
+        rows += [(round(T[k] * 1e9), int(track), x[k], y[k], 0.7, *after) for k in range(len(T))]
+    names = "total_nanos idx x y z vel_x vel_y yaw length width type subtype role"
+    path = folder / "omega.csv"
+    pd.DataFrame(rows, columns=names.split()).to_csv(path, index=False)
+    return path, {"pedestrian"}
+
+
+def osi(folder):
+    """A trace of OSI, written with its own library."""
+    betterosi = pytest.importorskip("betterosi")
+    path, kinds = folder / "trace.mcap", betterosi.MovingObject.VehicleClassification.Type
+    with betterosi.Writer(path) as writer:
+        for k, t in enumerate(T):
+            things = []
+            for track, kind in (("7", kinds.CAR), ("8", kinds.BUS), ("9", None)):
+                x, y, vx, vy, heading = motion(track, T)
+                length, width = SIZES.get(track, (0.5, 0.5))
+                things.append(
+                    betterosi.MovingObject(
+                        id=betterosi.Identifier(value=int(track)),
+                        type=betterosi.MovingObject.Type.VEHICLE if kind else betterosi.MovingObject.Type.PEDESTRIAN,
+                        base=betterosi.BaseMoving(
+                            dimension=betterosi.Dimension3d(length=length, width=width, height=1.5),
+                            position=betterosi.Vector3d(x=float(x[k]), y=float(y[k]), z=0.75),
+                            orientation=betterosi.Orientation3d(roll=0.0, pitch=0.0, yaw=heading),
+                            velocity=betterosi.Vector3d(x=vx, y=vy, z=0.0),
+                        ),
+                        vehicle_classification=betterosi.MovingObject.VehicleClassification(type=kind) if kind else None,
+                    )
+                )
+            nanos = round(t * 1e9)
+            stamp = betterosi.Timestamp(seconds=nanos // 10**9, nanos=nanos % 10**9)
+            writer.add(betterosi.GroundTruth(timestamp=stamp, moving_object=things), topic="ground_truth", log_time=nanos)
+    return path, {"pedestrian"}
+
+
 ABSENT = {"x": -10000.0, "y": -10000.0}
 
 
@@ -204,7 +247,7 @@ def tracked(folder):
     return path, {"pedestrian"}
 
 
-MADE = {f.__name__: f for f in (argoverse2, interaction, ind, highd, commonroad, nocturne, tracked)}
+MADE = {f.__name__: f for f in (argoverse2, interaction, ind, highd, commonroad, nocturne, omega_prime, osi, tracked)}
 
 
 @pytest.mark.parametrize("name", MADE)

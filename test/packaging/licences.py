@@ -33,6 +33,7 @@ TOLD = {  # what metadata does not say, or says only on Windows; looked up in th
     "empy": "BSD",
     "setuptools": "MIT",
     "docutils": "public domain, BSD-2-Clause; one file GPL-3.0",
+    "protobuf-py-ext": "Apache-2.0",
     "ros-fastcdr": "Apache-2.0",
     "ros-fastrtps": "Apache-2.0",
 }

@@ -17,6 +17,7 @@ from scenario_gen.base.errors import needs
 
 EXTRA_MODULES = (
     *(
+        "betterosi",
         "dask",
         "distributed",
         "duckdb",

@@ -193,11 +193,11 @@ class McapFile:
         yield from before(LATEST)
 
 
-def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
-    """Return the content of an MCAP file of `size` bytes.
+def open_mcap(file: BinaryIO, size: int, allowance: Allowance, wanted: str | None = "ros2") -> McapFile:
+    """Return the content of an MCAP file of `size` bytes, of the profile that is wanted, or of any (None).
 
     Raises:
-        DamagedError: it is damaged, was not closed, or is no recording of ROS 2.
+        DamagedError: it is damaged, was not closed, or is of another profile.
     """
     if size < len(MAGIC) + HEAD.size or file.read(len(MAGIC)) != MAGIC:
         raise DamagedError(0, "not the beginning of an MCAP file")
@@ -217,8 +217,8 @@ def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
     if first.opcode != Opcode.HEADER:
         raise DamagedError(first.start, "no header at the beginning of the file")
     profile = Header.read(Fields(content(file, first, allowance.config.most_chunk_bytes), first.start)).profile
-    if profile != "ros2":
-        raise DamagedError(first.start, f"the profile is {profile[:40]!r}, not 'ros2'")
+    if wanted is not None and profile != wanted:
+        raise DamagedError(first.start, f"the profile is {profile[:40]!r}, not {wanted!r}")
     for record in whole:
         found.take(record)
     return found

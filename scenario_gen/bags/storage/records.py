@@ -26,6 +26,7 @@ from scenario_gen.bags.storage.config import Allowance, FOUND_BYTES
 from scenario_gen.base.errors import guarded, ScenarioGenError
 
 MAGIC = b"\x89MCAP0\r\n"
+PROTOBUF = "protobuf"  # the encoding of schemas that are no texts
 HEAD = struct.Struct("<BQ")
 MESSAGE = struct.Struct("<HIQQ")
 CHUNK = struct.Struct("<QQQI")
@@ -110,10 +111,15 @@ class Fields(ReadDataStream):  # type: ignore[misc]  # mcap has no types
 
 
 def read_schema(data: bytes, offset: int) -> Schema:
-    """Return a Schema record, whose definition is a text."""
+    """Return a Schema record, whose definition is a text, or descriptors of Protocol Buffers.
+
+    Raises:
+        DamagedError: it is neither, or cut off.
+    """
     fields = Fields(data, offset)
     schema = Schema.read(fields)
-    fields.decoded(schema.data)
+    if schema.encoding != PROTOBUF:
+        fields.decoded(schema.data)
     return schema
 
 

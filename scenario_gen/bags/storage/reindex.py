@@ -18,7 +18,7 @@ from scenario_gen.bags.storage.definitions import definition
 from scenario_gen.bags.storage.files import METADATA
 from scenario_gen.bags.storage.mcap import Logged, McapFile
 from scenario_gen.bags.storage.metadata import profiles
-from scenario_gen.bags.storage.records import DamagedError
+from scenario_gen.bags.storage.records import DamagedError, PROTOBUF
 from scenario_gen.bags.storage.salvage import Gap, Salvage, salvage
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.base.documents import read_yaml, shown
@@ -179,7 +179,7 @@ def _announced(bag: BagWriter, channel: Channel, kind: str, schema: Schema | Non
     try:
         definition(kind)
     except InputError as error:
-        if schema is None or not schema.data:
+        if schema is None or not schema.data or schema.encoding == PROTOBUF:
             return str(error)
         known = (schema.encoding, schema.data.decode())  # a type that is not installed here, as the recorder described it
     qos, type_hash = (channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash"))

@@ -7,7 +7,8 @@ Positions are those of the middle of the bounding box, except in highD, which gi
 counter-clockwise from +x. Road users that are neither car, van, truck nor bus are counted and left out.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 import math
 
 from scenario_gen.logs.columns import Column
@@ -21,8 +22,10 @@ class Format:
         title: for people.
         source: of the definition.
         columns: quantity -> column, with its factor to s, m, m/s or rad: vehicle, time, x, y, vx, vy, heading, length, width,
-            kind.
+            kind, and subkind, which says more of those that are of kind "vehicle".
         kinds: which of `kind` are read, in small letters.
+        names: of the numbers in `kind` and in `subkind`, where these are no texts.
+        optional: quantities that a file need not have.
         companions: endings of the files of tracks, of classes and of frames per second, where these are three files.
         image: y grows downwards and positions are corners (highD).
         signs: further columns that distinguish the format from others.
@@ -35,13 +38,41 @@ class Format:
     companions: tuple[str, str, str] | None = None
     image: bool = False
     signs: tuple[str, ...] = ()
+    names: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    optional: frozenset[str] = frozenset()
 
     @property
     def needed(self) -> frozenset[str]:
         """The columns that a file must have."""
-        return frozenset({column.name for column in self.columns.values()} | set(self.signs))
+        wanted = {column.name for quantity, column in self.columns.items() if quantity not in self.optional}
+        return frozenset(wanted | set(self.signs))
+
+    @property
+    def useful(self) -> frozenset[str]:
+        """The columns that are read where a file has them, with those that it must have."""
+        return self.needed | {column.name for column in self.columns.values()}
 
 
+OSI_TYPES = dict(enumerate(("unknown", "other", "vehicle", "pedestrian", "animal")))
+OSI_VEHICLES = dict(
+    enumerate(
+        (
+            *(
+                "vehicle",
+                "vehicle",
+                "small car",
+                "compact car",
+                "car",
+                "luxury car",
+                "delivery van",
+                "heavy truck",
+                "semitrailer",
+            ),
+            *("trailer", "motorbike", "bicycle", "bus", "tram", "train", "wheelchair", "semitractor", "standup scooter"),
+            *("micromobility device", "work machine", "watercraft", "aircraft", "land vehicle"),
+        )
+    )
+)  # 0 and 1 are unknown and other: a vehicle, no more is said
 _LEVELX = ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv")  # their times are frames
 
 FORMATS = {
@@ -113,6 +144,32 @@ FORMATS = {
         companions=_LEVELX,
         image=True,
         signs=("laneId",),
+    ),
+    "omega_prime": Format(
+        title="omega-prime",
+        source="omega-prime 0.3.7: omega_prime.schemas, columns of CSV and Parquet; numbers of types: OSI 3.8, MovingObject",
+        columns={
+            "vehicle": Column("idx"),
+            "time": Column("total_nanos", 1e-9),
+            "x": Column("x"),
+            "y": Column("y"),
+            "vx": Column("vel_x"),
+            "vy": Column("vel_y"),
+            "heading": Column("yaw"),
+            "length": Column("length"),
+            "width": Column("width"),
+            "kind": Column("type"),
+            "subkind": Column("subtype"),
+        },
+        kinds=(
+            *("vehicle", "small car", "compact car", "car", "luxury car", "delivery van", "heavy truck", "semitractor"),
+            *("bus", "land vehicle"),
+        ),
+        names={
+            "kind": {str(number): name for number, name in OSI_TYPES.items()},
+            "subkind": {"-1": "vehicle"} | {str(number): name for number, name in OSI_VEHICLES.items()},
+        },
+        optional=frozenset(("vx", "vy", "heading", "length", "width", "subkind")),
     ),
 }
 """By their names in the parameter `format`."""

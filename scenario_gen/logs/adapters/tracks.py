@@ -4,7 +4,7 @@
 """Tables of public data sets (`formats`) to observations."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
@@ -20,21 +20,24 @@ from scenario_gen.logs.raw import check_size, left_out_note, RawLog
 from scenario_gen.logs.tables import from_frame, read_text, reals, segment_of, to_numbers, vehicle_name
 from scenario_gen.numerics import exact
 
+Load = Callable[[Path, Format, int, LogConfig], pd.DataFrame]
 
-def read(paths: Sequence[Path], config: LogConfig, *, name: str) -> RawLog:
+
+def read(paths: Sequence[Path], config: LogConfig, *, name: str, load: Load | None = None) -> RawLog:
     """Read one recording of a data set.
 
     Args:
         paths: its file, or the folder's files, of which one holds the tracks.
         config: bounds sizes.
         name: of the format, a key of `FORMATS`.
+        load: returns the columns of a file as they stand, of which so many rows were read before; by default of a table.
 
     Raises:
         InputError: a file is damaged or missing, has not the format's columns, or there are several recordings.
     """
     known = FORMATS[name]
     tracks = [path for path in paths if not _companion_ending(path, known)]
-    main = [path for path in tracks if not _is_of_pedestrians(path)]
+    main = [path for path in tracks if not _is_of_pedestrians(path, name)]
     if len(main) != 1:
         names = ", ".join(path.name for path in main) or "none"
         raise InputError(
@@ -43,7 +46,7 @@ def read(paths: Sequence[Path], config: LogConfig, *, name: str) -> RawLog:
     frames, segments, row = [], [], 0
     left_out: Counter[str] = Counter()
     for path in tracks:
-        table = _read_table(path, known, row, config)
+        table = (load or _read_table)(path, known, row, config)
         kinds = _kinds(path, known, table)
         keep = kinds.isin(known.kinds).to_numpy() & (path in main)
         vehicles = table.loc[~keep, known.columns["vehicle"].name]
@@ -52,8 +55,10 @@ def read(paths: Sequence[Path], config: LogConfig, *, name: str) -> RawLog:
             frames.append(_convert(table, path, known).assign(row=np.arange(row, row + len(table)))[keep])
             segments.append(segment_of(path, row))
             row += len(table)
-    notes = (f"read as {known.title}", *left_out_note(left_out, "car, van, truck or bus"))
-    return replace(from_frame(pd.concat(frames, ignore_index=True), main, tuple(segments), config), rows=row, notes=notes)
+    frame = pd.concat(frames, ignore_index=True)
+    without = () if "speed" in frame else ("there are no speeds: they are derived from the positions",)
+    notes = (f"read as {known.title}", *without, *left_out_note(left_out, "car, van, truck or bus"))
+    return replace(from_frame(frame, main, tuple(segments), config), rows=row, notes=notes)
 
 
 def recognised(path: Path) -> str:
@@ -85,9 +90,9 @@ def _companion_ending(path: Path, known: Format) -> str:
     return next((ending for ending in (known.companions or ())[1:] if path.name.endswith(ending)), "")
 
 
-def _is_of_pedestrians(path: Path) -> bool:
+def _is_of_pedestrians(path: Path, name: str) -> bool:
     """Return whether a file holds pedestrians alone, who have files of their own in INTERACTION."""
-    return path.name.startswith("pedestrian")
+    return name == "interaction" and path.name.startswith("pedestrian")
 
 
 def _read_table(path: Path, known: Format, before: int, config: LogConfig) -> pd.DataFrame:
@@ -97,12 +102,12 @@ def _read_table(path: Path, known: Format, before: int, config: LogConfig) -> pd
         needs("parquet", "pyarrow")
         from scenario_gen.logs.parquet import read_table
 
-        table = read_table(path, sorted(known.needed), before, config)
+        table = read_table(path, sorted(known.useful), before, config)
     else:
         table = read_text(path, before, config, sep=",")
     table.columns = pd.Index([str(column).strip() for column in table.columns])
     missing = sorted(known.needed - set(table.columns))
-    if missing and not _is_of_pedestrians(path):
+    if missing and not (known is FORMATS["interaction"] and _is_of_pedestrians(path, "interaction")):
         raise InputError(f"{path} lacks columns of {known.title}: {', '.join(missing)}; it has {', '.join(table.columns)}")
     return table
 
@@ -128,6 +133,8 @@ def _read_companion(path: Path, known: Format, which: int, columns: tuple[str, .
 
 def _kinds(path: Path, known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
     """Return the class of every row, in small letters."""
+    if known.names:
+        return _named(known, table)
     if "kind" in known.columns:
         column = known.columns["kind"].name
         kinds = table[column] if column in table else pd.Series("pedestrian", index=table.index)
@@ -138,9 +145,24 @@ def _kinds(path: Path, known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
     return table[column].map(vehicle_name).map(lambda name: classes.get(name, "without a class"))
 
 
+def _named(known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
+    """Return the class of every row, by the numbers in its columns."""
+
+    def named(quantity: str) -> "pd.Series[Any]":
+        names = known.names[quantity]
+        return table[known.columns[quantity].name].map(vehicle_name).map(lambda number: names.get(number, f"type {number}"))
+
+    kinds = named("kind")
+    return kinds.where(kinds != "vehicle", named("subkind")) if known.columns["subkind"].name in table else kinds
+
+
 def _convert(table: pd.DataFrame, path: Path, known: Format) -> pd.DataFrame:
     """Return the table in our quantities and units."""
-    columns = {quantity: column for quantity, column in known.columns.items() if quantity != "kind"}
+    columns = {
+        quantity: column
+        for quantity, column in known.columns.items()
+        if quantity not in ("kind", "subkind") and (quantity not in known.optional or column.name in table)
+    }
     if known.companions:
         rate = float(reals(_read_companion(path, known, 2, ("frameRate",))["frameRate"]).iloc[0])
         if not 0.1 <= rate <= 1000.0:
@@ -149,6 +171,8 @@ def _convert(table: pd.DataFrame, path: Path, known: Format) -> pd.DataFrame:
     out = to_numbers(table, columns, path)
     if known.image:
         out["x"], out["y"], out["vy"] = out["x"] + out["length"] / 2.0, -(out["y"] + out["width"] / 2.0), -out["vy"]
+    if not {"vx", "vy"} <= set(out):
+        return out
     vx, vy = out["vx"].to_numpy(float), out["vy"].to_numpy(float)
     out["speed"] = exact.hypot(vx, vy)
     if "heading" not in out:

@@ -24,12 +24,13 @@ from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonro
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
+from scenario_gen.output.exchange.osi import write_osi
 from scenario_gen.output.exchange.scenarionet import dataset_files, description, file_name, pickled
 from scenario_gen.roads import read_network
 
 EXPORTED = Kind("exported")
 MANIFEST = "export.json"
-MAPS = (".xodr", ".osm")  # endings of the names of maps that OpenSCENARIO can name
+MAPS = (".xodr", ".osm")  # endings of the names of maps that OpenSCENARIO can name: OpenDRIVE, Lanelet2
 ON_LANES = 0.9  # share of positions that lie on lanes of the map on which they were made, at least
 
 
@@ -67,6 +68,7 @@ class ExportFormat:
         shared: files that all scenarios of a case have in common, by name.
         closing: files about all scenarios, by name: of the first file and the `content` of each.
         takes_map: whether `ExportConfig.map` is written in place of lanes.
+        maps: endings of the names of such maps.
         own_lanes: whether the lanes of a vector map are written; if not, ones derived from the scenarios are in their place.
     """
 
@@ -74,6 +76,7 @@ class ExportFormat:
     shared: Callable[[Case, ExportConfig], Mapping[str, bytes]] = _nothing_shared
     own_lanes: bool = False
     takes_map: bool = False
+    maps: tuple[str, ...] = MAPS
     closing: Callable[[Sequence[tuple[str, Any]]], Mapping[str, bytes]] = _nothing_at_the_end
 
 
@@ -106,9 +109,10 @@ def export_bag(
     """
     to = EXPORTS[target]
     if export.map and not to.takes_map:
-        raise InputError(f"map: --to {target} writes lanes of its own; a map can be given with --to openscenario")
-    if export.map and Path(export.map).suffix.lower() not in MAPS:
-        raise InputError(f"map {export.map}: OpenSCENARIO names a road of OpenDRIVE (.xodr) or Lanelet2 (.osm)")
+        raise InputError(f"map: --to {target} writes lanes of its own; a map can be given with --to openscenario or osi")
+    if export.map and Path(export.map).suffix.lower() not in to.maps:
+        known = "OpenDRIVE (.xodr)" + (" or Lanelet2 (.osm)" if ".osm" in to.maps else "")
+        raise InputError(f"map {export.map}: --to {target} takes a road of {known}")
     cases = read_cases(bag, export, config, namespace=namespace, indices=indices)
     notes: list[str] = []
     entries: list[dict[str, object]] = []
@@ -183,6 +187,13 @@ def _to_openscenario(folder: Path, case: Case, exported: Exported, export: Expor
     return Written((name, _road_file(case, export)))
 
 
+def _to_osi(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
+    road, name = _road_file(case, export), f"case_{case.number}_{exported.index}.mcap"
+    data, notes = write_osi(case, exported, folder / road)
+    (folder / name).write_bytes(data)
+    return Written((name, road), notes)
+
+
 def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Written:
     name = f"case_{case.number}_{exported.index}"
     with BagWriter(folder / name) as bag:
@@ -227,6 +238,7 @@ EXPORTS = Registry[ExportFormat](
     {
         "commonroad": ExportFormat(_to_commonroad, own_lanes=True),
         "openscenario": ExportFormat(_to_openscenario, _roads, takes_map=True),
+        "osi": ExportFormat(_to_osi, _roads, takes_map=True, maps=(".xodr",)),
         "autoware": ExportFormat(_to_autoware),
         "scenarionet": ExportFormat(_to_scenarionet, own_lanes=True, closing=dataset_files),
     },

@@ -1,24 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`scenario-gen import`: trajectories of CommonRoad and OpenSCENARIO files as a table that is read as a log.
+"""`scenario-gen import`: trajectories of other software's files as a table that is read as a log.
 
 Columns: vehicle, t_s from the file's time zero, x_m and y_m of the footprint's centre, speed_mps, heading_rad from +x
 counter-clockwise, length_m, width_m. CommonRoad (2018b, 2020a) gives all of it; a missing speed is derived. OpenSCENARIO
 poses the rear axle, and its vertices have no speeds: the centre follows from the bounding box; the speeds are those of our own
 files' property; in others' files they are derived from positions and times, but for the first, which the initial action says.
+Traces of OSI and tables of omega-prime are read as logs are (`logs.adapters`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+import math
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError, of_system, reading
+from scenario_gen.logs import is_known, is_osi, LogConfig, read_raw
 from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.output.exchange.openscenario import SPEEDS
 from scenario_gen.output.exchange.xml import number, Place, read_xml
+from scenario_gen.types import Vehicle
 
 HEADER = "vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m"
 MOST_ROWS = 2_000_000
@@ -49,11 +55,13 @@ class Imported:
 
 
 def read_scenario_file(path: Path) -> Imported:
-    """Return the trajectories in a CommonRoad or OpenSCENARIO file.
+    """Return the trajectories in a CommonRoad or OpenSCENARIO file, a trace of OSI or a table of omega-prime.
 
     Raises:
-        InputError: it cannot be read, is neither, or holds no trajectory with times; file and place are named.
+        InputError: it cannot be read, is none of these, or holds no trajectory with times; file and place are named.
     """
+    if is_osi(path) or is_known(path, name="omega_prime"):
+        return _log(path)
     with reading(path):
         root = read_xml(path)
         place = Place(path, root, root.tag)
@@ -62,7 +70,7 @@ def read_scenario_file(path: Path) -> Imported:
         elif root.tag == "OpenSCENARIO":
             result = _openscenario(place)
         else:
-            raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read")
+            raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read, and OSI's .mcap")
     if not result.tracks:
         raise InputError(f"{path}: no vehicle with a trajectory in it" + "".join(f"; {note}" for note in result.notes))
     return result
@@ -108,7 +116,7 @@ def _commonroad(root: Place) -> Imported:
         states = [obstacle.child("initialState"), *obstacle.all("trajectory/state")]
         rows = np.array([_state(state, step) for state in states])
         length, width = rectangle.value("length"), rectangle.value("width")
-        tracks.append(_track(obstacle, obstacle.text("id"), (length, width), rows, None))
+        tracks.append(_track(obstacle.error, obstacle.text("id"), (length, width), rows, None))
     notes += [f"{count} × {kind} left out" for kind, count in left_out.items()]
     if static := len(root.element.findall("staticObstacle")):
         notes.append(f"{static} × static obstacle left out")
@@ -187,28 +195,60 @@ def _followed(follow: Place, name: str, box: Place, speed: float | None, speeds:
     result[:, 2] += x * sin + y * cos
     if speeds is not None and len(speeds) == len(result):
         result[:, 3] = speeds
-    return _track(follow, name, (size.attribute("length"), size.attribute("width")), result, speed)
+    return _track(follow.error, name, (size.attribute("length"), size.attribute("width")), result, speed)
 
 
-def _track(place: Place, vehicle: str, size: tuple[float, float], rows: Floats, speed: float | None) -> Track:
+def _track(
+    error: Callable[[str], InputError], vehicle: str, size: tuple[float, float], rows: Floats, speed: float | None
+) -> Track:
     """Return a track whose times ascend; speeds that are not given are derived.
 
     Raises:
         InputError: a time is not later than the one before, a size is not positive, or there are too many rows.
     """
     if len(rows) > MOST_ROWS:
-        raise place.error(f"{len(rows)} states; at most {MOST_ROWS} are read")
+        raise error(f"{len(rows)} states; at most {MOST_ROWS} are read")
     if min(size) <= 0.0:
-        raise place.error(f"a footprint of {size[0]:g} m × {size[1]:g} m; both must be positive")
+        raise error(f"a footprint of {size[0]:g} m × {size[1]:g} m; both must be positive")
     if len(rows) < 2 or (np.diff(rows[:, 0]) <= 0.0).any():
-        raise place.error("times must ascend, and be two at least")
+        raise error("times must ascend, and be two at least")
     if np.isnan(rows[:, 3]).any():
         rows[:, 3] = _speeds(rows, speed)
     if not np.isfinite(rows).all():
-        raise place.error("its times, places or speeds are beyond all numbers")
+        raise error("its times, places or speeds are beyond all numbers")
     if any(not c.isprintable() or c in ',"' for c in vehicle) or not vehicle:
-        raise place.error(f"the id {vehicle[:40]!r} cannot stand in a table; rename it")
+        raise error(f"the id {vehicle[:40]!r} cannot stand in a table; rename it")
     return Track(vehicle, *size, rows)
+
+
+def _log(path: Path) -> Imported:
+    """Return the vehicles of a trace of OSI or a table of omega-prime; sizes that are not given are a car's."""
+    log = read_raw([path], LogConfig())
+    tracks = []
+    for seen in log.vehicles:
+        speed = np.full(len(seen.fix_ns), np.nan)
+        known = dict(zip(seen.speed_row.tolist(), seen.speed.tolist(), strict=True))
+        speed[:] = [known.get(row, math.nan) for row in seen.fix_row.tolist()]
+        heading = np.unwrap(np.where(np.isnan(seen.heading), _directions(seen.fix), seen.heading))
+        rows = np.column_stack((seen.fix_ns * 1e-9, seen.fix, speed, heading))
+        usual = Vehicle(seen.id)
+        length, width = (
+            own if own > 0.0 else known_size for own, known_size in ((seen.length, usual.length), (seen.width, usual.width))
+        )
+        tracks.append(_track(partial(_fault, path, seen.id), seen.id, (length, width), rows, None))
+    return Imported(tuple(tracks), log.notes)
+
+
+def _fault(path: Path, vehicle: str, sentence: str) -> InputError:
+    return InputError(f"{path}, vehicle {vehicle}: {sentence}")
+
+
+def _directions(places: Floats) -> Floats:
+    """Return (K,) directions [rad] of the way through places (K, 2) [m]; 0 for a single one."""
+    if len(places) < 2:
+        return np.zeros(len(places))
+    step = np.gradient(places, axis=0)
+    return np.asarray(exact.arctan2(step[:, 1], step[:, 0]))
 
 
 def _speeds(rows: Floats, first: float | None) -> Floats:

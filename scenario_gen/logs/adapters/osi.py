@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Traces of ASAM OSI in MCAP files, as omega-prime writes them: the moving objects of type vehicle of GroundTruth messages.
+
+| quantity | field | unit |
+|---|---|---|
+| vehicle | moving_object.id.value | |
+| class | moving_object.type; vehicle_classification.type | |
+| length, width | base.dimension.length, width | m |
+| time | timestamp.seconds, nanos | s, ns |
+| position | base.position.x, y; the middle of the bounding box | m |
+| heading | base.orientation.yaw | rad, counter-clockwise from +x |
+| speed | base.velocity.x, y | m/s |
+
+Source: OSI 3.8, osi_groundtruth.proto and osi_object.proto. Coordinates are read as they stand: `proj_string` is not applied. The
+messages become the columns of omega-prime's table, and are read as it is (`formats.FORMATS`).
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+import math
+from pathlib import Path
+from typing import Any
+
+import betterosi
+import pandas as pd
+
+from scenario_gen.bags.storage.config import Allowance, BagConfig
+from scenario_gen.bags.storage.mcap import McapFile, open_mcap
+from scenario_gen.bags.storage.records import DamagedError
+from scenario_gen.base.documents import shown
+from scenario_gen.base.errors import guarded, InputError
+from scenario_gen.logs.adapters import tracks
+from scenario_gen.logs.adapters.formats import Format
+from scenario_gen.logs.config import listed, LogConfig
+from scenario_gen.logs.raw import check_size, RawLog
+
+KINDS = ("osi3.GroundTruth", "GroundTruth")
+LATEST = 9_000_000_000  # seconds that a stamp in 64 bits of nanoseconds can be
+COLUMNS = ("total_nanos", "idx", "x", "y", "vel_x", "vel_y", "yaw", "length", "width", "type", "subtype")
+Row = tuple[int, str, float, float, float, float, float, float, float, int, int]
+
+
+def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read the vehicles of one trace.
+
+    Raises:
+        InputError: it is damaged or too large, has no GroundTruth messages, or an object lacks its number or its position; names
+            the file, and the message.
+    """
+    return tracks.read(paths, config, name="omega_prime", load=_table)
+
+
+def _table(path: Path, _: Format, before: int, config: LogConfig) -> pd.DataFrame:
+    """Return the moving objects of all messages as omega-prime's table; without velocities where no object has any."""
+    rows: list[Row] = []
+    offset: Any = None
+    for k, message in enumerate(_messages(path, config)):
+        place = f"{path}, message {k + 1}"
+        offset = _offset(message) if k == 0 else offset
+        if _offset(message) != offset:
+            raise InputError(f"{place}: its proj_frame_offset is another than before; coordinates of one frame are read")
+        rows += _rows(message, place)
+        check_size(str(path), 0, before + len(rows), config)
+    if not rows:
+        raise InputError(f"{path}: no moving object in any of its messages")
+    frame = pd.DataFrame(rows, columns=pd.Index(COLUMNS))
+    return frame.drop(columns=["vel_x", "vel_y"]) if frame["vel_x"].isna().all() else frame
+
+
+def _messages(path: Path, config: LogConfig) -> Iterator[Any]:
+    """Yield the GroundTruth messages of one channel, in order of their stamps in the file."""
+    size = path.stat().st_size
+    check_size(str(path), size, 0, config)
+    allowance = Allowance(BagConfig(most_bytes=config.size_limit << 20), str(path), size, "log.size_limit")
+    with path.open("rb") as stream, _whole(path):
+        file = open_mcap(stream, size, allowance, None)
+        channel = _channel(file, path, config)
+        for k, (_, _, data) in enumerate(file.in_order([channel])):
+            allowance.hold(len(data))
+            with guarded(f"{path}, message {k + 1} is no GroundTruth"):
+                message = betterosi.GroundTruth.from_binary(data)
+            yield message
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    """Name the file in errors about damage."""
+    try:
+        yield
+    except DamagedError as error:
+        raise InputError(f"{path}: cut off or damaged, at {error}; copy it again") from error
+
+
+def _channel(file: McapFile, path: Path, config: LogConfig) -> int:
+    """Return the number of the one channel of GroundTruth messages, or of the one that the parameter `topics` names.
+
+    Raises:
+        InputError: there is none, or several.
+    """
+    topics = file.list_topics()
+    found = [topic for topic in topics if topic.type in KINDS and topic.encoding == "protobuf"]
+    wanted = listed(config.topics)
+    chosen = [topic for topic in found if topic.name in wanted] if wanted else found
+    if len(chosen) != 1:
+        there = ", ".join(f"{shown(topic.name)} ({shown(topic.type)})" for topic in (found or topics)) or "no topics"
+        need = "choose one with the parameter topics" if found else "one of osi3.GroundTruth is needed"
+        raise InputError(f"{path} has {there}; {need}")
+    return chosen[0].id
+
+
+def _offset(message: Any) -> tuple[float, float, float] | None:
+    """Return x, y [m] and yaw [rad] of a message's frame in its projection; None if they are not stated."""
+    offset = message.proj_frame_offset
+    if offset is None:
+        return None
+    place = offset.position
+    return (0.0, 0.0, offset.yaw) if place is None else (place.x, place.y, offset.yaw)
+
+
+def _rows(message: Any, place: str) -> Iterator[Row]:
+    """Yield a row for each moving object of a message.
+
+    Raises:
+        InputError: the message has no stamp, or one that is beyond all times; an object has no number or no position.
+    """
+    stamp = message.timestamp
+    if stamp is None or not 0 <= stamp.seconds < LATEST:
+        raise InputError(
+            f"{place}: {'no timestamp' if stamp is None else f'a timestamp of {stamp.seconds} s'}; 0 to 9e9 s is read"
+        )
+    nanos = stamp.seconds * 1_000_000_000 + stamp.nanos
+    for n, thing in enumerate(message.moving_object):
+        base = thing.base
+        if thing.id is None or base is None or base.position is None:
+            lack = "id" if thing.id is None else "base.position"
+            raise InputError(f"{place}: moving object {n + 1} has no {lack}")
+        kind = thing.vehicle_classification
+        yield (
+            *(nanos, str(thing.id.value), base.position.x, base.position.y),
+            *_of(base.velocity, "x", "y"),
+            *_of(base.orientation, "yaw"),
+            *_of(base.dimension, "length", "width"),
+            *(int(thing.type), 0 if kind is None else int(kind.type)),
+        )
+
+
+def _of(part: Any, *names: str) -> tuple[float, ...]:
+    """Return fields of a part of an object; NaN if there is no such part."""
+    return tuple(math.nan if part is None else getattr(part, name) for name in names)

@@ -1,0 +1,268 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""ASAM OSI 3.8: one MCAP file per scenario, a GroundTruth message per instant and the road as OpenDRIVE, as omega-prime reads it.
+
+Sources: OSI 3.8 (GroundTruth, MovingObject, and the trace file format for MCAP); omega-prime 0.3.7 (`Recording`, `MapOdr`), which
+names the topics. Positions are those of the middle of the bounding box, half a height above the ground, in the scenarios' frame;
+accelerations are vectors, with the part across the heading. Times begin at 0. A vehicle is in the messages while it is there.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime, UTC
+from functools import cache
+from io import BytesIO
+import math
+from pathlib import Path
+from typing import Any
+
+from mcap.writer import Writer
+import numpy as np
+
+from scenario_gen.base.errors import InputError, needs
+from scenario_gen.base.markup import read_xml
+from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.motion import at_times, EVEN
+from scenario_gen.types import height, is_truck, rear_axle, Scenario, Vehicle, WHEELBASE
+
+OBJECTS, MAP = "ground_truth", "ground_truth_map"  # omega-prime's topics
+WHEEL_RADIUS = 0.325  # metres, as in OpenSCENARIO files
+LARGEST_ID = 2**63 - 1  # that readers with signed numbers can hold
+NS = 1_000_000_000
+_SKIPPED = frozenset(("road", "junction", "junctionGroup", "controller", "station"))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """How OpenDRIVE's coordinates lie on the earth: a PROJ text ("" if unknown); x, y, z [m] and yaw [rad] of their origin."""
+
+    projection: str
+    offset: tuple[float, float, float, float] | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Vehicles on the instants of the file: their motion, numbers, and rates of yaw (N, T) [rad/s]."""
+
+    motion: Scenario
+    numbers: tuple[int, ...]
+    yaw_rate: Floats
+
+
+def write_osi(case: Case, exported: Exported, road: Path) -> tuple[bytes, tuple[str, ...]]:
+    """Return a scenario as the bytes of an MCAP file, and notes.
+
+    Args:
+        case: whose stamp is the file's date.
+        exported: the scenario; its ego, or else its first vehicle, is the host.
+        road: an OpenDRIVE file, in the scenario's frame.
+
+    Raises:
+        InputError: the OpenDRIVE file is not UTF-8.
+        MissingExtraError: betterosi is not installed.
+    """
+    needs("osi", "betterosi")
+    import betterosi
+
+    numbers, notes = object_numbers(exported)
+    time, parts = _parts(exported, numbers)
+    host = numbers[-1] if exported.ego is not None else numbers[0]
+    text, frame = _text(road), _frame(road)
+    stream = BytesIO()
+    writer = Writer(stream)
+    writer.start(library="scenario_gen")
+    writer.add_metadata(betterosi.OSI_TRACE_METADATA_NAME, _metadata(case, exported))
+    channels = {topic: _channel(writer, topic, kind) for topic, kind in ((OBJECTS, "GroundTruth"), (MAP, "MapAsamOpenDrive"))}
+    drawn = betterosi.MapAsamOpenDrive(map_reference=road.name, open_drive_xml_content=text)
+    writer.add_message(channels[MAP], log_time=0, data=drawn.to_binary(), publish_time=0)
+    for k, stamp in enumerate(np.round(time * NS).astype(np.int64).tolist()):
+        message = _ground_truth(parts, k, stamp, host, road.name, frame)
+        writer.add_message(channels[OBJECTS], log_time=stamp, data=message.to_binary(), publish_time=stamp, sequence=k)
+    writer.finish()
+    return stream.getvalue(), notes
+
+
+def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Return the numbers of the vehicles in the file, the ego's last, and a note where these are not their ids.
+
+    OSI's ids are numbers: if one id is none, the vehicles are numbered from 1.
+    """
+    vehicles = exported.others.vehicles if exported.ego is None else (*exported.others.vehicles, *exported.ego.vehicles)
+    ids = [vehicle.id for vehicle in vehicles]
+    if all(name.isascii() and name.isdigit() and str(int(name)) == name and int(name) <= LARGEST_ID for name in ids):
+        return tuple(int(name) for name in ids), ()
+    numbers = tuple(range(1, len(ids) + 1))
+    listed = ", ".join(f"{name} is {number}" for name, number in zip(ids, numbers, strict=True))
+    return numbers, (f"ids are numbers in OSI: {listed}",)
+
+
+def _parts(exported: Exported, numbers: tuple[int, ...]) -> tuple[Floats, tuple[_Part, ...]]:
+    """Return the instants of the file (T,) [s], with those of an ego that is there longer, and who moves.
+
+    A part ends before the file where its own time does.
+    """
+    time = exported.others.time
+    scenarios = [exported.others]
+    if exported.ego is not None:
+        time = np.concatenate([time, exported.ego.time[exported.ego.time > time[-1] + EVEN]])
+        scenarios.append(exported.ego)
+    parts, first = [], 0
+    for scenario in scenarios:
+        motion = at_times(scenario, time[time <= scenario.time[-1] + EVEN])
+        count = len(motion.vehicles)
+        parts.append(_Part(motion, numbers[first : first + count], _yaw_rates(motion)))
+        first += count
+    return time, tuple(parts)
+
+
+def _yaw_rates(motion: Scenario) -> Floats:
+    """Return rates of yaw (N, T) [rad/s], by central differences while the vehicle is there."""
+    rates: Floats = np.zeros(motion.heading.shape)
+    for n, (first, last) in enumerate(motion.present.tolist()):
+        own = slice(first, last + 1)
+        if last > first:
+            rates[n, own] = np.gradient(motion.heading[n, own], motion.time[own])
+    return rates
+
+
+def _ground_truth(parts: tuple[_Part, ...], k: int, stamp: int, host: int, road_file: str, frame: Frame) -> Any:
+    """Return the message of instant `k`; the host is named while it is there."""
+    import betterosi as osi
+
+    objects = [one for part in parts for one in _objects(part, k)]
+    there = any(one.id.value == host for one in objects)
+    offset = None
+    if frame.offset is not None:
+        x, y, z, yaw = frame.offset
+        offset = osi.GroundTruth.ProjFrameOffset(position=osi.Vector3d(x=x, y=y, z=z), yaw=yaw)
+    return osi.GroundTruth(
+        version=osi.InterfaceVersion(**dict(zip(("version_major", "version_minor", "version_patch"), _version(), strict=True))),
+        timestamp=osi.Timestamp(seconds=stamp // NS, nanos=stamp % NS),
+        host_vehicle_id=osi.Identifier(value=host) if there else None,
+        moving_object=objects,
+        map_reference=road_file,
+        proj_string=frame.projection or None,
+        proj_frame_offset=offset,
+    )
+
+
+def _version() -> tuple[int, int, int]:
+    """Return the version of OSI that the messages are of."""
+    import betterosi
+
+    major, minor, patch = map(int, betterosi.DEFAULT_VERSION.split("."))
+    return major, minor, patch
+
+
+def _objects(part: _Part, k: int) -> Iterator[Any]:
+    """Yield the vehicles that are there at instant `k`."""
+    import betterosi as osi
+
+    motion = part.motion
+    if k >= len(motion.time):
+        return
+    for n in np.flatnonzero(motion.there[:, k]).tolist():
+        vehicle, heading = motion.vehicles[n], motion.heading[n, k]
+        cos, sin = float(exact.cos(heading)), float(exact.sin(heading))
+        speed, along, rate = (float(values[n, k]) for values in (motion.speed, motion.acceleration, part.yaw_rate))
+        x, y = motion.position[n, k].tolist()
+        across = speed * rate
+        base = osi.BaseMoving(
+            dimension=osi.Dimension3d(length=vehicle.length, width=vehicle.width, height=height(vehicle)),
+            position=osi.Vector3d(x=x, y=y, z=height(vehicle) / 2.0),
+            orientation=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=_wrapped(heading)),
+            velocity=osi.Vector3d(x=speed * cos, y=speed * sin, z=0.0),
+            acceleration=osi.Vector3d(x=along * cos - across * sin, y=along * sin + across * cos, z=0.0),
+            orientation_rate=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=rate),
+        )
+        kinds, roles = osi.MovingObject.VehicleClassification.Type, osi.MovingObject.VehicleClassification.Role
+        kind = kinds.HEAVY_TRUCK if is_truck(vehicle) else kinds.CAR
+        yield osi.MovingObject(
+            id=osi.Identifier(value=part.numbers[n]),
+            type=osi.MovingObject.Type.VEHICLE,
+            base=base,
+            vehicle_classification=osi.MovingObject.VehicleClassification(type=kind, role=roles.CIVIL),
+            vehicle_attributes=_attributes(vehicle),
+        )
+
+
+def _wrapped(heading: float) -> float:
+    """Return an angle [rad] from -π to π."""
+    return min(max(float(wrap_angle(np.asarray(heading))), -math.pi), math.pi)
+
+
+def _attributes(vehicle: Vehicle) -> Any:
+    """Return where the axles are, from the middle of the bounding box, and the wheels."""
+    import betterosi as osi
+
+    rear, down = -rear_axle(vehicle), WHEEL_RADIUS - height(vehicle) / 2.0
+    return osi.MovingObject.VehicleAttributes(
+        bbcenter_to_rear=osi.Vector3d(x=rear, y=0.0, z=down),
+        bbcenter_to_front=osi.Vector3d(x=rear + WHEELBASE * vehicle.length, y=0.0, z=down),
+        radius_wheel=WHEEL_RADIUS,
+    )
+
+
+def _text(road: Path) -> str:
+    try:
+        return road.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"map {road.name}: not UTF-8 (byte {error.start}), as a trace of OSI holds its map; save it as UTF-8"
+        ) from error
+
+
+def _frame(road: Path) -> Frame:
+    """Return how an OpenDRIVE file says that its coordinates lie on the earth."""
+    header = read_xml(road, road.name, _SKIPPED).first("header")
+    reference = header.first("geoReference") if header is not None else None
+    offset = header.first("offset") if header is not None else None
+    moved = None
+    if offset is not None:
+        moved = (offset.number("x", 0.0), offset.number("y", 0.0), offset.number("z", 0.0), offset.number("hdg", 0.0))
+    return Frame(" ".join(reference.text.split()) if reference is not None else "", moved)
+
+
+def _metadata(case: Case, exported: Exported) -> dict[str, str]:
+    """Return the file's metadata, as the trace file format asks for them."""
+    import betterosi
+
+    date = datetime.fromtimestamp(case.start_ns // NS, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    about = f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}"
+    found: dict[str, str] = betterosi.prepare_required_file_metadata(
+        {"creation_time": date, "description": about, "authors": "scenario_gen"}
+    )
+    return found
+
+
+def _channel(writer: Writer, topic: str, kind: str) -> int:
+    """Announce a topic of a message of OSI; return its number."""
+    import betterosi
+
+    schema = writer.register_schema(f"osi3.{kind}", "protobuf", _definition(getattr(betterosi, kind).desc().file.name))
+    number: int = writer.register_channel(topic, "protobuf", schema, betterosi.prepare_channel_metadata())
+    return number
+
+
+@cache
+def _definition(name: str) -> bytes:
+    """Return the files of a message's definition, without comments, and no others: a FileDescriptorSet."""
+    import betterosi
+    from protobuf.wkt import FileDescriptorSet
+
+    whole = FileDescriptorSet.from_binary(betterosi.load_descriptor_set(betterosi.DEFAULT_VERSION))
+    files = {file.name: file for file in whole.file}
+    needed: dict[str, Any] = {}
+
+    def add(one: str) -> None:
+        if one not in needed:
+            for other in files[one].dependency:
+                add(other)
+            files[one].source_code_info = None
+            needed[one] = files[one]
+
+    add(name)
+    definition: bytes = FileDescriptorSet(file=list(needed.values())).to_binary()
+    return definition

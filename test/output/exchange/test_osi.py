@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Traces of OSI: the motion of the bag to the micrometre, the road as OpenDRIVE, and back again as a log."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.output.exchange.cases import read_cases
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.export import export_bag
+from scenario_gen.output.exchange.importing import import_file, read_scenario_file
+
+betterosi = pytest.importorskip("betterosi")
+
+
+@pytest.fixture(scope="module")
+def exported(small_bag, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("osi") / "out"
+    assert export_bag(small_bag, folder, "osi").scenarios == 4
+    return folder
+
+
+def messages(path, kind=betterosi.GroundTruth):
+    return [message for message in betterosi.read(path) if isinstance(message, kind)]
+
+
+def scenarios(bag):
+    """Return (file name, scenario) of each scenario of a bag."""
+    for case in read_cases(bag):
+        for one in case.scenarios:
+            yield f"case_{case.number}_{one.index}.mcap", one.others
+
+
+def test_the_motion_is_that_of_the_bag(small_bag, exported):
+    for name, scenario in scenarios(small_bag):
+        found = messages(exported / name)
+        stamps = [message.timestamp.seconds + message.timestamp.nanos * 1e-9 for message in found]
+        assert np.allclose(stamps, scenario.time, atol=1e-9) and stamps[0] == 0.0
+        for k, message in enumerate(found):
+            things = {thing.id.value: thing for thing in message.moving_object}
+            assert set(things) == {int(scenario.vehicles[n].id) for n in np.flatnonzero(scenario.there[:, k])}
+            for n, vehicle in enumerate(scenario.vehicles):
+                if not scenario.there[n, k]:
+                    continue
+                base = things[int(vehicle.id)].base
+                assert np.allclose((base.position.x, base.position.y), scenario.position[n, k], atol=1e-6)
+                assert abs(np.hypot(base.velocity.x, base.velocity.y) - scenario.speed[n, k]) < 1e-6
+                assert abs(np.angle(np.exp(1j * (base.orientation.yaw - scenario.heading[n, k])))) < 1e-6
+                assert (base.dimension.length, base.dimension.width) == (vehicle.length, vehicle.width)
+                assert base.position.z == base.dimension.height / 2.0 > 0.0
+
+
+def test_the_road_is_in_the_file_and_beside_it(exported):
+    for path in exported.glob("*.mcap"):
+        (drawn,) = messages(path, betterosi.MapAsamOpenDrive)
+        assert drawn.open_drive_xml_content == (exported / drawn.map_reference).read_text()
+        assert {message.map_reference for message in messages(path)} == {drawn.map_reference}
+
+
+def test_the_host_is_the_ego_or_else_the_first_vehicle(small_bag, exported, tmp_path):
+    assert {message.host_vehicle_id.value for path in exported.glob("*.mcap") for message in messages(path)} == {1}
+    export_bag(small_bag, tmp_path / "out", "osi", ExportConfig(ego="2"))
+    for path in (tmp_path / "out").glob("*.mcap"):
+        assert {message.host_vehicle_id.value for message in messages(path)} == {2}
+
+
+def test_the_same_bag_gives_the_same_bytes(small_bag, exported, tmp_path):
+    export_bag(small_bag, tmp_path / "again", "osi")
+    for path in exported.iterdir():
+        if not path.name.startswith("."):
+            assert path.read_bytes() == (tmp_path / "again" / path.name).read_bytes(), path.name
+
+
+def test_what_is_exported_is_read_back_and_as_a_log(small_bag, exported, tmp_path):
+    for name, scenario in scenarios(small_bag):
+        found = {track.vehicle: track for track in read_scenario_file(exported / name).tracks}
+        assert set(found) == {vehicle.id for vehicle in scenario.vehicles}
+        for n, vehicle in enumerate(scenario.vehicles):
+            rows = found[vehicle.id].rows
+            assert np.allclose(rows[:, 1:3], scenario.position[n, scenario.there[n]], atol=1e-6)
+            assert np.allclose(rows[:, 3], scenario.speed[n, scenario.there[n]], atol=1e-6)
+    name, _ = next(scenarios(small_bag))
+    import_file(exported / name, tmp_path / "log.csv")
+    assert (tmp_path / "log.csv").read_text().startswith("vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m\n1,0,")
+
+
+def test_ids_that_are_no_numbers_are_counted_and_that_is_said(small_bag, tmp_path):
+    from scenario_gen.output.exchange.cases import Exported
+    from scenario_gen.output.exchange.osi import object_numbers
+
+    _, scenario = next(scenarios(small_bag))
+    vehicles = tuple(replace(vehicle, id=name) for vehicle, name in zip(scenario.vehicles, ("a", "7"), strict=True))
+    one = Exported(0, 0, "ab" * 32, replace(scenario, vehicles=vehicles), None, driven=False)
+    assert object_numbers(one) == ((1, 2), ("ids are numbers in OSI: a is 1, 7 is 2",))
+
+
+@pytest.mark.parametrize("cut", [40, 2000, -100])
+def test_a_trace_that_is_cut_off_is_refused_by_name(exported, tmp_path, cut):
+    whole = next(exported.glob("*.mcap")).read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[:cut])
+    with pytest.raises(InputError, match=r"cut\.mcap"):
+        read_scenario_file(tmp_path / "cut.mcap")
