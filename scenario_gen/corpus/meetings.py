@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.messages import database, HOUR, quoted
+from scenario_gen.corpus.messages import database, DEGREE, HOUR, quoted
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import FASTEST, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
 from scenario_gen.logs import APART, LAG, shortest
@@ -70,7 +70,7 @@ def _search(base: Any, hour: int, files: tuple[Path, ...], target: Path, config:
     begin, end = hour * HOUR - edge, (hour + 1) * HOUR + edge
     names = [str(path) for path in files]
     base.execute(
-        "CREATE TEMP TABLE messages AS SELECT device, t, lat, lon, speed, heading FROM "
+        f"CREATE TEMP TABLE messages AS SELECT device, t, lat / {DEGREE} AS lat, lon / {DEGREE} AS lon, speed, heading FROM "
         f"read_parquet([{quoted(names)}]) WHERE t >= {begin} AND t < {end} AND cause = 0"
     )
     shared = _bins(base)

@@ -218,7 +218,7 @@ def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], 
     """
     files = [*messages, *chain.from_iterable(logs)]
     document = {
-        "format": 1,
+        "format": 2,  # of the tables
         "files": [
             [name, path.stat().st_size if path.is_file() else 0] for name, path in zip(resolved(files), files, strict=True)
         ],
@@ -227,7 +227,8 @@ def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], 
     place = out / ARCHIVE
     if place.exists():
         before = read_json(place, {"type": "object"})
-        for key, what in (("files", "archive, whose files were other ones"), ("parameters", "set of parameters")):
+        kinds = {"files": "archive, whose files were other ones", "parameters": "set of parameters", "format": "version"}
+        for key, what in kinds.items():
             if before.get(key) != document[key]:
                 raise InputError(f"{out} is a corpus of another {what}; name another folder, or remove this one")
         return
