@@ -43,7 +43,15 @@ EXTRAS["segmentation"] = [
     wanted for wanted in CORE if wanted.startswith(("numpy", "scipy", "numba"))
 ]  # all that it needs of the core
 EXTRAS["cli"] += [*EXTRAS["bags"], *EXTRAS["parquet"], *EXTRAS["report"]]
-EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["plot"], *EXTRAS["planners"], *EXTRAS["gym"], *EXTRAS["corpus"], *EXTRAS["osi"]]
+EXTRAS["all"] = [
+    *EXTRAS["cli"],
+    *EXTRAS["plot"],
+    *EXTRAS["planners"],
+    *EXTRAS["gym"],
+    *EXTRAS["corpus"],
+    *EXTRAS["osi"],
+    *EXTRAS["stores"],
+]
 EXTRAS["corpus"] += EXTRAS["cli"]  # whose commands it adds to
 EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("ros.in").values())]
 

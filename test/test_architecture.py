@@ -64,6 +64,7 @@ LATE = {
     "dask": "extra corpus",
     "distributed": "extra corpus",
     "duckdb": "extra corpus",
+    "fsspec": "extra stores",
     "concurrent": "slow to load",
     "jsonschema": "slow to load",
     "matplotlib": "extra plot",

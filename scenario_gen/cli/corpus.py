@@ -12,6 +12,7 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.stores import local, Place, place
 from scenario_gen.cli.options import assigned_all, takes
 from scenario_gen.cli.output import Commands, give, say, say_rows, status
 
@@ -41,7 +42,7 @@ def lines(texts: Sequence[str]) -> None:
         say(line)
 
 
-def conclude(failed: Sequence[str], out: Path) -> None:
+def conclude(failed: Sequence[str], out: Place) -> None:
     """Give the failed tasks.
 
     Raises:
@@ -54,8 +55,11 @@ def conclude(failed: Sequence[str], out: Path) -> None:
 
 @commands.command()
 def mine(
-    archive: Annotated[list[Path], typer.Argument(help="Folders of SPMD files, tables and bags, or single files. Repeatable.")],
-    out: Annotated[Path, typer.Option(help="Folder for the corpus. An unfinished corpus is continued.")],
+    archive: Annotated[
+        list[Path],
+        typer.Argument(help="Folders of SPMD files, tables and bags, or single files, or s3://, gs://, abfs://. Repeatable."),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the corpus, or s3://…. An unfinished corpus is continued.")],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     assignments: Annotated[
@@ -65,13 +69,14 @@ def mine(
     """Find the encounters in an archive of any size."""
     from scenario_gen.corpus.config import CorpusConfig
     from scenario_gen.corpus.mine import mine as mined
+    from scenario_gen.corpus.mine import PAGE
 
-    config = assigned_all(CorpusConfig(), assignments)
+    config, corpus = assigned_all(CorpusConfig(), assignments), place(out, to_write=True)
     with workers_of(workers, scheduler) as who:
-        result = mined(archive, out, config, workers=who)
-    give(summary=result.lines(), page=out / "encounters.html")
-    lines([*result.lines(), f"page: {out / 'encounters.html'}"])
-    conclude(result.failed, out)
+        result = mined([place(one) for one in archive], corpus, config, workers=who)
+    give(summary=result.lines(), page=corpus / PAGE)
+    lines([*result.lines(), f"page: {corpus / PAGE}"])
+    conclude(result.failed, corpus)
 
 
 @commands.command("synthetic-archive")
@@ -117,6 +122,8 @@ def batch(options: Batch) -> None:
     from scenario_gen.corpus.batch import BatchRequest, run_batch
     from scenario_gen.method.config import PipelineConfig
 
+    for path in (options.corpus, options.out):
+        local(path, "batch")
     config = assigned_all(PipelineConfig(), options.assignments)
     names = [name for text in options.roads for name in text.split(",") if name]
     with workers_of(options.workers, options.scheduler) as who:
@@ -161,6 +168,9 @@ def find(
     from scenario_gen.corpus import find as finding
     from scenario_gen.output.review.evaluation import write_page
 
+    for path in (batch, bag, report):
+        if path is not None:
+            local(path, "find")
     if report is not None:
         needs_bag(bag)
     found = finding.find(batch, condition, limit)
@@ -198,6 +208,7 @@ def library(
     from scenario_gen.corpus.library import build, SHARED
 
     config = assigned_all(SHARED, assignments)
+    local(corpus, "library")
     with workers_of(workers, scheduler) as who:
         built = build(corpus, config, most=most, seed=seed, workers=who)
     give(summary=built.lines())

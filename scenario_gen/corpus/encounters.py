@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from scenario_gen.bags.recordings.tracks import tracks_bytes, tracks_of
 from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError, needs
+from scenario_gen.base.stores import each_fetched, fetched, Place, Remote
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
@@ -36,25 +37,29 @@ ROW = {  # what is read of a row, and of which kinds it is
 MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
 
 
+AnyPlace = TypeVar("AnyPlace", Path, Remote)
+
+
 @dataclass(frozen=True)
 class CleanTask:
     """Encounters to clean, the tables of messages in which they are, and the table to write."""
 
     name: str
     found: tuple[Found, ...]
-    rows: tuple[Path, ...]
-    target: Path
+    rows: tuple[Place, ...]
+    target: Place
     config: CorpusConfig
 
 
 @dataclass(frozen=True)
 class LogTask:
-    """A log to read, of any format that `read_log` knows, and the table to write."""
+    """A log to read, of any format that `read_log` knows, files that readers look for `beside` it, and the table to write."""
 
     name: str
-    paths: tuple[Path, ...]
-    target: Path
+    paths: tuple[Place, ...]
+    target: Place
     config: CorpusConfig
+    beside: tuple[Place, ...] = ()
 
 
 def clean_found(task: CleanTask) -> None:
@@ -66,7 +71,8 @@ def clean_found(task: CleanTask) -> None:
     first, last = min(one.start for one in task.found) - MARGIN, max(one.end for one in task.found) + MARGIN
     wanted = sorted({device for one in task.found for device in one.devices})
     filters = [("t", ">=", first), ("t", "<=", last), ("device", "in", wanted)]
-    tables = [parquet.read_table(path, filters=filters).to_pandas() for path in task.rows if path.exists()]
+    with fetched(task.rows) as here:
+        tables = [parquet.read_table(path, filters=filters).to_pandas() for path in here]
     import pandas as pd
 
     messages = pd.concat(tables).drop_duplicates().sort_values(["device", "t", "lat", "lon"], kind="stable")
@@ -110,7 +116,8 @@ def read_one_log(task: LogTask) -> None:
     if task.target.exists():
         return
     try:
-        result = read_log(list(task.paths), task.config.log)
+        with fetched([*task.paths, *task.beside]) as here:
+            result = read_log(here[: len(task.paths)], task.config.log)
     except NoEncounterError as error:  # a result: the log is not read again
         write_encounters(task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []})
         return
@@ -152,7 +159,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
     }
 
 
-def write_encounters(target: Path, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]) -> None:
+def write_encounters(target: Place, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]) -> None:
     """Write a table of encounters, whole or not at all; the account stands in its metadata."""
     needs("corpus", "pyarrow")
     import pyarrow as pa
@@ -171,33 +178,33 @@ def write_encounters(target: Path, rows: Sequence[Mapping[str, Any]], account: M
         parquet.write_table(table.replace_schema_metadata({"account": json.dumps(account)}), part, compression="zstd")
 
 
-def tables_of(corpus: Path) -> list[Path]:
+def tables_of(corpus: AnyPlace) -> list[AnyPlace]:
     """Return the tables of a corpus that `mine` wrote, sorted.
 
     Raises:
         InputError: there is none.
     """
-    found = sorted((corpus / "encounters").glob("*.parquet"))
+    found: list[AnyPlace] = sorted((corpus / "encounters").glob("*.parquet"), key=str)
     if not found:
         raise InputError(f"{corpus} holds no encounters/*.parquet; write it with `scenario-gen mine ARCHIVE --out {corpus}`")
     return found
 
 
-def account_of(table: Path) -> dict[str, Any]:
-    """Return what a table says of the encounters that are not in it, and of its log's quality.
+def account_of(table: Path, name: Place) -> dict[str, Any]:
+    """Return what a table says of the encounters that are not in it, and of its log's quality; `name` is for messages.
 
     Raises:
         InputError: the table is damaged.
     """
     from pyarrow import parquet
 
-    with guarded(f"{table} cannot be read as a table"):
+    with guarded(f"{name} cannot be read as a table"):
         text = (parquet.read_schema(table).metadata or {}).get(b"account", b"{}").decode()
-    account: dict[str, Any] = parse_json(text, f"{table}: account", {"type": "object"})
+    account: dict[str, Any] = parse_json(text, f"{name}: account", {"type": "object"})
     return account
 
 
-def rows_of(tables: Sequence[Path], columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
+def rows_of(tables: Sequence[Place], columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
     """Yield the rows of tables, in their order.
 
     Raises:
@@ -205,9 +212,9 @@ def rows_of(tables: Sequence[Path], columns: Sequence[str] | None = None) -> Ite
     """
     from pyarrow import parquet
 
-    for path in tables:
+    for path, here in each_fetched(tables):
         with guarded(f"{path} cannot be read as a table"):
-            rows = parquet.read_table(path, columns=list(columns) if columns else None).to_pylist()
+            rows = parquet.read_table(here, columns=list(columns) if columns else None).to_pylist()
         if rows and (lacking := set(columns or ()) - rows[0].keys()):
             raise InputError(f"{path} lacks the columns {', '.join(sorted(lacking))}")
         yield from rows

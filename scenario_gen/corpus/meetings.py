@@ -9,6 +9,7 @@ proximity and what a vehicle drives in between: each looks into its own cell and
 proposes: what decides is computed from the messages with `scenario_gen.numerics.exact`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.base.stores import fetched, Place, workplace
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.messages import database, DEGREE, HOUR, quoted
 from scenario_gen.corpus.tasks import arriving
@@ -39,8 +41,8 @@ class HourTask:
     """Hours to search: (hour since 2004, the files that hold it or a neighbour), and where `meetings` are written."""
 
     name: str
-    hours: tuple[tuple[int, tuple[Path, ...]], ...]
-    folder: Path
+    hours: tuple[tuple[int, tuple[Place, ...]], ...]
+    folder: Place
     config: CorpusConfig
 
 
@@ -56,13 +58,16 @@ def search_hours(task: HourTask) -> None:
         InputError: the database fails.
     """
     left = [one for one in task.hours if not (task.folder / f"hour-{one[0]}.parquet").exists()]
-    with database(task.folder.parent, task.config.memory, f"{task.name} of {task.folder.parent}") as base:
+    own = task.folder.parent
+    tables = sorted({path for _, files in left for path in files}, key=str)
+    with fetched(tables) as here, database(workplace(own), task.config.memory, f"{task.name} of {own}") as base:
+        local = dict(zip(tables, here, strict=True))
         for hour, files in left:
-            with base.cursor() as own:  # its tables end with it
-                _search(own, hour, files, task.folder / f"hour-{hour}.parquet", task.config)
+            with base.cursor() as cursor:  # its tables end with it
+                _search(cursor, hour, [local[path] for path in files], task.folder / f"hour-{hour}.parquet", task.config)
 
 
-def _search(base: Any, hour: int, files: tuple[Path, ...], target: Path, config: CorpusConfig) -> None:
+def _search(base: Any, hour: int, files: Sequence[Path], target: Place, config: CorpusConfig) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+import itertools
 import json
 from pathlib import Path
 import re
@@ -17,6 +18,7 @@ from typing import Any
 
 from scenario_gen.base.errors import guarded, needs
 from scenario_gen.base.folders import scratch, write_text
+from scenario_gen.base.stores import download, Part, Place, Remote, size_of, workplace
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs.tables import COLUMNS
 
@@ -48,6 +50,7 @@ DISAGREE = (
 )
 PARQUET = "FORMAT parquet, PARQUET_VERSION V2, COMPRESSION zstd"
 DEGREE = 1e7  # units of latitude and longitude in tables: a ten-millionth of a degree, as messages have them (SAE J2735); 1 cm
+LONGEST_LINE = 65_536  # bytes; a longer one is no row
 CLOCKS = "left out: its clocks disagree (Gentime, DSecond)"
 
 
@@ -56,17 +59,17 @@ class RangeTask:
     """Bytes to parse: `pieces` are (file, first byte, byte after the last); `target` the Parquet file."""
 
     name: str
-    pieces: tuple[tuple[Path, int, int], ...]
-    target: Path
+    pieces: tuple[tuple[Place, int, int], ...]
+    target: Place
     memory: int
 
 
-def ranges(files: Sequence[Path], folder: Path, size: int, memory: int) -> list[RangeTask]:
+def ranges(files: Sequence[Place], folder: Place, size: int, memory: int) -> list[RangeTask]:
     """Divide files into tasks of `size` bytes each or somewhat more: long files are cut, short ones put together."""
-    tasks: list[list[tuple[Path, int, int]]] = []
+    tasks: list[list[tuple[Place, int, int]]] = []
     room = 0
     for path in files:
-        length = path.stat().st_size
+        length = size_of(path)
         for begin in range(0, length, size):
             end = min(begin + size, length)
             if not tasks or room <= 0:
@@ -105,23 +108,35 @@ def parse_range(task: RangeTask) -> None:
     """
     if task.target.exists():
         return
-    folder = task.target.parent
+    folder = workplace(task.target.parent.parent)
     folder.mkdir(parents=True, exist_ok=True)
     files = ", ".join(str(path) for path, _, _ in task.pieces)
     with (
-        scratch(folder.parent) as place,
-        database(folder.parent, task.memory, f"{task.name}: {files}") as base,
+        scratch(folder) as place,
+        database(folder, task.memory, f"{task.name}: {files}") as base,
     ):
         names = {}
-        for k, (path, begin, end) in enumerate(task.pieces):
-            whole = begin == 0 and end == path.stat().st_size
-            names[str(path if whole else _extract(path, begin, end, place / f"{k}.csv"))] = str(path)
+        for k, (path, begin, end), here in zip(itertools.count(), task.pieces, _fetched_text(task, place), strict=False):
+            whole = begin == 0 and end == size_of(path)
+            names[str(here if whole else _extract(here, begin, end, place / f"{k}.csv"))] = str(path)
         first = place / "parsed.parquet"
         account = _parse(base, names, first)
         with arriving(task.target.with_suffix(".json")) as part:
             write_text(part, json.dumps(account, indent=1) + "\n")
         with arriving(task.target) as part:
             first.replace(part)
+
+
+def _fetched_text(task: RangeTask, folder: Path) -> list[Path]:
+    """Return the files of the pieces; of an object there is what `_extract` reads of it, at the same offsets, and else a hole."""
+    parts = [
+        Part(path, max(begin - 1, 0), min(end + LONGEST_LINE, size_of(path)), folder / f"{k}.txt")
+        for k, (path, begin, end) in enumerate(task.pieces)
+        if isinstance(path, Remote)
+    ]
+    download(parts)
+    local = {part.source: part.target for part in parts}
+    return [local[path] if isinstance(path, Remote) else path for path, _, _ in task.pieces]
 
 
 def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
@@ -154,7 +169,7 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     file = "0" if one else f"list_position([{quoted(files)}], filename) - 1"
     source = (
         f"read_csv([{quoted(files)}], columns={{{columns}}}, header=false, auto_detect=false, delim=',', quote='', "
-        f"escape='', store_rejects=true, filename={'false' if one else 'true'}, max_line_size=65536)"
+        f"escape='', store_rejects=true, filename={'false' if one else 'true'}, max_line_size={LONGEST_LINE})"
     )
     if not files:
         source = "(SELECT " + ", ".join(f"NULL::{TYPES[name]} AS {name}" for name in TYPES) + ", '' AS filename LIMIT 0)"

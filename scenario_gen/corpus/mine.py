@@ -14,7 +14,6 @@ A file that is there is done, so a run that was killed goes on where it was.
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain
 import json
 import os
@@ -23,11 +22,9 @@ from typing import Any
 
 from scenario_gen.base.documents import COUNT, read_json
 from scenario_gen.base.errors import InputError, needs
-from scenario_gen.base.folders import write_text
-from scenario_gen.base.folders.claim import alone
-from scenario_gen.base.folders.scratch import sweep_tree
-from scenario_gen.base.interrupts import ending
+from scenario_gen.base.folders import scratch
 from scenario_gen.base.parameters import flatten
+from scenario_gen.base.stores import below, download, each_fetched, naming_objects, Part, Place, Remote, size_of, temporary
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import (
     account_of,
@@ -44,7 +41,7 @@ from scenario_gen.corpus.kinds import KINDS
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import arriving, check_out, spread, Workers
+from scenario_gen.corpus.tasks import agreed, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.logs import is_bag, is_commonroad, is_nocturne, is_spmd, is_table
 from scenario_gen.template import reactions_of
 
@@ -58,6 +55,7 @@ ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
         "notes": {"type": "array", "items": {"type": "string"}},
     },
 }
+HEAD = 16_384  # bytes of an object by which its format is recognised
 MOST_DRAWN = 120  # encounters on the page
 MOST_SHOWN = 20  # failures and files that are named; the corpus holds all
 
@@ -99,8 +97,8 @@ class Mined:
 
 
 def mine(
-    archives: Sequence[Path],
-    out: Path,
+    archives: Sequence[Place],
+    out: Place,
     config: CorpusConfig = CorpusConfig(),
     *,
     workers: Workers = Workers(),
@@ -120,18 +118,16 @@ def mine(
     needs("corpus", "duckdb", "pyarrow")
     messages, logs, others = inventory(archives)
     check_out(out, archives)
-    out.mkdir(parents=True, exist_ok=True)
-    with alone(out), ending(partial(sweep_tree, out)), spread(workers) as go:
+    with held(out), spread(workers) as go:
         _agree(out, messages, logs, config)
-        sweep_tree(out)
         log_tasks = [
             LogTask(paths[0].stem, tuple(paths), out / "encounters" / f"log-{k:05}.parquet", config)
             for k, paths in enumerate(logs)
         ]
-        failed = go(read_one_log, [task for task in log_tasks if not task.target.exists()])
+        failed = go(read_one_log, undone(log_tasks, _target))
         if messages:
             ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
-            lost = go(parse_range, [task for task in ranged if not task.target.exists()])
+            lost = go(parse_range, undone(ranged, _target))
             lost = lost or go(search_hours, hour_tasks(ranged, out, config))  # of all ranges, for an hour is done only once
             failed += lost or go(clean_found, clean_tasks(out, config))
         result = summary(out, config, failed, others)
@@ -140,9 +136,14 @@ def mine(
         return result
 
 
-def _write_gallery(path: Path, out: Path, made: Mined) -> None:
+def _target(task: LogTask | RangeTask | CleanTask) -> Place:
+    """The file that a task writes."""
+    return task.target
+
+
+def _write_gallery(path: Path, out: Place, made: Mined) -> None:
     """Write a page that shows the encounters, of a large corpus the first ones of each kind."""
-    tables = sorted((out / "encounters").glob("*.parquet"))
+    tables: list[Place] = sorted((out / "encounters").glob("*.parquet"), key=str)
     shown: Counter[str] = Counter()
     cards = []
     for table in tables:
@@ -164,102 +165,128 @@ def _write_gallery(path: Path, out: Path, made: Mined) -> None:
     write_page(path, "Encounters mined", first, cards, rest)
 
 
-def inventory(archives: Sequence[Path]) -> tuple[list[Path], list[list[Path]], list[Path]]:
-    """Return the SPMD files, the other logs, each with its files, and the files that are neither.
+Files = tuple[list[Path], list[list[Path]], list[Path]]
+Inventory = tuple[list[Place], list[list[Place]], list[Place]]
+"""The SPMD files, the other logs, each with its files, and the files that are neither."""
+
+
+def inventory(archives: Sequence[Place]) -> Inventory:
+    """Return what lies in archives.
 
     Raises:
         InputError: a path does not exist, or nothing in it can be read.
     """
-    messages: list[Path] = []
-    logs: list[list[Path]] = []
-    others: list[Path] = []
+    messages: list[Place] = []
+    logs: list[list[Place]] = []
+    others: list[Place] = []
     for archive in archives:
-        if not archive.exists():
-            raise InputError(f"{archive} does not exist")
-        before = len(messages) + len(logs)
-        if archive.is_file() or is_bag(archive):
-            (messages.append(archive) if is_spmd(archive) else logs.append([archive]))
-            continue
-        files = sorted(Path(folder, name) for folder, _, names in os.walk(archive) for name in names if not name.startswith("."))
-        spmd: list[Path] = []
-        rest: list[Path] = []
-        for path in files:
-            (spmd if is_spmd(path) else rest).append(path)
-        messages += spmd
-        bags = {path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)}
-        within = {path: not bags.isdisjoint(path.parents) for path in rest} if bags else dict.fromkeys(rest, False)
-        tables = [path for path in rest if not within[path] and (is_table(path) or is_commonroad(path) or is_nocturne(path))]
-        loose = [path for path in rest if path.suffix in (".mcap", ".db3") and not within[path]]
-        if not spmd and not bags and not loose and tables and all(path.parent == archive and is_table(path) for path in tables):
-            logs.append(tables)
-        else:
-            logs += [[path] for path in (*tables, *sorted(bags), *loose)]
-        known = {*spmd, *tables, *loose}
-        others += [path for path in rest if path not in known and not within[path]]
-        if len(messages) + len(logs) == before:
-            raise InputError(f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario")
+        own = _of_objects(archive) if isinstance(archive, Remote) else _of_files(archive)
+        messages += own[0]
+        logs += [list(one) for one in own[1]]
+        others += own[2]
     return messages, logs, others
 
 
-def resolved(paths: Iterable[Path]) -> Iterator[str]:
-    """Yield absolute names without links; folders are resolved once, for there may be 100,000 files."""
+def _of_objects(archive: Remote) -> Inventory:
+    """Return what lies in a store, by the beginnings of its objects, which are copied to files of the same names."""
+    single = archive.looked_up()
+    objects = [single] if single.size >= 0 else list(archive.rglob("*"))
+    if not objects:
+        raise InputError(f"{archive} does not exist, or is empty")
+    with scratch(temporary()) as place:
+        root = place / archive.name
+        found = {root if one is single else root / below(one, archive): one for one in objects}
+        folders = {folder for path in found for folder in path.parents if folder.is_relative_to(root)}
+        download(Part(one, 0, min(one.size, HEAD), path) for path, one in found.items())
+        of_path = {folder: archive if folder == root else archive / folder.relative_to(root).as_posix() for folder in folders}
+        of_path |= found
+        with naming_objects({str(root): archive.url}):
+            messages, logs, others = _of_files(root)
+        return (
+            [of_path[path] for path in messages],
+            [[of_path[path] for path in own] for own in logs],
+            [of_path[p] for p in others],
+        )
+
+
+def _of_files(archive: Path) -> Files:
+    """Return what lies in a folder, or what a file is."""
+    if not archive.exists():
+        raise InputError(f"{archive} does not exist")
+    if archive.is_file() or is_bag(archive):
+        return ([archive], [], []) if is_spmd(archive) else ([], [[archive]], [])
+    files = sorted(Path(folder, name) for folder, _, names in os.walk(archive) for name in names if not name.startswith("."))
+    spmd: list[Path] = []
+    rest: list[Path] = []
+    for path in files:
+        (spmd if is_spmd(path) else rest).append(path)
+    bags = {path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)}
+    within = {path: not bags.isdisjoint(path.parents) for path in rest} if bags else dict.fromkeys(rest, False)
+    tables = [path for path in rest if not within[path] and (is_table(path) or is_commonroad(path) or is_nocturne(path))]
+    loose = [path for path in rest if path.suffix in (".mcap", ".db3") and not within[path]]
+    one_log = not spmd and not bags and not loose and all(path.parent == archive and is_table(path) for path in tables)
+    logs = [tables] if tables and one_log else [[path] for path in (*tables, *sorted(bags), *loose)]
+    if not spmd and not logs:
+        raise InputError(f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario")
+    known = {*spmd, *tables, *loose}
+    return spmd, logs, [path for path in rest if path not in known and not within[path]]
+
+
+def resolved(paths: Iterable[Place]) -> Iterator[str]:
+    """Yield absolute names without links, and URLs; folders are resolved once, for there may be 100,000 files."""
     folders: dict[Path, Path] = {}
     for path in paths:
+        if isinstance(path, Remote):
+            yield path.url
+            continue
         if path.parent not in folders:
             folders[path.parent] = path.parent.resolve()
         yield str(path.resolve() if path.is_symlink() else folders[path.parent] / path.name)
 
 
-def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], config: CorpusConfig) -> None:
+def _agree(out: Place, messages: Sequence[Place], logs: Sequence[Sequence[Place]], config: CorpusConfig) -> None:
     """Write down what the corpus is of; or see that it is of the same.
 
     Raises:
         InputError: it is of something else.
     """
     files = [*messages, *chain.from_iterable(logs)]
+    sizes = [0 if isinstance(path, Path) and path.is_dir() else max(size_of(path), 0) for path in files]
     document = {
         "format": 2,  # of the tables
-        "files": [
-            [name, path.stat().st_size if path.is_file() else 0] for name, path in zip(resolved(files), files, strict=True)
-        ],
+        "files": [[name, size] for name, size in zip(resolved(files), sizes, strict=True)],
         "parameters": {name: value for name, (_, value) in flatten(config).items() if name not in ("memory", "task_rows")},
     }
-    place = out / ARCHIVE
-    if place.exists():
-        before = read_json(place, {"type": "object"})
-        kinds = {"files": "archive, whose files were other ones", "parameters": "set of parameters", "format": "version"}
-        for key, what in kinds.items():
-            if before.get(key) != document[key]:
-                raise InputError(f"{out} is a corpus of another {what}; name another folder, or remove this one")
-        return
-    if any(path.name != ARCHIVE and not path.name.startswith(".") for path in out.iterdir()):
-        raise InputError(f"{out} is not empty and no corpus; name another folder")
-    with arriving(place) as part:
-        write_text(part, json.dumps(document, indent=1) + "\n")
+    before = agreed(out, ARCHIVE, document, "corpus")
+    kinds = {"files": "archive, whose files were other ones", "parameters": "set of parameters", "format": "version"}
+    for key, what in kinds.items():
+        if before.get(key) != document[key]:
+            raise InputError(f"{out} is a corpus of another {what}; name another folder, or remove this one")
 
 
-def hour_tasks(ranged: Sequence[RangeTask], out: Path, config: CorpusConfig) -> list[HourTask]:
+def hour_tasks(ranged: Sequence[RangeTask], out: Place, config: CorpusConfig) -> list[HourTask]:
     """Put the hours that are not searched into tasks of about `task_rows` rows."""
     rows: Counter[int] = Counter()
     seen: set[int] = set()
-    files: dict[int, list[Path]] = {}
-    for task in ranged:
-        if task.target.exists():
-            for hour, count in read_json(task.target.with_suffix(".json"), ACCOUNT)["hours"].items():
-                seen.add(int(hour))
-                if count >= least_rows(config):  # else every range is searched for hours that only wrong stamps name
-                    rows[int(hour)] += count
-                    files.setdefault(int(hour), []).append(task.target)
-    tasks: list[list[tuple[int, tuple[Path, ...]]]] = []
+    files: dict[int, list[Place]] = {}
+    accounts = {task.target.with_suffix(".json"): task.target for task in ranged}
+    for account, here in each_fetched(list(accounts)):
+        for hour, count in read_json(here, ACCOUNT)["hours"].items():
+            seen.add(int(hour))
+            if count >= least_rows(config):  # else every range is searched for hours that only wrong stamps name
+                rows[int(hour)] += count
+                files.setdefault(int(hour), []).append(accounts[account])
+    tasks: list[list[tuple[int, tuple[Place, ...]]]] = []
     room = 0
     sides = -(-overlap(config) // HOUR)
+    done = {path.name for path in (out / "hours").glob("hour-*.parquet")}
     for hour in sorted(seen & {hour for own in files for hour in (own - 1, own)}):  # a meeting may begin with an hour's last row
-        if (out / "hours" / f"hour-{hour}.parquet").exists():
+        if f"hour-{hour}.parquet" in done:
             continue
         if not tasks or rows[hour] > room:
             tasks.append([])
             room = config.task_rows
-        near = sorted({path for near in range(hour - sides, hour + sides + 1) for path in files.get(near, ())})
+        near = sorted({path for near in range(hour - sides, hour + sides + 1) for path in files.get(near, ())}, key=str)
         tasks[-1].append((hour, tuple(near)))
         room -= rows[hour]
     return [HourTask(f"hours {own[0][0]} to {own[-1][0]}", tuple(own), out / "hours", config) for own in tasks]
@@ -270,33 +297,30 @@ def least_rows(config: CorpusConfig) -> int:
     return 2 * (int(min(config.log.min_presence, config.log.min_duration) / max(config.log.longest_gap, config.log.period)) + 1)
 
 
-def clean_tasks(out: Path, config: CorpusConfig) -> list[CleanTask]:
+def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
     """Group all meetings, and put those encounters that are not cleaned into tasks."""
     found = grouped(out, config)
+    there = {path.name for path in (out / "hours").glob("hour-*.rows.parquet")}
     tasks = []
     for k in range(0, len(found), config.task_encounters):
         own = tuple(found[k : k + config.task_encounters])
         target = out / "encounters" / f"found-{k // config.task_encounters:06}.parquet"
         first, last = min(one.meetings[0].start for one in own), max(one.end for one in own)
         first = min(meeting.start for one in own for meeting in one.meetings)
-        rows = tuple(
-            path
-            for hour in range(first // HOUR - 1, last // HOUR + 1)
-            if (path := out / "hours" / f"hour-{hour}.rows.parquet").exists()
-        )
-        if not target.exists():
-            tasks.append(CleanTask(f"encounters from {k}", own, rows, target, config))
-    return tasks
+        names = [f"hour-{hour}.rows.parquet" for hour in range(first // HOUR - 1, last // HOUR + 1)]
+        rows = tuple(out / "hours" / name for name in names if name in there)
+        tasks.append(CleanTask(f"encounters from {k}", own, rows, target, config))
+    return undone(tasks, _target)
 
 
-def grouped(out: Path, config: CorpusConfig) -> list[Found]:
+def grouped(out: Place, config: CorpusConfig) -> list[Found]:
     """Return the encounters of all meetings, and write their table."""
     import pyarrow as pa
     from pyarrow import parquet
 
     names = ("gap", "start", "a", "b", "end", "kind", "distance", "lat", "lon")
-    tables = sorted((out / "hours").glob("hour-*[0-9].parquet"))
-    rows = (row for path in tables for row in parquet.read_table(path, columns=list(names)).to_pylist())
+    tables: list[Place] = sorted((out / "hours").glob("hour-*[0-9].parquet"), key=str)
+    rows = (row for _, here in each_fetched(tables) for row in parquet.read_table(here, columns=list(names)).to_pylist())
     meetings = [Meeting(*(row[name] for name in names)) for row in rows]
     found = group(meetings, config.log)
     listed = [
@@ -314,15 +338,16 @@ def grouped(out: Path, config: CorpusConfig) -> list[Found]:
     return found
 
 
-def summary(out: Path, config: CorpusConfig, failed: list[str], others: Sequence[Path] = ()) -> Mined:
+def summary(out: Place, config: CorpusConfig, failed: list[str], others: Sequence[Place] = ()) -> Mined:
     """Return what is in a corpus, by listing it; `others` are files of the archive that were not read."""
     from pyarrow import parquet
 
     files: dict[str, Counter[str]] = {}
     notes: list[str] = []
     strays, least = 0, least_rows(config)
-    for path in sorted((out / "messages").glob("*.json")):
-        account = read_json(path, ACCOUNT)
+    accounts_of_text: list[Place] = sorted((out / "messages").glob("*.json"), key=str)
+    for _, here in each_fetched(accounts_of_text):
+        account = read_json(here, ACCOUNT)
         notes += account["notes"]
         strays += sum(int(count) for count in account["hours"].values() if count < least)
         for file, causes in account["files"].items():
@@ -337,13 +362,14 @@ def summary(out: Path, config: CorpusConfig, failed: list[str], others: Sequence
             f"{strays} rows lie in an hour of which their range of text has fewer than {least} (wrong stamps?): not searched"
         )
     shared: Counter[str] = Counter()
-    for path in sorted((out / "hours").glob("hour-*[0-9].parquet")):
-        shared.update(json.loads((parquet.read_schema(path).metadata or {}).get(b"shared", b"{}")).keys())
+    hours: list[Place] = sorted((out / "hours").glob("hour-*[0-9].parquet"), key=str)
+    for _, here in each_fetched(hours):
+        shared.update(json.loads((parquet.read_schema(here).metadata or {}).get(b"shared", b"{}")).keys())
     if shared:
         first = ", ".join(sorted(shared)[:10])
         notes.append(f"{len(shared)} ids are borne by several vehicles at once, and told apart by place: {first} …")
-    tables = sorted((out / "encounters").glob("*.parquet"))
-    accounts = [account_of(path) for path in tables]
+    tables: list[Place] = sorted((out / "encounters").glob("*.parquet"), key=str)
+    accounts = [account_of(here, path) for path, here in each_fetched(tables)]
     kinds = Counter(row["kind"] for row in rows_of(tables, ["kind"]))
     total: Counter[str] = Counter()
     for causes in files.values():

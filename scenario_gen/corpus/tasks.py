@@ -12,6 +12,7 @@ from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
+import json
 import logging
 import multiprocessing
 import os
@@ -22,9 +23,14 @@ import time
 import traceback
 from typing import Any, TypeVar
 
+from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import InputError, needs
-from scenario_gen.base.folders import naming, scratch, sync
+from scenario_gen.base.folders import naming, scratch, sync, write_text
+from scenario_gen.base.folders.claim import alone
+from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.base.interrupts import ending, starting
+from scenario_gen.base.stores import create, fetched, Place, Remote, upload
+from scenario_gen.base.stores import temporary as scratch_folder
 
 Task = TypeVar("Task")
 Progress = Callable[[int, int, str], None]
@@ -40,12 +46,20 @@ WAVE = 4  # tasks for each worker that the scheduler holds at a time
 
 
 @contextmanager
-def arriving(target: Path) -> Iterator[Path]:
+def arriving(target: Place) -> Iterator[Path]:
     """Give a temporary path beside `target`; at the end what was written there, file or folder, takes its name, synced.
+
+    To a store it is copied: each object is whole or not there.
 
     Raises:
         OSError: the disk is full, or fails; it names the file.
+        InputError: the store refuses it or goes on failing.
     """
+    if isinstance(target, Remote):
+        with scratch(scratch_folder()) as place:
+            yield place / target.name
+            upload(place / target.name, target)
+        return
     target.parent.mkdir(parents=True, exist_ok=True)
     with scratch(target.parent) as place:
         temporary = place / target.name  # for a bag's files are called as its folder is
@@ -61,17 +75,78 @@ def arriving(target: Path) -> Iterator[Path]:
         sync(target.parent)
 
 
-def check_out(out: Path, read: Sequence[Path]) -> None:
+def check_out(out: Place, read: Sequence[Place]) -> None:
     """Refuse a file as the folder of results, and a folder in what is read.
 
     Raises:
         InputError: it is one.
     """
-    if out.exists() and not out.is_dir():
+    if isinstance(out, Path) and out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file; name a folder")
     for source in read:
-        if out.resolve().is_relative_to(source.resolve()):
+        if _lies_in(out, source):
             raise InputError(f"{out} lies in {source}, of which it would become a part; name a folder outside of it")
+
+
+def _lies_in(out: Place, source: Place) -> bool:
+    if isinstance(out, Path) and isinstance(source, Path):
+        return out.resolve().is_relative_to(source.resolve())
+    return f"{out}/".startswith(f"{source}/")
+
+
+@contextmanager
+def held(out: Place) -> Iterator[None]:
+    """Keep other runs out of a folder of results, and remove at the end what runs have left there.
+
+    A store has no locks: there two runs that `agreed` write the same bytes, each object whole.
+
+    Raises:
+        InputError: another run is at work there.
+    """
+    if isinstance(out, Remote):
+        yield
+        return
+    out.mkdir(parents=True, exist_ok=True)
+    with alone(out), ending(partial(sweep_tree, out)):
+        sweep_tree(out)
+        yield
+
+
+def agreed(out: Place, name: str, document: Mapping[str, Any], kind: str) -> Mapping[str, Any]:
+    """Write down what results are of, or return what was written there before.
+
+    Args:
+        out: folder of the results.
+        name: of the file.
+        document: its content.
+        kind: of results, in messages.
+
+    Raises:
+        InputError: the folder holds something else.
+    """
+    place, text = out / name, json.dumps(document, indent=1) + "\n"
+    if not place.exists():
+        if _holds_anything(out):
+            raise InputError(f"{out} is not empty and no {kind}; name another folder")
+        if isinstance(place, Path):
+            with arriving(place) as part:
+                write_text(part, text)
+            return document
+        if create(place, text.encode()):
+            return document
+    with fetched([place]) as (here,):
+        found: dict[str, Any] = read_json(here, {"type": "object"})
+    return found
+
+
+def _holds_anything(out: Place) -> bool:
+    return out.exists() if isinstance(out, Remote) else any(not path.name.startswith(".") for path in out.iterdir())
+
+
+def undone(tasks: Sequence[Task], target: Callable[[Task], Place]) -> list[Task]:
+    """Return the tasks whose file is not there; each folder is listed once."""
+    there = {str(path) for folder in {target(task).parent for task in tasks} for path in folder.glob("*")}
+    return [task for task in tasks if str(target(task)) not in there]
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, needs, reading
 from scenario_gen.base.registry import Registry
+from scenario_gen.base.stores import local
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
@@ -404,6 +405,7 @@ def present(path: Path) -> list[Path]:
     """
     if not path.exists():
         beside = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
+        local(path, "a log")
         raise InputError(f"{path} does not exist; check the name and the folder{did_you_mean(path.name, beside)}")
     if not (path.is_file() or path.is_dir()):
         raise InputError(f"{path} is neither a file nor a folder")

@@ -17,10 +17,12 @@ from scenario_gen.base.errors import needs
 
 EXTRA_MODULES = (
     *(
+        "aiohttp",
         "betterosi",
         "dask",
         "distributed",
         "duckdb",
+        "fsspec",
         "gymnasium",
         "jinja2",
         "lz4",
@@ -30,6 +32,7 @@ EXTRA_MODULES = (
         "pyarrow",
         "rich",
         "rosbags",
+        "s3fs",
     ),
     *("typer", "zstandard"),
 )

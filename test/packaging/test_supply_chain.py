@@ -40,7 +40,7 @@ def test_setup_py_asks_for_the_same(tmp_path):
             (names if len(asked) > 1 else asked["core"]).add(Requirement(line).name)
     listed = {name: {one.name for one in wanted} for name, wanted in extras().items()}
     everything = set().union(*listed.values()) - listed["core"]
-    apart = {"ompl", "gymnasium", "matplotlib", "betterosi"}
+    apart = {"ompl", "gymnasium", "matplotlib", "betterosi", "fsspec", "s3fs", "aiohttp"}
     assert asked["core"] == listed["core"] and asked["all"] == everything == asked["corpus"] | apart
     assert asked["cli"] == everything - listed["corpus"] - apart
     assert asked["ros"] - everything == {"ros-jazzy-rclpy", "ros-jazzy-common-interfaces"}

@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Mining in an object store, before a server that speaks S3: the same bytes as in folders, also when it fails."""
+
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import count
+import os
+from pathlib import Path
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import pytest
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.stores import place, read
+from scenario_gen.corpus.mine import mine
+
+pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
+KEYS = {"AWS_ACCESS_KEY_ID": "any", "AWS_SECRET_ACCESS_KEY": "any", "AWS_DEFAULT_REGION": "us-east-1"}
+
+
+def free_port():
+    with socket.socket() as own:
+        own.bind(("127.0.0.1", 0))
+        return own.getsockname()[1]
+
+
+def answers(address):
+    try:
+        with urlopen(address, timeout=1.0):
+            return True
+    except HTTPError:
+        return True
+    except OSError:
+        return False
+
+
+@pytest.fixture(scope="module")
+def server():
+    """Moto's server in a process of its own."""
+    address = f"http://127.0.0.1:{free_port()}"
+    command = [sys.executable, "-m", "moto.server", "-p", address.rpartition(":")[2]]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            while not answers(address):
+                assert process.poll() is None
+                time.sleep(0.1)
+            yield address
+        finally:
+            process.kill()
+
+
+@pytest.fixture
+def bucket(server, archive, monkeypatch, request):
+    """The archive in a bucket of its own, whose URL this is."""
+    import boto3
+    import fsspec
+
+    for name, value in {**KEYS, "AWS_ENDPOINT_URL": server}.items():
+        monkeypatch.setenv(name, value)
+    fsspec.get_filesystem_class("s3").clear_instance_cache()
+    client, name = boto3.client("s3"), f"b{abs(hash(request.node.name))}"
+    client.create_bucket(Bucket=name)
+    for path in archive.glob("*.csv"):
+        client.upload_file(str(path), name, f"spmd/{path.name}")
+    return f"s3://{name}"
+
+
+def tables(out):
+    """{name: bytes} of the tables of a corpus, in a folder or in a store; not of its text's, which name files."""
+    if isinstance(out, Path):
+        return {path.name: path.read_bytes() for path in (out / "encounters").glob("*.parquet")}
+    return {one.name: read(one) for one in (out / "encounters").glob("*.parquet")}
+
+
+def command(*words, **environment):
+    """Run the command line in a process of its own."""
+    words = [sys.executable, "-m", "scenario_gen", *words]
+    return subprocess.Popen(words, env={**os.environ, **environment}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.mark.parametrize(("stored", "to_store"), [(True, True), (True, False), (False, True)])
+def test_the_corpus_is_the_same_wherever_archive_and_corpus_lie(bucket, archive, corpus, tmp_path, stored, to_store):
+    out = place(f"{bucket}/out", to_write=True) if to_store else tmp_path / "out"
+    made = mine([place(f"{bucket}/spmd") if stored else archive], out)
+    assert made.encounters == corpus[1].encounters and not made.failed
+    assert tables(out) == tables(corpus[0])
+    assert (out / "encounters.html").exists()
+
+
+def test_what_is_done_is_not_done_again_and_another_archive_is_refused(bucket, archive):
+    out = place(f"{bucket}/out")
+    mine([place(f"{bucket}/spmd")], out)
+    before = {one.url: one.etag for one in out.rglob("*.parquet")}
+    mine([place(f"{bucket}/spmd")], out)
+    assert {one.url: one.etag for one in out.rglob("*.parquet")} == before
+    with pytest.raises(InputError, match="corpus of another archive"):
+        mine([archive], out)
+
+
+class Failing(BaseHTTPRequestHandler):
+    """Passes requests on to a server; some get 503 instead, some nothing."""
+
+    protocol_version = "HTTP/1.1"
+    to = ""
+    requests = count(1)
+
+    def log_message(self, *_):
+        """Be silent."""
+
+    def _pass(self):
+        number = next(self.requests)
+        body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        if number % 7 == 0:
+            self.close_connection = True
+            self.connection.shutdown(socket.SHUT_RDWR)
+            return
+        if number % 5 == 0:
+            self.send_response(503)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+            return
+        headers = {name: value for name, value in self.headers.items() if name.lower() not in ("host", "connection")}
+        headers.setdefault("Content-Type", "application/octet-stream")  # urllib's own is that of a form
+        asked = Request(self.to + self.path, data=body or None, headers=headers, method=self.command)
+        try:
+            with urlopen(asked) as answer:
+                status, found, data = answer.status, answer.headers, answer.read()
+        except HTTPError as error:
+            status, found, data = error.code, error.headers, error.read()
+        self.send_response(status)
+        for name, value in found.items():
+            if name.lower() not in ("transfer-encoding", "connection", "content-length", "server", "date"):
+                self.send_header(name, value)
+        length = found.get("Content-Length", "0") if self.command == "HEAD" else str(len(data))
+        self.send_header("Content-Length", length)
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(data)
+
+    do_GET = do_PUT = do_POST = do_HEAD = do_DELETE = _pass  # noqa: N815
+
+
+@pytest.fixture
+def failing(server, monkeypatch):
+    """The same server behind one that fails: every fifth answer is 503, every seventh connection breaks."""
+    import fsspec
+
+    handler = type("To", (Failing,), {"to": server})
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as proxy:
+        thread = threading.Thread(target=proxy.serve_forever)
+        thread.start()
+        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{proxy.server_address[1]}")
+        fsspec.get_filesystem_class("s3").clear_instance_cache()
+        yield
+        proxy.shutdown()
+        thread.join()
+
+
+def test_a_store_that_fails_now_and_then_gives_the_same_bytes(bucket, failing, corpus):
+    out = place(f"{bucket}/failing")
+    made = mine([place(f"{bucket}/spmd")], out)
+    assert not made.failed, made.failed[0]
+    assert tables(out) == tables(corpus[0])
+
+
+@pytest.mark.parametrize("seconds", [1.5, 2.5, 3.5])
+def test_a_killed_run_is_gone_on_with(bucket, corpus, seconds):
+    out = place(f"{bucket}/killed")
+    words = ("mine", f"{bucket}/spmd", "--out", f"{bucket}/killed", "--workers", "1")
+    with command(*words) as process:
+        time.sleep(seconds)
+        process.send_signal(signal.SIGKILL)
+    with command(*words) as process:
+        _, said = process.communicate()
+    assert process.returncode == 0, said
+    assert tables(out) == tables(corpus[0])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("mine", "BUCKET/nothing", "--out", "BUCKET/out"), "s3://.*/nothing does not exist"),
+        (("mine", "s3://no-such-bucket/a", "--out", "BUCKET/out"), "s3://no-such-bucket/a does not exist; check bucket and name"),
+        (("mine", "BUCKET/spmd", "--out", "https://example.org/x"), "https is only read"),
+        (("mine", "ftp://host/a", "--out", "BUCKET/out"), "ftp is not read or written"),
+        (("batch", "BUCKET/out", "--roads", "straight", "--out", "x"), "batch takes a file or folder; copy it first"),
+        (("find", "BUCKET/out"), "find takes a file or folder"),
+        (("generate", "BUCKET/spmd/one.csv", "--road", "straight", "--out", "x"), "a log takes a file or folder; copy it first"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_line_with_its_url(bucket, tmp_path, words, said):
+    import re
+
+    with command(*(word.replace("BUCKET", bucket) for word in words)) as process:
+        out, errors = process.communicate()
+    assert process.returncode == 2 and re.search(said, " ".join(errors.split())), (out, errors)
+    assert "Traceback" not in errors
+
+
+def test_without_credentials_the_remedy_is_named(bucket, tmp_path):
+    nobody = {"AWS_ACCESS_KEY_ID": "", "AWS_SECRET_ACCESS_KEY": "", "AWS_EC2_METADATA_DISABLED": "true", "HOME": str(tmp_path)}
+    with command("mine", f"{bucket}/spmd", "--out", f"{bucket}/out", **nobody) as process:
+        _, errors = process.communicate()
+    assert process.returncode == 2 and "AWS_ACCESS_KEY_ID" in errors, errors
