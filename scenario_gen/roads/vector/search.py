@@ -92,7 +92,10 @@ class _Field:
             return distance, cells[..., 1] * size[0] + cells[..., 0]
 
         parts = [slice(k, k + _AT_ONCE) for k in range(0, len(points), _AT_ONCE)]
-        known = np.unique(np.concatenate([np.unique(around(part)[1]) for part in parts]))
+        seen = np.zeros(int(size[0] * size[1]), dtype=np.bool_)
+        for part in parts:
+            seen[around(part)[1]] = True
+        known = np.flatnonzero(seen)
         self.index = np.full(int(size[0] * size[1]), len(known), dtype=np.int32)
         self.index[known] = np.arange(len(known))
         self.size = size
