@@ -13,7 +13,7 @@ import typer
 
 from scenario_gen.base.errors import did_you_mean, InputError, printable
 from scenario_gen.cli.options import configured, ParametersOption, remind, SetOption
-from scenario_gen.cli.output import bars, Commands, give, open_page, say, say_rows
+from scenario_gen.cli.output import bars, beside, Commands, give, open_page, say, say_rows
 
 commands = Commands("Look at a bag of scenarios")
 OTHER = "Other formats"
@@ -60,7 +60,7 @@ def report(
         page = folders[0] / REPORT
     else:
         remind(bag)
-        folder = out or bag.resolve().with_name(f"{bag.resolve().stem}_report")
+        folder = out or beside(bag, f"{bag.resolve().stem}_report")
         with bars() as advance:
             write_page(bag, folder, progress=partial(advance, "scenarios"))
         page = folder / REPORT
@@ -136,7 +136,7 @@ def export_scenarios(
         else:
             config = assigned(config, option)
     remind(bag)
-    folder = out or bag.resolve().with_name(f"{bag.resolve().name}_{to}")
+    folder = out or beside(bag, f"{bag.resolve().name}_{to}")
     with bars() as advance:
         result = export_bag(
             bag, folder, to, config, bag_config, namespace=namespace, indices=index or (), progress=partial(advance, "scenarios")
@@ -153,7 +153,7 @@ def import_scenario(
     """Convert the trajectories of a CommonRoad or OpenSCENARIO file to a table that `generate` reads."""
     from scenario_gen.output.exchange.importing import import_file
 
-    target = out or file.with_suffix(".csv")
+    target = out or beside(file, f"{file.stem}.csv")
     result = import_file(file, target)
     rows = sum(len(track.rows) for track in result.tracks)
     give(vehicles=len(result.tracks), rows=rows, file=target, notes=result.notes)
@@ -170,7 +170,7 @@ def save_bag(
     """Recover the intact messages of an unclosed or damaged bag. The old files stay as they are."""
     from scenario_gen.bags.storage.reindex import reindex
 
-    target = out or bag.resolve().with_name(f"{bag.resolve().name}_reindexed")
+    target = out or beside(bag, f"{bag.resolve().name}_reindexed")
     result = reindex(bag, target, configured(parameter_file, assignments).bag)
     give(messages=result.messages, bag=target, notes=result.lines())
     for line in (f"{result.messages} messages: {target}", *result.lines()):

@@ -12,7 +12,7 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.base.stores import local, Place, place
+from scenario_gen.base.stores import Place, place
 from scenario_gen.cli.options import assigned_all, takes
 from scenario_gen.cli.output import Commands, give, say, say_rows, status
 
@@ -53,7 +53,7 @@ def conclude(failed: Sequence[str], out: Place) -> None:
         raise RefusedError(f"{len(failed)} tasks failed, see above; the results of the others are in {out}")
 
 
-@commands.command()
+@commands.command(urls=("archive", "out"))
 def mine(
     archive: Annotated[
         list[Path],
@@ -101,9 +101,9 @@ def synthetic_archive(
 class Batch:
     """The options of `batch`."""
 
-    corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote.")]
+    corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote, or s3://….")]
     roads: Annotated[list[str], typer.Option(help="Roads, as for `generate`: separated by commas, or repeated.")]
-    out: Annotated[Path, typer.Option(help="Folder for tables and bags. An unfinished batch is continued.")]
+    out: Annotated[Path, typer.Option(help="Folder for tables and bags, or s3://…. An unfinished batch is continued.")]
     count: Annotated[int, typer.Option(min=1, max=100_000, help="Scenarios per template and road.")] = 50
     seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 0
     templates: Annotated[int, typer.Option(min=0, help="Use the first so many templates of the corpus. 0: all.")] = 0
@@ -115,25 +115,23 @@ class Batch:
     ] = None
 
 
-@commands.command()
+@commands.command(urls=("corpus", "out"))
 @takes(Batch)
 def batch(options: Batch) -> None:
     """Generate scenarios from all templates of a corpus on all given roads."""
     from scenario_gen.corpus.batch import BatchRequest, run_batch
     from scenario_gen.method.config import PipelineConfig
 
-    for path in (options.corpus, options.out):
-        local(path, "batch")
-    config = assigned_all(PipelineConfig(), options.assignments)
+    config, out = assigned_all(PipelineConfig(), options.assignments), place(options.out, to_write=True)
     names = [name for text in options.roads for name in text.split(",") if name]
     with workers_of(options.workers, options.scheduler) as who:
         result = run_batch(
-            options.corpus, names, options.out, BatchRequest(config, options.count, options.seed),
+            place(options.corpus), names, out, BatchRequest(config, options.count, options.seed),
             templates=options.templates, workers=who,
         )  # fmt: skip
     give(summary=result.lines())
     lines(result.lines())
-    conclude(result.failed, options.out)
+    conclude(result.failed, out)
 
 
 def needs_bag(bag: Path | None) -> None:
@@ -151,9 +149,9 @@ def shown(value: object) -> str:
     return "" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
-@commands.command()
+@commands.command(urls=("batch",))
 def find(
-    batch: Annotated[Path, typer.Argument(help="A batch, finished or not.")],
+    batch: Annotated[Path, typer.Argument(help="A batch, finished or not; or s3://….")],
     condition: Annotated[str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")] = "true",
     limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list. 0: all.")] = 20,
     bag: Annotated[
@@ -168,21 +166,19 @@ def find(
     from scenario_gen.corpus import find as finding
     from scenario_gen.output.review.evaluation import write_page
 
-    for path in (batch, bag, report):
-        if path is not None:
-            local(path, "find")
     if report is not None:
         needs_bag(bag)
-    found = finding.find(batch, condition, limit)
-    give(scenarios=found.rows, coverage=finding.coverage_lines(found, batch))
+    source = place(batch)
+    found = finding.find(source, condition, limit)
+    give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
     say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in found.rows], names=5)
-    lines(finding.coverage_lines(found, batch))
+    lines(finding.coverage_lines(found, source))
     if again:
         for row in found.rows:
-            finding.make_again(batch, row)
+            finding.make_again(source, row)
         lines([f"{len(found.rows)} scenarios generated again: all byte-identical"])
     if bag is not None:
-        finding.export_hits(batch, found.rows, bag)
+        finding.export_hits(source, found.rows, bag)
         give(bag=bag)
         lines([f"bag: {bag}"])
         if report is not None:
@@ -191,7 +187,7 @@ def find(
             lines([f"report: {report}"])
 
 
-@commands.command()
+@commands.command(urls=("corpus",))
 def library(
     corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote. The library goes to CORPUS/library.")],
     most: Annotated[
@@ -207,10 +203,9 @@ def library(
     """Segment the encounters of a corpus together; write the primitives that they share."""
     from scenario_gen.corpus.library import build, SHARED
 
-    config = assigned_all(SHARED, assignments)
-    local(corpus, "library")
+    config, source = assigned_all(SHARED, assignments), place(corpus, to_write=True)
     with workers_of(workers, scheduler) as who:
-        built = build(corpus, config, most=most, seed=seed, workers=who)
+        built = build(source, config, most=most, seed=seed, workers=who)
     give(summary=built.lines())
     lines(built.lines())
-    conclude(built.failed, corpus / "library")
+    conclude(built.failed, source / "library")

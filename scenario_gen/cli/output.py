@@ -18,7 +18,9 @@ import webbrowser
 
 import typer
 
-from scenario_gen.base.errors import presentable, printable, ScenarioGenError
+from scenario_gen.base.errors import InputError, presentable, printable, ScenarioGenError
+from scenario_gen.base.stores import renamed
+from scenario_gen.cli import places
 
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.", rich_help_panel="Output")]
 JsonOption = Annotated[
@@ -62,22 +64,32 @@ def printing(command: str, *, quiet: bool, as_json: bool) -> Iterator[None]:
 
 
 class Commands(typer.Typer):
-    """Commands that stand together in `--help`; each takes --quiet and --json."""
+    """Commands that stand together in `--help`; each takes --quiet and --json, and URLs of a store where it takes paths."""
 
     def __init__(self, panel: str) -> None:
         super().__init__()
         self.panel = panel
 
-    def command(self, name: str | None = None, *, panel: str = "", **options: Any) -> Callable[..., Any]:
-        """Return a decorator that adds a command, as typer's; the function itself stays as it is."""
+    def command(
+        self, name: str | None = None, *, panel: str = "", urls: Sequence[str] = (), **options: Any
+    ) -> Callable[..., Any]:
+        """Return a decorator that adds a command, as typer's; the function itself stays as it is.
+
+        Args:
+            name: of the command; the function's by default.
+            panel: of `--help`.
+            urls: parameters whose URLs the function takes itself.
+            options: of typer.
+        """
 
         def of(function: Callable[..., None]) -> Callable[..., None]:
             own = name or function.__name__
 
             @functools.wraps(function)
             def run(*, quiet: bool, as_json: bool, **values: Any) -> None:
-                with printing(own, quiet=quiet or _current.quiet, as_json=as_json or _current.as_json):
-                    function(**values)
+                how = printing(own, quiet=quiet or _current.quiet, as_json=as_json or _current.as_json)
+                with how, places.as_files(values, paths) as own_values:
+                    function(**own_values)
 
             signature = getattr(function, "__signature__", None) or inspect.signature(function)
             hints = get_type_hints(function, include_extras=True) | {"quiet": QuietOption, "as_json": JsonOption}
@@ -85,6 +97,7 @@ class Commands(typer.Typer):
                 entry.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[entry.name])
                 for entry in signature.parameters.values()
             ]
+            paths = places.paths_of(parameters, urls)
             parameters += [
                 inspect.Parameter(flag, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=hints[flag])
                 for flag in ("quiet", "as_json")
@@ -105,7 +118,7 @@ def start(*, quiet: bool, as_json: bool) -> None:
 
 def give(**results: Any) -> None:
     """Add results to the object of --json."""
-    _current.results |= results
+    _current.results |= plain(results)
 
 
 def print_object(results: Mapping[str, Any]) -> None:
@@ -127,7 +140,7 @@ def plain(value: Any) -> Any:
         return value if math.isfinite(value) else None
     if value is None or isinstance(value, (bool, int)):
         return value
-    return printable(str(value))
+    return printable(renamed(str(value)))
 
 
 def say(*what: Any, sep: str = " ", wrap: bool = False) -> None:
@@ -135,7 +148,8 @@ def say(*what: Any, sep: str = " ", wrap: bool = False) -> None:
     from scenario_gen.base.terminal import Terminal
 
     if not _current.quiet:
-        Terminal(stderr=_current.as_json).print(*what, sep=sep, soft_wrap=not wrap)
+        texts = [renamed(one) if isinstance(one, str) else one for one in what]
+        Terminal(stderr=_current.as_json).print(*texts, sep=sep, soft_wrap=not wrap)
 
 
 def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1) -> None:
@@ -185,9 +199,21 @@ def status() -> AbstractContextManager[Callable[[str], None]]:
     return nullcontext(lambda _: None) if _current.quiet else status_line()
 
 
+def beside(path: Path, name: str) -> Path:
+    """Return the path of that name beside an input, where a command writes by default.
+
+    Raises:
+        InputError: the input is the copy of an object, beside which nothing would stay.
+    """
+    if (url := renamed(str(path))) != str(path):
+        raise InputError(f"--out is missing: name a folder or a place in a store, for nothing is written beside {url}")
+    return path.resolve().with_name(name)
+
+
 def open_page(page: Path) -> bool:
     """Open a page in a browser if somebody sits at this terminal and there is a display; return whether it was opened."""
     has_display = sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
-    if _current.as_json or _current.quiet or not (sys.stdout.isatty() and has_display):
+    is_copy = renamed(str(page)) != str(page)
+    if is_copy or _current.as_json or _current.quiet or not (sys.stdout.isatty() and has_display):
         return False
     return webbrowser.open(page.resolve().as_uri())

@@ -11,27 +11,23 @@ The table of cases is written last, so a part is done where that table is; no ot
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from hashlib import sha256
-from itertools import islice
+from itertools import groupby
 import json
 from pathlib import Path
 from typing import Any
 
 from scenario_gen.bags.recordings.write import add_results, scenario_bytes
 from scenario_gen.bags.storage.writer import BagWriter
-from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import InputError, needs, RefusedError
-from scenario_gen.base.folders import sha256_of, write_text
-from scenario_gen.base.folders.claim import alone
-from scenario_gen.base.folders.scratch import sweep_tree
-from scenario_gen.base.interrupts import ending
+from scenario_gen.base.folders import sha256_of
 from scenario_gen.base.provenance import parameter_texts, versions
+from scenario_gen.base.stores import each_fetched, Place
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
-from scenario_gen.corpus.tasks import arriving, check_out, spread, Workers
+from scenario_gen.corpus.tasks import agreed, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import at_period, criticality
@@ -64,11 +60,11 @@ class BatchRequest:
 class PartTask:
     """Templates (table, row) to place on a road, and where the three files go: `out`/…/road=`token`/part-`number`."""
 
-    templates: tuple[tuple[Path, int], ...]
+    templates: tuple[tuple[Place, int], ...]
     road: str
     token: str
     number: int
-    out: Path
+    out: Place
     request: BatchRequest
 
     @property
@@ -76,8 +72,8 @@ class PartTask:
         """The task in messages."""
         return f"part {self.number} on {self.token}"
 
-    def place(self, what: str, ending: str = ".parquet") -> Path:
-        """Return the path of one of the three."""
+    def target(self, what: str, ending: str = ".parquet") -> Place:
+        """Return where one of the three goes."""
         return self.out / what / f"road={self.token}" / f"part-{self.number:05}{ending}"
 
 
@@ -110,9 +106,9 @@ class Batch:
 
 
 def run_batch(
-    corpus: Path,
+    corpus: Place,
     roads: Sequence[str],
-    out: Path,
+    out: Place,
     request: BatchRequest = BatchRequest(),
     *,
     templates: int = 0,
@@ -138,28 +134,29 @@ def run_batch(
     rows = rows[: templates or None]
     if not rows:
         raise InputError(f"{corpus} holds no encounter")
-    first = encounter_of(_row(*rows[0]), rows[0][0])
+    first = next(encounter_of(row, table) for row, table in _rows(rows[:1]))
     for road in roads:  # an unknown name ends the batch; it is no cause of single cases
         with suppress(RefusedError):
             build_road(road, first, request.config.road)
     document = {
         "format": 1,
-        "corpus": [sha256_of(table) for table in tables],
+        "corpus": [sha256_of(here) for _, here in each_fetched(tables)],
         "roads": list(roads),
         "count": request.count,
         "seed": request.seed,
         "templates": len(rows),
         "parameters": parameter_texts(request.config),
     }
-    out.mkdir(parents=True, exist_ok=True)
-    with alone(out), ending(partial(sweep_tree, out)), spread(workers) as go:
-        _agree(out, document)
-        sweep_tree(out)
-        tasks = [task for task in parts(rows, roads, out, request) if not task.place("cases").exists()]
+    with held(out), spread(workers) as go:
+        before = agreed(out, BATCH, document, "batch")
+        other = [key for key in document if before.get(key) != document[key]]
+        if other:
+            raise InputError(f"{out} is a batch of other {', '.join(other)}; name another folder, or remove this one")
+        tasks = undone(parts(rows, roads, out, request), lambda task: task.target("cases"))
         return summary(out, go(generate_part, tasks))
 
 
-def parts(rows: Sequence[tuple[Path, int]], roads: Sequence[str], out: Path, request: BatchRequest) -> list[PartTask]:
+def parts(rows: Sequence[tuple[Place, int]], roads: Sequence[str], out: Place, request: BatchRequest) -> list[PartTask]:
     """Return the tasks: ten templates on one road each, whatever the number of workers."""
     tokens = tokens_of(roads)
     return [
@@ -180,54 +177,37 @@ def seed_of(seed: int, template: str, road: str) -> int:
     return int.from_bytes(sha256(f"{seed}\n{template}\n{road}".encode()).digest()[:4], "big")
 
 
-def _agree(out: Path, document: Mapping[str, Any]) -> None:
-    """Write the request of a batch to its folder, or compare it with the one that is there.
-
-    Raises:
-        InputError: the folder holds something else, or a batch of another request.
-    """
-    place = out / BATCH
-    if place.exists():
-        before = read_json(place, {"type": "object"})
-        other = [key for key in document if before.get(key) != document[key]]
-        if other:
-            raise InputError(f"{out} is a batch of other {', '.join(other)}; name another folder, or remove this one")
-        return
-    if any(not path.name.startswith(".") for path in out.iterdir()):
-        raise InputError(f"{out} is not empty and no batch; name another folder")
-    with arriving(place) as part:
-        write_text(part, json.dumps(document, indent=1) + "\n")
-
-
 def generate_part(task: PartTask) -> None:
     """Generate a part's scenarios and write its bag and its two tables; done if the table of cases is there.
 
     Raises:
         OSError: the disk is full, or fails.
     """
-    if task.place("cases").exists():
+    if task.target("cases").exists():
         return
     cases, results = [], dict[str, GenerationResult]()
-    for k, (table, row) in enumerate(task.templates):
-        case, result = _generate_case(_row(table, row), table, f"/case_{k}", task)
+    for k, (row, table) in enumerate(_rows(task.templates)):
+        case, result = _generate_case(row, table, f"/case_{k}", task)
         cases.append(case)
         if result is not None and len(result.generated.scenarios):
             results[f"/case_{k}"] = result
     scenarios = [row for name, result in results.items() for row in _scenario_rows(name, result, cases, task)]
     if results:
-        with arriving(task.place("bags", "")) as part, BagWriter(part) as bag:
+        with arriving(task.target("bags", "")) as part, BagWriter(part) as bag:
             add_results(bag, results)
-    _write(task.place("scenarios"), scenarios, SCENARIO_COLUMNS)
-    _write(task.place("cases"), cases, CASE_COLUMNS)
+    _write(task.target("scenarios"), scenarios, SCENARIO_COLUMNS)
+    _write(task.target("cases"), cases, CASE_COLUMNS)
 
 
-def _row(table: Path, row: int) -> dict[str, Any]:
-    """One row of a table of encounters."""
-    return next(islice(rows_of([table]), row, None))
+def _rows(templates: Sequence[tuple[Place, int]]) -> Iterator[tuple[dict[str, Any], Place]]:
+    """Yield the rows (table, number) of encounters, each with its table; a table is read once for those that follow."""
+    for table, own in groupby(templates, key=lambda template: template[0]):
+        rows = list(rows_of([table]))
+        yield from ((rows[number], table) for _, number in own)
 
 
 def _generate_case(
-    row: Mapping[str, Any], table: Path, namespace: str, task: PartTask
+    row: Mapping[str, Any], table: Place, namespace: str, task: PartTask
 ) -> tuple[dict[str, Any], GenerationResult | None]:
     """Generate one template's scenarios; a refusal is a case without any, with the reason."""
     request, seed = task.request, seed_of(task.request.seed, row["name"], task.road)
@@ -295,7 +275,7 @@ CASE_COLUMNS = {
 }
 
 
-def _write(target: Path, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
+def _write(target: Place, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
     """Write a table, whole or not at all; NaN becomes null."""
     import pyarrow as pa
     from pyarrow import parquet
@@ -307,9 +287,10 @@ def _write(target: Path, rows: Sequence[Mapping[str, Any]], columns: Mapping[str
         parquet.write_table(pa.Table.from_pylist(clean, schema=schema), part, compression="zstd")
 
 
-def summary(out: Path, failed: list[str]) -> Batch:
+def summary(out: Place, failed: list[str]) -> Batch:
     """Return the figures of the parts that are done."""
-    cases = list(rows_of(sorted((out / "cases").rglob("*.parquet"))))
+    tables: list[Place] = sorted((out / "cases").rglob("*.parquet"), key=str)
+    cases = list(rows_of(tables))
     refused: Counter[str] = Counter()
     for case in cases:
         refused.update(json.loads(case["refused"]))

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 import json
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from scenario_gen.bags.recordings.tracks import tracks_bytes, tracks_of
 from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.base.stores import each_fetched, fetched, Place, Remote
+from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
@@ -35,9 +35,6 @@ ROW = {  # what is read of a row, and of which kinds it is
     **dict.fromkeys(("lat", "lon"), float | None),
 }
 MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
-
-
-AnyPlace = TypeVar("AnyPlace", Path, Remote)
 
 
 @dataclass(frozen=True)
@@ -178,13 +175,13 @@ def write_encounters(target: Place, rows: Sequence[Mapping[str, Any]], account: 
         parquet.write_table(table.replace_schema_metadata({"account": json.dumps(account)}), part, compression="zstd")
 
 
-def tables_of(corpus: AnyPlace) -> list[AnyPlace]:
+def tables_of(corpus: Place) -> list[Place]:
     """Return the tables of a corpus that `mine` wrote, sorted.
 
     Raises:
         InputError: there is none.
     """
-    found: list[AnyPlace] = sorted((corpus / "encounters").glob("*.parquet"), key=str)
+    found: list[Place] = sorted((corpus / "encounters").glob("*.parquet"), key=str)
     if not found:
         raise InputError(f"{corpus} holds no encounters/*.parquet; write it with `scenario-gen mine ARCHIVE --out {corpus}`")
     return found

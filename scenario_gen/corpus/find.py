@@ -11,6 +11,7 @@ from typing import Any
 from scenario_gen.bags.recordings.write import add_message
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.stores import below, fetched, Place, workplace
 from scenario_gen.corpus.messages import database, quoted
 from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerated
 
@@ -28,7 +29,7 @@ class Hits:
     coverage: list[tuple[str, str, str, int]]
 
 
-def find(batch: Path, condition: str = "true", limit: int = 0) -> Hits:
+def find(batch: Place, condition: str = "true", limit: int = 0) -> Hits:
     """Return the scenarios of a batch for which a condition holds, the most critical first.
 
     Args:
@@ -40,13 +41,16 @@ def find(batch: Path, condition: str = "true", limit: int = 0) -> Hits:
     Raises:
         InputError: there is no batch, or the condition is none.
     """
-    tables = [str(path) for path in sorted((batch / "scenarios").rglob("*.parquet")) if _done(batch, path)]
+    done = {below(table, batch / "cases") for table in (batch / "cases").rglob("*.parquet")}
+    listed: list[Place] = sorted((batch / "scenarios").rglob("*.parquet"), key=str)
+    tables = [table for table in listed if below(table, batch / "scenarios") in done]
     if not tables:
         raise InputError(f"{batch} holds no scenarios; write them with `scenario-gen batch DIR --roads … --out {batch}`")
     columns = f"the columns are {', '.join(COLUMNS)}, seed, sha256"
-    with database(batch, MEMORY, f"{batch}: condition {condition!r}", columns) as base:
+    what = f"{batch}: condition {condition!r}"
+    with fetched(tables) as here, database(workplace(batch), MEMORY, what, columns) as base:
         base.execute(
-            f"CREATE TABLE scenarios AS SELECT * FROM read_parquet([{quoted(tables)}], hive_partitioning=true, "
+            f"CREATE TABLE scenarios AS SELECT * FROM read_parquet([{quoted(list(map(str, here)))}], hive_partitioning=true, "
             "hive_types_autocast=false)"
         )
         base.execute("SET enable_external_access = false")  # a condition reads no files
@@ -60,18 +64,11 @@ def find(batch: Path, condition: str = "true", limit: int = 0) -> Hits:
     return Hits(rows, coverage)
 
 
-def _done(batch: Path, table: Path) -> bool:
-    """Whether the part of a table of scenarios is done: its table of cases is there."""
-    return (batch / "cases" / table.relative_to(batch / "scenarios")).exists()
-
-
-def coverage_lines(hits: Hits, batch: Path) -> list[str]:
+def coverage_lines(hits: Hits, batch: Place) -> list[str]:
     """Return the coverage for people: of each kind on each road the scenarios by class of PET, and what is empty."""
     classes = [*(f"< {bound:g} s" for bound in PET), "more", "none"]
-    kinds, roads = (
-        sorted({one[0] for one in hits.coverage}),
-        sorted({path.name.partition("=")[2] for path in (batch / "cases").iterdir()}),
-    )
+    kinds = sorted({kind for kind, *_ in hits.coverage})
+    roads = sorted({table.parent.name.partition("=")[2] for table in (batch / "cases").rglob("*.parquet")})
     cells = {(kind, road, pet): count for kind, road, pet, count in hits.coverage}
     messages = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
     for kind in kinds:
@@ -81,24 +78,25 @@ def coverage_lines(hits: Hits, batch: Path) -> list[str]:
     return messages
 
 
-def bag_of(batch: Path, row: Mapping[str, Any]) -> Path:
+def bag_of(batch: Place, row: Mapping[str, Any]) -> Place:
     """Return the bag in which a row's scenario is."""
     return batch / "bags" / f"road={row['road']}" / f"part-{row['part']:05}"
 
 
-def make_again(batch: Path, row: Mapping[str, Any]) -> Regenerated:
+def make_again(batch: Place, row: Mapping[str, Any]) -> Regenerated:
     """Make a scenario again, alone, from its template, road, parameters and seed; it has the SHA-256 of the table.
 
     Raises:
         ScenarioGenError: it comes out differently; the message names what differs.
     """
-    result = regenerate_scenario(bag_of(batch, row), row["index"], namespace=row["namespace"])
+    with fetched([bag_of(batch, row)]) as (bag,):
+        result = regenerate_scenario(bag, row["index"], namespace=row["namespace"])
     if result.sha256 != row["sha256"]:
         raise ScenarioGenError(f"{bag_of(batch, row)}: scenario {row['index']} of {row['namespace']} is not that of the table")
     return result
 
 
-def export_hits(batch: Path, rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:
+def export_hits(batch: Place, rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:
     """Write the scenarios of rows to a bag, each made again, with its template and road, in a namespace; return its folder.
 
     Raises:

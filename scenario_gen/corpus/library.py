@@ -12,6 +12,7 @@ The library is fitted to a sample; then all pairs are assigned to its primitives
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import combinations, pairwise
@@ -22,12 +23,14 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.folders import Kind, replaced_folder
+from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
+from scenario_gen.base.provenance import parameter_texts
+from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.kinds import Motion, space_time_gap
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import arriving, spread, Workers
+from scenario_gen.corpus.tasks import agreed, arriving, spread, undone, Workers
 from scenario_gen.method.segmentation import (
     assign,
     Assignment,
@@ -42,7 +45,7 @@ from scenario_gen.template import reactions_of
 from scenario_gen.types import Encounter, FOLLOW, YIELD
 
 LIBRARY = Kind("primitive library")
-NAME, SEGMENTS, PAGE, SUMMARY = "library.json", "segments", "library.html", "summary.json"
+NAME, SEGMENTS, PAGE, SUMMARY, REQUEST = "library.json", "segments", "library.html", "summary.json", "request.json"
 SHORTEST = 2.0  # s that a pair must be there together
 EXAMPLES = 2
 VERBS = {FOLLOW: "follows", YIELD: "yields"}
@@ -56,9 +59,9 @@ class AssignTask:
     """A table of encounters to assign to a library, and the table of segments to write."""
 
     name: str
-    library: Path
-    table: Path
-    target: Path
+    library: Place
+    table: Place
+    target: Place
     config: SegmentationConfig
 
 
@@ -120,7 +123,7 @@ def pair_encounters(encounter: Encounter, interaction: float) -> Iterator[Encoun
 
 
 def build(
-    corpus: Path,
+    corpus: Place,
     config: SegmentationConfig = SHARED,
     *,
     most: int = 1000,
@@ -151,11 +154,15 @@ def build(
     again = _labels(build_library(sample, config, seed + 1)[1], sample)
     smaller = [len(sample) // part for part in (8, 4, 2) if len(sample) >= 4 * part]
     growth = [(count, len(build_library(sample[:count], config, seed)[0].means)) for count in smaller]
-    with replaced_folder(corpus / "library", LIBRARY) as folder, spread(workers) as go:
-        library.save(folder / NAME)
+    request = {"most": most, "seed": seed, "parameters": parameter_texts(config)}
+    request["corpus"] = [sha256_of(here) for _, here in each_fetched(tables)]
+    with _replaced(corpus / "library", request) as folder, spread(workers) as go:
+        with arriving(folder / NAME) as part:
+            library.save(part)
         tasks = [AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config) for table in tables]
-        failed = go(assign_table, tasks)
-        rows = list(rows_of(sorted((folder / SEGMENTS).glob("*.parquet"))))
+        failed = go(assign_table, undone(tasks, lambda task: task.target))
+        segments: list[Place] = sorted((folder / SEGMENTS).glob("*.parquet"), key=str)
+        rows = list(rows_of(segments))
         assigned = {row["pair"]: row for row in rows}
         fresh = np.concatenate([_labels_again(assigned[pair.name], pair) for pair in sample])
         built = Built(
@@ -170,9 +177,29 @@ def build(
             limit=config.sampler.states,
             failed=tuple(failed),
         )
-        (folder / SUMMARY).write_text(json.dumps(vars(built), indent=1) + "\n", encoding="utf-8")
-        _write_page(folder / PAGE, library, rows, {pair.name: pair for pair in pairs}, built)
+        with arriving(folder / SUMMARY) as part:
+            write_text(part, json.dumps(vars(built), indent=1) + "\n")
+        with arriving(folder / PAGE) as part:
+            _write_page(part, library, rows, {pair.name: pair for pair in pairs}, built)
     return built
+
+
+@contextmanager
+def _replaced(folder: Place, request: Mapping[str, Any]) -> Iterator[Place]:
+    """Give the folder to write to: a new one, which replaces an earlier library at the end; in a store, one that is gone on with.
+
+    Raises:
+        InputError: the store holds a library of another request, or the folder is no library.
+    """
+    if isinstance(folder, Path):
+        with replaced_folder(folder, LIBRARY) as own:
+            yield own
+        return
+    before = agreed(folder, REQUEST, request, "library")
+    other = [key for key in request if before.get(key) != request[key]]
+    if other:
+        raise InputError(f"{folder} is a library of other {', '.join(other)}; remove it first")
+    yield folder
 
 
 def labels_of(points: Ints, primitives: Ints, pair: Encounter) -> Ints:
@@ -198,7 +225,8 @@ def assign_table(task: AssignTask) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
-    library = PrimitiveLibrary.load(task.library)
+    with fetched([task.library]) as (here,):
+        library = PrimitiveLibrary.load(here)
     rows = []
     for row in rows_of([task.table]):
         for pair in pair_encounters(encounter_of(row, task.table), CorpusConfig().interaction):

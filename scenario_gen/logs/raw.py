@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.stores import renamed
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Encounter
@@ -124,7 +125,7 @@ class RawLog:
     def where(self, row: int) -> str:
         """Name the file and line (or topic and message) of a row."""
         segment = self.segments[bisect_right([s.first for s in self.segments], row) - 1]
-        return f"{segment.label}, {segment.unit} {segment.number + row - segment.first}"
+        return f"{renamed(segment.label)}, {segment.unit} {segment.number + row - segment.first}"
 
 
 def left_out_note(counts: Mapping[str, int], kinds: str) -> tuple[str, ...]:

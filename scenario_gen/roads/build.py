@@ -11,6 +11,7 @@ from typing import Protocol
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import did_you_mean, InputError, reading, RefusedError
 from scenario_gen.base.registry import Registry
+from scenario_gen.base.stores import local
 from scenario_gen.roads.builtin import draw, draw_corridor, draw_paper, layout_for
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
@@ -121,7 +122,7 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
     path = Path(name_or_path)
     if path.suffix.lower() in (".yaml", ".yml"):
         with reading(path):
-            return read_map(path, config)
+            return read_map(local(path, "a map"), config)
     if name_or_path not in ROADS:
         names, near = ", ".join(ROADS.names()), did_you_mean(name_or_path, ROADS.names())
         kinds = f"a map_server YAML file or a vector map ({', '.join(FORMATS)})"

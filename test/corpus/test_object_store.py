@@ -7,6 +7,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import count
 import os
 from pathlib import Path
+import shutil
 import signal
 import socket
 import subprocess
@@ -16,61 +17,36 @@ import time
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
+from object_store import new_bucket, reached, serving
 import pytest
 
+from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.stores import place, read
+from scenario_gen.base.stores import below, place, read, upload
+from scenario_gen.corpus.batch import BatchRequest, run_batch
+from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
+from scenario_gen.corpus.library import build
 from scenario_gen.corpus.mine import mine
 
 pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
-KEYS = {"AWS_ACCESS_KEY_ID": "any", "AWS_SECRET_ACCESS_KEY": "any", "AWS_DEFAULT_REGION": "us-east-1"}
-
-
-def free_port():
-    with socket.socket() as own:
-        own.bind(("127.0.0.1", 0))
-        return own.getsockname()[1]
-
-
-def answers(address):
-    try:
-        with urlopen(address, timeout=1.0):
-            return True
-    except HTTPError:
-        return True
-    except OSError:
-        return False
 
 
 @pytest.fixture(scope="module")
 def server():
-    """Moto's server in a process of its own."""
-    address = f"http://127.0.0.1:{free_port()}"
-    command = [sys.executable, "-m", "moto.server", "-p", address.rpartition(":")[2]]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        try:
-            while not answers(address):
-                assert process.poll() is None
-                time.sleep(0.1)
-            yield address
-        finally:
-            process.kill()
+    with serving() as address:
+        yield address
 
 
 @pytest.fixture
 def bucket(server, archive, monkeypatch, request):
     """The archive in a bucket of its own, whose URL this is."""
     import boto3
-    import fsspec
 
-    for name, value in {**KEYS, "AWS_ENDPOINT_URL": server}.items():
-        monkeypatch.setenv(name, value)
-    fsspec.get_filesystem_class("s3").clear_instance_cache()
-    client, name = boto3.client("s3"), f"b{abs(hash(request.node.name))}"
-    client.create_bucket(Bucket=name)
+    reached(monkeypatch, server)
+    url = new_bucket(f"b{abs(hash(request.node.name))}")
     for path in archive.glob("*.csv"):
-        client.upload_file(str(path), name, f"spmd/{path.name}")
-    return f"s3://{name}"
+        boto3.client("s3").upload_file(str(path), url.removeprefix("s3://"), f"spmd/{path.name}")
+    return url
 
 
 def tables(out):
@@ -78,6 +54,13 @@ def tables(out):
     if isinstance(out, Path):
         return {path.name: path.read_bytes() for path in (out / "encounters").glob("*.parquet")}
     return {one.name: read(one) for one in (out / "encounters").glob("*.parquet")}
+
+
+def contents(out):
+    """{name: bytes} of all files of a batch, or of a library, in a folder or in a store."""
+    if isinstance(out, Path):
+        return {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("[!.]*") if path.is_file()}
+    return {below(one, out): read(one) for one in out.rglob("[!.]*")}
 
 
 def command(*words, **environment):
@@ -103,6 +86,51 @@ def test_what_is_done_is_not_done_again_and_another_archive_is_refused(bucket, a
     assert {one.url: one.etag for one in out.rglob("*.parquet")} == before
     with pytest.raises(InputError, match="corpus of another archive"):
         mine([archive], out)
+
+
+def test_a_batch_and_what_it_finds_are_the_same_in_a_store(bucket, corpus, tmp_path):
+    stored, local, request = place(f"{bucket}/corpus"), tmp_path / "batch", BatchRequest(count=2, seed=5)
+    upload(corpus[0] / "encounters", stored / "encounters")
+    out = place(f"{bucket}/batch")
+    made = run_batch(stored, ["straight"], out, request, templates=4)
+    assert made.lines() == run_batch(corpus[0], ["straight"], local, request, templates=4).lines()
+    assert made.scenarios and contents(out) == contents(local)
+    assert find(out).rows == find(local).rows and coverage_lines(find(out), out) == coverage_lines(find(local), local)
+    row = find(out).rows[0]
+    assert make_again(out, row).sha256 == row["sha256"]
+    namespaces = read_recording(export_hits(out, [row], tmp_path / "hits")).namespaces
+    assert [one.hashes for one in namespaces.values()] == [(row["sha256"],)]
+    remove(out / "cases" / "road=straight" / "part-00000.parquet")  # as if killed before its last object
+    assert not find_or_none(out)
+    run_batch(stored, ["straight"], out, request, templates=4)
+    assert contents(out) == contents(local)
+    with pytest.raises(InputError, match="batch of other count"):
+        run_batch(stored, ["straight"], out, BatchRequest(count=3, seed=5), templates=4)
+
+
+def find_or_none(out):
+    """The scenarios of parts that are done."""
+    try:
+        return find(out).rows
+    except InputError:
+        return []
+
+
+def remove(one):
+    system, path = one.there()
+    system.rm_file(path)
+
+
+def test_a_library_is_the_same_in_a_store(bucket, corpus, tmp_path):
+    stored, local = place(f"{bucket}/corpus"), tmp_path / "corpus"
+    upload(corpus[0] / "encounters", stored / "encounters")
+    shutil.copytree(corpus[0] / "encounters", local / "encounters")
+    assert build(stored, most=4) == build(local, most=4)
+    in_store = contents(stored / "library")
+    assert in_store.pop("request.json") and in_store == contents(local / "library")
+    assert build(stored, most=4).assigned  # is gone on with
+    with pytest.raises(InputError, match="library of other most; remove it first"):
+        build(stored, most=5)
 
 
 class Failing(BaseHTTPRequestHandler):
@@ -191,9 +219,10 @@ def test_a_killed_run_is_gone_on_with(bucket, corpus, seconds):
         (("mine", "s3://no-such-bucket/a", "--out", "BUCKET/out"), "s3://no-such-bucket/a does not exist; check bucket and name"),
         (("mine", "BUCKET/spmd", "--out", "https://example.org/x"), "https is only read"),
         (("mine", "ftp://host/a", "--out", "BUCKET/out"), "ftp is not read or written"),
-        (("batch", "BUCKET/out", "--roads", "straight", "--out", "x"), "batch takes a file or folder; copy it first"),
-        (("find", "BUCKET/out"), "find takes a file or folder"),
-        (("generate", "BUCKET/spmd/one.csv", "--road", "straight", "--out", "x"), "a log takes a file or folder; copy it first"),
+        (("batch", "BUCKET/out", "--roads", "straight", "--out", "x"), "out holds no encounters/"),
+        (("library", "BUCKET/out"), "out holds no encounters/"),
+        (("find", "BUCKET/out"), "out holds no scenarios"),
+        (("roads", "BUCKET/a.xodr", "--out", "x.svg"), "a.xodr: a map takes a file or folder; copy it first"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_line_with_its_url(bucket, tmp_path, words, said):

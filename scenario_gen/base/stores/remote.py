@@ -201,7 +201,7 @@ def local(path: Path, use: str) -> Path:
     """
     url = url_of(path)
     if url:
-        raise InputError(f"{url}: {use} takes a file or folder; copy it first (`mine` reads and writes {KNOWN})")
+        raise InputError(f"{url}: {use} takes a file or folder; copy it first")
     return path
 
 

@@ -172,20 +172,27 @@ def read(found: Remote) -> bytes:
     return data
 
 
+_copies: dict[str, str] = {}  # {path: URL} of files that stand for objects; paths are never used twice
+
+
 @contextmanager
 def naming_objects(names: dict[str, str]) -> Iterator[None]:
-    """Let errors name objects instead of the files {path: URL} that they were fetched to, or come from."""
+    """Let errors, and texts that are `renamed`, name objects instead of the files {path: URL} that stand for them."""
+    _copies.update(names)
     try:
         yield
     except ScenarioGenError as error:
-        error.args = (renamed(str(error), names),)
+        error.args = (renamed(str(error)),)
         raise
+    finally:
+        for path in names:
+            _copies.pop(path, None)
 
 
-def renamed(text: str, names: dict[str, str]) -> str:
-    """Return a text with URLs instead of paths; longer paths first, for one may begin with another."""
-    for path in sorted(names, key=len, reverse=True):
-        text = text.replace(path, names[path])
+def renamed(text: str) -> str:
+    """Return a text with URLs instead of the paths of copies; longer paths first, for one may begin with another."""
+    for path in sorted(_copies, key=len, reverse=True) if _copies else ():
+        text = text.replace(path, _copies.get(path, path))
     return text
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, of_system, reading
 from scenario_gen.base.markup import Element, finite, read_xml
+from scenario_gen.base.stores import local
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
@@ -71,7 +72,7 @@ def read_network(path: Path) -> LaneNetwork:
         InputError: it is missing, broken or empty.
     """
     try:
-        status = path.stat()
+        status = local(path, "a map").stat()
     except (OSError, ValueError) as error:
         raise (
             of_system(error, path) if isinstance(error, OSError) else InputError(f"map {shown(str(path))!r}: {error}")
