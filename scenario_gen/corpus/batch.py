@@ -16,7 +16,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
-from itertools import islice
 import json
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ from scenario_gen.base.folders.claim import alone
 from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.base.interrupts import ending
 from scenario_gen.base.provenance import parameter_texts, versions
-from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.encounters import encounter_of, row_at, rows_of, tables_of
 from scenario_gen.corpus.tasks import arriving, check_out, spread, Workers
 from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
@@ -138,7 +137,7 @@ def run_batch(
     rows = rows[: templates or None]
     if not rows:
         raise InputError(f"{corpus} holds no encounter")
-    first = encounter_of(_row(*rows[0]), rows[0][0])
+    first = encounter_of(row_at(*rows[0]), rows[0][0])
     for road in roads:  # an unknown name ends the batch; it is no cause of single cases
         with suppress(RefusedError):
             build_road(road, first, request.config.road)
@@ -156,7 +155,9 @@ def run_batch(
         _agree(out, document)
         sweep_tree(out)
         tasks = [task for task in parts(rows, roads, out, request) if not task.place("cases").exists()]
-        return summary(out, go(generate_part, tasks))
+        failed = go(generate_part, tasks)
+        sweep_tree(out)
+        return summary(out, failed)
 
 
 def parts(rows: Sequence[tuple[Path, int]], roads: Sequence[str], out: Path, request: BatchRequest) -> list[PartTask]:
@@ -209,7 +210,7 @@ def generate_part(task: PartTask) -> None:
         return
     cases, results = [], dict[str, GenerationResult]()
     for k, (table, row) in enumerate(task.templates):
-        case, result = _generate_case(_row(table, row), table, f"/case_{k}", task)
+        case, result = _generate_case(row_at(table, row), table, f"/case_{k}", task)
         cases.append(case)
         if result is not None and len(result.generated.scenarios):
             results[f"/case_{k}"] = result
@@ -219,11 +220,6 @@ def generate_part(task: PartTask) -> None:
             add_results(bag, results)
     _write(task.place("scenarios"), scenarios, SCENARIO_COLUMNS)
     _write(task.place("cases"), cases, CASE_COLUMNS)
-
-
-def _row(table: Path, row: int) -> dict[str, Any]:
-    """One row of a table of encounters."""
-    return next(islice(rows_of([table]), row, None))
 
 
 def _generate_case(

@@ -34,6 +34,7 @@ ROW = {  # what is read of a row, and of which kinds it is
     "tracks": bytes,
     **dict.fromkeys(("lat", "lon"), float | None),
 }
+ROWS = 100  # encounters that are read at a time: a log may hold thousands
 MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
 
 
@@ -175,7 +176,8 @@ def write_encounters(target: Place, rows: Sequence[Mapping[str, Any]], account: 
     }
     table = pa.Table.from_pylist(list(rows), schema=pa.schema(list(kinds.items())))
     with arriving(target) as part:
-        parquet.write_table(table.replace_schema_metadata({"account": json.dumps(account)}), part, compression="zstd")
+        described = table.replace_schema_metadata({"account": json.dumps(account)})
+        parquet.write_table(described, part, row_group_size=ROWS, compression="zstd")
 
 
 def tables_of(corpus: AnyPlace) -> list[AnyPlace]:
@@ -218,6 +220,24 @@ def rows_of(tables: Sequence[Place], columns: Sequence[str] | None = None) -> It
         if rows and (lacking := set(columns or ()) - rows[0].keys()):
             raise InputError(f"{path} lacks the columns {', '.join(sorted(lacking))}")
         yield from rows
+
+
+def row_at(table: Path, number: int) -> dict[str, Any]:
+    """Return one row of a table; only its row group is read.
+
+    Raises:
+        InputError: the table is damaged, or has no such row.
+    """
+    from pyarrow import parquet
+
+    with guarded(f"{table} cannot be read as a table"), parquet.ParquetFile(table) as file:
+        for k in range(file.num_row_groups):
+            count = file.metadata.row_group(k).num_rows
+            if number < count:
+                row: dict[str, Any] = file.read_row_group(k).slice(number, 1).to_pylist()[0]
+                return row
+            number -= count
+    raise InputError(f"{table} lacks a row; `mine` writes it anew")
 
 
 def encounter_of(row: Mapping[str, Any], table: object = "an encounter's row") -> Encounter:

@@ -23,6 +23,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, replaced_folder
+from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.kinds import Motion, space_time_gap
@@ -155,6 +156,7 @@ def build(
         library.save(folder / NAME)
         tasks = [AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config) for table in tables]
         failed = go(assign_table, tasks)
+        sweep_tree(folder)  # what killed workers left
         rows = list(rows_of(sorted((folder / SEGMENTS).glob("*.parquet"))))
         assigned = {row["pair"]: row for row in rows}
         fresh = np.concatenate([_labels_again(assigned[pair.name], pair) for pair in sample])
