@@ -3,21 +3,27 @@
 
 """`python -m benchmarks NAME [--json] [--quick]`: run one benchmark (or `all`); `--list` names them."""
 
+import os
+
+THREADS = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1")
+os.environ |= THREADS  # of ours, of every peer and of their processes; libraries read it once, as they are imported
+
+# ruff: noqa: E402
 import argparse
 import importlib
 import inspect
 import json
-import os
 import pkgutil
 import platform
 import signal
 import sys
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy
 import scipy
 
 import benchmarks
+from benchmarks import row
 from benchmarks._size import QUICK
 from benchmarks.row import MADE, Row
 
@@ -42,17 +48,28 @@ def machine() -> dict[str, str | int]:
         "python": platform.python_version(),
         "numpy": numpy.__version__,
         "scipy": scipy.__version__,
+        "threads": max((pool["num_threads"] for pool in _pools()), default=1),
     }
+
+
+def _pools() -> list[dict[str, Any]]:
+    """Return the pools of threads of the libraries that are loaded, those of peers too; none if threadpoolctl is missing."""
+    try:
+        from threadpoolctl import threadpool_info
+    except ImportError:
+        return []
+    found: list[dict[str, Any]] = threadpool_info()
+    return found
 
 
 def table(rows: list[Row]) -> str:
     """Lay the rows out as a table for people."""
     lines = [f"{'figure':<58} {'value':>12} {'unit':<10} {'target':>12}  met  peer"]
-    for row in rows:
-        sign = "≥" if row.better == "higher" else "≤"
-        target = "" if row.target is None else f"{sign} {row.target:g}"
-        met = {None: "", True: "yes", False: "NO"}[row.met]
-        lines.append(f"{row.id:<58} {row.value:>12.4g} {row.unit:<10} {target:>12}  {met:<4} {row.peer or ''}")
+    for one in rows:
+        sign = "≥" if one.better == "higher" else "≤"
+        target = "" if one.target is None else f"{sign} {one.target:g}"
+        met = {None: "", True: "yes", False: "NO"}[one.met]
+        lines.append(f"{one.id:<58} {one.value:>12.4g} {one.unit:<10} {target:>12}  {met:<4} {one.peer or ''}")
     return "\n".join(lines)
 
 
@@ -69,7 +86,7 @@ def main() -> int:
     parser.add_argument("--details", help="naturalness: a file for the figures of every case, a line of JSON each")
     parser.add_argument("--pictures", help="naturalness: a folder for pictures of the first ten cases")
     parser.add_argument("--checkout", help="naturalness: the folder of another checkout to be measured")
-    parser.add_argument("--variety", help="naturalness: the sampler's preset, narrow (default) or wide")
+    parser.add_argument("--variety", help="naturalness: the sampler's preset, wide (default) or narrow")
     parser.add_argument(
         "--full",
         action="store_true",
@@ -80,6 +97,7 @@ def main() -> int:
     parser.add_argument("--log", action="append", help="paper: a file of a log instead of the bundled cases; repeatable")
     parser.add_argument("--seed", type=int, help="paper: same seed, same page")
     parser.add_argument("--part", help="corpus: mine, memory, recorded, batch, kills, library or peers alone")
+    parser.add_argument("--rows", help="a file that gets each row as it is measured, a line of JSON each")
     parser.add_argument("--quick", action="store_true", help="next to nothing of each, to see that it runs; figures say nothing")
     arguments = parser.parse_args()
     known = names()
@@ -96,6 +114,7 @@ def main() -> int:
         run = importlib.import_module(f"benchmarks.{name}").run
         given = {key: value for key, value in vars(arguments).items() if value is not None}
         MADE.clear()
+        row.FILE = arguments.rows
         stopped, rows = "", list[Row]()
         try:
             rows = run(**{key: given[key] for key in inspect.signature(run).parameters if key in given})
@@ -110,7 +129,7 @@ def main() -> int:
 def report(name: str, rows: list[Row], stopped: str, arguments: argparse.Namespace) -> None:
     """Print the rows of a benchmark; of one that was stopped, those that were measured, and why it was."""
     if arguments.json:
-        document = {"benchmark": name, "quick": arguments.quick, "rows": [row.document() for row in rows], "machine": machine()}
+        document = {"benchmark": name, "quick": arguments.quick, "rows": [one.document() for one in rows], "machine": machine()}
         print(json.dumps(document | ({"stopped": stopped} if stopped else {}), allow_nan=False), flush=True)
     else:
         print(f"{name}{f' (stopped: {stopped})' if stopped else ''}\n{table(rows)}\n", flush=True)

@@ -37,7 +37,7 @@ class Job:
     roads: tuple[str, ...]
     own: tuple[bool, ...]
     count: int
-    variety: str = "narrow"  # the sampler's preset, where it has several
+    variety: str = "wide"  # the sampler's preset, where it has several
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ def run(job: Job) -> Iterator[Made]:
         yield generated(job.name, encounter, road, job.count, own=own, variety=job.variety)
 
 
-def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, variety: str = "narrow") -> Made:
+def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, variety: str = "wide") -> Made:
     """Put one encounter on one road."""
     from scenario_gen.base.errors import ScenarioGenError
     from scenario_gen.method.evaluation import EvaluationConfig

@@ -51,7 +51,7 @@ class Prepared:
     waits: tuple[Wait, ...]
 
     def sample(
-        self, count: int, seed: int = 0, config: SamplingConfig = SamplingConfig(variety="narrow"), *, checked: bool = True
+        self, count: int, seed: int = 0, config: SamplingConfig = SamplingConfig(), *, checked: bool = True
     ) -> ScenarioSet:
         """Sample `count` scenarios; unchecked, every candidate counts as valid."""
         checker = Checker(self.road, self.fit.requested, self.conflicts, self.waits)
@@ -64,19 +64,25 @@ def cases() -> Iterator[Prepared | str]:
     """Every recorded encounter on every road that it can be fitted to and planned on; else a sentence why not."""
     for path in sorted((DATA / "trajectories").glob("*/encounter_*.csv"))[:LOGS]:
         encounter = read_log(path).encounters[0]
-        segmentation = segment(encounter)
-        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-        waits = find_waits(encounter)
         for road_name in ROADS:
             name = path.stem.removeprefix("encounter_")[:32]
             try:
-                road = build_road(road_name, encounter)
-                fit = fit_template(encounter, segmentation, road)
-                routes = plan_routes(road, fit)
+                yield prepared(encounter, road_name, name)
             except ScenarioGenError as error:
                 yield f"{name} on {road_name}: {error}"
-                continue
-            yield Prepared(name, road_name, encounter, segmentation, road, fit, routes, conflicts, waits)
+
+
+def prepared(encounter: Encounter, road_name: str, name: str) -> Prepared:
+    """Return an encounter fitted to a road and planned on it.
+
+    Raises:
+        ScenarioGenError: that is not possible.
+    """
+    segmentation = segment(encounter)
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+    road = build_road(road_name, encounter)
+    fit = fit_template(encounter, segmentation, road)
+    return Prepared(name, road_name, encounter, segmentation, road, fit, plan_routes(road, fit), conflicts, find_waits(encounter))
 
 
 def displacement(scenarios: Sequence[Scenario]) -> float:

@@ -39,7 +39,7 @@ class Calibration:
     def worst(self) -> float:
         """Largest distance of predicted and observed in a decile with at least 30 samples."""
         enough = self.counts >= 30
-        return float(np.abs(self.predicted - self.observed)[enough].max())
+        return float(np.abs(self.predicted - self.observed)[enough].max()) if enough.any() else float("nan")
 
 
 def deciles(predicted: Floats, truth: Floats) -> tuple[Floats, Floats, Ints]:

@@ -46,6 +46,8 @@ ROWS = sized(10_000_000, quick=40_000)
 DENSE = {"rows": ROWS, "hours": 6.0, "encounters": sized(1000, quick=6), "outside": sized(500, quick=6)}
 SPARSE = {"rows": 5 * ROWS, "hours": 30.0, "encounters": sized(537, quick=6), "outside": sized(268, quick=6)}
 """As many encounters in a row as the Safety Pilot's archive has: 462,161 in 43 · 10⁹."""
+MESSAGES, ENCOUNTERS, TEXT = 43.1e9, 462_161, 5.4e12  # of that archive; bytes
+CORE_HOUR, STORED = 0.05, 0.023  # $ for a core-hour, and for a GB and month
 ARCHIVES = {"dense": DENSE, "sparse": SPARSE}
 CLEANED = sized(300, quick=10)
 TEMPLATES, COUNT = sized((200, 50), quick=(2, 2))
@@ -166,6 +168,13 @@ def memory_of(place: Path) -> list[Row]:
     recall, precision, kinds = _scores(read_planted(archive), out)
     rows = json.loads((archive / "synthetic.json").read_text())["rows"]
     searching = seconds["search"] + seconds["group"]
+    stored, shuffled = (
+        float(sum(path.stat().st_size for path in (out / folder).glob(pattern))) / rows
+        for folder, pattern in (("messages", "*.parquet"), ("hours", "*.parquet"))
+    )
+    cleaned = _cleaning(archive, place)
+    each = sum(path.stat().st_size for path in (place / "small" / "encounters").glob("*.parquet")) / CLEANED
+    whole = estimate(rows / seconds["parse"], rows / searching, cleaned, stored, shuffled, each)
     what = f"{rows / 1e6:.0f} M rows, {SPARSE['encounters']} encounters"
     return [
         Row(f"{what}: recall", recall, "", "higher", 0.99),
@@ -175,6 +184,39 @@ def memory_of(place: Path) -> list[Row]:
         Row(f"{what}: from Parquet", rows / searching / 1e6, "M rows/CPU s", "higher", 2.5),
         Row(f"{what}: peak memory", max(memory.values()), "MiB", "lower", 1024.0),
         Row(f"{what}: peak memory by that of {ROWS / 1e6:.0f} M", max(memory.values()) / max(few.values()), "", "lower", 1.2),
+        *whole,
+    ]
+
+
+def estimate(parsed: float, searched: float, cleaned: float, stored: float, shuffled: float, each: float) -> list[Row]:
+    """Return what the whole archive of the Safety Pilot would cost, by stage, from measured rates.
+
+    Args:
+        parsed: rows of text per CPU second.
+        searched: rows of Parquet per CPU second, grouping included.
+        cleaned: CPU seconds for an encounter.
+        stored: bytes of `messages/` for each row.
+        shuffled: bytes of `hours/` for each row.
+        each: bytes of `encounters/` for an encounter.
+    """
+    hours = {
+        f"parsing, {parsed / 1e6:.2f} M rows per CPU s": MESSAGES / parsed / 3600.0,
+        f"searching, {searched / 1e6:.2f} M rows per CPU s": MESSAGES / searched / 3600.0,
+        f"cleaning, {cleaned:.3f} CPU s each": ENCOUNTERS * cleaned / 3600.0,
+    }
+    disk = {
+        f"messages/, {stored:.2f} bytes a row": MESSAGES * stored / 1e9,
+        f"hours/, {shuffled:.2f} bytes a row": MESSAGES * shuffled / 1e9,
+        f"encounters/, {each / 1e3:.1f} kB each": ENCOUNTERS * each / 1e9,
+    }
+    spent, kept = sum(hours.values()), sum(disk.values())
+    reading = TEXT / 1e9 / spent * 16.0 / 3600.0
+    return [
+        *(Row(f"whole archive: {what}", value, "core-hours", "lower") for what, value in hours.items()),
+        *(Row(f"whole archive: {what}", value, "GB", "lower") for what, value in disk.items()),
+        Row("whole archive: computing", spent * CORE_HOUR, "$", "lower", None, f"{spent:.1f} core-hours at {CORE_HOUR} $"),
+        Row("whole archive: storage", kept * STORED, "$ a month", "lower", None, f"{kept:.0f} GB at {STORED} $"),
+        Row("whole archive: sixteen cores read", reading, "GB/s", "lower"),
     ]
 
 

@@ -121,7 +121,7 @@ def run(
     details: str | None = None,
     pictures: str | None = None,
     checkout: str | None = None,
-    variety: str = "narrow",
+    variety: str = "wide",
     *,
     held_out: bool = False,
 ) -> list[Row]:

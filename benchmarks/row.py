@@ -4,11 +4,15 @@
 """One measured figure."""
 
 from dataclasses import asdict, dataclass
+import json
 import math
+from pathlib import Path
 from typing import Any, Literal
 
 MADE: "list[Row]" = []
 """All rows of this process, as they are measured: a benchmark that is stopped keeps what it has."""
+FILE: str | None = None
+"""Gets each row at once, so that a SIGKILL loses none."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,9 @@ class Row:
         object.__setattr__(self, "value", float(self.value))
         object.__setattr__(self, "target", None if self.target is None else float(self.target))
         MADE.append(self)
+        if FILE:
+            with Path(FILE).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(self.document()) + "\n")
 
     @property
     def met(self) -> bool | None:

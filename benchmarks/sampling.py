@@ -8,10 +8,19 @@ from time import process_time
 import numpy as np
 
 from benchmarks import _sampling_peers
-from benchmarks._sampling_cases import arrival_spread, cases, displacement, displacement_at_instants, divergences, Prepared
+from benchmarks._sampling_cases import (
+    arrival_spread,
+    cases,
+    displacement,
+    displacement_at_instants,
+    divergences,
+    Prepared,
+    prepared,
+)
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.method.sampling import draw_scenarios, Plan
+from benchmarks.scaling import group
+from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.template.interaction import find_conflicts
@@ -24,22 +33,54 @@ from scenario_gen.types.segmentation import Segmentation
 COUNT = sized(200, quick=4)  # scenarios per recorded encounter and road
 SCENARIOS = sized(2000, quick=16)  # whose throughput is measured
 REPEATS = sized(5, quick=1)
+CROSSING = sized(500, quick=8)
 TARGETS = {"speed": 0.1, "acceleration": 0.2, "gap": 0.1}
 
 
 def run() -> list[Row]:
     """Measure."""
-    return [*_sampling_peers.rows(), *_throughput(), *_recorded()]
+    return [*_sampling_peers.rows(), *_throughput(), *_crossing(), *_recorded("wide"), *_recorded("narrow")]
+
+
+def reference() -> float:
+    """CPU seconds of a fixed job in NumPy: how fast the machine is now."""
+    matrix = np.random.default_rng(0).standard_normal((300, 300))
+    started = process_time()
+    for _ in range(sized(200, quick=2)):
+        np.sort(matrix @ matrix, axis=1)
+    return process_time() - started
+
+
+def _crossing() -> list[Row]:
+    """Two vehicles that cross, on a road with a crossing: the order of arrival is checked, too."""
+    case = prepared(group(2, 20.0), "four_way", "two platoons")
+    rows = []
+    for variety in ("wide", "narrow"):
+        taken = []
+        for _ in range(REPEATS):
+            machine = reference()
+            started = process_time()
+            found = case.sample(CROSSING, config=SamplingConfig(variety=variety))
+            taken.append((process_time() - started, machine, len(found.scenarios), found.acceptance))
+        spent, machine, count, acceptance = min(taken)
+        told = f"acceptance {acceptance:.2f}; NumPy's fixed job beside it {machine:.3f} s"
+        rows += [
+            Row(f"crossing, {variety}: valid scenarios, checked, one core", count / spent, "1/s", "higher", None, told),
+            Row(f"crossing, {variety}: a scenario over NumPy's fixed job", spent / count / machine, "×", "lower"),
+        ]
+    return rows
 
 
 def _throughput() -> list[Row]:
     shapes = ((2, 20.0, SCENARIOS), (2, 20.0, 4 * SCENARIOS), (2, 40.0, SCENARIOS), (8, 20.0, SCENARIOS))
     taken = [[_seconds(*shape) for shape in shapes] for _ in range(REPEATS)]  # in turn: the machine is not always as fast
+    machine = reference()
     base = min(times[0] for times in taken)
     more, longer, fuller = (float(np.median([times[k] / times[0] for times in taken])) for k in (1, 2, 3))
     slowest = f"least of {REPEATS} runs; the slowest {SCENARIOS / max(times[0] for times in taken):.0f}/s"
     return [
         Row("valid two-vehicle 20 s scenarios, checked, one core", SCENARIOS / base, "1/s", "higher", 2000.0, slowest),
+        Row("such a scenario over NumPy's fixed job", base / SCENARIOS / machine, "×", "lower", None, f"{machine:.3f} s"),
         Row("cost of four times the samples", more, "×", "lower", 4.4),
         Row("cost of twice the duration", longer, "×", "lower", 2.2),
         Row("cost of four times the vehicles (8)", fuller, "×", "lower", 16.0),
@@ -77,8 +118,8 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
     return spent
 
 
-def _recorded() -> list[Row]:
-    """Acceptance, diversity and realism, from one run at the default standard deviations."""
+def _recorded(variety: str) -> list[Row]:
+    """Acceptance, diversity and realism, from one run with a preset of the sampler (`wide` is the default)."""
     acceptance: dict[str, list[float]] = {}
     spreads, moved, apart, refused, broken = [], [], [], 0, 0
     realism: dict[str, list[float]] = {name: [] for name in TARGETS}
@@ -86,7 +127,7 @@ def _recorded() -> list[Row]:
         if not isinstance(case, Prepared):
             refused += 1
             continue
-        found = case.sample(COUNT)
+        found = case.sample(COUNT, config=SamplingConfig(variety=variety))
         acceptance.setdefault(case.name, []).append(found.acceptance)
         broken += len(found.scenarios) < COUNT
         if len(found.scenarios) < 2:
@@ -104,19 +145,31 @@ def _recorded() -> list[Row]:
     peer = f"{len(everywhere)} encounters × roads, {refused} refused before sampling"
     rows = [
         Row(
-            "raw acceptance, worst encounter on its best road", min(max(v) for v in acceptance.values()), "", "higher", 0.7, peer
+            f"{variety}: raw acceptance, worst encounter on its best road",
+            min(max(v) for v in acceptance.values()),
+            "",
+            "higher",
+            0.7,
+            peer,
         ),
-        Row("raw acceptance, worst encounter and road", min(everywhere), "", "higher", 0.3),
-        Row("sets that stayed short", float(broken), "sets", "lower", 0.0),
-        Row("mean pairwise displacement, least", min(apart), "m", "higher", 0.5, f"median {np.median(apart):.2f} m"),
-        Row("the same without the clock's part, least", min(moved), "m", "higher", 0.5, f"median {np.median(moved):.2f} m"),
+        Row(f"{variety}: raw acceptance, worst encounter and road", min(everywhere), "", "higher", 0.3),
+        Row(f"{variety}: sets that stayed short", float(broken), "sets", "lower", 0.0),
+        Row(f"{variety}: mean pairwise displacement, least", min(apart), "m", "higher", 0.5, f"median {np.median(apart):.2f} m"),
+        Row(
+            f"{variety}: the same without the clock's part, least",
+            min(moved),
+            "m",
+            "higher",
+            0.5,
+            f"median {np.median(moved):.2f} m",
+        ),
     ]
     if spreads:
-        label = "standard deviation of arrival at a crossing conflict, median"
+        label = f"{variety}: standard deviation of arrival at a crossing conflict, median"
         rows.append(Row(label, float(np.median(spreads)), "s", "higher", 0.5, f"from {min(spreads):.2f} to {max(spreads):.2f} s"))
     rows += [
         Row(
-            f"JS {name} to the fitted template, median",
+            f"{variety}: JS {name} to the fitted template, median",
             float(np.median(values)),
             "bit",
             "lower",

@@ -31,7 +31,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation.measures import features, measure, MEASURES
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import draw_scenarios, Plan, relaxed_states, SamplingConfig
+from scenario_gen.method.sampling import Callbacks, draw_scenarios, Plan, relaxed_states, SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
@@ -120,7 +120,7 @@ def _measured(case: Case, natural: int) -> dict[str, Any]:
 
     config = SamplingConfig()
     plain, seconds = case.sample()
-    brute, _ = case.sample(count=natural, config=replace(config, attempts=1), found=found)
+    brute, _ = case.sample(count=natural, config=replace(config, attempts=1), callbacks=Callbacks(found=found))
     each = {name: np.array(seen) for name, seen in values.items()}
     few = list(plain.scenarios[:COUNT])
     figures: dict[str, Any] = {

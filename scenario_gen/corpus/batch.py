@@ -26,7 +26,7 @@ from scenario_gen.base.errors import InputError, needs, RefusedError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.base.stores import each_fetched, Place
-from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.encounters import encounter_of, rows_at, rows_of, tables_of
 from scenario_gen.corpus.tasks import agreed, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
@@ -200,10 +200,9 @@ def generate_part(task: PartTask) -> None:
 
 
 def _rows(templates: Sequence[tuple[Place, int]]) -> Iterator[tuple[dict[str, Any], Place]]:
-    """Yield the rows (table, number) of encounters, each with its table; a table is read once for those that follow."""
+    """Yield the rows (table, number) of encounters, each with its table; a table is opened once for those that follow."""
     for table, own in groupby(templates, key=lambda template: template[0]):
-        rows = list(rows_of([table]))
-        yield from ((rows[number], table) for _, number in own)
+        yield from ((row, table) for row in rows_at(table, [number for _, number in own]))
 
 
 def _generate_case(

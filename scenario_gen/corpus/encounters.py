@@ -34,6 +34,7 @@ ROW = {  # what is read of a row, and of which kinds it is
     "tracks": bytes,
     **dict.fromkeys(("lat", "lon"), float | None),
 }
+ROWS = 100  # encounters that are read at a time: a log may hold thousands
 MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
 
 
@@ -172,7 +173,8 @@ def write_encounters(target: Place, rows: Sequence[Mapping[str, Any]], account: 
     }
     table = pa.Table.from_pylist(list(rows), schema=pa.schema(list(kinds.items())))
     with arriving(target) as part:
-        parquet.write_table(table.replace_schema_metadata({"account": json.dumps(account)}), part, compression="zstd")
+        described = table.replace_schema_metadata({"account": json.dumps(account)})
+        parquet.write_table(described, part, row_group_size=ROWS, compression="zstd")
 
 
 def tables_of(corpus: Place) -> list[Place]:
@@ -215,6 +217,25 @@ def rows_of(tables: Sequence[Place], columns: Sequence[str] | None = None) -> It
         if rows and (lacking := set(columns or ()) - rows[0].keys()):
             raise InputError(f"{path} lacks the columns {', '.join(sorted(lacking))}")
         yield from rows
+
+
+def rows_at(table: Place, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """Yield rows of a table by their numbers, in ascending order; only their row groups are read.
+
+    Raises:
+        InputError: the table is damaged, or has no such row.
+    """
+    from pyarrow import parquet
+
+    with fetched([table]) as (here,), guarded(f"{table} cannot be read as a table"), parquet.ParquetFile(here) as file:
+        first = 0
+        for k in range(file.num_row_groups):
+            last = first + file.metadata.row_group(k).num_rows
+            wanted = [number - first for number in numbers if first <= number < last]
+            yield from file.read_row_group(k).take(wanted).to_pylist() if wanted else ()
+            first = last
+    if numbers and max(numbers) >= first:
+        raise InputError(f"{table} lacks a row; `mine` writes it anew")
 
 
 def encounter_of(row: Mapping[str, Any], table: object = "an encounter's row") -> Encounter:

@@ -65,7 +65,7 @@ def find(batch: Place, condition: str = "true", limit: int = 0) -> Hits:
 
 
 def coverage_lines(hits: Hits, batch: Place) -> list[str]:
-    """Return the coverage for people: of each kind on each road the scenarios by class of PET, and what is empty."""
+    """Return the coverage for people: of each kind on each road the scenarios by class of PET, without empty classes."""
     classes = [*(f"< {bound:g} s" for bound in PET), "more", "none"]
     kinds = sorted({kind for kind, *_ in hits.coverage})
     roads = sorted({table.parent.name.partition("=")[2] for table in (batch / "cases").rglob("*.parquet")})
@@ -73,8 +73,8 @@ def coverage_lines(hits: Hits, batch: Place) -> list[str]:
     messages = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
     for kind in kinds:
         for road in roads:
-            counts = ", ".join(f"{pet}: {cells.get((kind, road, pet), 0)}" for pet in classes)
-            messages.append(f"  {kind} on {road}: PET {counts}")
+            counts = ", ".join(f"{pet}: {cells[kind, road, pet]}" for pet in classes if (kind, road, pet) in cells)
+            messages.append(f"  {kind} on {road}: {f'PET {counts}' if counts else 'no scenario'}")
     return messages
 
 

@@ -24,6 +24,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
+from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.base.provenance import parameter_texts
 from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
@@ -161,6 +162,8 @@ def build(
             library.save(part)
         tasks = [AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config) for table in tables]
         failed = go(assign_table, undone(tasks, lambda task: task.target))
+        if isinstance(folder, Path):
+            sweep_tree(folder)  # what killed workers left
         segments: list[Place] = sorted((folder / SEGMENTS).glob("*.parquet"), key=str)
         rows = list(rows_of(segments))
         assigned = {row["pair"]: row for row in rows}

@@ -32,6 +32,7 @@ ASKEW = 0.37  # of the longitude, added to the latitude, so that one number tell
 ROW = 1 << 24  # cells in a row around the globe, at the most
 SHARED = 3  # such bins make an id one that may be shared
 TOGETHER = 10  # bins in which two vehicles send: fewer, and it is one whose fixes jump
+MORE = 1.4  # times the messages of one vehicle in a bin: so many are sent by two
 ELSEWHERE = 1 << 40  # added to a shared id for each further vehicle that bears it
 MARGIN = 3_000_000  # µs of messages that are kept before and after a meeting
 
@@ -188,9 +189,16 @@ def _bins(base: Any) -> dict[str, int]:
 
 
 def _together(t: Ints, who: Ints) -> int:
-    """Return in how many bins more than one of the vehicles of an id sends; t (M,) µs, who (M,)."""
-    pairs = np.unique(np.stack([t // BIN, who]), axis=1)
-    return int((np.diff(pairs[0]) == 0).sum())
+    """Return in how many bins more than one of the vehicles of an id sends, and together more than one does; t (M,) µs, who (M,).
+
+    Fixes of one vehicle that jump do not add messages.
+    """
+    sent = np.unique(np.stack([t, who]), axis=1)  # heard twice, it counts once
+    messages = np.unique(sent[0] // BIN, return_counts=True)[1]
+    senders = np.unique(np.unique(np.stack([sent[0] // BIN, sent[1]]), axis=1)[0], return_counts=True)[1]
+    alone = messages[senders == 1]
+    usual = float(np.quantile(alone, 0.9) if len(alone) >= TOGETHER else np.median(messages) / 2.0)
+    return int(((senders > 1) & (messages >= MORE * usual)).sum())
 
 
 def _candidates(base: Any, config: CorpusConfig) -> dict[str, Ints]:

@@ -51,6 +51,7 @@ DISAGREE = (
 PARQUET = "FORMAT parquet, PARQUET_VERSION V2, COMPRESSION zstd"
 DEGREE = 1e7  # units of latitude and longitude in tables: a ten-millionth of a degree, as messages have them (SAE J2735); 1 cm
 LONGEST_LINE = 65_536  # bytes; a longer one is no row
+MOST_FILES = 65_536  # of a task: their numbers have two bytes
 CLOCKS = "left out: its clocks disagree (Gentime, DSecond)"
 
 
@@ -65,14 +66,14 @@ class RangeTask:
 
 
 def ranges(files: Sequence[Place], folder: Place, size: int, memory: int) -> list[RangeTask]:
-    """Divide files into tasks of `size` bytes each or somewhat more: long files are cut, short ones put together."""
+    """Divide files into tasks of about `size` bytes or of `MOST_FILES`: long files are cut, short ones put together."""
     tasks: list[list[tuple[Place, int, int]]] = []
     room = 0
     for path in files:
         length = size_of(path)
         for begin in range(0, length, size):
             end = min(begin + size, length)
-            if not tasks or room <= 0:
+            if not tasks or room <= 0 or len(tasks[-1]) == MOST_FILES:
                 tasks.append([])
                 room = size
             tasks[-1].append((path, begin, end))
@@ -166,7 +167,9 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     columns = ", ".join(f"'{name}': '{TYPES.get(name, 'VARCHAR')}'" for name in COLUMNS)
     cause = " ".join(f"WHEN {condition} THEN {k}" for k, condition in enumerate(CAUSES.values(), start=1))
     one = len(files) == 1
-    file = "0" if one else f"list_position([{quoted(files)}], filename) - 1"
+    if len(files) > 1:
+        base.execute(f"CREATE TYPE read AS ENUM ({quoted(files)})")  # found by hash: a list is searched for each row
+    file = "0" if one else "enum_code(filename::read)"
     source = (
         f"read_csv([{quoted(files)}], columns={{{columns}}}, header=false, auto_detect=false, delim=',', quote='', "
         f"escape='', store_rejects=true, filename={'false' if one else 'true'}, max_line_size={LONGEST_LINE})"

@@ -61,7 +61,7 @@ def arriving(target: Place) -> Iterator[Path]:
             upload(place / target.name, target)
         return
     target.parent.mkdir(parents=True, exist_ok=True)
-    with scratch(target.parent) as place:
+    with scratch(target.parent, swept=True) as place:  # by `sweep_tree`: to list a folder for each of its files is quadratic
         temporary = place / target.name  # for a bag's files are called as its folder is
         yield temporary
         if temporary.is_dir():
@@ -110,6 +110,7 @@ def held(out: Place) -> Iterator[None]:
     with alone(out), ending(partial(sweep_tree, out)):
         sweep_tree(out)
         yield
+        sweep_tree(out)
 
 
 def agreed(out: Place, name: str, document: Mapping[str, Any], kind: str) -> Mapping[str, Any]:

@@ -17,7 +17,7 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.grouping import group, label, Meeting
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
-from scenario_gen.corpus.meetings import in_order
+from scenario_gen.corpus.meetings import _together, in_order, TOGETHER
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.synthetic import read_planted
@@ -229,3 +229,25 @@ def test_who_is_joined_to_whom():
     brief = [meeting(1, 2, 0, 4, 1.0)]
     assert group(brief, config) == []
     assert label(17 + (2 << 40)) == "17x2"
+
+
+def test_fixes_that_jump_are_not_two_vehicles_at_once():
+    t = np.arange(0, 600_000_000, 100_000)
+    far = np.random.default_rng(0).random(len(t)) < 0.05
+    assert _together(t, far.astype(np.int64)) == 0  # single fixes
+    assert _together(t, (t // 3_000_000) % 2) < TOGETHER  # 3 s here, 3 s there
+    both = np.concatenate([t, t[3000:3100] + 40_000])  # a second vehicle for 10 s
+    assert _together(both, (np.arange(len(both)) >= len(t)).astype(np.int64)) == 20
+    assert _together(np.concatenate([t, t + 40_000]), np.repeat([0, 1], len(t))) == 1200  # for all of the time
+
+
+def test_ranges_hold_as_many_files_as_have_numbers(tmp_path, monkeypatch):
+    monkeypatch.setattr("scenario_gen.corpus.messages.MOST_FILES", 2)
+    files = [tmp_path / f"it's {k}.csv" for k in range(5)]
+    for path in files:
+        path.write_text(",".join(["1"] * 19) + "\n")
+    tasks = ranges(files, tmp_path / "out" / "messages", 1 << 20, 500)
+    assert [len(task.pieces) for task in tasks] == [2, 2, 1]
+    parse_range(tasks[0])
+    accounts = json.loads(tasks[0].target.with_suffix(".json").read_text())["files"]
+    assert {name: one["rows"] for name, one in accounts.items()} == {str(path): 1 for path in files[:2]}

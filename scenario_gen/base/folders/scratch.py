@@ -21,8 +21,12 @@ DEPTHS = ("*/", "*/*/")  # at which a corpus and a batch write below their own f
 
 
 @contextmanager
-def scratch(parent: Path) -> Iterator[Path]:
+def scratch(parent: Path, *, swept: bool = False) -> Iterator[Path]:
     """Yield an empty folder in `parent`, which only this user may enter, and remove it at the end.
+
+    Args:
+        parent: the folder.
+        swept: whether others remove what killed processes left there; else `parent` is listed, whatever it holds.
 
     Raises:
         OSError: there is no room, or no right to write.
@@ -36,7 +40,8 @@ def scratch(parent: Path) -> Iterator[Path]:
     with ending(clean_up):
         try:
             with uninterrupted():
-                sweep(parent)
+                if not swept:
+                    sweep(parent)
                 claims.append(_claimed(parent / NAME))
                 own = claims[0]
                 own.folder.chmod(0o700)

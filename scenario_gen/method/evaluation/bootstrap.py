@@ -58,7 +58,7 @@ class Bootstrap:
         """Return the statistic of the whole set with its percentile bounds (Efron 1979), widened to hold the value.
 
         Distances such as E cannot fall below zero, and resampling raises them. Correcting for that bias makes intervals too
-        short near zero (docs/benchmarks.md has the figures), so it is left in.
+        short near zero, so it is left in.
 
         Args:
             statistic: maps weights (B, S) to values (B,); NaN where a resample has no value.
