@@ -94,7 +94,7 @@ def _scores(planted: list[Planted], out: Path) -> tuple[float, float, float]:
     """Recall, precision and share of right kinds of the table of encounters."""
     from pyarrow import parquet
 
-    rows = parquet.read_table(out / "found.parquet").to_pylist()
+    rows = parquet.read_table(out / "found").to_pylist()
     found = {frozenset(device % TRUE for device in row["devices"]): row["kind"] for row in rows}
     true = {frozenset(one.devices): one.kind for one in planted if one.inside}
     hit = found.keys() & true.keys()

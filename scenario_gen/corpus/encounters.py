@@ -20,7 +20,7 @@ from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.base.stores import each_fetched, fetched, Place, Remote
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.grouping import Found, label
+from scenario_gen.corpus.grouping import Found, label, part_of, read_found
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs import encounters_of, NoEncounterError, Observations, RawLog, read_log, Segment
@@ -42,13 +42,22 @@ AnyPlace = TypeVar("AnyPlace", Path, Remote)
 
 @dataclass(frozen=True)
 class CleanTask:
-    """Encounters to clean, the tables of messages in which they are, and the table to write."""
+    """Encounters to clean: `found` are (partition, first row, row after the last), `hours` those of their messages.
+
+    A corpus has thousands of these tasks, each of which passes through the scheduler: it holds numbers, no tables or paths.
+    """
 
     name: str
-    found: tuple[Found, ...]
-    rows: tuple[Place, ...]
-    target: Place
+    corpus: Place
+    number: int
+    found: tuple[tuple[int, int, int], ...]
+    hours: tuple[int, ...]
     config: CorpusConfig
+
+    @property
+    def target(self) -> Place:
+        """The table to write."""
+        return self.corpus / "encounters" / f"found-{self.number:06}.parquet"
 
 
 @dataclass(frozen=True)
@@ -68,17 +77,19 @@ def clean_found(task: CleanTask) -> None:
         return
     from pyarrow import parquet
 
-    first, last = min(one.start for one in task.found) - MARGIN, max(one.end for one in task.found) + MARGIN
-    wanted = sorted({device for one in task.found for device in one.devices})
-    filters = [("t", ">=", first), ("t", "<=", last), ("device", "in", wanted)]
-    with fetched(task.rows) as here:
-        tables = [parquet.read_table(path, filters=filters).to_pandas() for path in here]
+    parts = [part_of(task.corpus, number) for number, _, _ in task.found]
+    with fetched([*parts, *(task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours)]) as here:
+        listed = [one for path, (_, *rows) in zip(here, task.found, strict=False) for one in read_found(path, *rows)]
+        first, last = min(one.start for one in listed) - MARGIN, max(one.end for one in listed) + MARGIN
+        wanted = sorted({device for one in listed for device in one.devices})
+        filters = [("t", ">=", first), ("t", "<=", last), ("device", "in", wanted)]
+        tables = [parquet.read_table(path, filters=filters).to_pandas() for path in here[len(parts) :]]
     import pandas as pd
 
     messages = pd.concat(tables).drop_duplicates().sort_values(["device", "t", "lat", "lon"], kind="stable")
     by_device = dict(tuple(messages.groupby("device")))
     rows, refused = [], []
-    for found in task.found:
+    for found in listed:
         try:
             encounters = encounters_of(_raw(found, by_device), task.config.log).encounters
         except InputError as error:
