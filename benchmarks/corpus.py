@@ -8,7 +8,7 @@ text to Parquet stands beside them, from the same run.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import cache
 import json
@@ -117,6 +117,10 @@ def _peer(archive: Path, place: Path) -> float:
         return time.process_time() - begun
 
 
+def _bytes(files: Iterable[Path]) -> int:
+    return sum(path.stat().st_size for path in files)
+
+
 def mining(place: Path) -> list[Row]:
     """Encounters planted among 10⁷ rows, ten times as densely as in the Safety Pilot's archive: found, and at what cost."""
     seconds, memory, archive, out = _mined(place, "dense")
@@ -127,8 +131,8 @@ def mining(place: Path) -> list[Row]:
     all_of_it = seconds["parse"] + seconds["search"] + seconds["group"]
     peer = f"DuckDB's copy of the text to Parquet alone: {rows / _peer(archive, place) / 1e6:.2f}"
     what = f"{rows / 1e6:.1f} M rows, {DENSE['encounters']} encounters and {DENSE['outside']} just outside"
-    stored = sum(path.stat().st_size for path in (out / "messages").glob("*.parquet"))
-    shuffled = sum(path.stat().st_size for path in (out / "hours").glob("*.rows.parquet"))
+    text = _bytes(archive.glob("*.csv"))
+    stored = {stage: _bytes((out / stage).iterdir()) for stage in ("messages", "hours", "found")}
     cleaned = _cleaning(archive, place)
     return [
         Row(f"recall, {what}", recall, "", "higher", 0.99),
@@ -140,8 +144,9 @@ def mining(place: Path) -> list[Row]:
         ),
         Row("text to Parquet", rows / seconds["parse"] / 1e6, "M rows/CPU s", "higher", None, peer),
         Row("cleaning of found encounters", cleaned, "CPU s each", "lower"),
-        Row("messages as Parquet", stored / kept, "bytes/row", "lower"),
-        Row("shuffle: messages of who meets, written once more", shuffled / stored, "of Parquet", "lower"),
+        Row("text", text / rows, "bytes/row", "lower"),
+        *(Row(f"files of {stage}", size / rows, "bytes/row", "lower") for stage, size in stored.items()),
+        *(Row(f"files of {stage}", 100.0 * size / text, "% of text", "lower", 5.0) for stage, size in stored.items()),
         *(Row(f"a task of {stage}", seconds[f"{stage}, a task"], "CPU s", "higher") for stage in ("parse", "search")),
         *(Row(f"peak memory of {stage}", memory[stage], "MiB", "lower", 1024.0) for stage in memory),
     ]

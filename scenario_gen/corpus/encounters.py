@@ -22,6 +22,7 @@ from scenario_gen.base.stores import each_fetched, fetched, Place, Remote
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label, part_of, read_found
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
+from scenario_gen.corpus.messages import DEGREE
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs import encounters_of, NoEncounterError, Observations, RawLog, read_log, Segment
 from scenario_gen.logs.tables import EPOCH_NS
@@ -110,9 +111,7 @@ def _raw(found: Found, by_device: Mapping[int, Any]) -> RawLog:
         speed = own["speed"].to_numpy(np.float64)
         heading = np.pi / 2.0 - own["heading"].to_numpy(np.float64) * (np.pi / 180.0)
         vehicles.append(
-            Observations(
-                label(device), stamps, own[["lat", "lon"]].to_numpy(np.float64), numbers, heading, stamps, speed, numbers
-            )
+            Observations(label(device), stamps, own[["lat", "lon"]].to_numpy() / DEGREE, numbers, heading, stamps, speed, numbers)
         )
         begin += len(own)
     return RawLog(found.name, True, tuple(vehicles), begin, (Segment(0, found.name, "message", 1),))
