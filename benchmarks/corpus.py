@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import cache
+from importlib.util import find_spec
 import json
 import os
 from pathlib import Path
@@ -25,6 +26,7 @@ import numpy as np
 from benchmarks._corpus_kills import killed_batch
 from benchmarks._corpus_peers import costs, missing
 from benchmarks._corpus_primitives import f1, planted_encounter, score
+from benchmarks._corpus_store import bucket_with, spent, START
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.base.errors import RefusedError
@@ -52,12 +54,13 @@ TEMPLATES, COUNT = sized((200, 50), quick=(2, 2))
 ROADS = ("corridor", "t_intersection")
 KILLS = sized(20, quick=1)
 PEERS = sized(3, quick=1)
+STORED, ROUNDS = sized((4_000_000, 3), quick=(20_000, 1))
 LIBRARY, NEW = sized((1000, 100), quick=(8, 2))
 TRUE = 1 << 40
 
 
 def run(part: str = "all") -> list[Row]:
-    """Measure; `part` is mine, memory, recorded, batch, kills, library or peers."""
+    """Measure; `part` is mine, memory, store, recorded, batch, kills, library or peers."""
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -180,6 +183,30 @@ def memory_of(place: Path) -> list[Row]:
         Row(f"{what}: from Parquet", rows / searching / 1e6, "M rows/CPU s", "higher", 2.5),
         Row(f"{what}: peak memory", max(memory.values()), "MiB", "lower", 1024.0),
         Row(f"{what}: peak memory by that of {ROWS / 1e6:.0f} M", max(memory.values()) / max(few.values()), "", "lower", 1.2),
+    ]
+
+
+def store(place: Path) -> list[Row]:
+    """An archive in an object store mined to the store, against the same in folders; no row without moto's server."""
+    if find_spec("moto") is None or find_spec("flask") is None:
+        return []
+    archive = place / "stored-archive"
+    _stage("write", archive, json.dumps({"rows": STORED, "hours": 6.0, "encounters": 40, "outside": 20}))
+    mined = ["-m", "scenario_gen", "mine", "--workers", "1"]
+    cpu: dict[str, list[float]] = {"store": [], "local": [], "start": [], "start local": []}
+    with bucket_with(archive) as (url, environment):
+        for k in range(ROUNDS):
+            cpu["local"].append(spent([*mined, str(archive), "--out", str(place / f"stored-{k}")], {}))
+            cpu["store"].append(spent([*mined, f"{url}/archive", "--out", f"{url}/out-{k}"], environment))
+            cpu["start local"].append(spent(["-c", START, str(place)], {}))
+            cpu["start"].append(spent(["-c", START, url], environment))
+    of = {name: float(np.median(values)) for name, values in cpu.items()}
+    loaded = of["start"] - of["start local"]
+    what = f"{_bytes(archive.glob('*.csv')) / 1e6:.0f} MB of text, in and to s3"
+    parts = f"{of['store']:.1f} and {of['local']:.1f} s, of which the libraries of the store take {loaded:.1f} s to load"
+    return [
+        Row(f"{what}: CPU over that of folders", of["store"] / of["local"], "×", "lower", 1.2, parts),
+        Row(f"{what}: the same without loading the libraries", (of["store"] - loaded) / of["local"], "×", "lower"),
     ]
 
 
@@ -364,6 +391,7 @@ def peers(place: Path) -> list[Row]:
 PARTS = {
     "mine": mining,
     "memory": memory_of,
+    "store": store,
     "recorded": recorded,
     "batch": batch,
     "kills": kills,
