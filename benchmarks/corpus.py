@@ -149,7 +149,7 @@ def mining(place: Path) -> list[Row]:
         Row("cleaning of found encounters", cleaned, "CPU s each", "lower"),
         Row("text", text / rows, "bytes/row", "lower"),
         *(Row(f"files of {stage}", size / rows, "bytes/row", "lower") for stage, size in stored.items()),
-        *(Row(f"files of {stage}", 100.0 * size / text, "% of text", "lower", 5.0) for stage, size in stored.items()),
+        *(Row(f"files of {stage}, share of text", 100.0 * size / text, "%", "lower", 5.0) for stage, size in stored.items()),
         *(Row(f"a task of {stage}", seconds[f"{stage}, a task"], "CPU s", "higher") for stage in ("parse", "search")),
         *(Row(f"peak memory of {stage}", memory[stage], "MiB", "lower", 1024.0) for stage in memory),
     ]
