@@ -14,9 +14,10 @@ import time
 
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import clean_found
+from scenario_gen.corpus.grouping import group_partition
 from scenario_gen.corpus.meetings import search_hours
 from scenario_gen.corpus.messages import parse_range, ranges
-from scenario_gen.corpus.mine import clean_tasks, grouped, hour_tasks, inventory
+from scenario_gen.corpus.mine import clean_tasks, group_tasks, hour_tasks, inventory
 from scenario_gen.corpus.synthetic import ArchiveConfig, write_archive
 
 STAGES = ("parse", "search", "group", "clean")
@@ -32,7 +33,7 @@ def work(name: str, archive: Path, out: Path) -> Iterator[Callable[[], object]]:
     elif name == "search":
         yield from (partial(search_hours, task) for task in hour_tasks(ranged, out, config))
     elif name == "group":
-        yield partial(grouped, out, config)
+        yield from (partial(group_partition, task) for task in group_tasks(out, config))
     else:
         yield from (partial(clean_found, task) for task in clean_tasks(out, config))
 

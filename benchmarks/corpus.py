@@ -8,9 +8,10 @@ text to Parquet stands beside them, from the same run.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import cache
+from importlib.util import find_spec
 import json
 import os
 from pathlib import Path
@@ -25,6 +26,7 @@ import numpy as np
 from benchmarks._corpus_kills import killed_batch
 from benchmarks._corpus_peers import costs, missing
 from benchmarks._corpus_primitives import f1, planted_encounter, score
+from benchmarks._corpus_store import bucket_with, spent, START
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.base.errors import RefusedError
@@ -54,12 +56,13 @@ TEMPLATES, COUNT = sized((200, 50), quick=(2, 2))
 ROADS = ("corridor", "t_intersection")
 KILLS = sized(20, quick=1)
 PEERS = sized(3, quick=1)
+STORED, ROUNDS = sized((4_000_000, 3), quick=(20_000, 1))
 LIBRARY, NEW = sized((1000, 100), quick=(8, 2))
 TRUE = 1 << 40
 
 
 def run(part: str = "all") -> list[Row]:
-    """Measure; `part` is mine, memory, recorded, batch, kills, library or peers."""
+    """Measure; `part` is mine, memory, store, recorded, batch, kills, library or peers."""
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -96,7 +99,7 @@ def _scores(planted: list[Planted], out: Path) -> tuple[float, float, float]:
     """Recall, precision and share of right kinds of the table of encounters."""
     from pyarrow import parquet
 
-    rows = parquet.read_table(out / "found.parquet").to_pylist()
+    rows = parquet.read_table(out / "found").to_pylist()
     found = {frozenset(device % TRUE for device in row["devices"]): row["kind"] for row in rows}
     true = {frozenset(one.devices): one.kind for one in planted if one.inside}
     hit = found.keys() & true.keys()
@@ -119,6 +122,10 @@ def _peer(archive: Path, place: Path) -> float:
         return time.process_time() - begun
 
 
+def _bytes(files: Iterable[Path]) -> int:
+    return sum(path.stat().st_size for path in files)
+
+
 def mining(place: Path) -> list[Row]:
     """Encounters planted among 10⁷ rows, ten times as densely as in the Safety Pilot's archive: found, and at what cost."""
     seconds, memory, archive, out = _mined(place, "dense")
@@ -129,8 +136,8 @@ def mining(place: Path) -> list[Row]:
     all_of_it = seconds["parse"] + seconds["search"] + seconds["group"]
     peer = f"DuckDB's copy of the text to Parquet alone: {rows / _peer(archive, place) / 1e6:.2f}"
     what = f"{rows / 1e6:.1f} M rows, {DENSE['encounters']} encounters and {DENSE['outside']} just outside"
-    stored = sum(path.stat().st_size for path in (out / "messages").glob("*.parquet"))
-    shuffled = sum(path.stat().st_size for path in (out / "hours").glob("*.rows.parquet"))
+    text = _bytes(archive.glob("*.csv"))
+    stored = {stage: _bytes((out / stage).iterdir()) for stage in ("messages", "hours", "found")}
     cleaned = _cleaning(archive, place)
     return [
         Row(f"recall, {what}", recall, "", "higher", 0.99),
@@ -142,8 +149,9 @@ def mining(place: Path) -> list[Row]:
         ),
         Row("text to Parquet", rows / seconds["parse"] / 1e6, "M rows/CPU s", "higher", None, peer),
         Row("cleaning of found encounters", cleaned, "CPU s each", "lower"),
-        Row("messages as Parquet", stored / kept, "bytes/row", "lower"),
-        Row("shuffle: messages of who meets, written once more", shuffled / stored, "of Parquet", "lower"),
+        Row("text", text / rows, "bytes/row", "lower"),
+        *(Row(f"files of {stage}", size / rows, "bytes/row", "lower") for stage, size in stored.items()),
+        *(Row(f"files of {stage}, share of text", 100.0 * size / text, "%", "lower", 5.0) for stage, size in stored.items()),
         *(Row(f"a task of {stage}", seconds[f"{stage}, a task"], "CPU s", "higher") for stage in ("parse", "search")),
         *(Row(f"peak memory of {stage}", memory[stage], "MiB", "lower", 1024.0) for stage in memory),
     ]
@@ -217,6 +225,30 @@ def estimate(parsed: float, searched: float, cleaned: float, stored: float, shuf
         Row("whole archive: computing", spent * CORE_HOUR, "$", "lower", None, f"{spent:.1f} core-hours at {CORE_HOUR} $"),
         Row("whole archive: storage", kept * STORED, "$ a month", "lower", None, f"{kept:.0f} GB at {STORED} $"),
         Row("whole archive: sixteen cores read", reading, "GB/s", "lower"),
+    ]
+
+
+def store(place: Path) -> list[Row]:
+    """An archive in an object store mined to the store, against the same in folders; no row without moto's server."""
+    if find_spec("moto") is None or find_spec("flask") is None:
+        return []
+    archive = place / "stored-archive"
+    _stage("write", archive, json.dumps({"rows": STORED, "hours": 6.0, "encounters": 40, "outside": 20}))
+    mined = ["-m", "scenario_gen", "mine", "--workers", "1"]
+    cpu: dict[str, list[float]] = {"store": [], "local": [], "start": [], "start local": []}
+    with bucket_with(archive) as (url, environment):
+        for k in range(ROUNDS):
+            cpu["local"].append(spent([*mined, str(archive), "--out", str(place / f"stored-{k}")], {}))
+            cpu["store"].append(spent([*mined, f"{url}/archive", "--out", f"{url}/out-{k}"], environment))
+            cpu["start local"].append(spent(["-c", START, str(place)], {}))
+            cpu["start"].append(spent(["-c", START, url], environment))
+    of = {name: float(np.median(values)) for name, values in cpu.items()}
+    loaded = of["start"] - of["start local"]
+    what = f"{_bytes(archive.glob('*.csv')) / 1e6:.0f} MB of text, in and to s3"
+    parts = f"{of['store']:.1f} and {of['local']:.1f} s, of which the libraries of the store take {loaded:.1f} s to load"
+    return [
+        Row(f"{what}: CPU over that of folders", of["store"] / of["local"], "×", "lower", 1.2, parts),
+        Row(f"{what}: the same without loading the libraries", (of["store"] - loaded) / of["local"], "×", "lower"),
     ]
 
 
@@ -401,6 +433,7 @@ def peers(place: Path) -> list[Row]:
 PARTS = {
     "mine": mining,
     "memory": memory_of,
+    "store": store,
     "recorded": recorded,
     "batch": batch,
     "kills": kills,

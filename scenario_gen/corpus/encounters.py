@@ -20,8 +20,9 @@ from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.grouping import Found, label
+from scenario_gen.corpus.grouping import Found, label, part_of, read_found
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
+from scenario_gen.corpus.messages import DEGREE
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs import encounters_of, NoEncounterError, Observations, RawLog, read_log, Segment
 from scenario_gen.logs.tables import EPOCH_NS
@@ -40,13 +41,22 @@ MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothi
 
 @dataclass(frozen=True)
 class CleanTask:
-    """Encounters to clean, the tables of messages in which they are, and the table to write."""
+    """Encounters to clean: `found` are (partition, first row, row after the last), `hours` those of their messages.
+
+    A corpus has thousands of these tasks, each of which passes through the scheduler: it holds numbers, no tables or paths.
+    """
 
     name: str
-    found: tuple[Found, ...]
-    rows: tuple[Place, ...]
-    target: Place
+    corpus: Place
+    number: int
+    found: tuple[tuple[int, int, int], ...]
+    hours: tuple[int, ...]
     config: CorpusConfig
+
+    @property
+    def target(self) -> Place:
+        """The table to write."""
+        return self.corpus / "encounters" / f"found-{self.number:06}.parquet"
 
 
 @dataclass(frozen=True)
@@ -66,17 +76,19 @@ def clean_found(task: CleanTask) -> None:
         return
     from pyarrow import parquet
 
-    first, last = min(one.start for one in task.found) - MARGIN, max(one.end for one in task.found) + MARGIN
-    wanted = sorted({device for one in task.found for device in one.devices})
-    filters = [("t", ">=", first), ("t", "<=", last), ("device", "in", wanted)]
-    with fetched(task.rows) as here:
-        tables = [parquet.read_table(path, filters=filters).to_pandas() for path in here]
+    parts = [part_of(task.corpus, number) for number, _, _ in task.found]
+    with fetched([*parts, *(task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours)]) as here:
+        listed = [one for path, (_, *rows) in zip(here, task.found, strict=False) for one in read_found(path, *rows)]
+        first, last = min(one.start for one in listed) - MARGIN, max(one.end for one in listed) + MARGIN
+        wanted = sorted({device for one in listed for device in one.devices})
+        filters = [("t", ">=", first), ("t", "<=", last), ("device", "in", wanted)]
+        tables = [parquet.read_table(path, filters=filters).to_pandas() for path in here[len(parts) :]]
     import pandas as pd
 
     messages = pd.concat(tables).drop_duplicates().sort_values(["device", "t", "lat", "lon"], kind="stable")
     by_device = dict(tuple(messages.groupby("device")))
     rows, refused = [], []
-    for found in task.found:
+    for found in listed:
         try:
             encounters = encounters_of(_raw(found, by_device), task.config.log).encounters
         except InputError as error:
@@ -97,9 +109,7 @@ def _raw(found: Found, by_device: Mapping[int, Any]) -> RawLog:
         speed = own["speed"].to_numpy(np.float64)
         heading = np.pi / 2.0 - own["heading"].to_numpy(np.float64) * (np.pi / 180.0)
         vehicles.append(
-            Observations(
-                label(device), stamps, own[["lat", "lon"]].to_numpy(np.float64), numbers, heading, stamps, speed, numbers
-            )
+            Observations(label(device), stamps, own[["lat", "lon"]].to_numpy() / DEGREE, numbers, heading, stamps, speed, numbers)
         )
         begin += len(own)
     return RawLog(found.name, True, tuple(vehicles), begin, (Segment(0, found.name, "message", 1),))

@@ -7,6 +7,9 @@ As `logs.groups` does with tracks, here with the table of meetings alone. An enc
 left, one of at least `min_duration`; its time is the encounter's. Who is near a member for at least `min_presence` of that time
 joins, the longest first, if it meets at least half of the members. Meetings of two members are used up, but for what of them lies
 outside.
+
+Only meetings that overlap in time influence each other. An instant that no meeting spans therefore divides the archive, and each
+task groups the meetings between two such instants.
 """
 
 from collections import defaultdict
@@ -14,10 +17,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, UTC
 import heapq
+from pathlib import Path
 
+import numpy as np
+
+from scenario_gen.base.stores import fetched, Place
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs import LogConfig, SHARED
+from scenario_gen.numerics import Ints
 
 START = datetime(2004, 1, 1, tzinfo=UTC)
+PARTITION = 5000  # meetings that one task groups, at least
 
 
 @dataclass(frozen=True, order=True)
@@ -41,18 +52,64 @@ class Meeting:
 
 @dataclass(frozen=True)
 class Found:
-    """An encounter in the table: its vehicles, its time [µs since 2004], and the meetings it is made of, strongest first."""
+    """An encounter in the table: its vehicles, its time [µs since 2004], and the meetings it is made of, strongest first.
+
+    What is read from a table has no meetings.
+    """
 
     devices: tuple[int, ...]
     start: int
     end: int
-    meetings: tuple[Meeting, ...]
+    meetings: tuple[Meeting, ...] = ()
 
     @property
     def name(self) -> str:
         """A name that no other encounter of the archive has: when, and who."""
         when = START + timedelta(microseconds=self.start)
         return f"{when:%Y%m%dT%H%M%S}{when.microsecond // 100_000}_{'_'.join(label(device) for device in self.devices[:3])}"
+
+
+@dataclass(frozen=True)
+class GroupTask:
+    """A partition: the meetings from `begin` to before `end` [µs since 2004], which lie in the tables of `hours`."""
+
+    name: str
+    corpus: Place
+    number: int
+    hours: tuple[int, ...]
+    begin: int
+    end: int
+    config: CorpusConfig
+
+    @property
+    def target(self) -> Place:
+        """The table of encounters to write."""
+        return part_of(self.corpus, self.number)
+
+
+def part_of(corpus: Place, number: int) -> Place:
+    """Return the table of a partition's encounters."""
+    return corpus / "found" / f"part-{number:06}.parquet"
+
+
+def partitions(start: Ints, end: Ints, least: int = 0) -> list[tuple[int, int]]:
+    """Return spans of time, in order, that no meeting crosses: (begin, end) [µs since 2004], the end excluded.
+
+    Args:
+        start: (M,) of the meetings, in any order.
+        end: (M,)
+        least: meetings in each span but the last; 0: `PARTITION`.
+    """
+    if not len(start):
+        return []
+    order = np.argsort(start, kind="stable")
+    start, until = start[order], np.maximum.accumulate(end[order])
+    free = np.flatnonzero(start[1:] >= until[:-1]) + 1
+    first = [0]
+    while (k := int(np.searchsorted(free, first[-1] + (least or PARTITION)))) < len(free):
+        first.append(int(free[k]))
+    begins = start[first].tolist()
+    return list(zip(begins, [*begins[1:], int(until[-1]) + 1], strict=True))
 
 
 def label(device: int) -> str:
@@ -115,3 +172,37 @@ def _grow(seed: Meeting, by_device: dict[int, set[Meeting]], least: int, config:
         met = len({one.other(best) for one in near[best]})
         (members if met >= SHARED * len(members) else refused).add(best)
     return members
+
+
+def group_partition(task: GroupTask) -> None:
+    """Write the table of a partition's encounters, in order of time; `earliest` is the start of the first of its meetings."""
+    if task.target.exists():
+        return
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    names = ("gap", "start", "a", "b", "end", "kind", "distance", "lat", "lon")
+    inside = [("start", ">=", task.begin), ("start", "<", task.end)]
+    with fetched([task.corpus / "hours" / f"hour-{hour}.parquet" for hour in task.hours]) as here:
+        tables = [parquet.read_table(path, columns=list(names), filters=inside).to_pylist() for path in here]
+    rows = [
+        {
+            "name": one.name, "devices": list(one.devices), "start": one.start, "end": one.end, "kind": one.meetings[0].kind,
+            "gap": one.meetings[0].gap, "distance": min(meeting.distance for meeting in one.meetings),
+            "lat": one.meetings[0].lat, "lon": one.meetings[0].lon, "earliest": min(meeting.start for meeting in one.meetings),
+        }
+        for one in group([Meeting(*(row[name] for name in names)) for table in tables for row in table], task.config.log)
+    ]  # fmt: skip
+    whole, number = pa.int64(), pa.float64()
+    kinds = {"name": pa.string(), "devices": pa.list_(whole), "start": whole, "end": whole, "kind": pa.string()}
+    kinds |= {**dict.fromkeys(("gap", "distance", "lat", "lon"), number), "earliest": whole}
+    with arriving(task.target) as part:
+        parquet.write_table(pa.Table.from_pylist(rows, schema=pa.schema(list(kinds.items()))), part, compression="zstd")
+
+
+def read_found(table: Path, first: int, last: int) -> list[Found]:
+    """Return the encounters in rows `first` to before `last` of a table, without their meetings."""
+    from pyarrow import parquet
+
+    rows = parquet.read_table(table, columns=["devices", "start", "end"]).slice(first, last - first).to_pylist()
+    return [Found(tuple(row["devices"]), row["start"], row["end"]) for row in rows]

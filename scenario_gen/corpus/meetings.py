@@ -19,7 +19,7 @@ import numpy as np
 
 from scenario_gen.base.stores import fetched, Place, workplace
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.messages import database, DEGREE, HOUR, quoted
+from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR, quoted, write_messages
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import FASTEST, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
 from scenario_gen.logs import APART, LAG, shortest
@@ -95,8 +95,10 @@ def _search(base: Any, hour: int, files: Sequence[Path], target: Place, config: 
     kinds = {**dict.fromkeys(("a", "b", "start", "end"), pa.int64()), **numbers, "kind": pa.string()}
     table = pa.Table.from_pylist(found, schema=pa.schema(list(kinds.items())))
     wanted = _excerpt(rows, found)
+    excerpt = {name: values[wanted] for name, values in rows.items()}
+    excerpt |= {name: np.rint(excerpt[name] * DEGREE).astype(np.int32) for name in ("lat", "lon")}  # exactly what was read
     with arriving(target.with_suffix(".rows.parquet")) as part:
-        parquet.write_table(pa.table({name: values[wanted] for name, values in rows.items()}), part, compression="zstd")
+        write_messages(pa.table(excerpt).to_reader(GROUP), part)
     with arriving(target) as part:
         parquet.write_table(table.replace_schema_metadata({"shared": json.dumps(shared)}), part, compression="zstd")
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Basic safety messages in text -> Parquet sorted by hour, with an account of every row that was left out.
+"""Basic safety messages in text -> Parquet sorted by hour, vehicle and time, with an account of every row that was left out.
 
 A task parses one byte range, so a file may be of any size. DuckDB reads the text; what it cannot read it counts.
 """
@@ -48,7 +48,14 @@ DISAGREE = (
     f"DSecond <> {UNKNOWN_SECOND} AND "
     f"abs(Gentime * 1e-3 - DSecond - 60000.0 * round((Gentime * 1e-3 - DSecond) / 60000.0)) > {CLOCK}"
 )
-PARQUET = "FORMAT parquet, PARQUET_VERSION V2, COMPRESSION zstd"
+IN_ORDER = f"TRY_CAST(t // {HOUR} AS INTEGER), TRY_CAST(device AS INTEGER), TRY_CAST(t % {HOUR} AS UINTEGER)"  # short
+GROUP = 122_880  # rows of a group in a table
+PACKED: dict[str, Any] = {  # how tables of messages are written: differences between rows, of one vehicle and in order of time
+    "compression": "zstd",
+    "compression_level": 3,
+    "use_dictionary": ["device", "speed", "heading", "cause", "file"],
+    "column_encoding": dict.fromkeys(("t", "lat", "lon"), "DELTA_BINARY_PACKED"),
+}
 DEGREE = 1e7  # units of latitude and longitude in tables: a ten-millionth of a degree, as messages have them (SAE J2735); 1 cm
 LONGEST_LINE = 65_536  # bytes; a longer one is no row
 MOST_FILES = 65_536  # of a task: their numbers have two bytes
@@ -158,7 +165,7 @@ def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
 
 
 def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
-    """Parse files (read name -> true name) into one table in order of hours; return the account.
+    """Parse files (read name -> true name) into one table in order of hours, in each of vehicles and time; return the account.
 
     The table has device, t, lat, lon [1e-7°], speed, heading, `cause` (0: the row is kept), `file` (which of `names`) and `back`
     (a stamp before that of the row above, of the same vehicle).
@@ -177,13 +184,14 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     if not files:
         source = "(SELECT " + ", ".join(f"NULL::{TYPES[name]} AS {name}" for name in TYPES) + ", '' AS filename LIMIT 0)"
         file = "0"
-    base.execute(
-        f"COPY (SELECT TxDevice AS device, Gentime AS t, TRY_CAST(round(Latitude * {DEGREE}) AS INTEGER) AS lat, "
+    select = (
+        f"SELECT TxDevice AS device, Gentime AS t, TRY_CAST(round(Latitude * {DEGREE}) AS INTEGER) AS lat, "
         f"TRY_CAST(round(Longitude * {DEGREE}) AS INTEGER) AS lon, Speed AS speed, Heading AS heading, "
         f"(CASE {cause} WHEN {DISAGREE} THEN {OFF} ELSE 0 END)::UTINYINT AS cause, ({file})::USMALLINT AS file, "
         "coalesce(TxDevice = lag(TxDevice) OVER () AND Gentime < lag(Gentime) OVER (), false) AS back "
-        f"FROM {source} ORDER BY t // {HOUR}) TO {quoted([str(target)])} ({PARQUET})"
+        f"FROM {source} ORDER BY {IN_ORDER}"
     )
+    write_messages(base.sql(select).to_arrow_reader(GROUP), target)
     parsed = f"read_parquet({quoted([str(target)])})"
     counts = base.execute(
         f"SELECT file, cause, count(*), count(*) FILTER (back AND cause = 0) FROM {parsed} GROUP BY ALL"
@@ -230,12 +238,27 @@ def _unchecked(
     if most:
         again = target.with_name("again.parquet")
         listed = ", ".join(map(str, most))
-        base.execute(
-            f"COPY (SELECT * REPLACE ((CASE WHEN cause = {OFF} AND file IN ({listed}) THEN 0 ELSE cause END)::UTINYINT AS cause) "
-            f"FROM {parsed}) TO {quoted([str(again)])} ({PARQUET})"
+        select = (
+            f"SELECT * REPLACE ((CASE WHEN cause = {OFF} AND file IN ({listed}) THEN 0 ELSE cause END)::UTINYINT AS cause) "
+            f"FROM {parsed}"
         )
+        write_messages(base.sql(select).to_arrow_reader(GROUP), again)
         again.replace(target)
     return [f"{names[files[number]]}: DSecond disagrees with Gentime in most rows, and is not asked" for number in most]
+
+
+def write_messages(batches: Any, target: Path) -> None:
+    """Write a table of messages.
+
+    Args:
+        batches: pyarrow's reader of them; latitude and longitude in units of 1e-7°.
+        target: the file.
+    """
+    from pyarrow import parquet
+
+    with parquet.ParquetWriter(target, batches.schema, **PACKED) as writer:
+        for batch in batches:
+            writer.write_batch(batch)
 
 
 def _rejected(base: Any) -> list[tuple[str, int]]:

@@ -1,24 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`mine`: an archive -> a corpus of encounters. Four stages of tasks, each writing files that the next one reads.
+"""`mine`: an archive -> a corpus of encounters. Stages of tasks, each writing files that the next one reads.
 
     messages/range-*.parquet    what text said, by hour (`messages.py`)
     hours/hour-*.parquet        which two vehicles meet (`meetings.py`), and beside it their messages
-    found.parquet               who is joined to whom (`grouping.py`)
+    found/part-*.parquet        who is joined to whom (`grouping.py`)
     encounters/*.parquet        cleaned encounters (`encounters.py`); of logs in other formats, these at once
 
 A file that is there is done, so a run that was killed goes on where it was.
 """
 
+from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import accumulate, chain
 import json
 import os
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from scenario_gen.base.documents import COUNT, read_json
 from scenario_gen.base.errors import InputError, needs
@@ -36,13 +38,14 @@ from scenario_gen.corpus.encounters import (
     rows_of,
     tables_of,
 )
-from scenario_gen.corpus.grouping import Found, group, Meeting
+from scenario_gen.corpus.grouping import group_partition, GroupTask, partitions
 from scenario_gen.corpus.kinds import KINDS
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tasks import agreed, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.logs import is_bag, is_commonroad, is_nocturne, is_spmd, is_table
+from scenario_gen.numerics import Ints
 from scenario_gen.template import reactions_of
 
 ARCHIVE, PAGE = "archive.json", "encounters.html"
@@ -129,6 +132,7 @@ def mine(
             ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
             lost = go(parse_range, undone(ranged, _target))
             lost = lost or go(search_hours, hour_tasks(ranged, out, config))  # of all ranges, for an hour is done only once
+            lost = lost or go(group_partition, group_tasks(out, config))
             failed += lost or go(clean_found, clean_tasks(out, config))
         result = summary(out, config, failed, others)
         with arriving(out / PAGE) as part:
@@ -136,7 +140,7 @@ def mine(
         return result
 
 
-def _target(task: LogTask | RangeTask | CleanTask) -> Place:
+def _target(task: LogTask | RangeTask | GroupTask | CleanTask) -> Place:
     """The file that a task writes."""
     return task.target
 
@@ -253,7 +257,7 @@ def _agree(out: Place, messages: Sequence[Place], logs: Sequence[Sequence[Place]
     files = [*messages, *chain.from_iterable(logs)]
     sizes = [0 if isinstance(path, Path) and path.is_dir() else max(size_of(path), 0) for path in files]
     document = {
-        "format": 2,  # of the tables
+        "format": 3,  # of the tables
         "files": [[name, size] for name, size in zip(resolved(files), sizes, strict=True)],
         "parameters": {name: value for name, (_, value) in flatten(config).items() if name not in ("memory", "task_rows")},
     }
@@ -297,45 +301,52 @@ def least_rows(config: CorpusConfig) -> int:
     return 2 * (int(min(config.log.min_presence, config.log.min_duration) / max(config.log.longest_gap, config.log.period)) + 1)
 
 
-def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
-    """Group all meetings, and put those encounters that are not cleaned into tasks."""
-    found = grouped(out, config)
-    there = {path.name for path in (out / "hours").glob("hour-*.rows.parquet")}
-    tasks = []
-    for k in range(0, len(found), config.task_encounters):
-        own = tuple(found[k : k + config.task_encounters])
-        target = out / "encounters" / f"found-{k // config.task_encounters:06}.parquet"
-        first, last = min(one.meetings[0].start for one in own), max(one.end for one in own)
-        first = min(meeting.start for one in own for meeting in one.meetings)
-        names = [f"hour-{hour}.rows.parquet" for hour in range(first // HOUR - 1, last // HOUR + 1)]
-        rows = tuple(out / "hours" / name for name in names if name in there)
-        tasks.append(CleanTask(f"encounters from {k}", own, rows, target, config))
+def group_tasks(out: Place, config: CorpusConfig) -> list[GroupTask]:
+    """Divide all meetings at instants that none of them spans; return the partitions that are not grouped."""
+    hours = _hours(out)
+    tables = [out / "hours" / f"hour-{hour}.parquet" for hour in hours]
+    start, end = (np.concatenate([np.zeros(0, dtype=np.int64), *own]) for own in _columns(tables, "start", "end"))
+    tasks = [
+        GroupTask(f"partition {k}", out, k, _between(hours, begin // HOUR, (last - 1) // HOUR), begin, last, config)
+        for k, (begin, last) in enumerate(partitions(start, end))
+    ]
     return undone(tasks, _target)
 
 
-def grouped(out: Place, config: CorpusConfig) -> list[Found]:
-    """Return the encounters of all meetings, and write their table."""
-    import pyarrow as pa
+def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
+    """Put those encounters that are not cleaned into tasks."""
+    hours = _hours(out)
+    tables: list[Place] = sorted((out / "found").glob("part-*.parquet"), key=str)
+    columns = _columns(tables, "earliest", "end")
+    offsets = [0, *accumulate(map(len, columns[0]))]
+    earliest, end = (np.concatenate([np.zeros(0, dtype=np.int64), *own]) for own in columns)
+    tasks = []
+    for k in range(0, offsets[-1], config.task_encounters):
+        last = min(k + config.task_encounters, offsets[-1])
+        parts = range(bisect_right(offsets, k) - 1, bisect_left(offsets, last))
+        own = [(part, max(k - offsets[part], 0), min(last, offsets[part + 1]) - offsets[part]) for part in parts]
+        near = _between(hours, int(min(earliest[k:last])) // HOUR - 1, int(max(end[k:last])) // HOUR)
+        number = k // config.task_encounters
+        tasks.append(CleanTask(f"encounters from {k}", out, number, tuple(one for one in own if one[1] < one[2]), near, config))
+    return undone(tasks, _target)
+
+
+def _hours(out: Place) -> list[int]:
+    """Return the hours that are searched, in order."""
+    return sorted(int(path.stem.removeprefix("hour-")) for path in (out / "hours").glob("hour-*[0-9].parquet"))
+
+
+def _between(hours: list[int], first: int, last: int) -> tuple[int, ...]:
+    """Return those of the hours from the first to the last."""
+    return tuple(hours[bisect_left(hours, first) : bisect_right(hours, last)])
+
+
+def _columns(tables: Sequence[Place], *names: str) -> list[list[Ints]]:
+    """Return for each column its values (rows,) in each table."""
     from pyarrow import parquet
 
-    names = ("gap", "start", "a", "b", "end", "kind", "distance", "lat", "lon")
-    tables: list[Place] = sorted((out / "hours").glob("hour-*[0-9].parquet"), key=str)
-    rows = (row for _, here in each_fetched(tables) for row in parquet.read_table(here, columns=list(names)).to_pylist())
-    meetings = [Meeting(*(row[name] for name in names)) for row in rows]
-    found = group(meetings, config.log)
-    listed = [
-        {
-            "name": one.name, "devices": list(one.devices), "start": one.start, "end": one.end, "kind": one.meetings[0].kind,
-            "gap": one.meetings[0].gap, "distance": min(meeting.distance for meeting in one.meetings),
-            "lat": one.meetings[0].lat, "lon": one.meetings[0].lon,
-        }
-        for one in found
-    ]  # fmt: skip
-    kinds: dict[str, Any] = {"name": pa.string(), "devices": pa.list_(pa.int64()), "start": pa.int64(), "end": pa.int64()}
-    kinds |= {"kind": pa.string(), **dict.fromkeys(("gap", "distance", "lat", "lon"), pa.float64())}
-    with arriving(out / "found.parquet") as part:
-        parquet.write_table(pa.Table.from_pylist(listed, schema=pa.schema(list(kinds.items()))), part, compression="zstd")
-    return found
+    read = [parquet.read_table(here, columns=list(names)) for _, here in each_fetched(tables)]
+    return [[table[name].to_numpy() for table in read] for name in names]
 
 
 def summary(out: Place, config: CorpusConfig, failed: list[str], others: Sequence[Place] = ()) -> Mined:

@@ -3,8 +3,10 @@
 
 """Mining: planted encounters are found and no others, rows left out are counted, the work can be cut off anywhere."""
 
+from dataclasses import replace
 import json
 import os
+import pickle
 
 from hypothesis import given, strategies
 import numpy as np
@@ -13,13 +15,14 @@ import pytest
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.base.folders.claim import claim
+from scenario_gen.corpus import grouping
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
-from scenario_gen.corpus.grouping import group, label, Meeting
+from scenario_gen.corpus.grouping import group, label, Meeting, partitions
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
 from scenario_gen.corpus.meetings import _together, in_order, TOGETHER
 from scenario_gen.corpus.messages import parse_range, ranges
-from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.mine import clean_tasks, mine
 from scenario_gen.corpus.synthetic import read_planted
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs.config import LogConfig
@@ -103,7 +106,7 @@ def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     """As after a kill: of each stage a file is gone, and a torn one lies there."""
     out, _ = corpus
     before = {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")}
-    for stage in ("messages", "hours", "encounters"):
+    for stage in ("messages", "hours", "found", "encounters"):
         sorted((out / stage).glob("*[0-9].parquet"))[0].unlink()
         killed_while_writing(out / stage)
     killed_while_writing(out)
@@ -133,7 +136,7 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     mined = mine([tmp_path / "in"], tmp_path / "out")
     assert mined.encounters == 0 and len(mined.failed) == 2 and "one.csv" in mined.failed[0] and "no table" in mined.failed[1]
     assert "packed.csv.gz" in " ".join(mined.notes)
-    assert (tmp_path / "out" / "found.parquet").exists()
+    assert not list((tmp_path / "out").glob("found/*"))
     assert mined.account == {"rows": 4, "left out: no row of 19 fields with numbers": 2, "left out: no vehicle": 1}
 
 
@@ -251,3 +254,31 @@ def test_ranges_hold_as_many_files_as_have_numbers(tmp_path, monkeypatch):
     parse_range(tasks[0])
     accounts = json.loads(tasks[0].target.with_suffix(".json").read_text())["files"]
     assert {name: one["rows"] for name, one in accounts.items()} == {str(path): 1 for path in files[:2]}
+
+
+@given(
+    rows=strategies.lists(
+        strategies.tuples(*(strategies.integers(0, high) for high in (4, 3, 150, 40, 9))).filter(lambda row: row[3] >= 3),
+        max_size=40,
+    ),
+    least=strategies.integers(1, 6),
+)
+def test_partitions_of_meetings_give_the_encounters_of_all(rows, least):
+    config = LogConfig(max_vehicles=3)
+    meetings = [meeting(a, a + 1 + more, start, start + length, float(gap)) for a, more, start, length, gap in rows]
+    spans = partitions(np.array([m.start for m in meetings]), np.array([m.end for m in meetings]), least)
+    divided = [[m for m in meetings if begin <= m.start < end] for begin, end in spans]
+    assert sum(map(len, divided)) == len(meetings) and all(len(own) >= least for own in divided[:-1])
+    assert [one for own in divided for one in group(own, config)] == group(meetings, config)
+
+
+def test_small_partitions_give_the_same_corpus_by_small_tasks(archive, corpus, tmp_path, monkeypatch):
+    monkeypatch.setattr(grouping, "PARTITION", 2)
+    config = CorpusConfig(task_encounters=3)
+    mine([archive], tmp_path / "out", config)
+    assert len(list((tmp_path / "out" / "found").glob("*"))) > 3
+    assert list(rows_of(tables_of(tmp_path / "out"))) == list(rows_of(tables_of(corpus[0])))
+    for table in (tmp_path / "out" / "encounters").glob("*.parquet"):
+        table.unlink()
+    tasks = clean_tasks(tmp_path / "out", config)
+    assert max(len(task.found) for task in tasks) > 1 and max(len(pickle.dumps(replace(t, config=None))) for t in tasks) <= 500
