@@ -3,8 +3,8 @@
 
 """One size of the scaling benchmark in a process of its own, so that CPU and memory are its own.
 
-`python -m benchmarks._scaling_case` takes `generate VEHICLES SECONDS COUNT CELL`, `grid CELLS` or `map LANES`, and writes CPU seconds
-and the peak's MiB as JSON.
+`python -m benchmarks._scaling_case` takes `generate VEHICLES SECONDS COUNT CELL`, `grid CELLS` or `map LANES`, and writes CPU
+seconds and the peak's MiB as JSON.
 """
 
 from collections.abc import Callable
