@@ -28,7 +28,7 @@ from scenario_gen.types import Encounter, Vehicle
 
 ROAD, MOST = "four_way", 100_000_000
 SPEED, GAP, LANE = 10.0, 14.0, 1.75  # m/s, m, m
-BLOCK = 100.0  # m between two streets of a map
+BLOCK = 29.0  # m between two streets of a map: 10⁴ lanes are just below the 300 km that are searched
 HALF = 5.0  # m, half the width of the streets of a grid
 STAGES = {
     "generation": ("road_and_template", "segment", "fit_template", "plan_routes", "sample_scenarios"),
@@ -135,7 +135,7 @@ def main() -> None:
                 setattr(pipeline, name, _timed(spent, share, getattr(pipeline, name)))
         found = generated(int(words[0]), float(words[1]), int(words[2]), float(words[3])) | spent
     else:
-        measure, least = (planned, 200) if kind == "grid" else (placed, 64)
+        measure, least = (planned, 200) if kind == "grid" else (placed, 400)
         measure(least)
         found = measure(int(words[0]))
     print(json.dumps(found | {"mebibytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0}))

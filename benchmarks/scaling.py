@@ -39,7 +39,7 @@ def run() -> list[Row]:
     rows += _rows("scenarios", f"scenarios, 2 vehicles, {SECONDS:g} s", found, 1.0)
     found = {n * n: _measured("grid", n) for n in sized((200, 1000, 3000, 10_000), quick=(200, 300))}
     rows += _rows("cells", "cells: drawing, distances, first path", found, 1.0)
-    found = {n: _measured("map", n) for n in sized((100, 1000, 10_000), quick=(64, 100))}
+    found = {n: _measured("map", n) for n in sized((1000, 3000, 10_000), quick=(400, 500))}
     rows += _rows("lanes", "lanes: reading, best place of two vehicles", found)
     return [*rows, _inventory(sized(FILES, quick=200))]
 
