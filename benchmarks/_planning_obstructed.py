@@ -19,9 +19,9 @@ from benchmarks._planning_maps import road_of
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.search.planner import Budget
 from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
-from scenario_gen.method.routing.search.sweep import blocked_before, curve_length, SWEEP
+from scenario_gen.method.routing.search.sweep import curve_length, SWEEP
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.clearance import clearance_in_cells, footprint_fits, to_cells
+from scenario_gen.roads.clearance import blocked_before, clearance_in_cells, footprint_fits, to_cells
 from scenario_gen.roads.obstacles import Obstacle, with_obstacles
 from scenario_gen.types.road import Road
 

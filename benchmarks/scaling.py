@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a group costs: `generate` by the number of vehicles, the horizon and the number of scenarios; the inventory of an archive.
+"""What size costs: `generate` by vehicles, horizon and scenarios; grids by cells, maps by lanes; the inventory of an archive.
 
-CPU seconds in this process, kernels loaded. Vehicles come from two arms of a crossing, one behind the other, and go straight on.
+Each size is measured in a process of its own (`_scaling_case`): CPU seconds, kernels loaded, and the peak of its memory.
+Exponents are least-squares slopes of log CPU over log size. Vehicles come from two arms of a crossing and go straight on.
 """
 
-import math
+import json
 from pathlib import Path
+import subprocess
+import sys
 import tempfile
 from time import process_time
 
@@ -16,60 +19,65 @@ import numpy as np
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.corpus.mine import inventory
-from scenario_gen.pipeline import generate
-from scenario_gen.types import Encounter, Vehicle
 
-ROAD, COUNT, SECONDS = "four_way", 50, 20.0
+COUNT, SECONDS, CELL = 50, 20.0, 0.2
+COARSE = 0.5  # m: with cells of 0.2 m, 300 s of a crossing at 10 m/s are more than `road.max_cells` may be
 TARGETS = {8: 6.0, 12: 15.0}  # CPU seconds, by the number of vehicles
-SPEED, GAP, LANE = 10.0, 14.0, 1.75  # m/s, m, m
 FILES = 100_000
 
 
-def group(vehicles: int, seconds: float) -> Encounter:
-    """Return vehicles of two platoons that cross, the second one after the first."""
-    steps = round(seconds / 0.1) + 1
-    way = SPEED * 0.1 * np.arange(steps)
-    position, heading = [], []
-    for k in range(vehicles):
-        behind = GAP * (k // 2)
-        if k % 2 == 0:
-            position.append(np.column_stack([way - 60.0 - behind, np.full(steps, -LANE)]))
-        else:
-            position.append(np.column_stack([np.full(steps, LANE), way - 72.0 - GAP * (vehicles // 2) - behind]))
-        heading.append(np.full(steps, np.pi / 2.0 * (k % 2)))
-    names = tuple(Vehicle(str(k)) for k in range(vehicles))
-    speed = np.full((vehicles, steps), SPEED)
-    return Encounter("group", names, 1_600_000_000_000_000_000, 100_000_000, np.array(position), np.array(heading), speed)
-
-
 def run() -> list[Row]:
-    """The cost of groups, and of the inventory of many files."""
-    count = sized(COUNT, quick=2)
-    _cost(group(2, SECONDS), 2)  # what is loaded and compiled is not measured
-    sizes = sized((2, 4, 8, 12), quick=(2, 4))
-    cost = {n: _cost(group(n, SECONDS), count) for n in sizes}
-    rows = [Row(f"{n} vehicles, {SECONDS:g} s, {count} scenarios", cost[n], "CPU s", "lower", TARGETS.get(n)) for n in sizes]
-    most = max(cost)
-    rows.append(Row("exponent in vehicles", _exponent(cost[2], cost[most], most / 2), "", "lower", 1.5))
-    long, many = sized(60.0, quick=25.0), sized(1000, quick=4)
-    two = _cost(group(2, long), count)
-    rows.append(
-        Row("exponent in the horizon", _exponent(cost[2], two, long / SECONDS), "", "lower", 1.2, f"{long:g} s: {two:.2f} s")
-    )
-    more = _cost(group(2, SECONDS), many)
-    rows.append(Row("exponent in scenarios", _exponent(cost[2], more, many / count), "", "lower", 1.0, f"{many}: {more:.2f} s"))
+    """The cost of groups, grids, maps, and of the inventory of many files."""
+    rows = [*_vehicles(sized((2, 4, 8, 12), quick=(2, 3)))]
+    fine = ((CELL, (20.0, 40.0, 60.0)), (COARSE, (20.0, 60.0, 300.0)))
+    for cell, horizons in sized(fine, quick=((COARSE, (20.0, 25.0)),)):
+        count = sized(COUNT, quick=2)
+        found = {seconds: _measured("generate", 2, seconds, count, cell) for seconds in horizons}
+        rows += _rows("horizon", f"s, 2 vehicles, {count} scenarios, cells of {cell:g} m", found, 1.2)
+    sizes = sized((50, 1000, 100_000), quick=(2, 4))
+    found = {n: _measured("generate", 2, SECONDS, n, CELL) for n in sizes}
+    rows += _rows("scenarios", f"scenarios, 2 vehicles, {SECONDS:g} s", found, 1.0)
+    found = {n * n: _measured("grid", n) for n in sized((200, 1000, 3000, 10_000), quick=(200, 300))}
+    rows += _rows("cells", "cells: drawing, distances, first path", found, 1.0)
+    found = {n: _measured("map", n) for n in sized((1000, 3000, 10_000), quick=(400, 500))}
+    rows += _rows("lanes", "lanes: reading, best place of two vehicles", found)
     return [*rows, _inventory(sized(FILES, quick=200))]
 
 
-def _cost(encounter: Encounter, count: int) -> float:
-    """CPU seconds of the whole of `generate`."""
-    begun = process_time()
-    generate(encounter, ROAD, count=count, seed=1)
-    return process_time() - begun
+def _vehicles(sizes: tuple[int, ...]) -> list[Row]:
+    """Rows of groups, and which shares of their cost generation and evaluation are."""
+    count = sized(COUNT, quick=2)
+    found = {n: _measured("generate", n, SECONDS, count, CELL) for n in sizes}
+    rows = _rows("vehicles", f"vehicles, {SECONDS:g} s, {count} scenarios", found, 1.5, TARGETS)
+    for n in sized((2, 8), quick=(2,)):
+        for stage in ("generation", "references", "evaluation"):
+            rows.append(Row(f"{n} vehicles: share of {stage}", 100.0 * found[n][stage] / found[n]["all"], "%", "lower"))
+    return rows
 
 
-def _exponent(first: float, second: float, ratio: float) -> float:
-    return math.log(second / first) / math.log(ratio)
+def _rows(
+    name: str,
+    what: str,
+    found: dict[int, dict[str, float]] | dict[float, dict[str, float]],
+    target: float | None = None,
+    targets: dict[int, float] | None = None,
+) -> list[Row]:
+    """Rows of what was measured at each size, and of the exponent."""
+    rows = []
+    for size, case in found.items():
+        parts = ", ".join(f"{part} {value:.3g} s" for part, value in case.items() if part not in ("all", "mebibytes"))
+        rows.append(Row(f"{size:,g} {what}", case["all"], "CPU s", "lower", (targets or {}).get(int(size)), parts or None))
+        rows.append(Row(f"{size:,g} {what}: peak memory", case["mebibytes"], "MiB", "lower"))
+    slope = np.polyfit(np.log(list(found)), np.log([case["all"] for case in found.values()]), 1)[0]
+    return [*rows, Row(f"exponent in {name}", slope, "", "lower", target, f"{min(found):g} to {max(found):g}")]
+
+
+def _measured(*words: object) -> dict[str, float]:
+    """CPU seconds and MiB of one size, in a process of its own."""
+    command = [sys.executable, "-m", "benchmarks._scaling_case", *map(str, words)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return found
 
 
 def _inventory(files: int) -> Row:

@@ -17,7 +17,7 @@ from scenario_gen.method.validity import containment as inside
 from scenario_gen.method.validity import control_points
 from scenario_gen.numerics import Bools, exact, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
-from scenario_gen.roads import clearance_in_cells, distance_transform, to_cells
+from scenario_gen.roads import blocked_before, clearance_in_cells, distance_transform, to_cells
 from scenario_gen.types import once_per_object, Road, Scenario
 
 FARTHEST = 10.0  # metres; margins and depths beyond are told as this
@@ -58,7 +58,7 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
         motion.heading[ego],
         np.array([half]),
         clearance_in_cells(road),
-        inside.blocked_before(road.drivable),
+        blocked_before(road),
         np.array((*road.origin, road.resolution)),
         RESOLUTION,
         out,

@@ -7,6 +7,7 @@ from scenario_gen.numerics.arrays import (
     Bools,
     canonical_heading,
     canonical_poses,
+    Counts,
     Floats,
     freeze,
     frozen,
@@ -19,6 +20,6 @@ from scenario_gen.numerics.arrays import (
 )
 
 __all__ = [
-    "Bools", "Floats", "Ints", "canonical_heading", "canonical_poses", "freeze", "frozen", "frozen_bools", "frozen_ints",
-    "runs", "sealed", "wrap_angle",
+    "Bools", "Counts", "Floats", "Ints", "canonical_heading", "canonical_poses", "freeze", "frozen", "frozen_bools",
+    "frozen_ints", "runs", "sealed", "wrap_angle",
 ]  # fmt: skip

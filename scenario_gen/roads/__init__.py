@@ -7,6 +7,7 @@ from scenario_gen.roads.arms import Arm, arms_of, reverse, ring_of, unused_arms
 from scenario_gen.roads.build import build_road, BUILT_IN, DrawRoad, road_and_template, ROADS
 from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.roads.clearance import (
+    blocked_before,
     clearance_field,
     clearance_in_cells,
     CONTACT,
@@ -46,6 +47,7 @@ __all__ = [
     "along_lanes",
     "arms_of",
     "bent_axis",
+    "blocked_before",
     "build_road",
     "clearance_field",
     "clearance_in_cells",

@@ -5,13 +5,14 @@
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, exact, Floats, sealed
-from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1
+from scenario_gen.numerics import Bools, Counts, exact, Floats, sealed
+from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1, OUTN2
 from scenario_gen.types import once_per_object, Road
 
 CONTACT = 1e-9  # [cells] what lies nearer than this touches
 
 
+@once_per_object
 def clearance_field(road: Road) -> Floats:
     """Distance [m] from every cell's centre to the nearest non-drivable cell, 0 in such cells.
 
@@ -20,19 +21,36 @@ def clearance_field(road: Road) -> Floats:
     Returns:
         (H, W), read-only.
     """
-    return _both(road)[0]
-
-
-def clearance_in_cells(road: Road) -> Floats:
-    """The same field in units of cells, for kernels: (H, W), read-only."""
-    return _both(road)[1]
+    return sealed(clearance_in_cells(road) * road.resolution)
 
 
 @once_per_object
-def _both(road: Road) -> tuple[Floats, Floats]:
+def clearance_in_cells(road: Road) -> Floats:
+    """The same field in units of cells, for kernels: (H, W), read-only."""
     cells = np.empty(road.drivable.shape)
     distance_transform(road.drivable, cells)
-    return sealed(cells * road.resolution), sealed(cells)
+    return sealed(cells)
+
+
+@once_per_object
+def blocked_before(road: Road) -> Counts:
+    """(H, W + 1): how many cells left of each column are not drivable: any run of a row is looked up in one step; cached."""
+    height, width = road.drivable.shape
+    counts = np.empty((height, width + 1), dtype=np.int32)
+    _count_blocked(road.drivable, counts)
+    return sealed(counts)
+
+
+@kernel(B2, OUTN2)
+def _count_blocked(drivable: Bools, out: Counts) -> None:
+    """Fill `out` (H, W + 1) for `blocked_before`."""
+    height, width = drivable.shape
+    for i in range(height):
+        count = 0
+        for j in range(width):
+            out[i, j] = count
+            count += not drivable[i, j]
+        out[i, width] = count
 
 
 def to_cells(road: Road, xy: Floats) -> Floats:

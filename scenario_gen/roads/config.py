@@ -31,7 +31,7 @@ class RoadConfig(Parameters):
     corridor_run_out: float = parameter(6.0, "how far a corridor goes on beyond a path's ends", unit="m", low=1.0, high=50.0)
     paper: bool = parameter(False, "straight and t_intersection as in the paper: a grid of 1000 x 1000 cells, lengths in cells")
     max_cells: int = parameter(
-        25_000_000, "most cells of a road that is drawn, or pixels of a map that is read", low=1, high=80_000_000
+        25_000_000, "most cells of a road that is drawn, or pixels of a map that is read", low=1, high=100_000_000
     )
     obstacles: str = parameter(
         "", "what stands in the way, rectangles `x y yaw length width` in the road's frame, parted by `;`", unit="m, rad"

@@ -13,7 +13,7 @@ from scenario_gen.numerics import Bools, exact, Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import corners, unit, unit_left
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
-from scenario_gen.roads.labels import labelled
+from scenario_gen.roads.labels import small_parts
 from scenario_gen.types import Road
 
 ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4, "roundabout": 4}
@@ -104,9 +104,7 @@ class Sketch:
         """
         low, drivable = self.grid(name, config)
         if not self.islands:
-            holes = labelled(~drivable)
-            small = np.bincount(holes.ravel()) <= int(_SLIVER / np.square(config.resolution))
-            drivable |= small[holes] & (holes > 0)
+            drivable |= small_parts(~drivable, int(_SLIVER / np.square(config.resolution)))
         shift = np.array([*low, 0.0])
         return Road(name, drivable, config.resolution, np.zeros(2), entries - shift, exits - shift)
 

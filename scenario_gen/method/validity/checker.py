@@ -17,7 +17,7 @@ from scenario_gen.method.validity.dynamics import control_points, is_motion
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
 from scenario_gen.numerics import Bools, exact, Floats, runs
-from scenario_gen.roads import clearance_in_cells, drives_against, RuleCheck
+from scenario_gen.roads import blocked_before, clearance_in_cells, drives_against, RuleCheck
 from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, required_orders, time_gaps, Wait
 from scenario_gen.types import (
     at_ends,
@@ -70,7 +70,7 @@ class Checker:
         self._limits = self.limits or Limits()
         self._dynamics_limits = np.array([getattr(self._limits, name) for name in dynamics.LIMITS])
         if self.road is not None:
-            self._clearance, self._blocked = clearance_in_cells(self.road), inside.blocked_before(self.road.drivable)
+            self._clearance, self._blocked = clearance_in_cells(self.road), blocked_before(self.road)
             self._grid = np.array((*self.road.origin, self.road.resolution))
         lanes = self.road.lanes if self.road is not None else None
         self._rules = RuleCheck(lanes) if lanes is not None and lanes.rules else None

@@ -12,23 +12,15 @@ Where neither suffices the stretch is halved, until it is proven, the footprint 
 import numpy as np
 
 from scenario_gen.method.validity.dynamics import stretch
-from scenario_gen.numerics import Bools, exact, Floats, Ints
-from scenario_gen.numerics.kernels import F, F1, F2, F4, I2, kernel, OUT2
+from scenario_gen.numerics import Counts, exact, Floats
+from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, N2, OUT2
 
 CONTACT = 1e-9  # cells, an overlap this small only touches
 PROVEN, FOUND, UNPROVEN = 0.0, 1.0, 2.0
 
 
-def blocked_before(drivable: Bools) -> Ints:
-    """(H, W + 1): how many cells left of each column are not drivable, so that any run of a row is asked in one step."""
-    height, width = drivable.shape
-    counts = np.zeros((height, width + 1), dtype=np.int64)
-    np.cumsum(~drivable, axis=1, out=counts[:, 1:])
-    return counts
-
-
 @kernel(inline=True)
-def _rectangle_drivable(blocked: Ints, x: float, y: float, c: float, s: float, length: float, width: float) -> bool:
+def _rectangle_drivable(blocked: Counts, x: float, y: float, c: float, s: float, length: float, width: float) -> bool:
     """Whether the rectangle centred at (x, y), half sizes length and width, all in cells, covers drivable cells only."""
     a, b = length, width
     if c < 0.0:  # half a turn changes nothing
@@ -80,7 +72,7 @@ def _discs_drivable(clearance: Floats, x: float, y: float, c: float, s: float, l
 
 @kernel(inline=True)
 def _first_exit(
-    b: Floats, h: float, yaw: Floats, half: Floats, clearance: Floats, blocked: Ints, resolution: float
+    b: Floats, h: float, yaw: Floats, half: Floats, clearance: Floats, blocked: Counts, resolution: float
 ) -> tuple[float, float]:
     """(status, u) of one interval: control points b (4, 2), start and change of heading (2,), half sizes, in cells."""
     length, width = half
@@ -110,14 +102,14 @@ def _first_exit(
     return PROVEN, 1.0
 
 
-@kernel(F1, F4, F2, F2, F2, I2, F1, F, OUT2)
+@kernel(F1, F4, F2, F2, F2, N2, F1, F, OUT2)
 def first_exits(
     time: Floats,
     control: Floats,
     heading: Floats,
     half: Floats,
     clearance: Floats,
-    blocked: Ints,
+    blocked: Counts,
     grid: Floats,
     resolution: float,
     out: Floats,

@@ -23,6 +23,7 @@ from scenario_gen.numerics.kernels import B, F1, F2, F3, kernel, OUT1, OUT2, OUT
 Numbers = npt.NDArray[Any]  # floats or whole numbers; they become floats
 
 EPSILON = 2.220446049250313e-16
+_MANY_ROWS = 16  # for which looking at all of b first is cheap
 
 
 @kernel(inline=True)
@@ -49,14 +50,20 @@ def dot(a: Floats, b: Floats) -> float:
 
 @kernel(F3, F3, OUT3, B)
 def _matmul(a: Floats, b: Floats, out: Floats, symmetric: bool) -> None:
-    """The product a b; of a symmetric one only the upper half."""
+    """The product a b; of a symmetric one only the upper half.
+
+    Of other large ones, zeros of a are skipped where they meet no infinity: a row of a banded matrix costs as much as its band.
+    """
     inner = a.shape[2]
     whole = inner // 4 * 4
     for s in range(a.shape[0]):
+        skip = not symmetric and a.shape[1] >= _MANY_ROWS and np.isfinite(b[s]).all()
         for i in range(a.shape[1]):
             row, start = out[s, i], i if symmetric else 0
             for k in range(0, whole, 4):  # four terms a pass, added in the order of k
                 a0, a1, a2, a3 = a[s, i, k], a[s, i, k + 1], a[s, i, k + 2], a[s, i, k + 3]
+                if skip and a0 == 0.0 and a1 == 0.0 and a2 == 0.0 and a3 == 0.0:
+                    continue  # 0 b is ±0, which changes no sum that began with +0
                 b0, b1, b2, b3 = b[s, k], b[s, k + 1], b[s, k + 2], b[s, k + 3]
                 for j in range(start, b.shape[2]):
                     row[j] = (((row[j] + a0 * b0[j]) + a1 * b1[j]) + a2 * b2[j]) + a3 * b3[j]
@@ -144,10 +151,10 @@ def _householder(columns: Floats, reflectors: Floats, scale: Floats, order: Ints
 
 @kernel(OUT2, OUT1, OUT2)
 def _reflect(reflectors: Floats, scale: Floats, columns: Floats) -> None:
-    """Multiply the columns (c, m) by the product of the reflectors, from the left."""
+    """Multiply the first columns (c, m) of the unit matrix by the product of the reflectors, from the left."""
     for k in range(len(scale) - 1, -1, -1):
         v = reflectors[k]
-        for j in range(len(columns)):
+        for j in range(k, len(columns)):
             factor = scale[k] * _dot(v[k:], columns[j, k:])
             for i in range(k, columns.shape[1]):
                 columns[j, i] -= factor * v[i]

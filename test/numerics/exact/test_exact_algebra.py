@@ -47,6 +47,16 @@ def test_a_row_of_a_product_does_not_depend_on_the_others():
     assert all((exact.matmul(a[k : k + 1], b)[0] == whole[k]).all() for k in range(50))
 
 
+@pytest.mark.parametrize("odd", [0.0, np.inf, np.nan])
+def test_zeros_of_a_large_matrix_change_no_bit(odd):
+    rng = np.random.default_rng(5)
+    a, b = np.triu(np.tril(rng.normal(size=(40, 43)), 3), -2), rng.normal(size=(43, 7))
+    b[20, 3] = odd
+    whole = exact.matmul(a, b)
+    for row, alone in zip(whole, a, strict=True):  # of a single row none is skipped
+        assert row.tobytes() == exact.matmul(alone, b).tobytes()
+
+
 @given(st.integers(1, 12), st.integers(1, 12), st.booleans(), st.booleans(), st.integers(0, 2**32 - 1))
 @settings(max_examples=60)
 def test_qr_is_a_factorisation(m, n, full, pivot, seed):

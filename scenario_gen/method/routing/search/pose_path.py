@@ -23,8 +23,8 @@ from scenario_gen.method.routing.search.pose_tree import (  # fmt: skip
 from scenario_gen.method.routing.search.sweep import follow, scratch_rows
 from scenario_gen.method.routing.search.tree_nodes import BOUND, CONNECTION, LINK2, Links, NODES_A, PARENT, PARTNER, X, Y
 from scenario_gen.method.routing.search.tree_samples import Random, RandomState, uniform
-from scenario_gen.numerics import Floats, Ints
-from scenario_gen.numerics.kernels import F, F2, I, I1, I2, kernel, OUT1, OUT2
+from scenario_gen.numerics import Counts, Floats, Ints
+from scenario_gen.numerics.kernels import F, F2, I, I1, kernel, N2, OUT1, OUT2
 
 
 @kernel(inline=True)
@@ -103,7 +103,7 @@ def trace(node: Floats, link: Links, counter: Ints, radius: float, spacing: floa
 
 @kernel(inline=True)
 def _prices(
-    path: Floats, first: int, last: int, clearance: Floats, blocked: Ints, setting: Floats, guide: Floats, price: Floats,
+    path: Floats, first: int, last: int, clearance: Floats, blocked: Counts, setting: Floats, guide: Floats, price: Floats,
     low: Floats, high: Floats,
 ) -> None:  # fmt: skip
     """Fill price[first:last], the cost of the piece that leads to each pose of a path."""
@@ -116,9 +116,9 @@ def _prices(
         )  # fmt: skip
 
 
-@kernel(I, I, F, F2, I2, F2, OUT1, RandomState, OUT2)
+@kernel(I, I, F, F2, N2, F2, OUT1, RandomState, OUT2)
 def shorten(  # noqa: PLR0912
-    n: int, tries: int, spacing: float, clearance: Floats, blocked: Ints, guide: Floats, setting: Floats, random: Random,
+    n: int, tries: int, spacing: float, clearance: Floats, blocked: Counts, guide: Floats, setting: Floats, random: Random,
     path: Floats,
 ) -> int:  # fmt: skip
     """Put shorter curves between poses of a path, chosen at random; string pulling for cars.

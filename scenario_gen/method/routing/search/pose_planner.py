@@ -16,9 +16,17 @@ from scenario_gen.method.routing.search import tree_nodes as shared
 from scenario_gen.method.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError, Query
 from scenario_gen.method.routing.search.pose_path import shorten, trace
 from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig, string_pulled
-from scenario_gen.method.routing.search.sweep import blocked_before, SWEEP
+from scenario_gen.method.routing.search.sweep import SWEEP
 from scenario_gen.numerics import exact, Floats, wrap_angle
-from scenario_gen.roads import clearance_in_cells, common_component, component_cells, footprint_fits, to_cells, to_metres
+from scenario_gen.roads import (
+    blocked_before,
+    clearance_in_cells,
+    common_component,
+    component_cells,
+    footprint_fits,
+    to_cells,
+    to_metres,
+)
 from scenario_gen.types import Road
 
 POOL = 512  # nodes that a pool has room for at first

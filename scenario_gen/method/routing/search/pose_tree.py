@@ -41,8 +41,8 @@ from scenario_gen.method.routing.search.tree_nodes import (  # fmt: skip
     ZETA,
 )
 from scenario_gen.method.routing.search.tree_samples import Random, RandomState, uniform
-from scenario_gen.numerics import exact, Floats, Ints
-from scenario_gen.numerics.kernels import F2, I, I1, I2, kernel, OUT1, OUT2, OUTI1
+from scenario_gen.numerics import Counts, exact, Floats, Ints
+from scenario_gen.numerics.kernels import F2, I, I1, kernel, N2, OUT1, OUT2, OUTI1
 
 YAW, WORD, PART_A, PART_B, PART_C = 4, 5, 6, 7, 8
 COLUMNS = 10
@@ -109,7 +109,7 @@ def _nearest(
 
 
 @kernel(inline=True)
-def _is_free(x: float, y: float, yaw: float, blocked: Ints, setting: Floats, low: Floats, high: Floats) -> bool:
+def _is_free(x: float, y: float, yaw: float, blocked: Counts, setting: Floats, low: Floats, high: Floats) -> bool:
     """Whether the footprint at a pose is free."""
     c, s = exact.cos(yaw), exact.sin(yaw)
     return bool(swept_free(blocked, x, y, c, s, x, y, c, s, setting[HALF_LENGTH], setting[HALF_WIDTH], 0.0, low, high))
@@ -123,8 +123,8 @@ def _bell(random: Random) -> float:
 
 @kernel(inline=True)
 def _sample(
-    ends: Floats, free_cells: Ints, about: Floats, clearance: Floats, blocked: Ints, setting: Floats, random: Random, low: Floats,
-    high: Floats,
+    ends: Floats, free_cells: Ints, about: Floats, clearance: Floats, blocked: Counts, setting: Floats, random: Random,
+    low: Floats, high: Floats,
 ) -> tuple[float, float, float]:  # fmt: skip
     """A free pose: about a known path, or anywhere that a better path can lie."""
     x, y, yaw = ends[1, 0], ends[1, 1], ends[1, 2]
@@ -150,7 +150,7 @@ def _sample(
 
 @kernel(inline=True)
 def _edge(
-    m: int, word: int, a: float, b: float, c: float, node: Floats, clearance: Floats, blocked: Ints, setting: Floats,
+    m: int, word: int, a: float, b: float, c: float, node: Floats, clearance: Floats, blocked: Counts, setting: Floats,
     guide: Floats, low: Floats, high: Floats,
 ) -> tuple[float, float]:  # fmt: skip
     """`sweep.follow` from node m on."""
@@ -163,7 +163,7 @@ def _edge(
 @kernel(inline=True)
 def _grow_greedily(
     tree: int, x: float, y: float, yaw: float, node: Floats, link: Links, counter: Ints, setting: Floats, clearance: Floats,
-    blocked: Ints, guide: Floats, low: Floats, high: Floats,
+    blocked: Counts, guide: Floats, low: Floats, high: Floats,
 ) -> tuple[int, int]:  # fmt: skip
     """Haste before the first path: nodes a step apart along the curve to a pose as far as it is free; returns as `_extend`."""
     m, word, a, b, c = _nearest(tree, x, y, yaw, node, counter, setting[TURN])
@@ -193,7 +193,7 @@ def _grow_greedily(
 @kernel(inline=True)
 def _cheapest_parent(
     tree: int, parent: int, x: float, y: float, yaw: float, word: int, a: float, b: float, c: float, edge: float, count: int,
-    near: Ints, node: Floats, clearance: Floats, blocked: Ints, setting: Floats, guide: Floats, low: Floats, high: Floats,
+    near: Ints, node: Floats, clearance: Floats, blocked: Counts, setting: Floats, guide: Floats, low: Floats, high: Floats,
 ) -> tuple[int, int, float, float, float, float]:  # fmt: skip
     """Algorithm 4: the near node by which a pose costs least, the curve from there, and what it costs."""
     best = node[parent, COST] + edge
@@ -216,7 +216,7 @@ def _cheapest_parent(
 @kernel(inline=True)
 def _extend(
     tree: int, x: float, y: float, yaw: float, ends: Floats, node: Floats, link: Links, counter: Ints, setting: Floats,
-    clearance: Floats, blocked: Ints, guide: Floats, near: Ints, low: Floats, high: Floats,
+    clearance: Floats, blocked: Counts, guide: Floats, near: Ints, low: Floats, high: Floats,
 ) -> tuple[int, int]:  # fmt: skip
     """Algorithm 2: one step of a tree towards a pose; returns what came of it, and the node."""
     radius = setting[TURN]
@@ -271,7 +271,7 @@ def _extend(
 @kernel(inline=True)
 def _connect(
     tree: int, x: float, y: float, yaw: float, ends: Floats, node: Floats, link: Links, counter: Ints, setting: Floats,
-    clearance: Floats, blocked: Ints, guide: Floats, near: Ints, low: Floats, high: Floats,
+    clearance: Floats, blocked: Counts, guide: Floats, near: Ints, low: Floats, high: Floats,
 ) -> tuple[int, int]:  # fmt: skip
     """Algorithm 3: extend a tree towards a pose, a new node of the other one, until it is there or trapped."""
     status, m = ADVANCED, -1
@@ -290,9 +290,9 @@ def plant(ends: Floats, node: Floats, link: Links, counter: Ints) -> None:
         node[root, COST], node[root, EDGE] = 0.0, 0.0
 
 
-@kernel(I, F2, I2, F2, I1, F2, F2, OUT2, OUTLINK2, OUTI1, OUT1, RandomState)
+@kernel(I, F2, N2, F2, I1, F2, F2, OUT2, OUTLINK2, OUTI1, OUT1, RandomState)
 def grow(  # noqa: PLR0912
-    iterations: int, clearance: Floats, blocked: Ints, ends: Floats, free_cells: Ints, about: Floats, guide: Floats,
+    iterations: int, clearance: Floats, blocked: Counts, ends: Floats, free_cells: Ints, about: Floats, guide: Floats,
     node: Floats, link: Links, counter: Ints, setting: Floats, random: Random,
 ) -> None:  # fmt: skip
     """Algorithm 1 for at most `iterations`; returns early at the first path, and when the pool is full.
@@ -300,7 +300,7 @@ def grow(  # noqa: PLR0912
     Args:
         iterations: how many samples to draw; the very first is the other tree's root: the direct curve.
         clearance: (H, W) cells.
-        blocked: (H, W + 1) from `sweep.blocked_before`.
+        blocked: (H, W + 1) from `blocked_before`.
         ends: (2, 3) start and goal.
         free_cells: flat indices of the cells to sample from.
         about: (G, 3) poses of a path to sample about; none: everywhere.

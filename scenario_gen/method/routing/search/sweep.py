@@ -10,23 +10,14 @@ cells: the swept area lies in it, so nothing slips between two poses.
 import numpy as np
 
 from scenario_gen.method.routing.search.dubins import shortest, TURNS
-from scenario_gen.numerics import exact, Floats, Ints
-from scenario_gen.numerics.kernels import F, F2, I2, kernel, OUT2
-from scenario_gen.roads import clearance_in_cells, CONTACT, to_cells
-from scenario_gen.types import once_per_object, Road
+from scenario_gen.numerics import Counts, exact, Floats
+from scenario_gen.numerics.kernels import F, F2, kernel, N2, OUT2
+from scenario_gen.roads import blocked_before, clearance_in_cells, CONTACT, to_cells
+from scenario_gen.types import Road
 
 SWEEP = 0.2  # [m] between two poses that are compared with the grid
 FEELERS = 6  # most discs that cover a footprint
 FAR = 1e9  # [cells] room where nothing is near
-
-
-@once_per_object
-def blocked_before(road: Road) -> Ints:
-    """(H, W + 1): how many cells left of each column are not drivable: any run of a row is looked up in one step; cached."""
-    counts = np.zeros((road.drivable.shape[0], road.drivable.shape[1] + 1), dtype=np.int64)
-    np.cumsum(~road.drivable, axis=1, out=counts[:, 1:])
-    counts.setflags(write=False)
-    return counts
 
 
 @kernel(inline=True)
@@ -46,7 +37,7 @@ def _spread(ax: float, ay: float, bx: float, by: float, first: int, low: Floats,
 
 @kernel(inline=True)
 def swept_free(
-    blocked: Ints, x0: float, y0: float, c0: float, s0: float, x1: float, y1: float, c1: float, s1: float, half_length: float,
+    blocked: Counts, x0: float, y0: float, c0: float, s0: float, x1: float, y1: float, c1: float, s1: float, half_length: float,
     half_width: float, bulge: float, low: Floats, high: Floats,
 ) -> bool:  # fmt: skip
     """Whether the hull of the footprints at two near poses (x, y, cos, sin; in cells) covers drivable cells only.
@@ -133,7 +124,7 @@ def offset_from(x: float, y: float, guide: Floats) -> float:
 
 @kernel(inline=True)
 def follow(
-    clearance: Floats, blocked: Ints, x: float, y: float, yaw: float, word: int, a: float, b: float, c: float, radius: float,
+    clearance: Floats, blocked: Counts, x: float, y: float, yaw: float, word: int, a: float, b: float, c: float, radius: float,
     half_length: float, half_width: float, sweep: float, wish: Floats, guide: Floats, low: Floats, high: Floats,
 ) -> tuple[float, float]:  # fmt: skip
     """How far a footprint can follow a Dubins curve, and what that costs; in cells.
@@ -206,8 +197,8 @@ def scratch_rows(half_length: float, half_width: float, sweep: float) -> int:
     return int(2.0 * np.sqrt(half_length * half_length + half_width * half_width) + sweep) + 8
 
 
-@kernel(F2, I2, F2, F, F, OUT2)
-def check_sweep(clearance: Floats, blocked: Ints, poses: Floats, half_length: float, half_width: float, out: Floats) -> None:
+@kernel(F2, N2, F2, F, F, OUT2)
+def check_sweep(clearance: Floats, blocked: Counts, poses: Floats, half_length: float, half_width: float, out: Floats) -> None:
     """Whether the footprint can move from each of M near poses (M, 3) [cells, rad] to the next; all in cells.
 
     Writes `out` (M, 2): 1 where the way to the pose (for the first: the pose itself) is free, else 0; and about the room beside.
@@ -251,9 +242,9 @@ def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Flo
     return out
 
 
-@kernel(F2, I2, F, F, F, F, F, F, F, F, F, F)
+@kernel(F2, N2, F, F, F, F, F, F, F, F, F, F)
 def curve_length(
-    clearance: Floats, blocked: Ints, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius: float,
+    clearance: Floats, blocked: Counts, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius: float,
     half_length: float, half_width: float, sweep: float,
 ) -> float:  # fmt: skip
     """Length of the shortest Dubins curve between two poses if a footprint can follow it, else infinity; all in cells.
