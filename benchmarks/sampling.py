@@ -19,7 +19,7 @@ from benchmarks._sampling_cases import (
 )
 from benchmarks._size import sized
 from benchmarks.row import Row
-from benchmarks.scaling import group
+from benchmarks._scaling_case import group
 from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
