@@ -23,7 +23,8 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads import build_road
-from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, pair_conflict, Wait
+from scenario_gen.template.answers import conflict_of
+from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.road import Road
@@ -108,7 +109,7 @@ def arrival_spread(case: Prepared, scenarios: Sequence[Scenario]) -> float:
         if conflict.following:
             continue
         a, b = sorted((conflict.first, conflict.second))
-        found = [pair_conflict(s.vehicles, s.time, s.position, s.heading, a, b) for s in scenarios]
+        found = [conflict_of(s, a, b) for s in scenarios]
         entries = [one.entry_second for one in found if one is not None]
         if len(entries) > 1:
             spreads.append(float(np.std(entries)))

@@ -17,9 +17,9 @@ from benchmarks._sampling_cases import (
     Prepared,
     prepared,
 )
+from benchmarks._scaling_case import group
 from benchmarks._size import sized
 from benchmarks.row import Row
-from benchmarks._scaling_case import group
 from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats

@@ -9,8 +9,8 @@ import numpy as np
 
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.template.interaction import Conflict, pair_conflict, WAIT_SPEED
-from scenario_gen.types import Vehicle
+from scenario_gen.template.interaction import Conflict, find_conflicts, WAIT_SPEED
+from scenario_gen.types import once_per_object, Vehicle
 
 SLOWEST = 2.0  # m/s, below which a time gap says nothing
 
@@ -45,8 +45,14 @@ class Motion(Protocol):
 
 def conflict_of(motion: Motion, a: int, b: int) -> Conflict | None:
     """Return the conflict of two vehicles of a motion; None without one."""
-    low, high = sorted((a, b))
-    return pair_conflict(motion.vehicles, motion.time, motion.position, motion.heading, low, high, motion.present)
+    return _conflicts(motion).get((min(a, b), max(a, b)))
+
+
+@once_per_object
+def _conflicts(motion: Motion) -> dict[tuple[int, int], Conflict]:
+    """Return the conflict of each pair of vehicles that has one."""
+    found = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present)
+    return {(min(one.first, one.second), max(one.first, one.second)): one for one in found}
 
 
 def departure(motion: Motion, who: int, entry: float) -> float:

@@ -33,6 +33,7 @@ BLOCK = 16  # poses that share one bounding circle
 DEPTH = 1e-6  # m, footprints that meet less deeply only touch
 
 Size = tuple[float, float]  # half length, half width [m] of a footprint
+_Sweep = tuple[Floats, Floats, Floats]  # poses and circles as of `_swept`, length and width [m]
 
 FOLLOWING_ANGLE = 0.5  # rad, largest difference of heading of two vehicles on the same path
 FOLLOWING_LENGTHS = 3.0  # a shared path longer than this many vehicle lengths is following
@@ -120,9 +121,11 @@ def find_conflicts(
         heading: (N, T) rad.
         present: (N, 2) first and last sample of each vehicle; default: everybody throughout.
     """
-    time, position, heading = (np.ascontiguousarray(array, dtype=np.float64) for array in (time, position, heading))
+    spans = [slice(first, last + 1) for first, last in present.tolist()] if len(present) else [slice(None)] * len(vehicles)
+    sweeps = [_swept(time[own], position[n, own], heading[n, own]) for n, own in enumerate(spans)]
+    sizes = [np.array((vehicle.length, vehicle.width)) for vehicle in vehicles]
     pairs = combinations(range(len(vehicles)), 2)
-    conflicts = (pair_conflict(vehicles, time, position, heading, a, b, present) for a, b in pairs)
+    conflicts = (_pair_conflict(a, b, (*sweeps[a], sizes[a]), (*sweeps[b], sizes[b])) for a, b in pairs)
     return tuple(conflict for conflict in conflicts if conflict is not None)
 
 
@@ -155,22 +158,10 @@ def closest_crossing(conflicts: Sequence[Conflict]) -> Conflict | None:
     return min(crossing, key=lambda conflict: conflict.encroachment, default=None)
 
 
-def pair_conflict(
-    vehicles: tuple[Vehicle, ...],
-    time: Floats,
-    position: Floats,
-    heading: Floats,
-    a: int,
-    b: int,
-    present: Ints = ALWAYS,
-) -> Conflict | None:
-    """Return the conflict of `a` < `b`, or None if their swept footprints are apart; arrays as in `find_conflicts`, in metres."""
+def _pair_conflict(a: int, b: int, sweep_a: _Sweep, sweep_b: _Sweep) -> Conflict | None:
+    """Return the conflict of vehicles a < b, or None if their swept footprints are apart."""
     out = np.empty(7)
-    size_a = np.array((vehicles[a].length, vehicles[a].width))
-    size_b = np.array((vehicles[b].length, vehicles[b].width))
-    own = [slice(first, last + 1) for first, last in present[[a, b]].tolist()] if len(present) else [slice(None)] * 2
-    of_a, of_b = ((time[at], position[n, at], heading[n, at]) for n, at in zip((a, b), own, strict=True))
-    _conflict(*of_a, size_a, *of_b, size_b, out)
+    _conflict(*sweep_a, *sweep_b, out)
     exists, a_first, following, *times = out.tolist()
     if not exists:
         return None
@@ -327,23 +318,20 @@ def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: 
     return shared, lead
 
 
-@kernel(F1, F2, F1, F1, F1, F2, F1, F1, OUT1)
+@kernel(F1, F2, F1)
+def _swept(time: Floats, position: Floats, heading: Floats) -> tuple[Floats, Floats]:
+    """Return the poses (M, 5) of a sweep, and the circles (B, 3) around its blocks."""
+    poses = _sweep(time, position, heading)
+    return poses, _block_circles(poses)
+
+
+@kernel(F2, F2, F1, F2, F2, F1, OUT1)
 def _conflict(
-    time_a: Floats,
-    position_a: Floats,
-    heading_a: Floats,
-    size_a: Floats,
-    time_b: Floats,
-    position_b: Floats,
-    heading_b: Floats,
-    size_b: Floats,
-    out: Floats,
-) -> None:
-    """Fill `out`: exists, a first, following, entry and exit of a, entry and exit of b (7,)."""
+    a: Floats, circles_a: Floats, size_a: Floats, b: Floats, circles_b: Floats, size_b: Floats, out: Floats
+) -> None:  # fmt: skip
+    """Fill `out`: exists, a first, following, entry and exit of a, entry and exit of b (7,); poses and circles as of `_swept`."""
     out[0] = 0.0
     half_a, half_b = (0.5 * size_a[0], 0.5 * size_a[1]), (0.5 * size_b[0], 0.5 * size_b[1])
-    a, b = _sweep(time_a, position_a, heading_a), _sweep(time_b, position_b, heading_b)
-    circles_a, circles_b = _block_circles(a), _block_circles(b)
     entry_a, exit_a = _occupancy(a, half_a, b, circles_b, half_b)
     entry_b, exit_b = _occupancy(b, half_b, a, circles_a, half_a)
     if not (np.isfinite(entry_a) and np.isfinite(entry_b)):

@@ -10,8 +10,7 @@ import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import Motion
-from scenario_gen.template import Conflict, pair_conflict
-from scenario_gen.types import once_per_object
+from scenario_gen.template import conflict_of
 
 
 @dataclass(frozen=True)
@@ -44,18 +43,12 @@ class Criticality:
         return len(dict(template.order).keys() - dict(self.order).keys())
 
 
-@once_per_object
-def conflict_between(motion: Motion, a: int, b: int) -> Conflict | None:
-    """Return the conflict of two vehicles a < b, None if their swept footprints are apart."""
-    return pair_conflict(motion.vehicles, motion.time, motion.position, motion.heading, a, b, motion.present)
-
-
 def criticality(motion: Motion, horizon: float) -> Criticality:
     """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""
     pairs = [(a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)]
     pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
     everybody = combinations(range(len(motion.vehicles)), 2)
-    conflicts = [conflict for a, b in everybody if (conflict := conflict_between(motion, a, b)) is not None]
+    conflicts = [conflict for a, b in everybody if (conflict := conflict_of(motion, a, b)) is not None]
     encroachments = [c.encroachment for c in conflicts if not c.following]
     return Criticality(
         min_distance=min((float(footprint_distance(motion, a, b)[both].min()) for a, b, both in pairs), default=float("nan")),

@@ -7,7 +7,8 @@ import numpy as np
 
 from scenario_gen.method.evaluation.motion import Motion
 from scenario_gen.numerics import exact, Floats
-from scenario_gen.types import once_per_object, Vehicle
+from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
+from scenario_gen.types import once_per_object
 
 STILL = 1e-6  # m/s; what closes more slowly does not close: rounding alone makes equal velocities differ
 
@@ -28,8 +29,12 @@ def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
 @once_per_object
 def _nearness(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
     """Distance [m] and time to collision [s], (T,) each."""
-    separation = _separation(motion, a, b)
-    return _distance(motion, a, b, separation), _time_to_collision(*separation)
+    ahead = _directions(motion)
+    half = np.array([(0.5 * motion.vehicles[n].length, 0.5 * motion.vehicles[n].width) for n in (a, b)])
+    distance, time = np.empty_like(motion.speed[a]), np.empty_like(motion.speed[a])
+    own, other = ((motion.position[n], ahead[n], motion.speed[n]) for n in (a, b))
+    _fill_nearness(*own, *other, half, distance, time)
+    return distance, time
 
 
 @once_per_object
@@ -38,74 +43,63 @@ def _directions(motion: Motion) -> Floats:
     return np.stack([exact.cos(motion.heading), exact.sin(motion.heading)], axis=-1)
 
 
-def _distance(motion: Motion, a: int, b: int, separation: tuple[Floats, Floats, Floats]) -> Floats:
-    """Two convex shapes that do not overlap are nearest at a corner of one of them."""
-    first, second = motion.vehicles[a], motion.vehicles[b]
-    centre, ahead = motion.position, _directions(motion)
-    nearest = np.minimum(
-        _corner_distance(centre[a], ahead[a], first, _corners(centre[b], ahead[b], second)),
-        _corner_distance(centre[b], ahead[b], second, _corners(centre[a], ahead[a], first)),
-    )
-    offset, reach, _ = separation
-    overlap = (np.abs(offset) < reach).all(axis=0)
-    return np.where(overlap, 0.0, nearest)
+@kernel(F2, F2, F1, F2, F2, F1, F2, OUT1, OUT1)
+def _fill_nearness(
+    position_a: Floats,
+    ahead_a: Floats,
+    speed_a: Floats,
+    position_b: Floats,
+    ahead_b: Floats,
+    speed_b: Floats,
+    half: Floats,
+    distance: Floats,
+    time: Floats,
+) -> None:
+    """Fill `distance` (T,) [m] and `time` (T,) [s]; positions and directions are (T, 2), half lengths and widths (2, 2).
 
-
-def _time_to_collision(offset: Floats, reach: Floats, closing: Floats) -> Floats:
-    """Return the time (T,) [s] until two footprints touch; offset, reach and closing speed as of `_separation`.
-
-    Exact for footprints that do not turn: on each of the four separating axes they overlap during one interval of time,
-    and they touch when all four intervals have begun and none has ended.
+    Two convex shapes that do not overlap are nearest at a corner of one of them. The time is exact for footprints that do not
+    turn: on each of the four separating axes they overlap during one interval of time, and they touch when all four intervals
+    have begun and none has ended.
     """
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        enters, leaves = (-reach - offset) / closing, (reach - offset) / closing
-    still = np.abs(closing) < STILL
-    apart = np.abs(offset) >= reach
-    begin = np.where(still, np.where(apart, np.inf, -np.inf), np.minimum(enters, leaves)).max(axis=0)
-    end = np.where(still, np.where(apart, -np.inf, np.inf), np.maximum(enters, leaves)).min(axis=0)
-    return np.where((begin < end) & (end > 0.0), np.maximum(begin, 0.0), np.inf)
+    (la, wa), (lb, wb) = half
+    offset, closing, reach = np.empty(4), np.empty(4), np.empty(4)
+    for t in range(len(speed_a)):
+        ca, sa, cb, sb = ahead_a[t, 0], ahead_a[t, 1], ahead_b[t, 0], ahead_b[t, 1]
+        dx, dy = position_b[t, 0] - position_a[t, 0], position_b[t, 1] - position_a[t, 1]
+        vx, vy = speed_b[t] * cb - speed_a[t] * ca, speed_b[t] * sb - speed_a[t] * sa
+        alike, askew = abs(ca * cb + sa * sb), abs(sa * cb - ca * sb)
+        reach[0], reach[1] = la + lb * alike + wb * askew, wa + lb * askew + wb * alike
+        reach[2], reach[3] = lb + la * alike + wa * askew, wb + la * askew + wa * alike
+        overlap, begin, end = True, -np.inf, np.inf
+        for k in range(4):
+            c, s = (ca, sa) if k < 2 else (cb, sb)
+            x, y = (c, s) if k % 2 == 0 else (-s, c)
+            offset[k], closing[k] = dx * x + dy * y, vx * x + vy * y
+            overlap = overlap and abs(offset[k]) < reach[k]
+            if abs(closing[k]) >= STILL:
+                enters, leaves = (-reach[k] - offset[k]) / closing[k], (reach[k] - offset[k]) / closing[k]
+                begin, end = max(begin, min(enters, leaves)), min(end, max(enters, leaves))
+            elif abs(offset[k]) >= reach[k]:
+                begin, end = np.inf, -np.inf
+        time[t] = max(begin, 0.0) if begin < end and end > 0.0 else np.inf
+        if overlap:
+            distance[t] = 0.0
+            continue
+        px, py, qx, qy = position_a[t, 0], position_a[t, 1], position_b[t, 0], position_b[t, 1]
+        from_b = _corner_distance(px, py, ca, sa, la, wa, qx, qy, cb, sb, lb, wb)
+        distance[t] = min(from_b, _corner_distance(qx, qy, cb, sb, lb, wb, px, py, ca, sa, la, wa))
 
 
-def _separation(motion: Motion, a: int, b: int) -> tuple[Floats, Floats, Floats]:
-    """Project b relative to a on the four separating axes, along and across a, along and across b.
-
-    Returns:
-        Offset [m], summed half extents [m] and closing speed [m/s]; (4, T) each.
-    """
-    ahead = _directions(motion)
-    axes = np.stack([ahead[a], _left(ahead[a]), ahead[b], _left(ahead[b])])
-    offset = ((motion.position[b] - motion.position[a]) * axes).sum(axis=-1)
-    velocity = motion.speed[b, :, None] * ahead[b] - motion.speed[a, :, None] * ahead[a]
-    closing = (velocity * axes).sum(axis=-1)
-    alike, askew = (np.abs((ahead[a] * other).sum(axis=-1)) for other in (ahead[b], _left(ahead[b])))
-    (la, wa), (lb, wb) = ((0.5 * vehicle.length, 0.5 * vehicle.width) for vehicle in (motion.vehicles[a], motion.vehicles[b]))
-    reach = np.stack(
-        [
-            la + lb * alike + wb * askew,
-            wa + lb * askew + wb * alike,
-            lb + la * alike + wa * askew,
-            wb + la * askew + wa * alike,
-        ]
-    )
-    return offset, reach, closing
-
-
-def _left(ahead: Floats) -> Floats:
-    """Return vectors (..., 2) turned by 90° to the left."""
-    return np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
-
-
-def _corners(centre: Floats, ahead: Floats, vehicle: Vehicle) -> Floats:
-    """Return the corners (4, T, 2) of footprints at centres (T, 2) with directions (T, 2)."""
-    x = 0.5 * vehicle.length * np.array([1.0, 1.0, -1.0, -1.0])[:, None, None]
-    y = 0.5 * vehicle.width * np.array([1.0, -1.0, -1.0, 1.0])[:, None, None]
-    return np.asarray(centre + x * ahead + y * _left(ahead))
-
-
-def _corner_distance(centre: Floats, ahead: Floats, vehicle: Vehicle, points: Floats) -> Floats:
-    """Return the least distance (T,) from points (4, T, 2) to a footprint; 0 for a point inside."""
-    offset = points - centre
-    c, s = ahead[:, 0], ahead[:, 1]
-    along = np.abs(offset[..., 0] * c + offset[..., 1] * s) - 0.5 * vehicle.length
-    across = np.abs(offset[..., 1] * c - offset[..., 0] * s) - 0.5 * vehicle.width
-    return np.asarray(exact.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)).min(axis=0))
+@kernel(inline=True)
+def _corner_distance(
+    x: float, y: float, c: float, s: float, length: float, width: float, ox: float, oy: float, oc: float, os: float,
+    other_length: float, other_width: float,
+) -> float:  # fmt: skip
+    """Least distance from the corners of the other footprint to one at (x, y) with direction (c, s); half lengths and widths."""
+    least = np.inf
+    for k in range(4):
+        ahead, left = other_length if k < 2 else -other_length, other_width if k % 3 == 0 else -other_width
+        dx, dy = ox + ahead * oc + left * -os - x, oy + ahead * os + left * oc - y
+        along, across = abs(dx * c + dy * s) - length, abs(dy * c - dx * s) - width
+        least = min(least, exact.hypot(max(along, 0.0), max(across, 0.0)))
+    return least

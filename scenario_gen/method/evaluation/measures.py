@@ -26,11 +26,10 @@ import math
 
 import numpy as np
 
-from scenario_gen.method.evaluation.criticality import conflict_between
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.numerics import exact
-from scenario_gen.template import Conflict
+from scenario_gen.template import Conflict, conflict_of
 from scenario_gen.types import Encounter, Measures, Pair, Scenario
 
 PERIOD = 0.1  # s
@@ -109,7 +108,7 @@ MEASURES = Measures(measure, features)
 
 def _crossing(motion: Motion, a: int, b: int) -> Conflict | None:
     """The conflict of two vehicles whose paths cross or merge; None of others, and of followers."""
-    conflict = conflict_between(motion, min(a, b), max(a, b))
+    conflict = conflict_of(motion, a, b)
     return None if conflict is None or conflict.following else conflict
 
 

@@ -13,7 +13,7 @@ from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, PATIEN
 from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
-from scenario_gen.template import closest_crossing, Conflict, find_conflicts, pair_conflict
+from scenario_gen.template import closest_crossing, Conflict, conflict_of, find_conflicts
 from scenario_gen.types import Cause, Encounter, join_pieces, Measures, Reaction, Request, Scenario, Target, token, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
@@ -109,7 +109,7 @@ def label_of(encounter: Encounter, request: Request, aim: Aim | None, reactions:
 def _order(encounter: Encounter, own: Conflict, whole: Scenario) -> str:
     """Say who goes first in a scenario at one of the template's conflicts."""
     a, b = sorted((own.first, own.second))
-    conflict = pair_conflict(whole.vehicles, whole.time, whole.position, whole.heading, a, b, whole.present)
+    conflict = conflict_of(whole, a, b)
     one, two = (encounter.vehicles[n].id for n in (own.first, own.second))
     if conflict is None:
         return f"{one} and {two} do not meet (in the template {one} goes first)"
