@@ -13,11 +13,12 @@ import socket
 import subprocess
 import sys
 import time
-from typing import Any
+from typing import Any, TypeAlias
 
 KEYS = {"AWS_ACCESS_KEY_ID": "any", "AWS_SECRET_ACCESS_KEY": "any", "AWS_DEFAULT_REGION": "us-east-1"}
 QUIET: Any = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 BUCKET = "kills"
+Process: TypeAlias = "subprocess.Popen[bytes]"
 
 
 def free_port() -> int:
@@ -35,8 +36,10 @@ def wait_for_port(port: int) -> None:
         time.sleep(0.05)
 
 
-def end(process: "subprocess.Popen[bytes]") -> None:
-    """Kill a process and all of its session."""
+def end(process: Process | None) -> None:
+    """Kill a process, if there is one, and all of its session."""
+    if process is None:
+        return
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
@@ -47,16 +50,22 @@ class Processes:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.temporary = folder, folder / "tmp"
-        self.temporary.mkdir()
         self.server_port, self.port = free_port(), free_port()
-        self.server = subprocess.Popen(
-            [sys.executable, "-m", "moto.server", "-p", str(self.server_port)], start_new_session=True, **QUIET
-        )
-        wait_for_port(self.server_port)
         self.environment = {**os.environ, **KEYS, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.port}"}
         self.environment |= {"TMPDIR": str(self.temporary), "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0"}
         self.environment |= {"DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON": "{}", "OMP_NUM_THREADS": "1"}
         self.address, self.count = "", 0
+        self.scheduler: Process | None = None
+        self.forwarder: Process | None = None
+        self.server: Process | None = None
+        self.nannies: list[Process] = []
+
+    def start(self) -> None:
+        """Start all but clients."""
+        self.temporary.mkdir()
+        words = [sys.executable, "-m", "moto.server", "-p", str(self.server_port)]
+        self.server = subprocess.Popen(words, start_new_session=True, **QUIET)
+        wait_for_port(self.server_port)
         self.start_forwarder()
         self.start_cluster()
 
@@ -78,13 +87,13 @@ class Processes:
         self.address = json.loads(known.read_text())["address"]
         self.nannies = [self.start_worker(), self.start_worker()]
 
-    def start_worker(self) -> "subprocess.Popen[bytes]":
+    def start_worker(self) -> Process:
         """Start a nanny, which starts a worker."""
         words = [sys.executable, "-m", "distributed.cli.dask_worker", self.address, "--nworkers", "1", "--nthreads", "1"]
         words += ["--no-dashboard", "--memory-limit", "0", "--local-directory", str(self.folder)]
         return subprocess.Popen(words, start_new_session=True, env=self.environment, **QUIET)
 
-    def start_client(self, words: list[str], log: Path) -> "subprocess.Popen[bytes]":
+    def start_client(self, words: list[str], log: Path) -> Process:
         """Start the command line; what it prints goes to a file, after what is there."""
         with log.open("ab") as output:
             command = [sys.executable, "-m", "scenario_gen", *words, "--scheduler", self.address]
@@ -115,7 +124,7 @@ class Processes:
         )
 
 
-def worker_of(nanny: "subprocess.Popen[bytes]") -> int:
+def worker_of(nanny: Process) -> int:
     """Return the worker's process, 0 where there is none at the moment."""
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != nanny.pid:

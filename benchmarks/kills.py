@@ -20,7 +20,7 @@ import tempfile
 import time
 from typing import Any
 
-from benchmarks._kills_processes import BUCKET, end, Processes, worker_of
+from benchmarks._kills_processes import BUCKET, end, Process, Processes, worker_of
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.corpus.synthetic import ArchiveConfig, write_archive
@@ -59,6 +59,7 @@ def run() -> list[Row]:
         whole = {path.name: path.read_bytes() for path in _tables_in(folder / "whole")}
         processes = Processes(folder)
         try:
+            processes.start()
             store = processes.store()
             store.create_bucket(Bucket=BUCKET)
             for path in archive.glob("*.csv"):
@@ -136,7 +137,7 @@ def _listed(processes: Processes, out: str) -> list[str]:
     return [one["Key"].removeprefix(f"{out}/") for page in pages for one in page.get("Contents", ())]
 
 
-def _kill(victim: str, processes: Processes, client: "subprocess.Popen[bytes]", chance: random.Random, number: int) -> None:
+def _kill(victim: str, processes: Processes, client: Process, chance: random.Random, number: int) -> None:
     """Kill the victim, and start what takes its place."""
     third = number % 3 == 0
     if victim == "client":
@@ -165,7 +166,7 @@ def _kill(victim: str, processes: Processes, client: "subprocess.Popen[bytes]", 
         processes.start_forwarder()
 
 
-def _go_on(processes: Processes, client: "subprocess.Popen[bytes]", out: str, log: Path, seen: Seen) -> None:
+def _go_on(processes: Processes, client: Process, out: str, log: Path, seen: Seen) -> None:
     """Run the command until it ends with 0."""
     for _ in range(RUNS):
         seen.runs += 1

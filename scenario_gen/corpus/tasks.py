@@ -249,7 +249,7 @@ class Spread:
 def bundle_sizes(tasks: int, workers: int) -> list[int]:
     """Return how many consecutive tasks each bundle has, by guided self-scheduling (Polychronopoulos & Kuck 1987).
 
-    A bundle takes a worker's share of what remains, so the last ones are single tasks, and no worker works long after the others.
+    A bundle takes a share of what remains, so the last ones are single tasks, and no worker works long after the others.
 
     Args:
         tasks: their number.
@@ -257,7 +257,7 @@ def bundle_sizes(tasks: int, workers: int) -> list[int]:
     """
     sizes = []
     while tasks:
-        sizes.append(max(min(tasks // workers, BUNDLE), 1))
+        sizes.append(max(min((tasks - 1) // workers, BUNDLE), 1))
         tasks -= sizes[-1]
     return sizes
 

@@ -58,14 +58,20 @@ def test_only_the_task_that_ends_its_workers_fails(tmp_path):
     assert [done for done, *_ in told] == list(range(1, 31))
 
 
-def test_a_scheduler_that_ends_is_named_at_once():
+def test_a_scheduler_that_is_lost_is_named(tmp_path):
+    from dask import config
     from distributed import LocalCluster
 
-    with LocalCluster(**ALONE) as cluster, spread(Workers(1, cluster.scheduler_address)) as go:
-        assert go(refuse, ["a"]) == []
+    with (
+        config.set({"distributed.comm.timeouts.connect": "1s"}),
+        LocalCluster(**ALONE) as cluster,
+        spread(Workers(1, cluster.scheduler_address)) as go,
+    ):
+        address = cluster.scheduler_address
+        assert go(write_once, [Counted("a", tmp_path)]) == []
         cluster.close()
-        with pytest.raises(InputError, match=f"{cluster.scheduler_address}.*goes on where it stopped"):
-            go(refuse, ["a"])
+        with pytest.raises(InputError, match=f"{address}: .*goes on where it stopped"):
+            go(write_once, [Counted("b", tmp_path)])
 
 
 @pytest.mark.parametrize("workers", [1, 2])
