@@ -49,8 +49,8 @@ class Seen:
     moments: list[float] = field(default_factory=list)
 
 
-def run() -> list[Row]:
-    """Measure."""
+def run(part: str = "all") -> list[Row]:
+    """Measure; `part` is client, worker, scheduler or store."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         archive = write_archive(folder / "archive", ARCHIVE, seed=5)
@@ -65,7 +65,7 @@ def run() -> list[Row]:
             for path in archive.glob("*.csv"):
                 store.upload_file(str(path), BUCKET, f"archive/{path.name}")
             rows = []
-            for victim in VICTIMS:
+            for victim in VICTIMS if part == "all" else [part]:
                 seen = _killed(victim, processes, whole)
                 rows += _rows(victim, seen)
                 print(victim, seen, file=sys.stderr)

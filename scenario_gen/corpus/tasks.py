@@ -350,6 +350,7 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
     """A client of a cluster on this machine, or of one that runs."""
     from distributed import Client
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # workers that die and a lost scheduler are named here
     if scheduler:
         with Client(scheduler) as client:
             yield client
@@ -377,7 +378,6 @@ def _cluster(workers: int, place: Path) -> Iterator[Any]:
         "distributed.admin.tick.interval": "500ms",
         "distributed.nanny.pre-spawn-environ": WORKERS,
     }
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a worker that dies is said here, by its tasks
     sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
     with dask.config.set(settings), LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0") as cluster:
         yield cluster
