@@ -3,7 +3,7 @@
 
 """SIGKILLs of a `mine` from a store into a store, by a Dask scheduler and two workers: are the tables those of a run in a folder?
 
-At a random moment of the work the client is killed (each third time its scheduler changes, too), or a worker (each third time
+When a random share of the objects is there, the client is killed (each third time its scheduler changes, too), or a worker (each third time
 with its nanny), or the scheduler, whose place a new one with new workers takes, or the way to the store: a TCP forwarder before
 moto's server, which breaks all connections and is back after 1 to 5 s. The server itself, which holds objects in memory, lives.
 Then the same command is run until it ends with 0.
@@ -30,6 +30,7 @@ VICTIMS = ("client", "worker", "scheduler", "store")
 ARCHIVE = ArchiveConfig(rows=sized(160_000, quick=40_000), hours=6.0, encounters=20, outside=10)
 SETTINGS = ["--set", "range_size=1", "--set", "task_rows=10000", "--set", "task_encounters=2"]
 PATIENCE = 240.0  # s after which a run counts as one that hangs
+PAUSE = 0.3  # s, at most, from the object at which a kill comes
 RUNS = 6  # of one sequence, at most
 LEFT = ".scenario_gen"  # with which names of intermediate files begin
 Tables = dict[str, bytes]
@@ -92,17 +93,16 @@ def _tables_in(out: Path) -> list[Path]:
 def _killed(victim: str, processes: Processes, whole: Tables) -> Seen:
     """Run sequences until so many kills have hit during the work."""
     seen, number = Seen(), 0
-    names, seconds = _names(processes, f"{victim}-whole")
+    names = _names(processes, f"{victim}-whole")
     while seen.kills < KILLS and number < 3 * KILLS:
         number += 1
         chance = random.Random(f"{victim} {number}")
         out, log = f"{victim}-{number}", processes.folder / f"{victim}-{number}.txt"
         client = processes.start_client(_words(out), log)
-        while client.poll() is None and not _listed(processes, out):
-            time.sleep(0.05)
-        moment = time.monotonic() + chance.uniform(0.0, 0.95 * seconds)
-        while client.poll() is None and time.monotonic() < moment:
-            time.sleep(0.01)
+        least = chance.randrange(1, len(names))
+        while client.poll() is None and len(_listed(processes, out)) < least:
+            time.sleep(0.02)
+        time.sleep(chance.uniform(0.0, PAUSE))
         share = len(_listed(processes, out)) / len(names)
         if client.poll() is not None or share == 1.0:
             end(client)
@@ -119,16 +119,11 @@ def _words(out: str) -> list[str]:
     return ["mine", f"s3://{BUCKET}/archive", "--out", f"s3://{BUCKET}/{out}", *SETTINGS]
 
 
-def _names(processes: Processes, out: str) -> tuple[set[str], float]:
-    """Return the names of the objects of an undisturbed run, and how many seconds it takes from the first one on."""
-    for again in ("", "-again"):  # the first one loads the workers' modules
-        begun = 0.0
-        client = processes.start_client(_words(out + again), processes.folder / f"{out}.txt")
-        while client.poll() is None:
-            begun = begun or (time.monotonic() if _listed(processes, out + again) else 0.0)
-            time.sleep(0.05)
-        assert client.returncode == 0, (processes.folder / f"{out}.txt").read_text()
-    return set(_listed(processes, out)), time.monotonic() - begun
+def _names(processes: Processes, out: str) -> set[str]:
+    """Return the names of the objects of an undisturbed run."""
+    log = processes.folder / f"{out}.txt"
+    assert processes.start_client(_words(out), log).wait() == 0, log.read_text()
+    return set(_listed(processes, out))
 
 
 def _listed(processes: Processes, out: str) -> list[str]:

@@ -202,10 +202,10 @@ class Spread:
         if not tasks or (self._workers == 1 and not self._scheduler):
             yield from (_guarded(function, task) for task in tasks)
             return
-        if self._client is None:
-            needs("corpus", "dask", "distributed")
-            self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
+        needs("corpus", "dask", "distributed")
         with _connected(self._scheduler):
+            if self._client is None:
+                self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
             yield from self._distributed(function, tasks)
 
     def _distributed(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
@@ -350,7 +350,8 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
     """A client of a cluster on this machine, or of one that runs."""
     from distributed import Client
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # workers that die and a lost scheduler are named here
+    for name in ("distributed", "distributed.client"):  # each has a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # workers that die and a lost scheduler are named here
     if scheduler:
         with Client(scheduler) as client:
             yield client
