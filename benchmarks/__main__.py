@@ -96,7 +96,9 @@ def main() -> int:
     parser.add_argument("--out", help="paper: the folder of the page")
     parser.add_argument("--log", action="append", help="paper: a file of a log instead of the bundled cases; repeatable")
     parser.add_argument("--seed", type=int, help="paper: same seed, same page")
-    parser.add_argument("--part", help="corpus: mine, memory, store, recorded, batch, kills, library or peers alone")
+    parser.add_argument(
+        "--part", help="corpus: mine, memory, store, recorded, batch, kills, library, peers; kills: a victim; that alone"
+    )
     parser.add_argument("--rows", help="a file that gets each row as it is measured, a line of JSON each")
     parser.add_argument("--quick", action="store_true", help="next to nothing of each, to see that it runs; figures say nothing")
     arguments = parser.parse_args()

@@ -4,7 +4,8 @@
 """Many workers: what a Dask scheduler of its own process spends on a task, and how long real worker processes wait for work.
 
 The work is fake: tasks sleep for 5 to 6 s. Scheduler, workers and client are processes of this machine, whose few cores serve
-them all. What 1,000 workers would need is extrapolated from the scheduler's own CPU time for a task.
+them all. What 1,000 workers would need is extrapolated from the scheduler's own CPU time for a task, and from that at rest by
+the number of heartbeats, which Dask makes rarer the more workers there are.
 """
 
 from collections import defaultdict
@@ -37,6 +38,7 @@ MANY = 1000  # workers
 SETTINGS = {  # of the cluster's processes; docs/corpus.md names them
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "false",
     "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "500ms",
+    "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
     "DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON": "{}",
 }
 
@@ -65,7 +67,7 @@ def run() -> list[Row]:
     whole = max(one["ended"] for one in done) - min(one["begun"] for one in done)
     a_task = 1e3 * (spent - resting * whole) / len(tasks)
     waits = _between(done)
-    load = a_task * MANY / (1e3 * sum(SECONDS) / 2.0) + resting * MANY / COUNT
+    load = a_task * MANY / (1e3 * sum(SECONDS) / 2.0) + resting * _heartbeats(MANY) / _heartbeats(COUNT)
     return [
         Row(
             "share of their time that workers wait", 100.0 * (1.0 - busy / (COUNT * whole)), "%", "lower", 5.0, f"{COUNT} workers"
@@ -105,6 +107,13 @@ def _cluster(folder: Path) -> Iterator[tuple[str, int]]:
                     nannies.wait(60)
         finally:
             scheduler.terminate()
+
+
+def _heartbeats(workers: int) -> float:
+    """Heartbeats of all workers in a second."""
+    from distributed.scheduler import heartbeat_interval
+
+    return workers / float(heartbeat_interval(workers))
 
 
 def _wait_for_all(address: str) -> None:

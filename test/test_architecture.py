@@ -82,7 +82,6 @@ LATE = {
 LATE_OURS = {
     "__main__.py": "a command loads what it needs",
     "cli/": "a command loads what it needs",
-    "corpus/tasks.py": "in a worker, whose processes load nothing else first",
     "logs/adapters/tracks.py": "needs pyarrow",
     "logs/read.py": "adapters need extras",
     "logs/tables.py": "needs pyarrow",

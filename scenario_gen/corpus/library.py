@@ -225,6 +225,8 @@ def _labels_again(row: Mapping[str, Any], pair: Encounter) -> Ints:
 
 def assign_table(task: AssignTask) -> None:
     """Write, for each pair of a table's encounters, its changepoints and the primitive of each segment."""
+    if task.target.exists():
+        return
     import pyarrow as pa
     from pyarrow import parquet
 

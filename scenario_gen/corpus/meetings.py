@@ -59,6 +59,8 @@ def search_hours(task: HourTask) -> None:
         InputError: the database fails.
     """
     left = [one for one in task.hours if not (task.folder / f"hour-{one[0]}.parquet").exists()]
+    if not left:
+        return
     own = task.folder.parent
     tables = sorted({path for _, files in left for path in files}, key=str)
     with fetched(tables) as here, database(workplace(own), task.config.memory, f"{task.name} of {own}") as base:

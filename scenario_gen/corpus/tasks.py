@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
+from itertools import count, islice
 import json
 import logging
 import multiprocessing
@@ -22,9 +22,10 @@ import tempfile
 import time
 import traceback
 from typing import Any, TypeVar
+from uuid import uuid4
 
 from scenario_gen.base.documents import read_json
-from scenario_gen.base.errors import InputError, needs
+from scenario_gen.base.errors import describe, InputError, needs, ScenarioGenError
 from scenario_gen.base.folders import naming, scratch, sync, write_text
 from scenario_gen.base.folders.claim import alone
 from scenario_gen.base.folders.scratch import sweep_tree
@@ -42,7 +43,8 @@ WORKERS = {  # their environment: one thread each; Dask's own has them return ev
 
 
 COMMON = ("config", "request")  # fields of tasks that are alike in all of them
-WAVE = 4  # tasks for each worker that the scheduler holds at a time
+WAVE = 4  # bundles for each worker that the scheduler holds at a time
+BUNDLE = 8  # tasks in a bundle, at most
 
 
 @contextmanager
@@ -175,17 +177,19 @@ class Spread:
         self._workers = workers.count or os.cpu_count() or 1
         self._scheduler, self._told, self._stack = workers.scheduler, workers.told, stack
         self._client: Any = None
-        self._rounds = 0
 
     def __call__(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> list[str]:
         """Run tasks, none of which depends on another.
 
         Args:
-            function: of a module, pure: it writes its task's file.
+            function: of a module, pure: it writes its task's file, and may be run again where that file is.
             tasks: each has a name.
 
         Returns:
             A sentence for each task that failed; the others are done.
+
+        Raises:
+            InputError: the scheduler was lost.
         """
         begun, failed = time.monotonic(), []
         for done, message in enumerate(self._outcomes(function, tasks), start=1):
@@ -199,31 +203,98 @@ class Spread:
         if not tasks or (self._workers == 1 and not self._scheduler):
             yield from (_guarded(function, task) for task in tasks)
             return
-        if self._client is None:
-            needs("corpus", "dask", "distributed")
-            self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
+        needs("corpus", "dask", "distributed")
+        with _connected(self._scheduler):
+            if self._client is None:
+                self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
+            yield from self._distributed(function, tasks)
+
+    def _distributed(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
+        """Yield as `_outcomes` does; workers run bundles of tasks.
+
+        Tasks of a bundle whose workers died are run one at a time at the end, so that only the task that ends them fails.
+        """
         from distributed import as_completed
 
-        client, waiting, names = self._client, iter(tasks), dict[str, str]()
-        common = _common(tasks)
-        self._rounds += 1
-        plugin = f"scenario_gen {os.getpid()} {self._rounds}"
+        client, common, submitted = self._client, _common(tasks), dict[tuple[str, int], Sequence[Task]]()
+        plugin = f"scenario_gen-{uuid4().hex}"
         client.register_plugin(_plugin(common), name=plugin)  # of later workers, too
 
-        def submitted(count: int) -> list[Any]:
-            wave: list[Any] = list(islice(waiting, count))
-            less = [replace(task, **dict.fromkeys(common)) for task in wave] if common else wave
-            futures: list[Any] = client.map(partial(_completed, function, plugin), less, pure=False) if wave else []
-            names.update((future.key, getattr(task, "name", "a task")) for future, task in zip(futures, wave, strict=True))
+        def submit(bundles: Sequence[Sequence[Any]]) -> list[Any]:
+            if not bundles:
+                return []
+            keys = [(plugin, number) for _, number in zip(bundles, numbers, strict=False)]  # one group, which Dask queues
+            submitted.update(zip(keys, bundles, strict=True))
+            less = [[replace(task, **dict.fromkeys(common)) for task in own] if common else own for own in bundles]
+            futures: list[Any] = client.map(partial(_completed, function, plugin), less, key=keys)
             return futures
 
         each = max(len(client.nthreads()), self._workers)
-        running = as_completed(submitted(WAVE * each))
+        start, numbers = iter(tasks), count()
+        waiting = (list(islice(start, size)) for size in bundle_sizes(len(tasks), each))
+        running, suspects = as_completed(submit(list(islice(waiting, WAVE * each)))), list[Task]()
         for done, future in enumerate(running, start=1):
-            lost = future.status != "finished"  # every worker that tried it died
-            yield f"{names.pop(future.key)}: {future.exception()}" if lost else future.result()
-            if done % each == 0:  # together: the scheduler spends less on a task
-                running.update(submitted(each))
+            own = submitted.pop(future.key)
+            outcomes = _outcomes_of(future, len(own))
+            if outcomes is None:
+                suspects += own
+            else:
+                yield from outcomes
+            if done % each == 0:  # together: the scheduler spends less on a bundle
+                running.update(submit(list(islice(waiting, each))))
+        for task in suspects:
+            (future,) = as_completed(submit([[task]]))
+            yield from _outcomes_of(future, 1) or [f"{getattr(task, 'name', 'a task')}: {future.exception()}"]
+
+
+def bundle_sizes(tasks: int, workers: int) -> list[int]:
+    """Return how many consecutive tasks each bundle has, by guided self-scheduling (Polychronopoulos & Kuck 1987).
+
+    A bundle takes a share of what remains, so the last ones are single tasks, and no worker works long after the others.
+
+    Args:
+        tasks: their number.
+        workers: their number.
+    """
+    sizes = []
+    while tasks:
+        sizes.append(max(min((tasks - 1) // workers, BUNDLE), 1))
+        tasks -= sizes[-1]
+    return sizes
+
+
+class FailedTasksError(Exception):
+    """Tasks of a bundle failed; the arguments are why, for each task, "" for one that did not fail.
+
+    As an exception it reaches the client with the news that the bundle has ended; a result would have to be fetched.
+    """
+
+
+def _outcomes_of(future: Any, count: int) -> Sequence[str] | None:
+    """Return why each of the `count` tasks of a bundle failed, "" if it did not; None if the workers that ran it died.
+
+    Raises:
+        ConnectionError: the scheduler was lost.
+    """
+    if future.status == "finished":
+        return [""] * count
+    if future.status == "cancelled":
+        raise ConnectionError("the scheduler was lost")
+    error = future.exception()
+    return error.args if isinstance(error, FailedTasksError) else None
+
+
+@contextmanager
+def _connected(scheduler: str) -> Iterator[None]:
+    """Name the scheduler in what is raised when it is lost.
+
+    Raises:
+        InputError: it was.
+    """
+    try:
+        yield
+    except (OSError, TimeoutError) as error:
+        raise InputError(f"{scheduler or 'Dask'}: {describe(error)}; the same command goes on where it stopped") from error
 
 
 def _common(tasks: Sequence[Any]) -> dict[str, Any]:
@@ -241,12 +312,18 @@ def _plugin(common: Mapping[str, Any]) -> Any:
     return plugin
 
 
-def _completed(function: Callable[[Any], Any], plugin: str, task: Any) -> str:
-    """Run a task, on a worker, with what it has in common with the others."""
+def _completed(function: Callable[[Any], Any], plugin: str, tasks: Sequence[Any]) -> None:
+    """Run the tasks of a bundle, on a worker, with what they have in common with the others.
+
+    Raises:
+        FailedTasksError: some failed.
+    """
     from distributed import get_worker
 
     common = get_worker().plugins[plugin].common
-    return _guarded(function, replace(task, **common) if common else task)
+    outcomes = [_guarded(function, replace(task, **common) if common else task) for task in tasks]
+    if any(outcomes):
+        raise FailedTasksError(*outcomes)
 
 
 @contextmanager
@@ -258,8 +335,6 @@ def spread(workers: Workers) -> Iterator[Spread]:
 
 def _guarded(function: Callable[[Any], Any], task: Any) -> str:
     """Run one task; an error of its own input is a sentence, and does not end the others."""
-    from scenario_gen.base.errors import describe, ScenarioGenError
-
     try:
         function(task)
     except (ScenarioGenError, OSError, MemoryError) as error:
@@ -276,6 +351,8 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
     """A client of a cluster on this machine, or of one that runs."""
     from distributed import Client
 
+    for name in ("distributed", "distributed.client"):  # each has a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # workers that die and a lost scheduler are named here
     if scheduler:
         with Client(scheduler) as client:
             yield client
@@ -297,12 +374,12 @@ def _cluster(workers: int, place: Path) -> Iterator[Any]:
     settings = {
         "temporary-directory": str(place),
         "distributed.scheduler.allowed-failures": 10,
+        "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further bundle
         "distributed.worker.daemon": True,
         "distributed.worker.profile.enabled": False,
         "distributed.admin.tick.interval": "500ms",
         "distributed.nanny.pre-spawn-environ": WORKERS,
     }
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a worker that dies is said here, by its tasks
     sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
     with dask.config.set(settings), LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0") as cluster:
         yield cluster

@@ -4,6 +4,9 @@
 """A task for worker processes, in a module that loads next to nothing."""
 
 from dataclasses import dataclass
+import os
+from pathlib import Path
+import signal
 
 from scenario_gen.base.errors import InputError
 
@@ -26,3 +29,23 @@ class Shared:
 def need_config(task):
     if task.config is None:
         raise InputError(f"{task.name} lacks its configuration")
+
+
+@dataclass(frozen=True)
+class Counted:
+    """A task with a file of its name."""
+
+    name: str
+    folder: Path
+
+
+def write_once(task):
+    if (task.folder / task.name).exists():
+        raise InputError(f"{task.name} was run before")
+    (task.folder / task.name).touch()
+
+
+def end_worker(task):
+    if task.name == "7":
+        os.kill(os.getpid(), signal.SIGKILL)
+    (task.folder / task.name).touch()

@@ -3,26 +3,22 @@
 
 """Batches: the same bytes by whomever, found again by what they are, made again alone; a killed run loses and doubles nothing."""
 
-from contextlib import ExitStack
 import os
-import pickle
 import signal
 import subprocess
 import sys
 import time
 
 import pytest
-from refusing import need_config, refuse, Shared
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus import batch as batches
 from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch, seed_of, tokens_of
-from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import rows_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
-from scenario_gen.corpus.tasks import Spread, spread, WAVE, Workers
+from scenario_gen.corpus.tasks import Workers
 from scenario_gen.method.fitting import LostConflictError
 
 pytestmark = pytest.mark.xdist_group("corpus")
@@ -177,44 +173,3 @@ def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypat
 def test_names_and_seeds():
     assert tokens_of(["a/map.osm", "b/map.osm", "straight"]) == ["map_0", "map_1", "straight"]
     assert seed_of(1, "a", "b") != seed_of(1, "a", "c") != seed_of(2, "a", "c")
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_task_that_is_refused_does_not_end_the_others(workers):
-    told = []
-    with spread(Workers(workers, "", lambda *how: told.append(how))) as go:
-        b, c = go(refuse, ["a", "b", "c"])
-        assert b == "b: b is none" and c.startswith("c: KeyError at refusing.py:") and c.endswith(": KeyError 'c'")
-    assert [done for done, *_ in told] == [1, 2, 3]
-
-
-def test_a_cluster_that_runs_is_used():
-    from distributed import LocalCluster
-
-    alone = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
-    with LocalCluster(**alone) as cluster, spread(Workers(1, cluster.scheduler_address)) as go:
-        assert go(refuse, ["a", "b"]) == ["b: b is none"]
-
-
-def test_tasks_are_submitted_in_waves_without_what_they_share():
-    """The scheduler holds a few tasks for each worker, and the configuration goes to each worker once."""
-    from distributed import Client, LocalCluster
-
-    with (
-        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster,
-        Client(cluster) as client,
-    ):
-        sizes, held = [], []
-        submit = client.map
-
-        def watched(run, tasks, **options):
-            sizes.extend(len(pickle.dumps((run, task))) for task in tasks)
-            held.append(len(client.futures) + len(tasks))
-            return submit(run, tasks, **options)
-
-        client.map = watched
-        go = Spread(Workers(1, cluster.scheduler_address), ExitStack())
-        go._client = client
-        config = CorpusConfig()
-        assert go(need_config, [Shared(str(k), config) for k in range(40)]) == []
-        assert len(sizes) == 40 and max(sizes) <= 500 and max(held) <= 2 * WAVE

@@ -5,6 +5,7 @@
 
 One half of the kills comes at any time of a run, the other shortly after the first file of the new result is there. After each,
 what the next run does first is done, so that leftovers are known to go; every tenth time a whole run follows, as users start it.
+`mine` with its store and its cluster is killed by `python -m benchmarks kills`.
 """
 
 from collections import Counter
@@ -206,3 +207,15 @@ def run(state: Path) -> Iterable[Figure]:
             f"{seen['left something']} left something, {seen['not cleaned']} still there after the next run",
             not seen["not cleaned"],
         )
+    yield from mining(state / "mine.json")
+
+
+def mining(known: Path) -> Iterable[Figure]:
+    """Return the figures of the benchmark `kills`, which is run if they are not there."""
+    if not known.exists():
+        command = [sys.executable, "-m", "benchmarks", "kills", "--json"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        known.write_text(done.stdout.splitlines()[-1])
+    for row in json.loads(known.read_text())["rows"]:
+        sign = "≥" if row["better"] == "higher" else "≤"
+        yield Figure(f"`mine` in a store: {row['id']}", f"{sign} {row['target']:g}", f"{row['value']:g}", bool(row["met"]))
