@@ -150,11 +150,11 @@ def _write_gallery(path: Path, out: Place, made: Mined) -> None:
     tables: list[Place] = sorted((out / "encounters").glob("*.parquet"), key=str)
     shown: Counter[str] = Counter()
     cards = []
-    for table in tables:
-        kinds = [row["kind"] for row in rows_of([table], ["kind"])]
+    for _, here in each_fetched(tables):
+        kinds = [row["kind"] for row in rows_of([here], ["kind"])]
         if made.encounters > MOST_DRAWN and all(shown[kind] >= MOST_DRAWN // len(KINDS) for kind in kinds):
             continue
-        for row in rows_of([table]):
+        for row in rows_of([here]):
             if made.encounters > MOST_DRAWN and shown[row["kind"]] >= MOST_DRAWN // len(KINDS):
                 continue
             shown[row["kind"]] += 1
@@ -380,8 +380,10 @@ def summary(out: Place, config: CorpusConfig, failed: list[str], others: Sequenc
         first = ", ".join(sorted(shared)[:10])
         notes.append(f"{len(shared)} ids are borne by several vehicles at once, and told apart by place: {first} …")
     tables: list[Place] = sorted((out / "encounters").glob("*.parquet"), key=str)
-    accounts = [account_of(here, path) for path, here in each_fetched(tables)]
-    kinds = Counter(row["kind"] for row in rows_of(tables, ["kind"]))
+    accounts, kinds = [], Counter[str]()
+    for path, here in each_fetched(tables):
+        accounts.append(account_of(here, path))
+        kinds.update(row["kind"] for row in rows_of([here], ["kind"]))
     total: Counter[str] = Counter()
     for causes in files.values():
         total.update(causes)
