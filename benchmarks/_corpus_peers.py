@@ -4,7 +4,7 @@
 """A template on a road by a chain of peers: jax-moseq, OMPL, scikit-learn's Gaussian processes.
 
 The chain is spared what a batch's task does besides: the fit to the road, checks, evaluation. It is told by us where to plan
-from and to, and its candidates go unchecked. jax-moseq runs as many sweeps as our three chains may, on the same features,
+from and to, and its candidates go unchecked. jax-moseq runs as many sweeps as our three chains ran, on the same features,
 compilation not counted; OMPL's RRTConnect takes its first path between neighbouring anchors, with our compiled check of
 edges; each vehicle has one Gaussian process across its route and one of its speed, with fixed hyperparameters.
 """
@@ -16,11 +16,10 @@ import warnings
 
 import numpy as np
 
-from benchmarks._segmentation_peers import installed, jax_moseq
+from benchmarks._segmentation_peers import installed, jax_moseq, posterior_of, sweeps_run
 from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.segmentation import segment
-from scenario_gen.method.segmentation.features import driving_features
 from scenario_gen.roads import build_road
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
@@ -53,13 +52,11 @@ def costs(encounter: Encounter, name: str, count: int, seed: int) -> dict[str, f
     road = build_road(name, encounter, config.road)
     made = Attempt(encounter, segment(encounter, config.segmentation, seed), road, config, count=count, seed=seed).run()
     found = {"ours": process_time() - begun}
-    own = config.segmentation
-    features = driving_features(encounter, own.speed_window, own.turn_window, own.speed_noise, own.turn_noise)[0]
-    moseq = jax_moseq(
-        features + 1e-6 * np.random.default_rng(0).standard_normal(features.shape), own.sampler.chains * own.sampler.sweeps
-    )
+    features, posterior = posterior_of(encounter, config.segmentation, seed)
+    jitter = 1e-6 * np.random.default_rng(0).standard_normal(features.shape)
+    moseq = jax_moseq(features + jitter, sweeps_run(posterior))
     assert moseq is not None
-    found["jax-moseq"] = moseq[1]
+    found["jax-moseq"] = moseq.seconds
     begun = process_time()
     for route in made.routes:
         _plan(road, route)
