@@ -279,7 +279,7 @@ def _outcomes_of(future: Any, count: int) -> Sequence[str] | None:
     if future.status == "finished":
         return [""] * count
     if future.status == "cancelled":
-        raise ConnectionError("the scheduler was lost")
+        raise ConnectionError("the connection has ended")
     error = future.exception()
     return error.args if isinstance(error, FailedTasksError) else None
 
@@ -294,7 +294,8 @@ def _connected(scheduler: str) -> Iterator[None]:
     try:
         yield
     except (OSError, TimeoutError) as error:
-        raise InputError(f"{scheduler or 'Dask'}: {describe(error)}; the same command goes on where it stopped") from error
+        lost = f"{scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
+        raise InputError(f"{lost}; the same command goes on where it stopped") from error
 
 
 def _common(tasks: Sequence[Any]) -> dict[str, Any]:
