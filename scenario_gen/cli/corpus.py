@@ -145,8 +145,10 @@ def needs_bag(bag: Path | None) -> None:
 
 
 def shown(value: object) -> str:
-    """Return a value of the table as text."""
-    return "" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
+    """Return a value of the table as text, a number with three digits, at most two of them decimals."""
+    if isinstance(value, float):
+        return f"{value:.{2 if abs(value) < 9.995 else 1 if abs(value) < 99.95 else 0}f}"
+    return "" if value is None else str(value)
 
 
 @commands.command(urls=("batch",))
@@ -171,7 +173,7 @@ def find(
     source = place(batch)
     found = finding.find(source, condition, limit)
     give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
-    say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in found.rows], names=5)
+    say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in found.rows], names=3)
     lines(finding.coverage_lines(found, source))
     if again:
         for row in found.rows:

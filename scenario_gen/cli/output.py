@@ -155,8 +155,8 @@ def say(*what: Any, sep: str = " ", wrap: bool = False) -> None:
 def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1) -> None:
     """Print a table; nothing in it is cut off.
 
-    Where standard output is no terminal, fields are separated by tabs. Where the terminal is too narrow, each row becomes two
-    lines: what it is, and its other fields with their names.
+    Where standard output is no terminal, fields are separated by tabs. Where the terminal is too narrow, each row becomes a
+    few lines: what it is, then its other fields with their names.
 
     Args:
         columns: their names.
@@ -180,9 +180,20 @@ def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int =
         say(table)
         return
     for row in rows:
-        pairs = [f"{name} {text}" for name, text in zip(columns, row, strict=True) if text]
-        say(", ".join(pairs[:names]), wrap=True)
-        say("  " + ", ".join(pairs[names:]), wrap=True)
+        pairs = [f"{name} {text}" for name, text in zip(columns[names:], row[names:], strict=True) if text]
+        for line in _filled([" ".join(row[:names]), *pairs], terminal.width):
+            say(line, wrap=True)
+
+
+def _filled(fields: Sequence[str], width: int) -> list[str]:
+    """Return fields in as few lines as hold each whole, separated by commas; all lines but the first are indented."""
+    lines = [fields[0]]
+    for text in fields[1:]:
+        if len(lines[-1]) + 2 + len(text) <= width:
+            lines[-1] += f", {text}"
+        else:
+            lines.append(f"  {text}")
+    return lines
 
 
 def bars() -> AbstractContextManager[Callable[[str, int, int], None]]:

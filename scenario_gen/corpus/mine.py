@@ -19,6 +19,7 @@ from itertools import accumulate, chain
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from scenario_gen.corpus.encounters import (
     encounter_of,
     LogTask,
     read_one_log,
+    rows_at,
     rows_of,
     tables_of,
 )
@@ -134,9 +136,10 @@ def mine(
             lost = lost or go(search_hours, hour_tasks(ranged, out, config))  # of all ranges, for an hour is done only once
             lost = lost or go(group_partition, group_tasks(out, config))
             failed += lost or go(clean_found, clean_tasks(out, config))
-        result = summary(out, config, failed, others)
+        tables = _encounters(out)
+        result = summary(out, config, tables, failed, others)
         with arriving(out / PAGE) as part:
-            _write_gallery(part, out, result)
+            _write_gallery(part, tables, result)
         return result
 
 
@@ -145,26 +148,53 @@ def _target(task: LogTask | RangeTask | GroupTask | CleanTask) -> Place:
     return task.target
 
 
-def _write_gallery(path: Path, out: Place, made: Mined) -> None:
-    """Write a page that shows the encounters, of a large corpus the first ones of each kind."""
+@dataclass(frozen=True)
+class _Encounters:
+    """What the tables of encounters hold.
+
+    Attributes:
+        accounts: of each table.
+        kinds: encounters of each kind.
+        drawn: rows for the page: all of a small corpus, of a large one the first ones of each kind.
+    """
+
+    accounts: list[dict[str, Any]]
+    kinds: Counter[str]
+    drawn: list[dict[str, Any]]
+
+
+def _encounters(out: Place) -> _Encounters:
+    """Return what the tables of encounters hold; each is read once.
+
+    Raises:
+        InputError: a table is damaged.
+    """
     tables: list[Place] = sorted((out / "encounters").glob("*.parquet"), key=str)
-    shown: Counter[str] = Counter()
+    accounts, kinds = [], Counter[str]()
+    drawn: list[tuple[bool, dict[str, Any]]] = []  # whether it is among the first of its kind
+    for path, here in each_fetched(tables):
+        accounts.append(account_of(here, path))
+        wanted: dict[int, bool] = {}
+        for k, row in enumerate(rows_of([here], ["kind"])):
+            early = kinds[row["kind"]] < MOST_DRAWN // len(KINDS)
+            if early or kinds.total() < MOST_DRAWN:
+                wanted[k] = early
+            kinds[row["kind"]] += 1
+        drawn += zip(wanted.values(), rows_at(here, list(wanted)), strict=True)
+    return _Encounters(accounts, kinds, [row for early, row in drawn if early or kinds.total() <= MOST_DRAWN])
+
+
+def _write_gallery(path: Path, tables: _Encounters, made: Mined) -> None:
+    """Write a page that shows encounters."""
     cards = []
-    for _, here in each_fetched(tables):
-        kinds = [row["kind"] for row in rows_of([here], ["kind"])]
-        if made.encounters > MOST_DRAWN and all(shown[kind] >= MOST_DRAWN // len(KINDS) for kind in kinds):
-            continue
-        for row in rows_of([here]):
-            if made.encounters > MOST_DRAWN and shown[row["kind"]] >= MOST_DRAWN // len(KINDS):
-                continue
-            shown[row["kind"]] += 1
-            encounter = encounter_of(row)
-            lines = [
-                f"{row['count']} vehicles, {row['seconds']:.1f} s, nearest {row['distance']:.1f} m, gap {row['gap']:.1f} m",
-                ", ".join(f"{pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()),
-                *reactions_of(encounter).sentences([vehicle.id for vehicle in encounter.vehicles]),
-            ]
-            cards.append({"title": f"{row['kind']}: {row['name']}", "lines": lines, "pictures": [sketch(encounter)]})
+    for row in tables.drawn:
+        encounter = encounter_of(row)
+        lines = [
+            f"{row['count']} vehicles, {row['seconds']:.1f} s, nearest {row['distance']:.1f} m, gap {row['gap']:.1f} m",
+            ", ".join(f"{pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()),
+            *reactions_of(encounter).sentences([vehicle.id for vehicle in encounter.vehicles]),
+        ]
+        cards.append({"title": f"{row['kind']}: {row['name']}", "lines": lines, "pictures": [sketch(encounter)]})
     first, *rest = made.lines()
     write_page(path, "Encounters mined", first, cards, rest)
 
@@ -349,7 +379,7 @@ def _columns(tables: Sequence[Place], *names: str) -> list[list[Ints]]:
     return [[table[name].to_numpy() for table in read] for name in names]
 
 
-def summary(out: Place, config: CorpusConfig, failed: list[str], others: Sequence[Place] = ()) -> Mined:
+def summary(out: Place, config: CorpusConfig, tables: _Encounters, failed: list[str], others: Sequence[Place] = ()) -> Mined:
     """Return what is in a corpus, by listing it; `others` are files of the archive that were not read."""
     from pyarrow import parquet
 
@@ -379,23 +409,18 @@ def summary(out: Place, config: CorpusConfig, failed: list[str], others: Sequenc
     if shared:
         first = ", ".join(sorted(shared)[:10])
         notes.append(f"{len(shared)} ids are borne by several vehicles at once, and told apart by place: {first} …")
-    tables: list[Place] = sorted((out / "encounters").glob("*.parquet"), key=str)
-    accounts, kinds = [], Counter[str]()
-    for path, here in each_fetched(tables):
-        accounts.append(account_of(here, path))
-        kinds.update(row["kind"] for row in rows_of([here], ["kind"]))
     total: Counter[str] = Counter()
     for causes in files.values():
         total.update(causes)
     reports = {file: {cause: n for cause, n in causes.items() if n and cause != "rows"} for file, causes in files.items()}
     return Mined(
-        encounters=sum(int(count) for count in kinds.values()),
-        kinds=dict(kinds),
+        encounters=tables.kinds.total(),
+        kinds=dict(tables.kinds),
         account={cause: count for cause, count in total.items() if count},
         files={file: causes for file, causes in reports.items() if causes},
-        refused=[one for account in accounts for one in account.get("refused", ())],
+        refused=[one for account in tables.accounts for one in account.get("refused", ())],
         failed=failed,
-        notes=notes + [line for account in accounts for line in account.get("quality", ())],
+        notes=notes + [line for account in tables.accounts for line in account.get("quality", ())],
     )
 
 

@@ -15,6 +15,8 @@ from rich.console import Console
 from scenario_gen.base.terminal import Terminal
 from scenario_gen.cli import commands as cli
 from scenario_gen.cli import output
+from scenario_gen.cli.corpus import shown
+from scenario_gen.corpus import find
 from scenario_gen.logs.synthetic import bundled
 
 
@@ -149,6 +151,17 @@ ROW = ("20120401-0815-encounter-000017", "crossing", "t_intersection", *("123.45
 def test_a_table_for_a_program_has_tabs(capsys):
     output.say_rows(COLUMNS, [ROW], names=3)
     assert capsys.readouterr().out == "\t".join(COLUMNS) + "\n" + "\t".join(ROW) + "\n"
+
+
+def test_a_row_in_80_columns_takes_two_lines(monkeypatch):
+    monkeypatch.setattr("scenario_gen.base.terminal.Terminal", Narrow)
+    Narrow.text = io.StringIO()
+    row = ("20120401T0815123_12345_12346_12347", "crossing", "t_intersection", "3", "49")
+    output.say_rows(find.COLUMNS, [(*row, *(shown(value) for value in (123.4, 12.34, 0.1, 1.25, 99.96, -9.996)))], names=3)
+    assert Narrow.text.getvalue().splitlines() == [
+        "20120401T0815123_12345_12346_12347 crossing t_intersection, vehicles 3, index 49",
+        "  seconds 123, distance 12.3, ttc 0.10, pet 1.25, speed 100, braking -10.0",
+    ]
 
 
 @pytest.mark.parametrize("columns", [3, 11])
