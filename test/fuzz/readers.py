@@ -61,6 +61,7 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "corpus/synthetic.py": "the truth of the archive that it wrote",
     "base/folders/claim.py": "what is none is no claim: test/base/folders",
     "base/folders/marker.py": "what is none is no marker: test/base/folders",
+    "corpus/grouping.py": "tables of meetings that the run before it has just written",
     "numerics/kernel_cache.py": "source files of the package, for a digest",
     "numerics/kernels.py": "source files of the package, to see which have kernels",
     "output/report/html.py": "assets of the package",
