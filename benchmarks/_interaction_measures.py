@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, runs
+from scenario_gen.numerics import Floats, runs
 from scenario_gen.template import conflict_of, lag_behind, Motion, time_gaps
 from scenario_gen.types import Reaction
 
@@ -109,7 +109,7 @@ def _for_nobody(motion: Motion, who: int, k: int) -> bool:
             continue
         between = motion.position[other, k] - own[k]
         ways = [
-            motion.speed[n, k] * np.array([float(exact.cos(h)), float(exact.sin(h))])
+            motion.speed[n, k] * np.array([float(np.cos(h)), float(np.sin(h))])
             for n, h in ((other, motion.heading[other, k]), (who, yaw[k]))
         ]
         ahead = between + np.linspace(0.0, _AHEAD, 13)[:, None] * (ways[0] - ways[1])

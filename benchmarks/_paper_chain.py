@@ -18,7 +18,7 @@ from scenario_gen.method.evaluation import without_changepoints
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import PAPER, plan_routes, PlanningConfig
 from scenario_gen.method.sampling import Features, Observations, Posterior, Regression, SamplingConfig, speed_knots
-from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads import build_road, draw, layout_for, RoadConfig
 from scenario_gen.template import clean_tracks, find_waits, Wait
 from scenario_gen.types import Encounter, Fit, Road, Route, Segmentation
@@ -131,7 +131,7 @@ class _Lanes:
         if outside < 0.0:
             reach = abs(distance) * HALF_ROAD / self.junction
         back = (SIDE / 2.0 - np.sign(distance) * reach) * (-1.0 if leaves else 1.0)
-        return [x + back * exact.cos(heading), y + back * exact.sin(heading), heading]
+        return [x + back * np.cos(heading), y + back * np.sin(heading), heading]
 
 
 def _evenly_scaled(encounter: Encounter, segmentation: Segmentation, road: Road, lanes: _Lanes) -> tuple[Floats, Floats]:
@@ -159,13 +159,11 @@ def _on_lane(road: Road, pose: Floats, centre: Floats) -> tuple[bool, int, float
     best, answer = np.inf, (False, 0, 0.0)
     for leaves, gates in ((False, road.entries), (True, road.exits)):
         for lane, gate in enumerate(gates):
-            along = np.array([exact.cos(gate[2]), exact.sin(gate[2])])
+            along = np.array([np.cos(gate[2]), np.sin(gate[2])])
             outward = along if leaves else -along
             offset = pose[:2] - gate[:2]
-            distance = float(exact.matmul(pose[:2] - centre, outward))
-            off = abs(exact.matmul(offset, np.array([-along[1], along[0]]))) + 10.0 * abs(
-                float(wrap_angle(np.asarray(pose[2] - gate[2])))
-            )
+            distance = float((pose[:2] - centre) @ outward)
+            off = abs(offset @ np.array([-along[1], along[0]])) + 10.0 * abs(float(wrap_angle(np.asarray(pose[2] - gate[2]))))
             cost = float(off) + (0.0 if distance >= 0.0 else 1.0)
             if cost < best:
                 best, answer = cost, (leaves, lane, distance)
@@ -195,7 +193,7 @@ def sample(
         if factor < 1.0
     )
     step = np.diff(position, axis=2)
-    speed = exact.hypot(step[..., 0], step[..., 1]) / encounter.dt  # eq 16
+    speed = np.hypot(step[..., 0], step[..., 1]) / encounter.dt  # eq 16
     return Sampled(fit, routes, position, np.concatenate([speed, speed[..., -1:]], axis=-1), notes)
 
 
@@ -210,10 +208,10 @@ def _vehicle(
     clock = np.unique(np.concatenate([np.arange(0.0, times[-1], TRAINING_PERIOD), times]))
     training, wanted = (_along(route, profile.state(t)[0]) for t in (clock, encounter.time))
     turn = rotation(training[-1] - training[0])
-    x = (exact.matmul(wanted, turn))[:, 0]
+    x = (wanted @ turn)[:, 0]
     there, back = np.unique(x, return_inverse=True)
-    y = ordinate_samples(exact.matmul(training, turn), there, count, seed + 7919 * n)[:, back]
-    return exact.matmul(np.stack([np.broadcast_to(x, y.shape), y], axis=-1), turn.T), factor
+    y = ordinate_samples(training @ turn, there, count, seed + 7919 * n)[:, back]
+    return np.stack([np.broadcast_to(x, y.shape), y], axis=-1) @ turn.T, factor
 
 
 def _profile(encounter: Encounter, fit: Fit, n: int, route: Route, waits: tuple[Wait, ...]) -> tuple[SpeedProfile, float]:
@@ -252,8 +250,8 @@ def _along(route: Route, station: Floats) -> Floats:
 
 def rotation(direction: Floats) -> Floats:
     """Return the matrix (2, 2) whose product from the right turns `direction` (2,), of any unit, to the x axis."""
-    turn = exact.arctan2(direction[1], direction[0])
-    return np.array([[exact.cos(turn), -exact.sin(turn)], [exact.sin(turn), exact.cos(turn)]])
+    turn = np.arctan2(direction[1], direction[0])
+    return np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
 
 
 def ordinate_posterior(anchors: Floats, x: Floats) -> Posterior:
@@ -283,4 +281,4 @@ def ordinate_samples(anchors: Floats, x: Floats, count: int, seed: int = 0) -> F
     """Curves (count, m) of y at x (m,) through one vehicle's anchors (A, 2), all in metres."""
     posterior = ordinate_posterior(anchors, x)
     generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed])))
-    return posterior.sample(exact.standard_normal(generator, (count, posterior.factor.shape[1])))
+    return posterior.sample(generator.standard_normal((count, posterior.factor.shape[1])))

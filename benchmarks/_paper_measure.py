@@ -21,7 +21,7 @@ from scenario_gen.method.evaluation import (
 )
 from scenario_gen.method.sampling import Features, Observations, Regression
 from scenario_gen.method.segmentation import segment, SegmentationConfig
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.template import find_waits
 from scenario_gen.types import Encounter, Interval, Road, Route, Segmentation, UNIFORM, WITH, WITHOUT
 
@@ -123,7 +123,7 @@ def line_error(speed: Floats, changepoints: Ints) -> float:
     total = 0.0
     for a, b in pairwise([0, *changepoints.tolist(), speed.shape[1]]):
         basis = np.vander(np.arange(a, b) - 0.5 * (a + b), 2)
-        fitted = exact.matmul(basis, exact.lstsq(basis, speed[:, a:b].T))
+        fitted = basis @ np.linalg.lstsq(basis, speed[:, a:b].T, rcond=None)[0]
         total += float((np.square(speed[:, a:b].T - fitted)).sum())
     return float(np.sqrt(total / speed.size))
 
@@ -146,13 +146,13 @@ def stop_speed(encounter: Encounter, arm: Sampled) -> float:
 def _bend(route: Route) -> tuple[float, float]:
     """How far a path strays from its chord; of straight ones the longest."""
     offset = route.points[:, :2] - route.points[0, :2]
-    chord = offset[-1] / max(float(exact.hypot(*offset[-1])), 1e-9)
+    chord = offset[-1] / max(float(np.hypot(*offset[-1])), 1e-9)
     return round(float(np.abs(offset[:, 0] * chord[1] - offset[:, 1] * chord[0]).max()), 1), float(route.length[-1])
 
 
 def compare_priors(route: Route, seed: int) -> Regressions:
     """Figure 2 on one planned path: the grid is turned so that the path's chord is along x, and y is far from zero."""
-    path = exact.matmul(route.points[:, :2], rotation((route.points[-1] - route.points[0])[:2]))
+    path = route.points[:, :2] @ rotation((route.points[-1] - route.points[0])[:2])
     path = path[np.concatenate([[True], path[1:, 0] > np.maximum.accumulate(path[:, 0])[:-1]])]  # a function of x
     x = np.linspace(path[0, 0], path[-1, 0], 120)
     truth = np.interp(x, *path.T)
@@ -163,7 +163,7 @@ def compare_priors(route: Route, seed: int) -> Regressions:
     priors = {}
     for name, degree in PRIORS.items():
         posterior = Regression(Features(x[0], x[-1], SIGMA, LENGTH, degree), observations).predict(x)
-        samples = posterior.sample(exact.standard_normal(generator, (10, posterior.factor.shape[1])))
+        samples = posterior.sample(generator.standard_normal((10, posterior.factor.shape[1])))
         priors[name] = Prior(samples, float(np.sqrt((np.square(posterior.mean - truth)).mean())))
     return Regressions(x, truth, training, priors)
 

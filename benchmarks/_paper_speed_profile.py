@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenario_gen.method.sampling import SamplingConfig, SpeedKnots
-from scenario_gen.numerics import Bools, exact, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, Floats, frozen, Ints
 from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT2, OUT3
 
 Marks = npt.NDArray[np.intc]
@@ -134,14 +134,14 @@ class SpeedProfileQP:
         h, f, a, low, high = self._programmes(knot, lengths)
         reached, wanted = np.cumsum(a[:, :groups], axis=1), np.cumsum(low[:, n : n + groups], axis=1)
         inner = reached[:, :-1]
-        h += exact.matmul(2.0 * _STIFFNESS * inner.transpose(0, 2, 1), inner)
-        f -= 2.0 * _STIFFNESS * (exact.matmul(wanted[:, None, :-1], inner))[:, 0]
+        h += (2.0 * _STIFFNESS * inner.transpose(0, 2, 1)) @ inner
+        f -= 2.0 * _STIFFNESS * (wanted[:, None, :-1] @ inner)[:, 0]
         a[:, groups - 1] = reached[:, -1]
         low[:, n + groups - 1] = high[:, n + groups - 1] = wanted[:, -1]
         bounded = np.r_[0:n, n + groups - 1 : n + self._rows]
         a, low, high = np.ascontiguousarray(a[:, groups - 1 :]), low[:, bounded].copy(), high[:, bounded].copy()
         speeds, feasible = self._optimise(h, f, a, low, high, self._sense[bounded].copy())
-        slid = (exact.matmul(reached, speeds[:, self.knots.unknown >= 0, None]))[..., 0] - wanted
+        slid = (reached @ speeds[:, self.knots.unknown >= 0, None])[..., 0] - wanted
         return speeds, feasible, slid
 
     def _speeds(self, samples: int) -> Floats:

@@ -9,10 +9,10 @@ import subprocess
 import sys
 
 import numpy as np
+from scipy import special
 
 from benchmarks._late_witness import LateWitness
 from scenario_gen.closed_loop.search.nearness import APART
-from scenario_gen.numerics import exact
 
 ROOT = Path(__file__).resolve().parents[1]
 PYTHON = ROOT / ".venv-judges-verifai" / "bin" / "python"
@@ -29,7 +29,7 @@ def first_failure(problem: LateWitness, kind: str, seed: int, most: int) -> int:
         most: drives.
     """
     generator = np.random.default_rng(seed)
-    natural = [one for one in problem.candidates(exact.standard_normal(generator, (256, problem.size))) if one is not None]
+    natural = [one for one in problem.candidates(generator.standard_normal((256, problem.size))) if one is not None]
     margins = [response.margin for response in problem.drive(natural[:100])]  # these are not counted
     command = [PYTHON, ROOT / "benchmarks" / "_verifai_sampler.py", kind, problem.size, seed, np.quantile(margins, 0.1)]
     driven = 0
@@ -42,7 +42,7 @@ def first_failure(problem: LateWitness, kind: str, seed: int, most: int) -> int:
             if not line:
                 raise RuntimeError(f"VerifAI's sampler {kind} ended after {driven} drives")
             point = np.clip(np.array(json.loads(line)), EDGE, 1.0 - EDGE)
-            (scenario,) = problem.candidates(np.asarray(exact.ndtri(point))[None])
+            (scenario,) = problem.candidates(np.asarray(special.ndtri(point))[None])
             margin: float | None = None if kind == "ce" else APART  # the Bayesian one needs a number
             if scenario is not None:
                 (response,) = problem.drive([scenario])

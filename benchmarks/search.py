@@ -16,7 +16,6 @@ from benchmarks._search_peers import first_failure, PYTHON
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.closed_loop.search.estimate import Search
-from scenario_gen.numerics import exact
 
 PLANNERS = {  # seconds late: drives of a search, failures of brute force, share of plain sampling's drives that is asked
     0.64: (600, 2897, 1 / 3),
@@ -81,7 +80,7 @@ def _plain(problem: LateWitness, seed: int) -> int:
     """Return the number of the first natural drive that fails; PLAIN if none does so far."""
     generator, driven = np.random.default_rng(seed), 0
     while driven < PLAIN:
-        z = exact.standard_normal(generator, (256, problem.size))
+        z = generator.standard_normal((256, problem.size))
         responses = problem.drive([one for one in problem.candidates(z) if one is not None])
         hits = [k for k, one in enumerate(responses) if one.failed]
         if hits:

@@ -18,7 +18,7 @@ from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
 from msg_conventions.poses import poses_of
 from msg_conventions.yaw import half_angle
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Route
 
 TYPE = "nav_msgs/msg/Path"
@@ -97,7 +97,7 @@ def read_poses(reader: CdrReader) -> tuple[Ints, list[str], Floats]:
 
 def chord_length(points: Floats) -> Floats:
     """Return (M,) metres along (M, 2+) points."""
-    return np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(points[:, :2], axis=0).T))])
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
 
 
 def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> bytes:

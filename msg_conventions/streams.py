@@ -9,8 +9,9 @@ QoS: reliable, volatile, depth 1000.
 
 import math
 
+import numpy as np
+
 from msg_conventions.cdr import CdrReader, CdrWriter
-from scenario_gen.numerics import exact
 
 FIXED, GPS, COVARIANCE_UNKNOWN = 0, 1, 0  # of NavSatStatus and NavSatFix
 
@@ -53,4 +54,4 @@ def decode_speed(data: bytes, what: str = "speed") -> tuple[int, float]:
 
 def speed_of(x: float, y: float) -> float:
     """Return the speed [m/s] of a twist: linear.x of the body frame, or the length of the horizontal vector."""
-    return x if y == 0.0 else exact.hypot(x, y)
+    return x if y == 0.0 else np.hypot(x, y)

@@ -6,7 +6,7 @@
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 
 TWO_PI = 2.0 * np.pi
 SHORTEST, LARGEST = 0.5, 2.0  # length, and part, of a quaternion, which should have length 1
@@ -20,7 +20,7 @@ def half_angle(heading: Floats) -> tuple[Floats, Floats]:
     if heading.size and max(heading.max(), -heading.min()) > np.pi:  # rarely
         heading = heading - TWO_PI * np.rint(heading / TWO_PI)
     half = 0.5 * heading
-    return exact.sin(half), exact.cos(half)
+    return np.sin(half), np.cos(half)
 
 
 def quaternion(heading: Floats) -> Floats:
@@ -51,7 +51,7 @@ def yaw(quaternions: Floats) -> Floats:
     x, y, z, w = np.moveaxis(quaternions, -1, 0)
     angle: Floats = np.where(
         (x == 0.0) & (y == 0.0),
-        2.0 * exact.arctan2(z, w),
-        exact.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        2.0 * np.arctan2(z, w),
+        np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     )
     return angle

@@ -27,7 +27,6 @@ from msg_conventions.yaw import yaw
 from scenario_gen.bags.storage.autoware import TRACKED
 from scenario_gen.bags.storage.definitions import type_store
 from scenario_gen.base.errors import guarded
-from scenario_gen.numerics import exact
 from scenario_gen.types import Encounter
 
 FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, odometry.TYPE, trajectory.TYPE
@@ -79,7 +78,7 @@ def decode_sample(data: bytes, kind: str, what: str) -> Sample:
     if kind == TWIST:
         return Sample(stamp, speed=speed_of(message.twist.linear.x, message.twist.linear.y))
     pose, linear = message.pose.pose, message.twist.twist.linear  # the speed is in the body frame
-    return Sample(stamp, (pose.position.x, pose.position.y), _heading(pose), exact.hypot(linear.x, linear.y))
+    return Sample(stamp, (pose.position.x, pose.position.y), _heading(pose), np.hypot(linear.x, linear.y))
 
 
 def decode_tracks(data: bytes, what: str) -> Encounter:
@@ -130,6 +129,6 @@ def _object(entry: Any) -> TrackedObject:
         kind=KINDS[label] if label < len(KINDS) else KINDS[0],
         position=(float(pose.position.x), float(pose.position.y)),
         heading=heading,
-        speed=exact.hypot(float(linear.x), float(linear.y)),
+        speed=np.hypot(float(linear.x), float(linear.y)),
         size=(float(entry.shape.dimensions.x), float(entry.shape.dimensions.y)),
     )

@@ -8,7 +8,7 @@ import numpy as np
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
 from scenario_gen.closed_loop.driver import Manner
 from scenario_gen.closed_loop.others import react
-from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import B, B1, F, F1, F2, F3, I, I1, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
@@ -36,29 +36,29 @@ def locate(now: float, time: Floats, motion: Floats, body: Floats, before: float
     pose, last = np.empty(5), time[-1]
     pose_at(time, motion, now, pose)
     out[0], out[1], out[2] = before, 1.0, 1.0
-    if before <= now <= last and exact.hypot(body[0] - pose[0], body[1] - pose[1]) < ON:
+    if before <= now <= last and np.hypot(body[0] - pose[0], body[1] - pose[1]) < ON:
         out[0] = now
     else:
         way, best, at, step = 0.0, np.inf, before, 0.05
         pose_at(time, motion, before, pose)
         x, y = pose[0], pose[1]
-        reach = exact.hypot(body[0] - x, body[1] - y) + WINDOW
+        reach = np.hypot(body[0] - x, body[1] - y) + WINDOW
         t = before
         while t <= last and way <= reach:
             pose_at(time, motion, t, pose)
-            way += exact.hypot(pose[0] - x, pose[1] - y)
+            way += np.hypot(pose[0] - x, pose[1] - y)
             x, y = pose[0], pose[1]
-            gap = exact.hypot(body[0] - x, body[1] - y)
+            gap = np.hypot(body[0] - x, body[1] - y)
             if gap < best - 1e-6 or (gap < best + 1e-6 and t <= now):
                 best, at = min(gap, best), t
             t += step
         pose_at(time, motion, at, pose)
         if pose[3] > 0.5:
-            along = (body[0] - pose[0]) * exact.cos(pose[2]) + (body[1] - pose[1]) * exact.sin(pose[2])
+            along = (body[0] - pose[0]) * np.cos(pose[2]) + (body[1] - pose[1]) * np.sin(pose[2])
             at += min(max(along / pose[3], -step), step)
         out[0] = min(max(at, before), last)
     pose_at(time, motion, out[0], pose)
-    c, s = exact.cos(pose[2]), exact.sin(pose[2])
+    c, s = np.cos(pose[2]), np.sin(pose[2])
     turn = (body[2] - pose[2] + np.pi) % (2.0 * np.pi) - np.pi
     aside = abs((body[1] - pose[1]) * c - (body[0] - pose[0]) * s)
     if abs(body[3] - pose[3]) < ON:
@@ -163,7 +163,7 @@ def at_goal(goal: Floats, beside: float, stays: bool, pose: Floats) -> bool:
     x, y = pose[0] - goal[0], pose[1] - goal[1]
     if stays:
         return bool(x * x + y * y <= beside * beside)
-    c, s = exact.cos(goal[2]), exact.sin(goal[2])
+    c, s = np.cos(goal[2]), np.sin(goal[2])
     turn = (pose[2] - goal[2] + np.pi) % (2.0 * np.pi) - np.pi
     return bool(-AT <= x * c + y * s <= BEYOND and abs(y * c - x * s) <= beside and abs(turn) <= GOAL_TURN)
 

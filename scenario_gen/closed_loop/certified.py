@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, exact, Floats, frozen
+from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.kernels import F, F1, F2, F3, kernel, OUT3
 from scenario_gen.template import conflict_of, lag_behind
 from scenario_gen.types import Scenario, tokens, yielders_of
@@ -104,7 +104,7 @@ def certified(scenario: Scenario, ego: int | str) -> Certified:
     if len(time) < 2 or time[0] != 0.0:
         raise InputError(f"scenario {scenario.index} must start at 0 s and have two samples at least")
     speed, yaw = scenario.speed, scenario.heading
-    velocity = speed[..., None] * np.stack([exact.cos(yaw), exact.sin(yaw)], axis=-1)
+    velocity = speed[..., None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
     motion = frozen(np.concatenate([scenario.position, yaw[..., None], speed[..., None], velocity], axis=2))
     half = frozen([(0.5 * vehicle.length, 0.5 * vehicle.width) for vehicle in scenario.vehicles])
     n, count = len(ids), int(np.ceil(time[-1] / CELL - 1e-9))
@@ -182,7 +182,7 @@ def boxes_meet(a: Floats, b: Floats) -> bool:
 @kernel(inline=True)
 def fill_box(x: float, y: float, yaw: float, length: float, width: float, out: Floats) -> None:
     """Write a box of half sizes `length` and `width` [m] at a pose [m, rad] into `out` (7,), as `boxes_meet` takes it."""
-    out[0], out[1], out[2], out[3] = x, y, exact.cos(yaw), exact.sin(yaw)
+    out[0], out[1], out[2], out[3] = x, y, np.cos(yaw), np.sin(yaw)
     out[4], out[5], out[6] = length, width, np.sqrt(length * length + width * width)
 
 
@@ -207,7 +207,7 @@ def fill_cells(time: Floats, motion: Floats, half: Floats, spans: Floats, cell: 
             pose_at(time, motion[i], start, a)
             pose_at(time, motion[i], end, b)
             pose_at(time, motion[i], 0.5 * (start + end), m)
-            c, s = exact.cos(m[2]), exact.sin(m[2])
+            c, s = np.cos(m[2]), np.sin(m[2])
             ahead = max(abs((a[0] - m[0]) * c + (a[1] - m[1]) * s), abs((b[0] - m[0]) * c + (b[1] - m[1]) * s))
             aside = max(abs((a[1] - m[1]) * c - (a[0] - m[0]) * s), abs((b[1] - m[1]) * c - (b[0] - m[0]) * s))
             turn = max(abs(a[2] - m[2]), abs(b[2] - m[2]))
@@ -215,7 +215,7 @@ def fill_cells(time: Floats, motion: Floats, half: Floats, spans: Floats, cell: 
             width = half[i, 1] + aside + half[i, 0] * turn + ROOM
             fill_box(m[0], m[1], m[2], length, width, out[i, k])
             out[i, k, 7] = way
-            way += exact.hypot(m[0] - a[0], m[1] - a[1]) + exact.hypot(b[0] - m[0], b[1] - m[1])
+            way += np.hypot(m[0] - a[0], m[1] - a[1]) + np.hypot(b[0] - m[0], b[1] - m[1])
 
 
 @kernel(F3, F, OUT3)

@@ -14,7 +14,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F, F1, kernel, OUT1
 
 
@@ -100,7 +100,7 @@ def _placed(ego: EgoState, pose: Pose, config: ClosedLoopConfig) -> Moved:
     if not largest <= FARTHEST:
         fault = f"{NO_PLACE} {'out of range' if np.isfinite(largest) else 'not finite'}"
         return Moved(EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / config.step), fault)
-    way = exact.hypot(pose.x - ego.x, pose.y - ego.y)
+    way = np.hypot(pose.x - ego.x, pose.y - ego.y)
     far = way > config.ego_speed * config.step + JUMP
     turn = (pose.yaw - ego.yaw + np.pi) % (2.0 * np.pi) - np.pi  # the yaw stays continuous
     curvature = 0.0 if far or way < 0.01 else turn / way
@@ -137,6 +137,6 @@ def bicycle(ego: Floats, acceleration: float, curvature: float, step: float, lim
     turn = k * way
     middle = ego[2] + 0.5 * turn
     half = 0.5 * turn
-    chord = way * (exact.sin(half) / half if abs(half) > 1e-6 else 1.0 - half * half / 6.0)
-    out[0], out[1] = ego[0] + chord * exact.cos(middle), ego[1] + chord * exact.sin(middle)
+    chord = way * (np.sin(half) / half if abs(half) > 1e-6 else 1.0 - half * half / 6.0)
+    out[0], out[1] = ego[0] + chord * np.cos(middle), ego[1] + chord * np.sin(middle)
     out[2], out[3], out[4], out[5] = ego[2] + turn, end, k, (end - speed) / step

@@ -28,7 +28,7 @@ from scenario_gen.closed_loop.picture import picture
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import read_trials, Trial
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 
 OTHERS = 8  # nearest others that are seen
@@ -145,7 +145,7 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
     def _observed(self) -> Seen:
         state = self._states[-1]
         ego = state.ego
-        c, s = float(exact.cos(ego.yaw)), float(exact.sin(ego.yaw))
+        c, s = float(np.cos(ego.yaw)), float(np.sin(ego.yaw))
 
         def local(xy: Floats) -> Floats:
             """Positions (..., 2) in the ego's frame."""
@@ -156,9 +156,9 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         if self._route is not None:
             around = np.linspace(self._station - 2.0, self._station + 8.0, 41)
             poses = self._route.at(around)
-            self._station = float(around[np.argmin(exact.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
+            self._station = float(around[np.argmin(np.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
             x, y, yaw = self._route.at(self._station).tolist()
-            offset = (ego.y - y) * float(exact.cos(yaw)) - (ego.x - x) * float(exact.sin(yaw))
+            offset = (ego.y - y) * float(np.cos(yaw)) - (ego.x - x) * float(np.sin(yaw))
             angle = (ego.yaw - yaw + np.pi) % (2.0 * np.pi) - np.pi
             left = self._route.length - self._station
             route = local(self._route.at(self._station + AHEAD)[:, :2])
@@ -166,12 +166,12 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         others = np.zeros((OTHERS, EACH))
         if len(found.ids):
             place = local(found.others[:, :2])
-            away = exact.hypot(place[:, 0], place[:, 1])
+            away = np.hypot(place[:, 0], place[:, 1])
             for row, k in enumerate(np.argsort(away, kind="stable")[:OTHERS].tolist()):
                 if away[k] <= REACH:
                     turn = found.others[k, 2] - ego.yaw
                     speed, length = found.others[k, 3], found.sizes[k, 0]
-                    others[row] = (1.0, *place[k], float(exact.cos(turn)), float(exact.sin(turn)), speed, length)
+                    others[row] = (1.0, *place[k], float(np.cos(turn)), float(np.sin(turn)), speed, length)
         own = np.array((ego.speed, ego.curvature, offset, angle, left))
         seen = np.concatenate([own, route.ravel(), others.ravel()]).astype(np.float32)
         return np.clip(seen, self.observation_space.low, self.observation_space.high)

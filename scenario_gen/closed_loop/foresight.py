@@ -10,7 +10,7 @@ import numpy as np
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
 from scenario_gen.closed_loop.driver import FREE, Manner, rate_after
 from scenario_gen.closed_loop.order import limit, PARTS
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import kernel
 
 SLOW = 0.2  # m/s; a certified speed below it counts as this one where it divides
@@ -51,7 +51,7 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
         out: (M, 4).
     """
     h, time, motion, pose, s = world.step, world.time, world.motion[world.ego], np.empty(5), seen[3]
-    cos, sin = exact.cos(seen[2]), exact.sin(seen[2])
+    cos, sin = np.cos(seen[2]), np.sin(seen[2])
     usual = 0.0  # the witness' own braking there, in the step that is over and after it
     for back in range(3):
         pose_at(time, motion, seen[6] - (1.0 - 0.5 * back) * h * seen[7], pose)

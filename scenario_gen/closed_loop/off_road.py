@@ -15,7 +15,7 @@ import numpy as np
 from scenario_gen.closed_loop.simulation import Drive
 from scenario_gen.method.validity import containment as inside
 from scenario_gen.method.validity import control_points
-from scenario_gen.numerics import Bools, exact, Floats, sealed
+from scenario_gen.numerics import Bools, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
 from scenario_gen.roads import blocked_before, clearance_in_cells, distance_transform, to_cells
 from scenario_gen.types import once_per_object, Road, Scenario
@@ -89,7 +89,7 @@ def between(motion: Scenario, rows: list[int], k: int, u: Floats) -> tuple[Float
     position = []
     for i in rows:
         yaw, speed = motion.heading[i, k : k + 2], motion.speed[i, k : k + 2]
-        way = step * speed[:, None] * np.stack([exact.cos(yaw), exact.sin(yaw)], axis=1)
+        way = step * speed[:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
         p, q = motion.position[i, k], motion.position[i, k + 1]
         position.append((1.0 + 2.0 * u) * v * v * p + u * v * v * way[0] + u * u * w * q - u * u * v * way[1])
     heading = motion.heading[rows, k, None] + u[:, 0] * (motion.heading[rows, k + 1] - motion.heading[rows, k])[:, None]
@@ -104,7 +104,7 @@ def _poses(motion: Scenario, ego: int, k: int, parts: int) -> Floats:
 
 def _parts(motion: Scenario, ego: int, k: int) -> int:
     """Return into how many parts step k is cut."""
-    way = exact.hypot(*(motion.position[ego, k + 1] - motion.position[ego, k]))
+    way = np.hypot(*(motion.position[ego, k + 1] - motion.position[ego, k]))
     way = max(float(way), float(motion.speed[ego, k : k + 2].max() * (motion.time[k + 1] - motion.time[k])))
     vehicle = motion.vehicles[ego]
     turn = abs(float(motion.heading[ego, k + 1] - motion.heading[ego, k])) * 0.5 * (vehicle.length + vehicle.width)
@@ -158,7 +158,7 @@ def measure(solid: Bools, near: Floats, poses: Floats, points: Floats, how: Floa
     height, width = solid.shape
     most, rim, largest = how[0], how[1], how[2] > 0.0
     for p in range(poses.shape[0]):
-        c, s = exact.cos(poses[p, 2]), exact.sin(poses[p, 2])
+        c, s = np.cos(poses[p, 2]), np.sin(poses[p, 2])
         found = 0.0 if largest else most
         count = 0
         for m in range(2 * points.shape[0]):  # once by the distances of centres, then exactly where that leaves it open

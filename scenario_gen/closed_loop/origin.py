@@ -9,7 +9,7 @@ import hashlib
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Scenario
 
 ALIKE = 0.1  # metres within which all vehicles of two scenarios of one encounter are at the same places, if they are copies
@@ -52,7 +52,7 @@ def _shape(scenario: Scenario, ego: int) -> Floats:
     """Return where all are, seen from the ego's start, at some instants, and when that is [s]: two roads give one shape."""
     when = np.linspace(0.0, float(scenario.time[-1]), INSTANTS)
     start, yaw = scenario.position[ego, 0], float(scenario.heading[ego, 0])
-    c, s = float(exact.cos(yaw)), float(exact.sin(yaw))
+    c, s = float(np.cos(yaw)), float(np.sin(yaw))
     away = np.stack(
         [[np.interp(when, scenario.time, each[:, axis] - start[axis]) for axis in range(2)] for each in scenario.position]
     )

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw
 
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 
 SIZE = 400  # pixels of each side
 SCALE = 4.0  # pixels a metre
@@ -51,7 +51,7 @@ def _ground(loop: ClosedLoop, centre: Floats) -> npt.NDArray[np.uint8]:
 def _corners(pose: Floats, length: float, width: float) -> Floats:
     """Return the corners (4, 2) in metres of a footprint at x, y, yaw."""
     x, y, yaw = pose.tolist()
-    ahead = np.array((float(exact.cos(yaw)), float(exact.sin(yaw))))
+    ahead = np.array((float(np.cos(yaw)), float(np.sin(yaw))))
     left = np.array((-ahead[1], ahead[0]))
     signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))
     return np.array([(x, y) + 0.5 * (a * length * ahead + b * width * left) for a, b in signs])

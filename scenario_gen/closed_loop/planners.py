@@ -10,7 +10,6 @@ import numpy as np
 
 from scenario_gen.closed_loop.ego import Command, EgoState, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Task
-from scenario_gen.numerics import exact
 from scenario_gen.numerics.curve import Curve
 
 SPEED_GAIN = 1.0  # 1/s, acceleration per m/s that is missing
@@ -31,11 +30,11 @@ class RouteFollower:
             return 0.0, 0.0
         around = np.linspace(self._near - 2.0, self._near + 8.0, 41)
         poses = self.route.at(around)
-        self._near = float(around[np.argmin(exact.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
+        self._near = float(around[np.argmin(np.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
         ahead = min(max(0.8 * ego.speed, 3.0), 15.0)
         x, y, _ = self.route.at(self._near + ahead).tolist()
         dx, dy = x - ego.x, y - ego.y
-        c, s = float(exact.cos(ego.yaw)), float(exact.sin(ego.yaw))
+        c, s = float(np.cos(ego.yaw)), float(np.sin(ego.yaw))
         return 2.0 * (dy * c - dx * s) / max(dx * dx + dy * dy, 1e-6), self._near
 
 
@@ -96,17 +95,17 @@ class IdmFollower(RouteFollower):
             return math.inf, 0.0
         nearest, speed = math.inf, 0.0
         own = 0.5 * self.task.vehicle.length
-        direction = np.stack([exact.cos(seen.others[:, 2]), exact.sin(seen.others[:, 2])], axis=1)
+        direction = np.stack([np.cos(seen.others[:, 2]), np.sin(seen.others[:, 2])], axis=1)
         when = np.arange(0.0, self.foresight + 0.01, 0.5)
         places = seen.others[:, None, :2] + (seen.others[:, None, 3:4] * when[:, None]) * direction[:, None]
         at, aside = self.route.project(places.reshape(-1, 2))
         turn = self.route.at(at)[:, 2].reshape(len(seen.ids), -1) - seen.others[:, 2:3]
-        along, across = np.abs(exact.cos(turn)), np.abs(exact.sin(turn))
+        along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
         length, width = 0.5 * seen.sizes[:, 0:1], 0.5 * seen.sizes[:, 1:2]
         gap = at.reshape(along.shape) - station - own - length * along - width * across
         beside = np.abs(aside.reshape(along.shape)) - 0.5 * self.task.vehicle.width - length * across - width * along
         for k in range(len(seen.ids)):
-            same_way = float(exact.cos(turn[k, 0]))
+            same_way = float(np.cos(turn[k, 0]))
             for m, time in enumerate(when.tolist()):
                 on = beside[k, m] < self.room and gap[k, m] > -own
                 if on and (m == 0 or (same_way < 0.7 and seen.ego.speed * time < gap[k, m] + 4.0 * own)):

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
-from scenario_gen.numerics import exact
 from scenario_gen.template import conflict_of
 
 STANDS = 0.5  # m/s
@@ -57,11 +56,11 @@ def state_at(drive: Drive, vehicle: int, time: float) -> At:
 def reason_of(loop: ClosedLoop, drive: Drive, who: int, time: float, ran: Runner) -> Reason:
     """Say what was behind the contact of the ego with vehicle `who` at a time [s]."""
     ego, other = state_at(drive, drive.ego, time), state_at(drive, who, time)
-    along = float(exact.cos(other.yaw - ego.yaw))
+    along = float(np.cos(other.yaw - ego.yaw))
     if ran is Runner.OTHER and ego.speed < STANDS:
         return Reason.STANDING
     if along > SAME_WAY:
-        ahead = (other.x - ego.x) * float(exact.cos(ego.yaw)) + (other.y - ego.y) * float(exact.sin(ego.yaw)) > 0.0
+        ahead = (other.x - ego.x) * float(np.cos(ego.yaw)) + (other.y - ego.y) * float(np.sin(ego.yaw)) > 0.0
         if _came_in(drive, who, time):
             return Reason.CUT_IN
         return Reason.REAR_END if ahead and ran is not Runner.OTHER else Reason.OTHER_RAN_INTO_EGO
@@ -78,8 +77,8 @@ def _came_in(drive: Drive, who: int, time: float) -> bool:
     then = max(time - BEFORE, 0.0)
     ego, other = state_at(drive, drive.ego, then), state_at(drive, who, then)
     dx, dy = ego.x - other.x, ego.y - other.y
-    c, s = float(exact.cos(other.yaw)), float(exact.sin(other.yaw))
+    c, s = float(np.cos(other.yaw)), float(np.sin(other.yaw))
     mine, its = drive.motion.vehicles[drive.ego], drive.motion.vehicles[who]
     turn = ego.yaw - other.yaw
-    wide = 0.5 * (its.width + mine.width * abs(float(exact.cos(turn))) + mine.length * abs(float(exact.sin(turn))))
+    wide = 0.5 * (its.width + mine.width * abs(float(np.cos(turn))) + mine.length * abs(float(np.sin(turn))))
     return abs(dy * c - dx * s) > wide and dx * c + dy * s > -0.5 * its.length and not math.isclose(then, time)

@@ -24,7 +24,7 @@ import numpy as np
 from scenario_gen.closed_loop.reasons import At, state_at
 from scenario_gen.closed_loop.simulation import Drive
 from scenario_gen.method.evaluation import footprint_distance, Motion
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Vehicle
 
 OUTSIDE = 0.3  # m; nuPlan's `max_violation_threshold` of drivable_area_compliance
@@ -101,8 +101,8 @@ def not_behind(drive: Drive, other: int) -> Floats:
     motion, ego = drive.motion, drive.ego
     away = motion.position[other] - motion.position[ego]
     yaw = motion.heading[ego]
-    ahead = away[:, 0] * exact.cos(yaw) + away[:, 1] * exact.sin(yaw)
-    return np.asarray(ahead >= float(exact.cos(math.radians(BEHIND))) * exact.hypot(away[:, 0], away[:, 1]))
+    ahead = away[:, 0] * np.cos(yaw) + away[:, 1] * np.sin(yaw)
+    return np.asarray(ahead >= float(np.cos(math.radians(BEHIND))) * np.hypot(away[:, 0], away[:, 1]))
 
 
 def _at_fault(drive: Drive, who: int, time: float, *, off_road: bool) -> bool:
@@ -120,7 +120,7 @@ def _at_fault(drive: Drive, who: int, time: float, *, off_road: bool) -> bool:
 
 def _touches_front(ego: At, own: Vehicle, other: At, its: Vehicle) -> bool:
     """Whether another touches the ego's front bumper: a thin box there."""
-    c, s = float(exact.cos(ego.yaw)), float(exact.sin(ego.yaw))
+    c, s = float(np.cos(ego.yaw)), float(np.sin(ego.yaw))
     front = 0.5 * own.length - 0.5 * BUMPER
     places = np.array([[[ego.x + front * c, ego.y + front * s]], [[other.x, other.y]]])
     bumper = Vehicle("bumper", BUMPER, own.width)
@@ -137,7 +137,7 @@ def comfortable(drive: Drive) -> bool:
     rate = smoothed(yaw, step, DERIVED, 1)
     sideways = smoothed(speed * rate, step, SMOOTHED, 0)
     along = smoothed(along, step, SMOOTHED, 0)
-    whole = np.asarray(exact.hypot(along, sideways))
+    whole = np.asarray(np.hypot(along, sideways))
     return bool(
         along.max() <= SPEEDING_UP
         and along.min() >= -BRAKING

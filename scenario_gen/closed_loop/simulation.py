@@ -19,7 +19,7 @@ from scenario_gen.closed_loop.advance import advance, at_goal, overlaps
 from scenario_gen.closed_loop.certified import CELL, Certified, certified
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import footprint_fits
 from scenario_gen.types import Road, Scenario, Vehicle
 
@@ -208,7 +208,7 @@ class ClosedLoop:
         """Return what a planner is told beforehand."""
         motion, ego = self.certified.motion, self.ego
         way = motion[ego, :, :3]
-        moved = exact.hypot(*np.diff(way[:, :2], axis=0).T) > 1e-3
+        moved = np.hypot(*np.diff(way[:, :2], axis=0).T) > 1e-3
         route = way[np.concatenate([[True], moved])]
         return Task(
             self.scenario.vehicles[ego],

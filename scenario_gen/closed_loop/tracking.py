@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.closed_loop.ego import Command, EgoState
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 
 SLOWEST = 0.5  # m/s below which a yaw rate is taken as that of this speed: a car does not turn on the spot
 CATCH_UP = 0.5  # 1/s, speed per metre that the ego is behind
@@ -41,12 +41,12 @@ class Track:
         """Return what keeps the ego on the track: its speed with what it is behind, and a turn towards where it is to be soon."""
         x, y, yaw = self.at(now + step)
         ahead = self.at(now + step + 0.1)
-        c, s = float(exact.cos(yaw)), float(exact.sin(yaw))
+        c, s = float(np.cos(yaw)), float(np.sin(yaw))
         pace = (ahead[0] - x) * c * 10.0 + (ahead[1] - y) * s * 10.0
         behind = (x - ego.x) * c + (y - ego.y) * s - ego.speed * step
         wanted = max(pace + CATCH_UP * behind, 0.0)
         tx, ty, tyaw = self.at(now + step + LOOK_AHEAD)
-        c, s = float(exact.cos(ego.yaw)), float(exact.sin(ego.yaw))
+        c, s = float(np.cos(ego.yaw)), float(np.sin(ego.yaw))
         dx, dy = (tx - ego.x) * c + (ty - ego.y) * s, (ty - ego.y) * c - (tx - ego.x) * s
         square = dx * dx + dy * dy
         if square > 1.0:

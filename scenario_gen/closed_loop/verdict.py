@@ -18,7 +18,7 @@ from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.method.evaluation import footprint_distance, Motion, time_to_collision
 from scenario_gen.method.validity import collision as apart
 from scenario_gen.method.validity import control_points
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.template import find_conflicts
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
@@ -246,9 +246,9 @@ def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision
     state = []
     for i in (drive.ego, who):
         x, y, yaw, speed = state_at(drive, i, at)
-        state.append((x, y, speed * float(exact.cos(yaw)), speed * float(exact.sin(yaw))))
+        state.append((x, y, speed * float(np.cos(yaw)), speed * float(np.sin(yaw))))
     (x, y, vx, vy), (ox, oy, wx, wy) = state
-    away = max(float(exact.hypot(ox - x, oy - y)), 1e-9)
+    away = max(float(np.hypot(ox - x, oy - y)), 1e-9)
     dx, dy = (ox - x) / away, (oy - y) / away
     mine, its = vx * dx + vy * dy, -(wx * dx + wy * dy)
     if mine > 2.0 * max(its, 0.0):
@@ -257,7 +257,7 @@ def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision
         ran = Runner.OTHER
     else:
         ran = Runner.BOTH
-    speed = float(exact.hypot(vx - wx, vy - wy))
+    speed = float(np.hypot(vx - wx, vy - wy))
     return Collision(at, motion.vehicles[who].id, speed, ran, reason_of(loop, drive, who, at, ran))
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.logs import LAG
-from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUTB1
 
 KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")
@@ -79,7 +79,7 @@ def _least_gap(one: Floats, other: Floats, when: Floats, then: Floats) -> tuple[
     i, j, least = 0, 0, np.inf
     for m in range(len(one)):
         for n in range(len(other)):
-            cost = exact.hypot(one[m, 0] - other[n, 0], one[m, 1] - other[n, 1]) + LAG * abs(when[m] - then[n])
+            cost = np.hypot(one[m, 0] - other[n, 0], one[m, 1] - other[n, 1]) + LAG * abs(when[m] - then[n])
             if cost < least:
                 i, j, least = m, n, cost
     return i, j, least
@@ -106,7 +106,7 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
         return "turning"
     if _intersect(one.position, one.heading, other.position, other.heading):
         return "crossing"
-    apart = exact.hypot(*(one.position - other.position).T)
+    apart = np.hypot(*(one.position - other.position).T)
     nearest = int(apart.argmin())
     if abs(float(wrap_angle(one.heading[nearest : nearest + 1] - other.heading[nearest : nearest + 1])[0])) >= AGAINST:
         return "opposing"
@@ -126,16 +126,16 @@ def unwrapped(heading: Floats) -> Floats:
 
 def path_of(motion: Motion) -> tuple[Floats, Floats]:
     """Return points (P, 2) [m] of a path, 4 m apart, with a straight at both ends, and its heading (P,) [rad] there."""
-    moved = np.concatenate([[True], exact.hypot(*np.diff(motion.position, axis=0).T) > 0.0])
+    moved = np.concatenate([[True], np.hypot(*np.diff(motion.position, axis=0).T) > 0.0])
     places = motion.position[moved]
-    driven = np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(places, axis=0).T))])
+    driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
     at = np.arange(0.0, float(driven[-1]) + STEP, STEP)
     heading = unwrapped(motion.heading[moved])
     middle = np.stack([np.interp(at, driven, places[:, 0]), np.interp(at, driven, places[:, 1])], axis=1)
     facing = np.interp(at, driven, heading)
     out = np.arange(STEP, BEYOND, STEP)[:, None]
-    before = middle[0] - out[::-1] * np.array([exact.cos(float(facing[0])), exact.sin(float(facing[0]))])
-    after = middle[-1] + out * np.array([exact.cos(float(facing[-1])), exact.sin(float(facing[-1]))])
+    before = middle[0] - out[::-1] * np.array([np.cos(float(facing[0])), np.sin(float(facing[0]))])
+    after = middle[-1] + out * np.array([np.cos(float(facing[-1])), np.sin(float(facing[-1]))])
     ends = np.full(len(out), facing[0]), np.full(len(out), facing[-1])
     return np.vstack([before, middle, after]), np.concatenate([ends[0], facing, ends[1]])
 
@@ -163,7 +163,7 @@ def _mark_on_path(position: Floats, heading: Floats, points: Floats, facing: Flo
                 nearest, least = n, x * x + y * y
         along = facing[nearest]
         x, y = position[k, 0] - points[nearest, 0], position[k, 1] - points[nearest, 1]
-        beside = abs(y * exact.cos(along) - x * exact.sin(along)) < BESIDE
+        beside = abs(y * np.cos(along) - x * np.sin(along)) < BESIDE
         reach = STEP + BESIDE
         found[k] = beside and abs(_wrapped(heading[k] - along)) < ALIKE and least < reach * reach
 

@@ -6,7 +6,7 @@
 Vehicles are not sampled at the same instants, so nothing is joined by exact time. All messages of a vehicle in a half second give
 one row, driven on to the middle of it with its speed and heading. Rows of the same half second meet in cells as wide as the
 proximity and what a vehicle drives in between: each looks into its own cell and into half of those around it. The database only
-proposes: what decides is computed from the messages with `scenario_gen.numerics.exact`.
+proposes: what decides is computed from the messages from them.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR, quoted, 
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import FASTEST, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
 from scenario_gen.logs import APART, LAG, shortest
-from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel
 
 BIN = 500_000  # µs
@@ -249,7 +249,7 @@ def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bo
     north = rows["lat"] * NORTH
     kept = np.zeros(len(pairs["a"]), dtype=bool)
     for k, (a, b, first, last) in enumerate(zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)):
-        wide = LONGITUDE * exact.cos(float(rows["lat"][own[a]][0]) * np.pi / 180.0)
+        wide = LONGITUDE * np.cos(float(rows["lat"][own[a]][0]) * np.pi / 180.0)
         one, other = ((rows["bin"][own[n]], north[own[n]], rows["lon"][own[n]]) for n in (a, b))
         kept[k] = _least_apart(*one, *other, wide, first, last, steps) <= reach * reach
     return kept

@@ -20,7 +20,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.folders import Kind, replaced_folder, write_text
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 
 TRUTH = "synthetic.json"
 SYNTHETIC = Kind("synthetic archive")
@@ -107,7 +107,7 @@ class _Draft:
     def add(self, place: tuple[float, float, float, float], drives: list[dict[str, float]]) -> list[int]:
         """Put drives, given about an encounter's own middle, to a place (east, north, turned by, time); return their devices."""
         east, north, turned, when = place
-        cos, sin = exact.cos(turned), exact.sin(turned)
+        cos, sin = np.cos(turned), np.sin(turned)
         devices = []
         for drive in drives:
             row = {"radius": 1.0, "turn": 0.0, "dip": 0.0, "dip_at": 0.0, "dip_width": 4.0, "x": 0.0, "y": 0.0, "at": 0.0} | drive
@@ -256,7 +256,7 @@ def _following(draft: _Draft) -> list[dict[str, float]]:
 def _merging(draft: _Draft) -> list[dict[str, float]]:
     angle, radius, speed, times = draft.between(0.8, 1.55), draft.between(9.0, 14.0), draft.between(6.0, 8.0), _recorded(draft)
     side = 1.0 if draft.random.random() < 0.5 else -1.0
-    x, y = -radius * exact.sin(angle), side * radius * (1.0 - exact.cos(angle))  # where the arc begins that ends at (0, 0)
+    x, y = -radius * np.sin(angle), side * radius * (1.0 - np.cos(angle))  # where the arc begins that ends at (0, 0)
     at = draft.between(1.2, 2.4) - radius * angle / speed
     return [
         {"heading": 0.0, "speed": speed, **times},
@@ -266,8 +266,8 @@ def _merging(draft: _Draft) -> list[dict[str, float]]:
 
 def _turning(draft: _Draft) -> list[dict[str, float]]:
     radius, lane, speed, other = draft.between(8.0, 11.0), 3.5, draft.between(5.0, 8.0), draft.between(8.0, 14.0)
-    beta = exact.arctan2(float(np.sqrt(2.0 * radius * lane - lane * lane)), radius - lane)  # where it crosses the other's lane
-    passes = -radius * exact.sin(beta) / other
+    beta = np.arctan2(float(np.sqrt(2.0 * radius * lane - lane * lane)), radius - lane)  # where it crosses the other's lane
+    passes = -radius * np.sin(beta) / other
     at = passes + draft.between(1.3, 2.4) - radius * beta / speed
     return [
         {"heading": 0.0, "speed": other, **_recorded(draft)},
@@ -361,13 +361,13 @@ def states(drives: Drives, who: Ints, time: Floats) -> tuple[Floats, Floats, Flo
     since, since_at = (time - drives.dip_at[who]) / width, ((drives.at - drives.dip_at) / drives.dip_width)[who]
     dip = drives.dip[who]
     speed = base * (1.0 - dip / (1.0 + np.square(since)))
-    driven = base * ((time - drives.at[who]) - dip * width * (exact.arctan2(since, 1.0) - exact.arctan2(since_at, 1.0)))
+    driven = base * ((time - drives.at[who]) - dip * width * (np.arctan2(since, 1.0) - np.arctan2(since_at, 1.0)))
     radius, turn, heading = drives.radius[who], drives.turn[who], drives.heading[who]
     bent = np.clip(driven / radius, 0.0, np.abs(turn))
     side = np.sign(turn)
     now = heading + side * bent
     rest = driven - bent * radius
-    cos, sin, cos0, sin0 = exact.cos(now), exact.sin(now), exact.cos(heading), exact.sin(heading)
+    cos, sin, cos0, sin0 = np.cos(now), np.sin(now), np.cos(heading), np.sin(heading)
     x = drives.x[who] + side * radius * (sin - sin0) + rest * cos
     y = drives.y[who] - side * radius * (cos - cos0) + rest * sin
     return np.stack([x + drives.east[who], y + drives.north[who]], axis=1), now, speed
@@ -383,13 +383,13 @@ def _rows(
     phase = np.repeat(0.1 * random.random(len(part)), amount)
     time = drives.begin[who] + 0.1 * tick + phase + 0.03 * (random.random(len(who)) - 0.5)
     position, heading, speed = states(drives, who, time)
-    off = config.noise * exact.random.standard_normal(random, (len(drives.x), 2))
+    off = config.noise * random.standard_normal((len(drives.x), 2))
     position = position + off[who] + 0.05 * (random.random((len(who), 2)) - 0.5)
     # metres of a degree on the ellipsoid; about each encounter's own origin, so that its shape is right to 1e-4
     north0 = PLACE[0] + drives.north[who] / 111_000.0
     r0 = north0 * (np.pi / 180.0)
-    metres_north = 111_132.954 - 559.822 * exact.cos(2.0 * r0) + 1.175 * exact.cos(4.0 * r0)
-    metres_east = 111_412.84 * exact.cos(r0) - 93.5 * exact.cos(3.0 * r0)
+    metres_north = 111_132.954 - 559.822 * np.cos(2.0 * r0) + 1.175 * np.cos(4.0 * r0)
+    metres_east = 111_412.84 * np.cos(r0) - 93.5 * np.cos(3.0 * r0)
     latitude = north0 + (position[:, 1] - drives.north[who]) / metres_north
     east0 = PLACE[1] + drives.east[who] / 80_000.0
     longitude = east0 + (position[:, 0] - drives.east[who]) / metres_east

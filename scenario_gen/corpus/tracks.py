@@ -12,7 +12,7 @@ import numpy as np
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap, unwrapped
 from scenario_gen.logs import APART, shortest, ticks, windows
-from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
+from scenario_gen.numerics import Bools, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
 FASTEST = 35.0  # m/s: what a vehicle drives in a bin widens the cells
@@ -57,7 +57,7 @@ def tracks_of(rows: dict[str, Any]) -> dict[int, Track]:
     around = [np.clip(at + k, first, last - 1) for k in (-2, -1, 0, 1, 2)]
     seconds = np.minimum((t[around[4]] - t[around[0]]) * 1e-6, 2.0)
     good = np.ones(len(t), dtype=bool)
-    wide = LONGITUDE * exact.cos(rows["lat"] * (np.pi / 180.0))
+    wide = LONGITUDE * np.cos(rows["lat"] * (np.pi / 180.0))
     for name, metres in (("lat", METRES), ("lon", wide)):
         middle = median_of_five(*(rows[name][index] for index in around))
         good &= np.abs(rows[name] - middle) * metres < OUTLIER + FASTEST * seconds
@@ -95,7 +95,7 @@ def meetings(a: Track, b: Track, span: tuple[int, int], config: CorpusConfig) ->
     inside = (a.t >= at[0]) & (a.t <= at[-1])
     origin = (float(a.lat[inside].mean()), float(a.lon[inside].mean())) if inside.any() else (float(a.lat[0]), float(a.lon[0]))
     one, other = (_at(track, at, origin, config) for track in (a, b))
-    apart = exact.hypot(*(one[0].position - other[0].position).T)
+    apart = np.hypot(*(one[0].position - other[0].position).T)
     near = one[1] & other[1] & (apart < config.log.proximity)
     found = []
     for low, high in runs(near, ticks(APART, config.log)):
@@ -130,7 +130,7 @@ def _at(track: Track, at: Ints, origin: tuple[float, float], config: CorpusConfi
     low, high = np.searchsorted(track.t, [at[0], at[-1]])
     own = slice(max(int(low) - 1, 0), int(high) + 1)
     t = track.t[own]
-    wide = LONGITUDE * exact.cos(origin[0] * (np.pi / 180.0))
+    wide = LONGITUDE * np.cos(origin[0] * (np.pi / 180.0))
     place = np.stack([(track.lon[own] - origin[1]) * wide, (track.lat[own] - origin[0]) * NORTH], axis=1)
     seconds, when = (t - at[0]) * 1e-6, (at - at[0]) * 1e-6
     position = np.stack([np.interp(when, seconds, place[:, 0]), np.interp(when, seconds, place[:, 1])], axis=1)
@@ -152,7 +152,7 @@ def tell_apart(t: Ints, lat: Floats, lon: Floats, speed: Floats) -> Ints:
         speed: (M,) m/s.
     """
     who = np.zeros(len(t), dtype=np.int64)
-    wide = exact.cos(float(lat.mean()) * np.pi / 180.0) * LONGITUDE
+    wide = np.cos(float(lat.mean()) * np.pi / 180.0) * LONGITUDE
     _tell_apart(
         np.asarray(t, dtype=np.int64), lat * METRES, lon * wide, np.asarray(speed, dtype=np.float64), np.zeros((MOST, 4)), who
     )

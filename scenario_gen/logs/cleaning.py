@@ -14,7 +14,7 @@ from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.geodesy import local_frame
 from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
-from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 
 LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
 SLOWEST = 5.0  # s between fixes: a slower source does not show how a vehicle drives, or its unit of time is another one
@@ -261,7 +261,7 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
 def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Observations:
     """Drop fixes that the vehicle cannot have reached at its measured speeds, except several in a row that agree."""
     limit = reach(vehicle)
-    step = exact.hypot(*np.diff(vehicle.fix, axis=0).T)
+    step = np.hypot(*np.diff(vehicle.fix, axis=0).T)
     seconds = np.diff(vehicle.fix_ns) * 1e-9
     keep = np.ones(len(vehicle.fix_ns), dtype=bool)
     if (step > JUMP_SLACK + limit[1:] * seconds).any():
@@ -291,10 +291,10 @@ def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
     keep = np.ones(len(fix), dtype=bool)
     last, n_doubted = 0, 0
     for i in range(1, len(fix)):
-        if exact.hypot(*(fix[i] - fix[last])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
+        if np.hypot(*(fix[i] - fix[last])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
             last, n_doubted = i, 0
             continue
-        agrees = n_doubted and exact.hypot(*(fix[i] - fix[i - 1])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
+        agrees = n_doubted and np.hypot(*(fix[i] - fix[i - 1])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
         n_doubted = n_doubted + 1 if agrees else 1
         keep[i] = False
         if n_doubted >= RELOCATED:

@@ -13,7 +13,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
-from scenario_gen.numerics import Bools, exact, Floats, runs
+from scenario_gen.numerics import Bools, Floats, runs
 
 TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
@@ -55,7 +55,7 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     seconds = np.diff(track.fix_ns) * 1e-9
     usual = float(np.median(seconds))
     longest = longest_bridge(seconds, config)
-    step = exact.hypot(*np.diff(track.fix, axis=0).T)
+    step = np.hypot(*np.diff(track.fix, axis=0).T)
     gaps = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
     back = reversals(track, config)
     cuts = gaps | back | laps(track, config)
@@ -103,7 +103,7 @@ def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple
     smooth = smooth_piece(part, origin_ns, config)
     if smooth is None:
         return [(part, None)]
-    turn = np.abs(np.diff(smooth.heading)) - SHARPEST * exact.hypot(*np.diff(smooth.position, axis=0).T)
+    turn = np.abs(np.diff(smooth.heading)) - SHARPEST * np.hypot(*np.diff(smooth.position, axis=0).T)
     if not (turn > 1e-6).any():
         return [(part, smooth)]
     at = origin_ns + round((smooth.first + int(np.argmax(turn)) + 0.5) * config.period * 1e9)
@@ -137,7 +137,7 @@ def reversals(track: Observations, config: LogConfig) -> Bools:
         first, last = np.searchsorted(seconds, (ticks[begin], ticks[end - 1])).tolist()
         before = departure(track.fix[first::-1])
         after = departure(track.fix[last:])
-        if before is not None and after is not None and float(exact.matmul(before, after)) > -exact.cos(TURNED):
+        if before is not None and after is not None and float(before @ after) > -np.cos(TURNED):
             cuts[min((first + last) // 2, len(cuts) - 1)] = True
     return cuts
 
@@ -145,7 +145,7 @@ def reversals(track: Observations, config: LogConfig) -> Bools:
 def departure(fix: Floats) -> Floats | None:
     """Return the unit vector (2,) from the first fix (F, 2) [m] to the first one `LEVER` away, None if there is none."""
     offset = fix - fix[0]
-    away = exact.hypot(offset[:, 0], offset[:, 1])
+    away = np.hypot(offset[:, 0], offset[:, 1])
     far = np.flatnonzero(away > LEVER)
     return offset[far[0]] / away[far[0]] if len(far) else None
 

@@ -11,7 +11,7 @@ PROJ itself calls the C library's functions, whose last bit depends on the CPU.
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Encounter
 
 SEMI_MAJOR, FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS84
@@ -28,14 +28,14 @@ def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]
         longitude: degrees, of the same shape.
         origin: latitude and longitude in degrees.
     """
-    sin_lat, cos_lat = exact.sin(latitude * _RADIANS), exact.cos(latitude * _RADIANS)
+    sin_lat, cos_lat = np.sin(latitude * _RADIANS), np.cos(latitude * _RADIANS)
     turned = (longitude - origin[1]) * _RADIANS
-    sin0, cos0 = exact.sin(origin[0] * _RADIANS), exact.cos(origin[0] * _RADIANS)
+    sin0, cos0 = np.sin(origin[0] * _RADIANS), np.cos(origin[0] * _RADIANS)
     normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.square(sin_lat))
     normal0 = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.square(sin0))
     # From the earth's centre: outwards in the origin's meridian, east of it, and up along the axis.
-    out = normal * cos_lat * exact.cos(turned) - normal0 * cos0
-    east = normal * cos_lat * exact.sin(turned)
+    out = normal * cos_lat * np.cos(turned) - normal0 * cos0
+    east = normal * cos_lat * np.sin(turned)
     up = (1.0 - ECCENTRICITY2) * (normal * sin_lat - normal0 * sin0)
     north = cos0 * up - sin0 * out
     # A chord's shadow on the plane is shorter than the arc: R sin(s / R) instead of s.
@@ -50,7 +50,7 @@ def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]
 
 def geodetic(position: Floats, origin: tuple[float, float]) -> tuple[Floats, Floats]:
     """Return latitude and longitude in degrees of positions (..., 2), the inverse of `local_frame` to 1e-9 m within 10 km."""
-    sin0, cos0 = exact.sin(origin[0] * _RADIANS), exact.cos(origin[0] * _RADIANS)
+    sin0, cos0 = np.sin(origin[0] * _RADIANS), np.cos(origin[0] * _RADIANS)
     normal0 = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.square(sin0))
     meridian = normal0 * (1.0 - ECCENTRICITY2) / (1.0 - ECCENTRICITY2 * np.square(sin0))
     latitude = np.full(position.shape[:-1], origin[0])

@@ -22,7 +22,7 @@ import numpy as np
 
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
-from scenario_gen.numerics import exact, Floats, runs
+from scenario_gen.numerics import Floats, runs
 
 MOST = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
 EDGE = 1.0  # s by which a group is shortened so that no vehicle joins late or leaves early
@@ -132,7 +132,7 @@ def distances(a: Piece, b: Piece) -> Floats:
     """Return the distances (T,) [m] of two pieces at their common ticks; empty where they have none."""
     first = max(a.first, b.first)
     last = max(min(a.last, b.last), first)
-    return exact.hypot(*(a.position(first, last) - b.position(first, last)).T)
+    return np.asarray(np.hypot(*(a.position(first, last) - b.position(first, last)).T))
 
 
 def driven(piece: Piece, first: int, last: int, config: LogConfig) -> float:
@@ -150,7 +150,7 @@ def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig)
     every = max(ticks(0.3, config), 1)
     time = np.arange(first, last, every) * config.period
     at_a, at_b = a.position(first, last)[::every], b.position(first, last)[::every]
-    apart = exact.hypot(at_a[:, None, 0] - at_b[None, :, 0], at_a[:, None, 1] - at_b[None, :, 1])
+    apart = np.hypot(at_a[:, None, 0] - at_b[None, :, 0], at_a[:, None, 1] - at_b[None, :, 1])
     return float((apart + LAG * np.abs(time[:, None] - time[None, :])).min())
 
 

@@ -13,8 +13,10 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy import linalg
+from scipy.interpolate import BSpline
 
-from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Floats, Ints, wrap_angle
 
 KNOT = 1.0  # m between knots
 MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there
@@ -44,7 +46,7 @@ class Path:
         length: (K,) the arc length [m] there.
     """
 
-    curve: exact.BSpline
+    curve: BSpline
     parameter: Floats
     length: Floats
 
@@ -61,13 +63,13 @@ class Path:
         foot = np.clip(foot, self.parameter[0], self.parameter[-1])
         gap, tangent = points - self.curve(foot), self.curve(foot, 1)
         left = tangent[:, 0] * gap[:, 1] - tangent[:, 1] * gap[:, 0]
-        return np.interp(foot, self.parameter, self.length), np.where(left < 0.0, -1.0, 1.0) * exact.hypot(*gap.T)
+        return np.interp(foot, self.parameter, self.length), np.where(left < 0.0, -1.0, 1.0) * np.hypot(*gap.T)
 
     def pose(self, arc: Floats) -> tuple[Floats, Floats]:
         """Return positions (T, 2) [m] and headings (T,) [rad], unwrapped, at arc lengths (T,) [m]."""
         u = np.interp(arc, self.length, self.parameter)
         tangent = self.curve(u, 1)
-        return self.curve(u), np.unwrap(exact.arctan2(tangent[:, 1], tangent[:, 0]))
+        return self.curve(u), np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,24 +111,24 @@ def fit_path(
     band = np.zeros((8, 2 * count))  # x and y of each coefficient in turn
     right = np.zeros(2 * count)
     inside = np.clip(place, low, high - 1e-9)
-    first, values = exact.bspline_basis(knots, 3, inside)
-    start = 2 * first
+    basis = BSpline.design_matrix(inside, knots, 3)  # four entries a row, the zeros too
+    start, values = 2 * basis.indices[::4].astype(np.int64), basis.data.reshape(-1, 4)
     for axis in (0, 1):
         observe(band, right, start + axis, values, 2, weight, points[:, axis])
     if headings is not None:
-        _, lower = exact.bspline_basis(knots[1:-1], 2, inside)
+        lower = BSpline.design_matrix(inside, knots[1:-1], 2).data.reshape(-1, 3)
         slope = np.zeros((len(place), 4))  # of a cubic basis: differences of the quadratic one, which begins at the same span
         slope[:, 1:] += lower / step
         slope[:, :-1] -= lower / step
-        across = np.column_stack((-exact.sin(headings.value), exact.cos(headings.value)))
+        across = np.column_stack((-np.sin(headings.value), np.cos(headings.value)))
         entries = (slope[:, :, None] * across[:, None, :]).reshape(-1, 8)
         shared = np.clip(spread / SAME_HEADING, STANDING_HEADING, 1.0)
         observe(band, right, start, entries, 1, headings.weight * shared, np.zeros(len(place)))
     for order, floor, moving, power in ((2, CURVATURE, LATERAL, 3), (3, STEERING, LATERAL_JERK, 5)):
         centre = low + step * (np.arange(count - order) + (order - 2) / 2.0)
         v = np.interp(centre, place, speed)
-        penalise(band, order, exact.power(step, 1 - 2 * order) * (1.0 / floor + exact.power(v, power) / moving))
-    return tabulate(exact.BSpline(knots, exact.solve_banded(band, right[:, None]).reshape(-1, 2), 3), low, high)
+        penalise(band, order, step ** (1 - 2 * order) * (1.0 / floor + v**power / moving))
+    return tabulate(BSpline(knots, linalg.solveh_banded(band, right, lower=True).reshape(-1, 2), 3), low, high)
 
 
 def observe(band: Floats, right: Floats, start: Ints, entries: Floats, stride: int, weight: Floats, target: Floats) -> None:
@@ -158,16 +160,16 @@ def penalise(band: Floats, order: int, weight: Floats) -> None:
 
 def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
     """Return a straight line through `point` (2,) [m] where the distance driven is (low + high) / 2."""
-    direction = np.array([exact.cos(heading), exact.sin(heading)])
+    direction = np.array([np.cos(heading), np.sin(heading)])
     ends = np.array([low - MARGIN, high + MARGIN])
     where = point + (ends - (low + high) / 2.0)[:, None] * direction
-    return tabulate(exact.BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
+    return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
 
 
-def tabulate(curve: exact.BSpline, low: float, high: float) -> Path:
+def tabulate(curve: BSpline, low: float, high: float) -> Path:
     """Measure the curve's arc length."""
     u = np.linspace(low, high, int(np.ceil((high - low) / STEP)) + 1)
-    rate = exact.hypot(*curve(u, 1).T)
+    rate = np.hypot(*curve(u, 1).T)
     length = low + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))])
     return Path(curve, u, length)
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 import shapely
 
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Encounter, together
 
 
@@ -151,9 +151,9 @@ def footprints(encounter: Encounter, vehicle: int) -> Floats:
     """Return the corners (T, 4, 2) [m] of a vehicle's footprint, counter-clockwise from the rear right."""
     body = encounter.vehicles[vehicle]
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [body.length / 2.0, body.width / 2.0]
-    cos, sin = exact.cos(encounter.heading[vehicle]), exact.sin(encounter.heading[vehicle])
+    cos, sin = np.cos(encounter.heading[vehicle]), np.sin(encounter.heading[vehicle])
     turn = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
-    turned: Floats = exact.matmul(corners, np.swapaxes(turn, 1, 2)) + encounter.position[vehicle][:, None, :]
+    turned: Floats = corners @ np.swapaxes(turn, 1, 2) + encounter.position[vehicle][:, None, :]
     return turned
 
 

@@ -16,12 +16,13 @@ from dataclasses import dataclass
 import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy import sparse
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.path import fit_path, Headings, headings_of, MOVES, Path, straight_path
 from scenario_gen.logs.raw import Observations
-from scenario_gen.numerics import Bools, exact, Floats, Ints, runs, wrap_angle
+from scenario_gen.numerics import Bools, Floats, Ints, runs, wrap_angle
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing
@@ -51,15 +52,16 @@ class Motion:
         self.size = int(self.variable[-1]) + 1
         first, second, third = (self._differences(order) for order in (1, 2, 3))
         speed, change = (first[0], first[1] * (1.0 / dt)), (second[0], second[1] * (1.0 / np.square(dt)))
-        self.prior = self._squared(third[0], third[1] * (np.sqrt(dt) / (config.jerk * exact.power(dt, 3))))
+        self.prior = self._squared(third[0], third[1] * (np.sqrt(dt) / (config.jerk * dt**3)))
         blocks = (speed[0], -speed[1]), change, (change[0], -change[1])
         self.bounds = np.repeat([0.0, config.acceleration_limit, config.braking_limit], [len(block[0]) for block in blocks])
         above = np.cumsum([0, *(len(block[0]) for block in blocks)])
         rows = [np.repeat(top + np.arange(len(at)), values.shape[1]) for top, (at, values) in zip(above, blocks, strict=False)]
         columns = [(at[:, None] + np.arange(values.shape[1])).ravel() for at, values in blocks]
         entries = np.concatenate([values.ravel() for _, values in blocks])
-        shape = (above[-1], self.size)
-        self.constraints = exact.Columns.of_entries(np.concatenate(rows), np.concatenate(columns), entries, shape)
+        some = entries != 0.0  # merged variables leave the last places of a row empty
+        places = np.concatenate(rows)[some], np.concatenate(columns)[some]
+        self.constraints = sparse.csc_array((entries[some], places), (above[-1], self.size))
 
     def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
         """Rows (F, E) over the coefficients from `tick` (F,) on, as the first variable (F,) and rows (F, E) from there."""
@@ -109,9 +111,7 @@ class Motion:
             pull = np.zeros(len(linear))
             np.add.at(pull, first[:, None] + np.arange(3), (rows.T * weight * values).T)
             linear = linear - pull
-        place = np.tile(np.arange(self.size), 4)
-        column = place + np.repeat(np.arange(4), self.size)
-        upper = exact.Columns.of_entries(place, column, quadratic[:, : self.size].ravel(), (self.size, self.size))
+        upper = sparse.dia_array((quadratic[:, : self.size], -np.arange(4)), (self.size, self.size)).T.tocsc()
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
@@ -199,7 +199,7 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         guess = motion.place(coefficients, fix_t)
         if not config.position_noise:
             noise = noise_about(first_noise, np.interp(fix_t, ticks, stands) < 0.5, aside, place - guess)
-        weight = np.minimum(1.0, 2.0 * noise / np.maximum(exact.hypot(aside, place - guess), 1e-9))  # Huber's
+        weight = np.minimum(1.0, 2.0 * noise / np.maximum(np.hypot(aside, place - guess), 1e-9))  # Huber's
         headings = headings_of(piece.heading, path.pose(guess)[1], np.gradient(guess, fix_t))
     place, published = motion.at_ticks(coefficients)
     position, heading = path.pose(place)
@@ -215,7 +215,7 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         before=differs,
         after=published - speed_of_fixes(ticks, position),
         changed=piece.speed - np.interp(speed_t, ticks, published)[: len(piece.speed)],
-        moved=exact.hypot(*(piece.fix - path.pose(guess)[0]).T),
+        moved=np.hypot(*(piece.fix - path.pose(guess)[0]).T),
         noise=noise,
         turned=wrap_angle(piece.heading[rolls] - np.interp(fix_t[rolls], ticks, heading)),
         headings=known[known] if np.ptp(place) < STRAIGHT else (headings.weight > 0.0)[known] if headings else ~known[known],
@@ -262,10 +262,10 @@ def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float, sp
         return fit_path(guess, piece.fix, weight, noise, speed, headings)
     known = piece.heading[np.isfinite(piece.heading)]
     if len(known):
-        heading = float(exact.arctan2(np.median(exact.sin(known)), np.median(exact.cos(known))))
+        heading = float(np.arctan2(np.median(np.sin(known)), np.median(np.cos(known))))
     else:  # the direction of the fixes' regression on the distance driven
         lever = guess - guess.mean()
-        heading = float(exact.arctan2(*exact.matmul(lever, piece.fix - piece.fix.mean(axis=0))[::-1]))
+        heading = float(np.arctan2(*(lever @ (piece.fix - piece.fix.mean(axis=0)))[::-1]))
     point = np.median(piece.fix, axis=0)
     return straight_path(point, heading, 2.0 * float(np.median(guess)) - high, high)
 
@@ -278,7 +278,7 @@ def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
         np.where(late > early, early, np.maximum(early - 1, 0)),
         np.where(late > early, late, np.minimum(late + 1, len(fix) - 1)),
     )
-    rate: Floats = exact.hypot(*(fix[late] - fix[early]).T) / (seconds[late] - seconds[early])
+    rate: Floats = np.hypot(*(fix[late] - fix[early]).T) / (seconds[late] - seconds[early])
     return rate
 
 
@@ -290,7 +290,7 @@ def estimated_noise(fix: Floats) -> float:
     lag = np.arange(-half, half + 1)
     square = np.square(lag) - np.square(lag).mean()
     parabola = 1.0 / len(lag) - np.square(lag).mean() * square / np.square(square).sum()  # the fitted parabola's value at lag 0
-    residual = fix[half : len(fix) - half] - exact.matmul(sliding_window_view(fix, len(lag), axis=0), parabola)
+    residual = fix[half : len(fix) - half] - sliding_window_view(fix, len(lag), axis=0) @ parabola
     return float(np.clip(max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])), LEAST_NOISE, MOST_NOISE))
 
 
@@ -351,5 +351,5 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
         k = max(len(inside) // 5, 1)
         if (end - begin) * dt >= 1.0 and len(inside):
             shift = np.median(inside[-k:], axis=0) - np.median(inside[:k], axis=0)
-            stands[begin:end] = exact.hypot(*shift) <= SHIFTED
+            stands[begin:end] = np.hypot(*shift) <= SHIFTED
     return stands

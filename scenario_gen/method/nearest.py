@@ -19,7 +19,7 @@ from scenario_gen.method.fitting import LostConflictError
 from scenario_gen.method.sampling import Cancelled, TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road, suitable_roads, with_suitable_roads
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import draw_route, footprint_fits, nearest_pose_with_room, road_and_template
 from scenario_gen.template import footprint_gap
@@ -53,7 +53,7 @@ def moved(state: State, pose: Floats) -> State:
 
 def _with_room(road: Road, vehicle: Vehicle, pose: Floats, requested: Floats) -> State:
     """The pose in whole centimetres, as little beyond the nearest one as its footprint then needs."""
-    away = (pose - requested)[:2] / exact.hypot(*(pose - requested)[:2])
+    away = (pose - requested)[:2] / np.hypot(*(pose - requested)[:2])
     for margin in _MARGINS:
         tried = np.array([*np.round(pose[:2] + margin * away, 2), requested[2]])
         if footprint_fits(road, tried[None], vehicle.length, vehicle.width)[0]:
@@ -234,7 +234,7 @@ class _Search:
         state = request.states(end)[name]
         if gap(np.array(state[:3])) > 0.0:
             return request
-        ahead = np.array([exact.cos(state[2]), exact.sin(state[2]), 0.0])
+        ahead = np.array([np.cos(state[2]), np.sin(state[2]), 0.0])
         for offset in (sign * step for step in _OFFSETS for sign in (1.0, -1.0)):
             tried = moved(state, np.array(state[:3]) + offset * ahead)
             pose = np.array(tried[:3])
@@ -313,7 +313,7 @@ class _Search:
             changes = []
             for name in (name for name in after if after[name] != before[name]):
                 a, b = before[name], after[name]
-                if (distance := float(exact.hypot(b[0] - a[0], b[1] - a[1]))) > 0.0:
+                if (distance := float(np.hypot(b[0] - a[0], b[1] - a[1]))) > 0.0:
                     changes.append(f"vehicle {name} {distance:.2f} m away")
                 elif a[2] != b[2]:
                     changes.append(f"vehicle {name} turned by {b[2] - a[2]:+.2f} rad")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Arrays, curves, compiled kernels, and `exact`, the one door to arithmetic that is the same on every CPU; nothing of traffic."""
+"""Arrays, curves, compiled kernels; nothing of traffic."""
 
 from scenario_gen.numerics.arrays import (
     Bools,

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, frozen, Ints
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws, meeting_shares
 
@@ -51,15 +50,15 @@ class Curve:
         s = np.asarray(station, dtype=np.float64)
         pose = np.stack([np.interp(s, self.station, self.points[:, k]) for k in range(3)], axis=-1)
         beyond = np.minimum(s, 0.0) + np.maximum(s - self.length, 0.0)
-        pose[..., 0] += beyond * exact.cos(pose[..., 2])
-        pose[..., 1] += beyond * exact.sin(pose[..., 2])
+        pose[..., 0] += beyond * np.cos(pose[..., 2])
+        pose[..., 1] += beyond * np.sin(pose[..., 2])
         return pose
 
     def beside(self, station: Floats, offset: Floats) -> Floats:
         """Poses (..., 3) at arc lengths and offsets [m, left positive]; the yaw is the curve's own."""
         pose = self.at(station)
-        pose[..., 0] -= offset * exact.sin(pose[..., 2])
-        pose[..., 1] += offset * exact.cos(pose[..., 2])
+        pose[..., 0] -= offset * np.sin(pose[..., 2])
+        pose[..., 1] += offset * np.cos(pose[..., 2])
         return pose
 
     def project(self, xy: Floats) -> tuple[Floats, Floats]:
@@ -69,7 +68,7 @@ class Curve:
         line = np.vstack((ends[:1], self.points, ends[1:]))[:, :2]
         at = np.concatenate(([-reach], self.station, [self.length + reach]))
         edge = np.diff(line, axis=0)
-        size = exact.hypot(edge[:, 0], edge[:, 1])
+        size = np.hypot(edge[:, 0], edge[:, 1])
         along = edge / size[:, None]
         candidates = [np.zeros((2, 0))]
         for part in (xy[first : first + TOGETHER] for first in range(0, len(xy), TOGETHER)):
@@ -77,7 +76,7 @@ class Curve:
             way, length = along[near], size[near]
             rel = part[:, None, :] - line[None, near, :]
             t = np.clip(rel[..., 0] * way[:, 0] + rel[..., 1] * way[:, 1], 0.0, length)
-            gap = exact.hypot(rel[..., 0] - t * way[:, 0], rel[..., 1] - t * way[:, 1])
+            gap = np.hypot(rel[..., 0] - t * way[:, 0], rel[..., 1] - t * way[:, 1])
             best = np.argmin(gap, axis=1)
             row = np.arange(len(part))
             side = way[best, 0] * rel[row, best, 1] - way[best, 1] * rel[row, best, 0]
@@ -104,8 +103,8 @@ def _near(xy: Floats, line: Floats, size: Floats) -> Ints:
     circle's diameter, and an edge is no nearer than its first vertex less its size. What is not finite keeps every edge.
     """
     centre = xy.mean(axis=0)
-    radius = exact.hypot(*(xy - centre).T).max()
-    away = exact.hypot(line[:, 0] - centre[0], line[:, 1] - centre[1])
+    radius = np.hypot(*(xy - centre).T).max()
+    away = np.hypot(line[:, 0] - centre[0], line[:, 1] - centre[1])
     return np.flatnonzero(~(away[:-1] - size > away.min() + 2.0 * radius + 1e-6))
 
 
@@ -116,8 +115,8 @@ def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
     near_other = _edges_in(b, a[np.union1d(near, near + 1)]) if len(near) else near
     u, v = np.diff(a, axis=0)[near], np.diff(b, axis=0)[near_other]
     t, q, det = meeting_shares(a[near, None], u[:, None], b[None, near_other], v[None])
-    sine = np.abs(det) / (exact.hypot(u[:, 0], u[:, 1])[:, None] * exact.hypot(v[:, 0], v[:, 1])[None, :])
-    hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= exact.sin(min_angle))
+    sine = np.abs(det) / (np.hypot(u[:, 0], u[:, 1])[:, None] * np.hypot(v[:, 0], v[:, 1])[None, :])
+    hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= np.sin(min_angle))
     i, j = np.nonzero(hit)
     k, n = near[i], near_other[j]
     return np.column_stack(

@@ -1,32 +1,34 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Compiled kernels: one decorator, explicit types, compiled once and cached on disk.
+"""Compiled kernels: `numba.njit` with declared types, compiled at the first call and kept by numba's own cache.
 
-Every kernel names its argument types and has one compiled form, which is made (or loaded from the cache) at its first call.
-`python -m scenario_gen.numerics.compiling` compiles every kernel of the project; `make` runs it at installation,
-and nodes that find one missing run it (`scenario_gen/numerics/compiling.py`).
-Inputs are `F1`, `I2`, …, read-only to the kernel; outputs are `OUT1`, `OUTI2`, ….
+Inputs are `F1`, `I2`, …, which the kernel only reads; outputs are `OUT1`, `OUTI2`, …. Where numba's cache lies is said by
+`folder`; `scenario_gen/numerics/compiling.py` compiles several kernels at once.
 """
 
 from collections.abc import Callable, Sequence
+from functools import cache, update_wrapper
+from hashlib import sha256
 import importlib
-import operator
+import os
 from pathlib import Path
+import platform
 import re
+import tempfile
 from typing import Any, cast, TypeVar
 
+import numba
 from numba import types
-from numba.core.registry import CPUDispatcher
-from numba.np.numpy_support import as_dtype
+from numba.extending import typeof_impl
 import numpy as np
 
-from scenario_gen.numerics.kernel_cache import keep
+from scenario_gen.numerics.arrays import sealed
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def _array(dtype: types.Type, ndim: int, *, readonly: bool) -> types.Array:
+def _array(dtype: Any, ndim: int, *, readonly: bool) -> types.Array:
     return types.Array(dtype, ndim, "C", readonly=readonly)
 
 
@@ -41,126 +43,167 @@ OUT1, OUT2, OUT3, OUT4 = (_array(F, n, readonly=False) for n in (1, 2, 3, 4))
 OUTI1, OUTI2 = (_array(I, n, readonly=False) for n in (1, 2))
 OUTB1, OUTB2 = (_array(B, n, readonly=False) for n in (1, 2))
 
-OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None, "no_cfunc_wrapper": True}
-_DECORATED = re.compile(r"^@(kernel\(|elementwise$)", re.MULTILINE)
-_registry: list[tuple[Any, tuple[Any, ...]]] = []
+OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+PACKAGE = Path(__file__).parents[1]
+_DECORATED = re.compile(rb"^@kernel\(", re.MULTILINE)
+_kernels: list["Kernel"] = []
 
 
-def _input(name: str, declared: types.Array) -> Callable[[Any], Any]:
-    """Return what makes an array argument the declared one; it is copied if it is not contiguous."""
-    dtype, ndim = as_dtype(declared.dtype), declared.ndim
-
-    def take(value: Any) -> Any:
-        array = np.ascontiguousarray(value)
-        if array.dtype is not dtype and array.dtype != dtype:
-            array = array.astype(dtype, casting="safe")
-        if array.ndim != ndim:
-            raise TypeError(f"{name}: an array of {array.ndim} dimensions was given, {ndim} are declared")
-        return array
-
-    return take
+@cache
+def sources() -> tuple[Path, ...]:
+    """Return the files of the package that hold kernels."""
+    return tuple(file for file in sorted(PACKAGE.rglob("*.py")) if _DECORATED.search(file.read_bytes()))
 
 
-def _output(name: str, declared: types.Array) -> Callable[[Any], Any]:
-    """Return what passes an output on; a copy of one would be lost."""
-    dtype, ndim = as_dtype(declared.dtype), declared.ndim
+@cache
+def folder() -> Path:
+    """Return the folder of compiled kernels: in `NUMBA_CACHE_DIR`, the user's cache, or a temporary folder of this process.
 
-    def take(array: Any) -> Any:
-        if array.dtype != dtype or array.ndim != ndim or not (array.flags.c_contiguous and array.flags.writeable):
-            raise TypeError(f"{name}: an output must be a writable, contiguous array of {ndim} dimensions of {dtype}")
-        return array
-
-    return take
-
-
-def _argument(name: str, declared: Any) -> Callable[[Any], Any]:
-    if isinstance(declared, types.Array):
-        return _output(name, declared) if declared.mutable else _input(name, declared)
-    return operator.index if declared == I else bool if declared == B else float
-
-
-class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A function with one compiled form, to Python and to the kernels that call it.
-
-    numba's own dispatcher compiles another form for every mixture of read-only and writable arrays that it is given.
+    Its name is a hash of all sources of kernels, as numba tells them apart (path, time, size), and of the versions of Python and
+    numba: a kernel is compiled anew when another file that it calls has changed.
     """
+    stamps = [(str(file), file.stat().st_mtime_ns, file.stat().st_size) for file in sources()]
+    name = "kernels-" + sha256(repr((stamps, numba.__version__, platform.python_version())).encode()).hexdigest()[:16]
+    user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "scenario_gen"
+    try:
+        place = Path(numba.config.CACHE_DIR or user.expanduser()) / name
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=place).close()
+    except (OSError, RuntimeError):  # the latter: the user has no home
+        place = Path(_temporary().name) / name
+        place.mkdir(mode=0o700)
+    return place
 
-    def __init__(self, function: Callable[..., Any], declared: tuple[Any, ...]) -> None:
-        super().__init__(function, targetoptions=OPTIONS)
-        self._declared = declared
-        self._arguments = tuple(_argument(function.__name__, each) for each in declared)
-        self._compiled: Callable[..., Any] | None = None
 
-    def compile(self, _types: Any = None) -> Any:
-        """Make or load the declared form, whatever signature is requested; calls from other kernels come here, too."""
-        keep(self)
-        entry = super().compile(self._declared)
-        self._compiled = entry
-        return entry
+@cache
+def _temporary() -> tempfile.TemporaryDirectory[str]:
+    """A folder that goes with this process."""
+    return tempfile.TemporaryDirectory(prefix="scenario_gen-kernels-")
+
+
+def is_lasting() -> bool:
+    """Say whether other processes will find the kernels that this one compiles."""
+    return _temporary.cache_info().currsize == 0
+
+
+def record(of: type[Any], *fields: Any) -> Any:
+    """Return the type of a NamedTuple whose fields have these types, as an argument of a kernel."""
+    return types.BaseTuple.from_types(fields, of)
+
+
+def _compiler(function: Callable[..., Any], **options: Any) -> Any:
+    """`numba.njit`, with its cache in our folder; the setting is the user's again afterwards."""
+    user = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder())
+    try:
+        return numba.njit(**OPTIONS, **options)(function)
+    finally:
+        numba.config.CACHE_DIR = user
+
+
+def _reader(declared: Any) -> Callable[[Any], Any]:
+    """What makes an argument the declared one: inputs contiguous and of their type; outputs stay (a copy would be lost)."""
+    if isinstance(declared, types.BaseTuple):  # numba converts no arrays inside of one: all fields are inputs, read-only
+        readers = [_reader(kind) for kind in declared.types]
+
+        def read_record(value: Any) -> Any:
+            fields = [read(each) for read, each in zip(readers, value, strict=True)]
+            return type(value)(*(sealed(each.view()) if isinstance(each, np.ndarray) else each for each in fields))
+
+        return read_record
+    if not isinstance(declared, types.Array) or declared.mutable:
+        return _same
+    dtype = np.dtype(str(declared.dtype))
+
+    def read(value: Any) -> Any:
+        array = np.ascontiguousarray(value)
+        return array if array.dtype == dtype else array.astype(dtype, casting="safe")
+
+    return read
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+class Kernel:
+    """A function that numba compiles for its declared types, for Python and for the kernels that call it."""
+
+    def __init__(self, function: Callable[..., Any], declared: Sequence[Any]) -> None:
+        """Declare it; it is compiled, or loaded, when it is called."""
+        update_wrapper(self, function)
+        self.declared, self.dispatcher = tuple(declared), _compiler(function, cache=True)
+        self._readers = [_reader(kind) for kind in declared]
+
+    @property
+    def name(self) -> str:
+        """What tells it from all others: its module and its name."""
+        return f"{self.__module__}:{self.__name__}"  # type: ignore[attr-defined]
+
+    @property
+    def size(self) -> int:
+        """Bytes of its own code: about how long it takes to be compiled."""
+        return len(self.dispatcher.py_func.__code__.co_code)
+
+    @property
+    def mark(self) -> Path:
+        """The empty file that says that it is in the cache."""
+        return folder() / f"{self.name}.ready"
+
+    def compile(self) -> Any:
+        """Make or load the compiled form, once, and return numba's function."""
+        if not self.dispatcher.signatures:
+            self.dispatcher.compile(self.declared)
+            self.dispatcher.disable_compile()
+            self.mark.touch()
+        return self.dispatcher
 
     def __call__(self, *values: Any) -> Any:
         """Call the compiled form."""
-        compiled = self._compiled or self.compile()
-        return compiled(*[take(value) for take, value in zip(self._arguments, values, strict=True)])
+        if not self.dispatcher.signatures:
+            if not self.mark.exists():
+                from scenario_gen.numerics.compiling import make_ready
+
+                make_ready()
+            self.compile()
+        return self.dispatcher(*[read(value) for read, value in zip(self._readers, values, strict=True)])
 
 
-class Helper(CPUDispatcher):  # type: ignore[misc]
-    """A function that kernels alone call: nothing is compiled for calls from Python, which takes a quarter of the time off."""
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function, targetoptions=OPTIONS | {"no_cpython_wrapper": True})
-
-    def __call__(self, *_: Any) -> Any:
-        """Refuse."""
-        raise TypeError(f"{self.__name__} is called by kernels alone; its Python form is {self.__name__}.py_func")
+@typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
+def _typeof_kernel(kernel: Kernel, context: Any) -> Any:
+    """To numba a kernel is the function that it compiled."""
+    return typeof_impl(kernel.compile(), context)
 
 
-def kernel(*argument_types: Any, inline: bool = False) -> Callable[[Function], Function]:
-    """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath: same bytes everywhere).
+def kernel(*declared: Any, inline: bool = False) -> Callable[[Function], Function]:
+    """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath).
 
     Args:
-        argument_types: numba types of the positional arguments, e.g. `kernel(F2, I, OUT1)`.
-        inline: a small helper called only from other kernels; it takes its types from them and is compiled, and kept, with them.
+        declared: numba types of the positional arguments, e.g. `kernel(F2, I, OUT1)`.
+        inline: a small helper called only from kernels; it takes its types from them and is compiled, and kept, with them.
     """
 
     def decorate(function: Function) -> Function:
         if inline:
-            return cast("Function", Helper(function))
-        dispatcher = Kernel(function, argument_types)
-        register(dispatcher, argument_types)
-        return cast("Function", dispatcher)
+            return cast("Function", _compiler(function, no_cpython_wrapper=True))
+        _kernels.append(Kernel(function, declared))
+        return cast("Function", _kernels[-1])
 
     return decorate
 
 
-def register(compiled: Any, argument_types: Any) -> None:
-    """Count among the kernels what `compile(argument_types)` compiles, or loads."""
-    _registry.append((compiled, argument_types))
-
-
-def registered() -> list[tuple[Any, Any]]:
-    """Return the kernels of all modules that have been imported, with the types of their arguments."""
-    return list(_registry)
+def registered() -> list[Kernel]:
+    """Return the kernels of all modules that have been imported."""
+    return list(_kernels)
 
 
 def import_all(packages: Sequence[str] = ()) -> None:
     """Import every module that has kernels, or those of some packages; one whose extra is not installed cannot be called."""
-    root = Path(__file__).parents[1]
-    for file in sorted(file for package in packages or ("",) for file in (root / package).rglob("*.py")):
-        if _DECORATED.search(file.read_text(encoding="utf-8")):
-            name = ".".join(file.relative_to(root.parent).with_suffix("").parts)
+    for file in sources():
+        parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+        if not packages or parts[1] in packages:
             try:
-                importlib.import_module(name)
+                importlib.import_module(".".join(parts))
             except ImportError as error:
                 if (error.name or "scenario_gen").startswith("scenario_gen"):
                     raise
-
-
-def is_cached(compiled: Any, argument_types: Any) -> bool:
-    """Say whether a kernel is in the cache; only the cache's index is read. numba has no public question for it."""
-    if getattr(compiled, "overloads", None):
-        return True  # in this process, too
-    cache = keep(compiled)
-    if not hasattr(cache, "_cache_file"):
-        return False
-    return cache._index_key(argument_types, compiled.targetctx.codegen()) in cache._cache_file._load_index()

@@ -1,22 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Directions, frames and polylines in the plane, in the arithmetic of `exact`."""
+"""Directions, frames and polylines in the plane."""
 
 import numpy as np
 
-from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, wrap_angle
 
 
 def unit(yaw: Floats | float) -> Floats:
     """Return unit vectors (..., 2) in directions (...) [rad]."""
-    return np.stack((exact.cos(yaw), exact.sin(yaw)), axis=-1)
+    return np.stack((np.cos(yaw), np.sin(yaw)), axis=-1)
 
 
 def unit_left(yaw: Floats | float) -> Floats:
     """Return unit vectors (..., 2) to the left of directions (...) [rad]."""
-    return np.stack((-exact.sin(yaw), exact.cos(yaw)), axis=-1)
+    return np.stack((-np.sin(yaw), np.cos(yaw)), axis=-1)
 
 
 def angle_between(angle: float, other: float) -> float:
@@ -26,13 +25,13 @@ def angle_between(angle: float, other: float) -> float:
 
 def ahead_and_left(offset: Floats, yaw: Floats | float) -> tuple[Floats, Floats]:
     """Return how far [m] offsets (..., 2) [m] reach ahead (...) and to the left (...) of headings (...) [rad]."""
-    x, y, cos, sin = offset[..., 0], offset[..., 1], exact.cos(yaw), exact.sin(yaw)
+    x, y, cos, sin = offset[..., 0], offset[..., 1], np.cos(yaw), np.sin(yaw)
     return x * cos + y * sin, y * cos - x * sin
 
 
 def place(poses: Floats, ahead: Floats | float, left: Floats | float) -> Floats:
     """Return the points (..., 2) that lie ahead (...) and to the left (...) [m] of poses (..., 3) x, y [m], yaw [rad]."""
-    x, y, cos, sin = poses[..., 0], poses[..., 1], exact.cos(poses[..., 2]), exact.sin(poses[..., 2])
+    x, y, cos, sin = poses[..., 0], poses[..., 1], np.cos(poses[..., 2]), np.sin(poses[..., 2])
     return np.stack((x + ahead * cos - left * sin, y + ahead * sin + left * cos), axis=-1)
 
 
@@ -46,13 +45,13 @@ def corners(poses: Floats, length: float, width: float) -> Floats:
 def edge_lengths(points: Floats) -> Floats:
     """Return the lengths (M - 1,) [m] of the edges of a polyline (M, 2) [m]."""
     step = np.diff(points, axis=0)
-    return exact.hypot(step[:, 0], step[:, 1])
+    return np.hypot(step[:, 0], step[:, 1])
 
 
 def edge_yaws(points: Floats) -> Floats:
     """Return the directions (M - 1,) [rad] of the edges of a polyline (M, 2) [m]."""
     step = np.diff(points, axis=0)
-    return exact.arctan2(step[:, 1], step[:, 0])
+    return np.arctan2(step[:, 1], step[:, 0])
 
 
 def meeting_shares(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:

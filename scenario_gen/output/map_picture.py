@@ -11,7 +11,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
 from scenario_gen.template import clean_tracks
 from scenario_gen.types import Encounter, LaneNetwork, Road, RuleKind
@@ -126,7 +126,7 @@ def _arrow(sheet: _Sheet, line: Floats, at: int, kind: str) -> None:
     """Draw a triangle on a line (M, 2) at one of its points, in its direction."""
     at = min(at % len(line), len(line) - 2)
     step = line[at + 1] - line[at]
-    ahead = step / max(float(exact.hypot(*step)), 1e-9)
+    ahead = step / max(float(np.hypot(*step)), 1e-9)
     left = np.array([-ahead[1], ahead[0]])
     sheet.shape("polygon", line[at] + np.array([1.8 * ahead, 0.7 * left, -0.7 * left]), **{"class": kind})
 
@@ -141,7 +141,7 @@ def _picture_of_grid(road: Road) -> str:
         sheet.shape("polygon", np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), fill="#d4d9e2")
     for kind, poses in (("in", road.entries), ("out", road.exits)):
         for x, y, yaw in poses:
-            line = np.array([(x, y), (x + exact.cos(float(yaw)), y + exact.sin(float(yaw)))])
+            line = np.array([(x, y), (x + np.cos(float(yaw)), y + np.sin(float(yaw)))])
             _arrow(sheet, line, 0, kind)
     return sheet.svg(road.name)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.ways import relative
 from scenario_gen.types import Road
@@ -79,7 +79,7 @@ def ring_of(road: Road) -> tuple[Floats, float] | None:
     poses = np.stack([arm.pose for arm in arms])
     normal = unit_left(poses[:, 2])
     reach = (normal * poses[:, :2]).sum(axis=1)
-    centre = exact.lstsq(normal, reach)
+    centre = np.linalg.lstsq(normal, reach, rcond=None)[0]
     if np.abs((normal * centre).sum(axis=1) - reach).max() > _LEVEL or road.drivable_at(centre[None])[0]:
         return None
     out = np.arange(0.0, _LARGEST_ISLAND, road.resolution / 2.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import corners, unit
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, LANE_GAP, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
@@ -73,7 +73,7 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
 def _corner(u: Floats, v: Floats, radius: float) -> Bools:
     """Cells of the rounded corner between two kerbs, u and v metres beyond each of them."""
     inside = (u >= 0.0) & (v >= 0.0) & (u < radius) & (v < radius)
-    return np.asarray(inside & (exact.hypot(u - radius, v - radius) > radius))
+    return np.asarray(inside & (np.hypot(u - radius, v - radius) > radius))
 
 
 def draw_paper(name: str, config: RoadConfig) -> Road:
@@ -125,10 +125,10 @@ def _at_a_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
     centre = junction_centre(tracks)
     poses = np.concatenate([track.poses[[0, -1]] for track in tracks])
     half = np.repeat([track.vehicle.length / 2.0 for track in tracks], 2)
-    away = exact.hypot(poses[:, 0] - centre[0], poses[:, 1] - centre[1])
+    away = np.hypot(poses[:, 0] - centre[0], poses[:, 1] - centre[1])
     required = away + half + ROOM + SLACK
-    across = np.abs(exact.sin(wrap_angle(poses[:, 2] - poses[np.argmax(required), 2])))
-    side = float(required[across > exact.sin(np.radians(30.0))].max(initial=SHORTEST))
+    across = np.abs(np.sin(wrap_angle(poses[:, 2] - poses[np.argmax(required), 2])))
+    side = float(required[across > np.sin(np.radians(30.0))].max(initial=SHORTEST))
     lanes = _parallel_lanes(tracks, config.lane_width)
     if any(track.makes_u_turn for track in tracks):  # from one outermost lane to the other in a half circle
         lanes = max(lanes, int(np.ceil((_U_TURN / config.lane_width + 1.0) / 2.0)))
@@ -145,9 +145,9 @@ def _parallel_lanes(tracks: tuple[Track, ...], lane_width: float) -> int:
         poses = np.stack([track.poses[k] for track in tracks])
         for track in tracks:
             station, offset = track.curve.project(poses[:, :2])
-            along = exact.cos(poses[:, 2] - track.curve.at(station)[:, 2])
-            same = (along > exact.cos(_SAME_WAY)) & (np.abs(offset) < _WIDEST)
-            oncoming = (along < -exact.cos(_SAME_WAY)) & (np.abs(offset) < _ONCOMING)
+            along = np.cos(poses[:, 2] - track.curve.at(station)[:, 2])
+            same = (along > np.cos(_SAME_WAY)) & (np.abs(offset) < _WIDEST)
+            oncoming = (along < -np.cos(_SAME_WAY)) & (np.abs(offset) < _ONCOMING)
             gaps = np.diff(np.sort(offset[same]))
             between = np.round(np.abs(offset[oncoming]) / lane_width - 1.0).max(initial=0.0)
             most = max(most, 1 + int((gaps > LANE_GAP).sum()), min(1 + int(np.ceil(between / 2.0)), _MOST_LANES))

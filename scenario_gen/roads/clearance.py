@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, Counts, exact, Floats, sealed
+from scenario_gen.numerics import Bools, Counts, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1, OUTN2
 from scenario_gen.types import once_per_object, Road
 
@@ -251,7 +251,7 @@ def footprint_free(clearance: Floats, x: float, y: float, yaw: float, half_lengt
         return False
     if clearance[i, j] - 0.7072 >= np.sqrt(half_length * half_length + half_width * half_width):
         return True
-    c, s = exact.cos(yaw), exact.sin(yaw)
+    c, s = np.cos(yaw), np.sin(yaw)
     corner_x, corner_y = np.empty(4), np.empty(4)
     for k in range(4):
         u = half_length if k in (0, 3) else -half_length
@@ -307,7 +307,7 @@ def nearest_pose_with_room(
     reach = int(max_distance / road.resolution)
     steps = np.arange(-reach, reach + 1) * road.resolution
     offset = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    distance = exact.hypot(offset[:, 0], offset[:, 1])
+    distance = np.hypot(offset[:, 0], offset[:, 1])
     order = np.argsort(distance, kind="stable")
     order = order[distance[order] <= max_distance]
     candidates = pose + np.pad(offset[order], ((0, 0), (0, 1)))
@@ -323,4 +323,4 @@ def nearest_pose_with_room(
         else:
             blocked = middle
     moved = pose + free * shift
-    return moved, float(exact.hypot(*(moved - pose)[:2]))
+    return moved, float(np.hypot(*(moved - pose)[:2]))

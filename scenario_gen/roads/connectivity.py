@@ -12,17 +12,17 @@ from collections.abc import Iterator
 import math
 
 import numpy as np
+from scipy import ndimage
 
-from scenario_gen.numerics import exact, Floats, Ints, sealed
+from scenario_gen.numerics import Floats, Ints, sealed
 from scenario_gen.roads.clearance import clearance_in_cells, segment_free, segments_free, to_metres
-from scenario_gen.roads.labels import labelled
 from scenario_gen.types import once_per_object, Road
 
 
 @once_per_object
 def components(road: Road, radius: float) -> Ints:
     """Connected components for a disc of `radius` [m]: (H, W), 0 where its centre cannot be, else 1, 2, …; read-only, cached."""
-    return sealed(labelled(clearance_in_cells(road) > radius / road.resolution))
+    return sealed(ndimage.label(clearance_in_cells(road) > radius / road.resolution)[0].astype(np.int64))
 
 
 @once_per_object
@@ -81,6 +81,6 @@ def _reachable(road: Road, xy: Floats, radius: float) -> Iterator[int]:
     i, j = i[labels[i, j] > 0], j[labels[i, j] > 0]
     centres = to_metres(road, np.stack((j + 0.5, i + 0.5), axis=-1))
     free = segments_free(road, np.broadcast_to(xy, centres.shape), centres, radius)
-    for k in np.argsort(exact.hypot(*(centres - xy).T), kind="stable"):
+    for k in np.argsort(np.hypot(*(centres - xy).T), kind="stable"):
         if free[k]:
             yield int(labels[i[k], j[k]])

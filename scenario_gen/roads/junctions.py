@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.arms import RING_ROOM
@@ -299,7 +299,7 @@ def _draw_arms(sketch: Sketch, arms: list[PlannedArm], config: RoadConfig) -> No
         turn = float((other_yaw - yaw) % (2.0 * np.pi))
         if 0.05 < turn < np.radians(165.0):
             gap = b - a
-            along = float(gap[0] * exact.sin(other_yaw) - gap[1] * exact.cos(other_yaw)) / exact.sin(turn)
+            along = float(gap[0] * np.sin(other_yaw) - gap[1] * np.cos(other_yaw)) / np.sin(turn)
             corner = a + along * unit(yaw)
             sketch.corner(corner, yaw, other_yaw, config.corner_radius)
             if abs(along) < _WIDE_JUNCTION:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact
 from scenario_gen.types import read_numbers, Road, split_pieces
 
 _FORM = "x y yaw length width"
@@ -59,7 +58,7 @@ def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...]) -> Road:
     blocked = np.zeros(road.drivable.shape, dtype=np.bool_)
     height, width = road.drivable.shape
     for obstacle in obstacles:
-        turn_cos, turn_sin = exact.cos(obstacle.yaw), exact.sin(obstacle.yaw)
+        turn_cos, turn_sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
         cos, sin = abs(turn_cos), abs(turn_sin)
         reach_x = 0.5 * (obstacle.length * cos + obstacle.width * sin)
         reach_y = 0.5 * (obstacle.length * sin + obstacle.width * cos)

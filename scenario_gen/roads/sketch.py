@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from PIL import Image, ImageDraw
+from scipy import ndimage
 
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import corners, unit, unit_left
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
-from scenario_gen.roads.labels import small_parts
 from scenario_gen.types import Road
 
 ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4, "roundabout": 4}
@@ -73,8 +73,8 @@ class Sketch:
         angle = float((second - first) % (2.0 * np.pi))
         if not 0.05 < angle < _FLAT:
             return
-        tangent = radius / exact.tan(angle / 2.0)
-        centre = at + radius / exact.sin(angle / 2.0) * unit(first + angle / 2.0)
+        tangent = radius / np.tan(angle / 2.0)
+        centre = at + radius / np.sin(angle / 2.0) * unit(first + angle / 2.0)
         begin, end = (at + tangent * unit(kerb) for kerb in (first, second))
         self.drivable.append(np.vstack((at[None], begin[None], _arc(centre, begin, end, radius), end[None])))
 
@@ -104,7 +104,8 @@ class Sketch:
         """
         low, drivable = self.grid(name, config)
         if not self.islands:
-            drivable |= small_parts(~drivable, int(_SLIVER / np.square(config.resolution)))
+            part, _ = ndimage.label(~drivable)
+            drivable |= np.bincount(part.ravel())[part] <= _SLIVER / np.square(config.resolution)
         shift = np.array([*low, 0.0])
         return Road(name, drivable, config.resolution, np.zeros(2), entries - shift, exits - shift)
 
@@ -112,6 +113,6 @@ class Sketch:
 def _arc(centre: Floats, first: Floats, last: Floats, radius: float) -> Floats:
     """(M, 2) the shorter arc about a centre from one point to another."""
     a, b = first - centre, last - centre
-    start = float(exact.arctan2(a[1], a[0]))
-    turn = float(exact.arctan2(a[0] * b[1] - a[1] * b[0], float((a * b).sum())))
+    start = float(np.arctan2(a[1], a[0]))
+    turn = float(np.arctan2(a[0] * b[1] - a[1] * b[0], float((a * b).sum())))
     return np.asarray(centre + radius * unit(start + np.linspace(0.0, turn, 9)))

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, angle_between, place, polyline_of, unit
 
@@ -50,14 +50,14 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits, sharpness: float | None
         return _accepted(_beside(entry, ahead, left, turn), fits) if ahead > 1.0 else None
     if abs(turn) > np.pi - _PARALLEL:
         return None  # a U-turn: the template says where along the road, see draw_u_turn
-    along_exit = left / exact.sin(turn)  # from the lines' intersection to the exit
-    along_entry = ahead - along_exit * exact.cos(turn)
+    along_exit = left / np.sin(turn)  # from the lines' intersection to the exit
+    along_entry = ahead - along_exit * np.cos(turn)
     sharp = sharpness or _PLAIN
     for curvature, ramp in (*((factor * sharp, _RAMP) for factor in _LADDER), *((last, _SHORT_RAMP) for last in _LAST)):
         if curvature > _TIGHTEST:
             continue
         bend = _bend(round(turn, 9), round(curvature, 9), ramp)
-        tangent = float(bend[-1, 1]) / exact.sin(turn)
+        tangent = float(bend[-1, 1]) / np.sin(turn)
         if tangent <= min(along_entry, along_exit) - 0.5:
             route = _accepted(_joined(entry, along_entry - tangent, bend, along_exit - tangent), fits)
             if route is not None:
@@ -77,7 +77,7 @@ def draw_u_turn(entry: Floats, leave: Floats, apex: float, fits: Fits) -> Curve 
     half = np.copysign(np.pi, left)
     angle = np.linspace(0.0, half, int(np.ceil(np.pi * radius / _STEP)) + 1)
     signed = np.copysign(radius, left)
-    arc = np.column_stack((signed * exact.sin(angle), signed * (1.0 - exact.cos(angle)), angle))
+    arc = np.column_stack((signed * np.sin(angle), signed * (1.0 - np.cos(angle)), angle))
     return _accepted(_joined(entry, apex, arc, apex - ahead), fits)
 
 
@@ -101,7 +101,7 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
         along = flare_begins(radius, aside)
         if distance - along < 0.5:
             return None
-        bends.append((distance - along, float(exact.arctan2(along, aside + _FLARE))))
+        bends.append((distance - along, float(np.arctan2(along, aside + _FLARE))))
     (before, first), (after, last) = bends
     about = float(((leave[2] - entry[2]) * side + first + last) % (2.0 * np.pi))
     pieces = ((before, 0.0), (_FLARE * first, -side / _FLARE), (radius * about, side / radius), (_FLARE * last, -side / _FLARE))
@@ -113,7 +113,7 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
     turned = np.array(yaw)
     xy = polyline_of(turned, np.array(steps))
     end = np.array(relative(entry, leave[:2]))
-    if exact.hypot(*(xy[-1] - end)) > 1.0:
+    if np.hypot(*(xy[-1] - end)) > 1.0:
         return None
     xy += np.linspace(0.0, 1.0, len(xy))[:, None] * (end - xy[-1])  # what rounding leaves
     return _accepted(Curve(np.column_stack((place(entry, xy[:, 0], xy[:, 1]), entry[2] + turned))), fits)
@@ -145,13 +145,13 @@ def line_between(shape: Curve, entry: Floats, leave: Floats) -> tuple[Curve, flo
     bent = _bent(shape, extra)
     turn = float(bent[-1, 2])
     ahead, left = relative(entry, leave[:2])
-    if abs(exact.sin(turn)) < 0.05:
-        after = before = (ahead - float(bent[-1, 0])) / 2.0 if exact.cos(turn) > 0.0 else -1.0
-        if abs(left - float(bent[-1, 1]) - after * exact.sin(turn)) > 0.3:
+    if abs(np.sin(turn)) < 0.05:
+        after = before = (ahead - float(bent[-1, 0])) / 2.0 if np.cos(turn) > 0.0 else -1.0
+        if abs(left - float(bent[-1, 1]) - after * np.sin(turn)) > 0.3:
             return None
     else:
-        after = (left - float(bent[-1, 1])) / exact.sin(turn)
-        before = ahead - float(bent[-1, 0]) - after * exact.cos(turn)
+        after = (left - float(bent[-1, 1])) / np.sin(turn)
+        before = ahead - float(bent[-1, 0]) - after * np.cos(turn)
     if min(before, after) < -0.05:
         return None
     return _joined(entry, max(before, 0.0), bent, max(after, 0.0)), max(before, 0.0)
@@ -192,7 +192,7 @@ def _accepted(curve: Curve | None, fits: Fits) -> Curve | None:
 
 def _beside(entry: Floats, ahead: float, left: float, turn: float) -> Curve | None:
     """Straight on, or to a line that is parallel, or nearly so, by a smooth shift in the middle (a polynomial of degree 5)."""
-    slope = float(exact.tan(turn))
+    slope = float(np.tan(turn))
     aside = left - slope * ahead / 2.0  # how far the two lines are apart half-way
     if abs(left) < 0.05 and abs(turn) < 1e-3:
         return Curve(np.array([entry[:3], [*place(entry, ahead, left), entry[2]]]))
@@ -205,7 +205,7 @@ def _beside(entry: Floats, ahead: float, left: float, turn: float) -> Curve | No
     x = np.linspace(0.0, 1.0, max(int(np.ceil(reach / 0.5)), 4) + 1)
     first, last = (ahead - reach) / 2.0, (ahead + reach) / 2.0
     end = left - slope * (ahead - last)
-    cube = exact.power(x, 3)
+    cube = x**3
     y = end * cube * (10.0 - 15.0 * x + 6.0 * np.square(x)) + slope * reach * cube * (-4.0 + 7.0 * x - 3.0 * np.square(x))
     along = np.concatenate(([0.0], first + reach * x, [ahead]))
     return Curve.through(place(entry, along, np.concatenate(([0.0], y, [left]))))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.manoeuvre import turn_of
 from scenario_gen.template.tracks import smoothing_spline, Track
@@ -175,7 +175,7 @@ def _reference_line(tracks: tuple[Track, ...], base: int) -> tuple[Curve, Ints]:
     for i in order[1:]:
         curve = tracks[i].curve
         station, _ = line.project(curve.points[:, :2])
-        against = exact.cos(curve.points[:, 2] - line.at(station)[:, 2]).mean() < 0.0
+        against = np.cos(curve.points[:, 2] - line.at(station)[:, 2]).mean() < 0.0
         direction[i] = -1 if against else 1
         if not tracks[i].still:
             line = _extended(line, curve.reversed() if against else curve)
@@ -201,7 +201,7 @@ def _extended(line: Curve, other: Curve) -> Curve:
 
 def _shifted(curve: Curve, rows: Ints, offset: float) -> Floats:
     shift = offset if abs(offset) < _MAX_SHIFT else 0.0  # farther apart there is nothing to fit on to
-    normal = np.column_stack((exact.sin(curve.points[rows, 2]), -exact.cos(curve.points[rows, 2])))
+    normal = np.column_stack((np.sin(curve.points[rows, 2]), -np.cos(curve.points[rows, 2])))
     return np.asarray(curve.points[rows, :2] + shift * normal)
 
 

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy import ndimage
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact, Floats, Ints, runs
+from scenario_gen.numerics import Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
 from scenario_gen.types import ALWAYS, Encounter, once_per_object, Segmentation, Vehicle
 
@@ -85,7 +86,7 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     The speed is smoothed by a centred moving mean over 0.5 s (an odd number of samples; the end samples are repeated).
     """
     width = 2 * round(0.5 * WAIT_SMOOTHING / encounter.dt) + 1
-    smooth = exact.moving_mean(encounter.speed, width)  # outside of its presence a speed is held
+    smooth = ndimage.uniform_filter1d(encounter.speed, width, mode="nearest")  # outside of its presence a speed is held
     time = encounter.time
     return tuple(
         Wait(vehicle, float(time[a]), float(time[b - 1]), _moves_slowly(encounter.speed[vehicle, a:b], time[a:b]))
@@ -179,13 +180,13 @@ def _sweep(time: Floats, position: Floats, heading: Floats) -> Floats:
     total, last = 1, 0
     for k in range(1, t):
         if k < t - 1:
-            here = exact.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
-            there = exact.hypot(position[k + 1, 0] - position[last, 0], position[k + 1, 1] - position[last, 1])
+            here = np.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
+            there = np.hypot(position[k + 1, 0] - position[last, 0], position[k + 1, 1] - position[last, 1])
             turn = max(abs(heading[k] - heading[last]), abs(heading[k + 1] - heading[last]))
             if max(here, there) < STAND_STEP and turn < STAND_STEP:
                 keep[k] = 0
                 continue
-        moved = exact.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
+        moved = np.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
         keep[k] = max(1, int(np.ceil(max(moved / POSE_STEP, abs(heading[k] - heading[last]) / POSE_TURN))))
         total += keep[k]
         last = k
@@ -199,7 +200,7 @@ def _sweep(time: Floats, position: Floats, heading: Floats) -> Floats:
             poses[m, 0] = (1.0 - w) * time[last] + w * time[k]
             poses[m, 1] = (1.0 - w) * position[last, 0] + w * position[k, 0]
             poses[m, 2] = (1.0 - w) * position[last, 1] + w * position[k, 1]
-            poses[m, 3], poses[m, 4] = exact.cos(yaw), exact.sin(yaw)
+            poses[m, 3], poses[m, 4] = np.cos(yaw), np.sin(yaw)
             m += 1
         if steps:
             last = k
@@ -216,7 +217,7 @@ def _block_circles(poses: Floats) -> Floats:
         lo, hi = b * BLOCK, min(m, (b + 1) * BLOCK)
         x, y, radius = 0.5 * (poses[lo, 1] + poses[hi - 1, 1]), 0.5 * (poses[lo, 2] + poses[hi - 1, 2]), 0.0
         for i in range(lo, hi):
-            radius = max(radius, exact.hypot(poses[i, 1] - x, poses[i, 2] - y))
+            radius = max(radius, np.hypot(poses[i, 1] - x, poses[i, 2] - y))
         circles[b, 0], circles[b, 1], circles[b, 2] = x, y, radius
     return circles
 
@@ -238,7 +239,7 @@ def _boxes_meet(dx: float, dy: float, ca: float, sa: float, half_a: Size, cb: fl
 def _meets_sweep(pose: Floats, half: Size, poses: Floats, circles: Floats, other: Size) -> bool:
     """True if the box at `pose` (t, x, y, cos, sin) meets any box of the sweep `poses`."""
     x, y = pose[1], pose[2]
-    reach = exact.hypot(half[0], half[1]) + exact.hypot(other[0], other[1])
+    reach = np.hypot(half[0], half[1]) + np.hypot(other[0], other[1])
     for b in range(circles.shape[0]):
         dx, dy, r = circles[b, 0] - x, circles[b, 1] - y, circles[b, 2] + reach
         if dx * dx + dy * dy >= r * r:
@@ -258,7 +259,7 @@ def _crossing_time(out_pose: Floats, in_pose: Floats, half: Size, poses: Floats,
         w = 0.5 * (outside + inside)
         for i in range(5):
             pose[i] = (1.0 - w) * out_pose[i] + w * in_pose[i]
-        norm = exact.hypot(pose[3], pose[4])
+        norm = np.hypot(pose[3], pose[4])
         pose[3], pose[4] = pose[3] / norm, pose[4] / norm
         if _meets_sweep(pose, half, poses, circles, other):
             inside = w
@@ -291,9 +292,9 @@ def _occupancy(mine: Floats, half: Size, poses: Floats, circles: Floats, other: 
 def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: Size) -> tuple[float, float]:
     """(metres of a's path shared with b in the same direction, metres of it on which a came first minus second)."""
     shared, lead, last = 0.0, 0.0, 0
-    reach = exact.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1])
+    reach = np.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1])
     for i in range(1, a.shape[0]):
-        step = exact.hypot(a[i, 1] - a[i - 1, 1], a[i, 2] - a[i - 1, 2])
+        step = np.hypot(a[i, 1] - a[i - 1, 1], a[i, 2] - a[i - 1, 2])
         if step == 0.0:
             continue
         near, nearest = -1, reach * reach
@@ -309,7 +310,7 @@ def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: 
                 if distance < nearest:
                     near, nearest = j, distance
         last = max(near, 0)
-        if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < exact.cos(FOLLOWING_ANGLE):
+        if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < np.cos(FOLLOWING_ANGLE):
             continue
         dx, dy = b[near, 1] - a[i, 1], b[near, 2] - a[i, 2]
         if _boxes_meet(dx, dy, a[i, 3], a[i, 4], half_a, b[near, 3], b[near, 4], half_b):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import crossings
 from scenario_gen.template.tracks import Track
 
@@ -37,13 +37,13 @@ def path_crossing(a: Track, b: Track) -> PathCrossing | None:
     first, second = (track.curve.cut(-_BEYOND, track.travelled + _BEYOND) for track in (a, b))
     places = crossings(first, second, _ANGLE) - _BEYOND
     angle = a.curve.at(places[:, 0])[:, 2] - b.curve.at(places[:, 1])[:, 2]
-    aslant = exact.cos(angle) > -exact.cos(_HEAD_ON)
+    aslant = np.cos(angle) > -np.cos(_HEAD_ON)
     places, angle = places[aslant], angle[aslant]
     if len(places) == 0:
         return None
     short = _outside(places[:, 0], a.travelled) + _outside(places[:, 1], b.travelled)
     lag = np.abs(_sample(a, places[:, 0]) - _sample(b, places[:, 1]))
-    best = int(np.argmin(short * 10.0 + lag * 0.05 + 25.0 * (1.0 - np.abs(exact.sin(angle)))))
+    best = int(np.argmin(short * 10.0 + lag * 0.05 + 25.0 * (1.0 - np.abs(np.sin(angle)))))
     return PathCrossing(float(places[best, 0]), float(places[best, 1]), bool(short[best] == 0.0))
 
 

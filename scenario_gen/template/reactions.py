@@ -12,8 +12,9 @@ from collections.abc import Sequence
 import math
 
 import numpy as np
+from scipy import ndimage
 
-from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template.answers import SLOWEST, time_gaps
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits
@@ -148,7 +149,7 @@ def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, apart: Fl
     gain = 1.0 if spread < _STEADY else float(((led - led.mean()) * (answer - answer.mean())).mean()) / (spread * spread)
     gap = float(np.median(apart[moves]))
     line = np.column_stack([np.ones(int(moves.sum())), own[moves]])
-    rest = apart[moves] - exact.matmul(line, exact.lstsq(line, apart[moves]))
+    rest = apart[moves] - line @ np.linalg.lstsq(line, apart[moves], rcond=None)[0]
     low, middle, high = np.sort(headway)[[0, len(headway) // 2, -1]].tolist()
     return Reaction(
         FOLLOW, who, whom, lag, min(max(gain, _GAINS[0]), _GAINS[1]),
@@ -171,14 +172,14 @@ def _starts_behind(encounter: Encounter, who: int, whom: int, behind: Bools) -> 
 def _soon(lag: float, duration: float) -> float:
     """The probability that a departure so long behind an event [s] answers it, and is not anywhere in the record [s]."""
     off = (lag - _HUMAN_LAG) / _HUMAN_SPREAD
-    soon = float(exact.exp(np.array(-0.5 * off * off))) / (_HUMAN_SPREAD * math.sqrt(2.0 * math.pi))
+    soon = float(np.exp(np.array(-0.5 * off * off))) / (_HUMAN_SPREAD * math.sqrt(2.0 * math.pi))
     return soon / (soon + 1.0 / max(duration, 1.0))
 
 
 def _smoothed(speed: Floats, dt: float) -> Floats:
     """The moving mean over a second, twice."""
     width = 2 * round(0.5 * _SMOOTH / dt) + 1
-    return exact.moving_mean(exact.moving_mean(speed, width), width)
+    return np.asarray(ndimage.uniform_filter1d(ndimage.uniform_filter1d(speed, width, mode="nearest"), width, mode="nearest"))
 
 
 def _best_lag(own: Floats, other: Floats, behind: Bools, dt: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, unit
 from scenario_gen.template.tracks import clean_tracks, Track
@@ -38,7 +38,7 @@ class Separation:
 
 def _reach(vehicle: Vehicle, turned: Floats) -> Floats:
     """(T,) half the width of a footprint, turned by these angles, along an axis."""
-    return vehicle.length / 2.0 * np.abs(exact.cos(turned)) + vehicle.width / 2.0 * np.abs(exact.sin(turned))
+    return vehicle.length / 2.0 * np.abs(np.cos(turned)) + vehicle.width / 2.0 * np.abs(np.sin(turned))
 
 
 def footprint_gap(a: Vehicle, poses_a: Floats, b: Vehicle, poses_b: Floats) -> tuple[Floats, Floats]:
@@ -112,14 +112,14 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
         power = (ease * np.square(levers)).sum()
         if power >= 1e-6:
             shift[[i, j]] += (clearance - worst.size) / power * ease * levers
-        if power < 1e-6 or exact.hypot(*shift.T).max() > max_shift:
+        if power < 1e-6 or np.hypot(*shift.T).max() > max_shift:
             raise RefusedError(_too_close(tracks, worst, clearance, max_shift))
         for k in (i, j):
             poses[k] = _place(tracks[k], shift[k]).poses
         known = {pair: gap for pair, gap in known.items() if i not in pair and j not in pair}
     else:
         raise RefusedError(_too_close(tracks, worst, clearance, max_shift))
-    moved = exact.hypot(*shift.T)
+    moved = np.hypot(*shift.T)
     before = smallest_gaps(tracks).min(axis=1)
     notes = tuple(
         f"vehicle {tracks[k].vehicle.id} came within {before[k]:.2f} m of another{' (overlap)' if before[k] < 0 else ''}: "
@@ -133,13 +133,13 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
 
 def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -> list[tuple[int, int]]:
     """Pairs (i, j), j < i, that are there together, and whose footprints come within `room` [m] of each other at most."""
-    diagonal = [float(exact.hypot(track.vehicle.length, track.vehicle.width)) for track in tracks]
+    diagonal = [float(np.hypot(track.vehicle.length, track.vehicle.width)) for track in tracks]
     pairs = []
     for i in range(len(tracks)):
         for j in range(i):
             both = tracks[i].there & tracks[j].there
             reach = (diagonal[i] + diagonal[j]) / 2.0
-            if both.any() and exact.hypot(*(poses[i] - poses[j])[both, :2].T).min() < room + reach:
+            if both.any() and np.hypot(*(poses[i] - poses[j])[both, :2].T).min() < room + reach:
                 pairs.append((i, j))
     return pairs
 

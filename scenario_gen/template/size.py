@@ -8,7 +8,6 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
 from scenario_gen.types import Encounter
 
 MOST_VEHICLES = 64  # as many as a log is cut into at most
@@ -62,7 +61,7 @@ def _refuse_scattered(encounter: Encounter) -> None:
             )
     nearest = np.full(len(encounter.vehicles), np.inf)
     for a, b in combinations(range(len(encounter.vehicles)), 2):
-        gap = exact.hypot(*(encounter.position[a] - encounter.position[b]).T).min()
+        gap = np.hypot(*(encounter.position[a] - encounter.position[b]).T).min()
         nearest[[a, b]] = np.minimum(nearest[[a, b]], gap)
     far = int(np.argmax(nearest))
     if nearest[far] > FARTHEST_APART:

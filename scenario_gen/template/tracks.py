@@ -16,9 +16,10 @@ from functools import cached_property
 import math
 
 import numpy as np
+from scipy import linalg
 
 from scenario_gen.base.cancelling import stop_if_cancelled
-from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
 from scenario_gen.types import Encounter, mask, once_per_object, Vehicle
@@ -108,7 +109,7 @@ def _clean(encounter: Encounter, i: int) -> Track:
     there = slice(first, last + 1)
     heading, speed = encounter.heading[i, there], encounter.speed[i, there]
     claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
-    spread = float(exact.hypot(*np.ptp(encounter.position[i, there], axis=0)))
+    spread = float(np.hypot(*np.ptp(encounter.position[i, there], axis=0)))
     still = bool(claimed[-1] < _STILL or spread < _STILL)
     cleaned = _standing if still else _smoothed
     curve, progress, deviation = cleaned(encounter.position[i, there], heading, speed, claimed)
@@ -128,9 +129,9 @@ def _clean(encounter: Encounter, i: int) -> Track:
 def _standing(position: Floats, heading: Floats, speed: Floats, _claimed: Floats) -> tuple[Curve, Floats, float]:
     """The path of a vehicle that stands, its progress, and how far its positions lie from it."""
     centre = position.mean(axis=0)
-    yaw = float(exact.arctan2(exact.sin(heading).mean(), exact.cos(heading).mean()))
+    yaw = float(np.arctan2(np.sin(heading).mean(), np.cos(heading).mean()))
     curve = Curve(np.array([[*centre, yaw], [*(centre + unit(yaw)), yaw]]))
-    return curve, np.zeros(len(speed)), float(exact.hypot(*(position - centre).T).max())
+    return curve, np.zeros(len(speed)), float(np.hypot(*(position - centre).T).max())
 
 
 def _smoothed(position: Floats, heading: Floats, speed: Floats, claimed: Floats) -> tuple[Curve, Floats, float]:
@@ -141,7 +142,7 @@ def _smoothed(position: Floats, heading: Floats, speed: Floats, claimed: Floats)
         grid, smooth = smoothing_spline(claimed, position, wavelength)
         curve = Curve.through(smooth)
         progress = np.interp(claimed, grid, curve.station)
-        deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
+        deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
         curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
         lateral = curvature * np.square(np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)))
         excess = (float(lateral.max()) / _MAX_LATERAL, deviation / _MAX_DEVIATION)  # what is too sharp is eased below
@@ -156,7 +157,7 @@ def _smoothed(position: Floats, heading: Floats, speed: Floats, claimed: Floats)
         share = progress / curve.length
         curve = _eased(curve)
         progress = share * curve.length
-        deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
+        deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
     return _aligned(curve, heading, speed, progress), progress, deviation
 
 
@@ -222,9 +223,9 @@ def smoothing_spline(u: Floats, values: Floats, wavelength: float) -> tuple[Floa
     np.add.at(bands[1], cell, weight * left * right)
     np.add.at(rhs, cell, (weight * left)[:, None] * values)
     np.add.at(rhs, cell + 1, (weight * right)[:, None] * values)
-    penalty = exact.power(wavelength / (2.0 * np.pi), 4) / exact.power(step, 3)
+    penalty = (wavelength / (2.0 * np.pi)) ** 4 / step**3
     for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))):
         factor = penalty * (1.0, 4.0, 1.0, -2.0, -2.0, 1.0)[k]
         columns = np.arange(count - 2) + a
         bands[b - a, columns] += factor
-    return grid, exact.solve_banded(bands, rhs)
+    return grid, linalg.solveh_banded(bands, rhs, lower=True)

@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import t
 
 from benchmarks._driving_worlds import draw_scenario
 from scenario_gen.closed_loop.origin import Origin, origins, units_of
 from scenario_gen.closed_loop.trials import rates, run_trials, Trial, with_origins
-from scenario_gen.method.evaluation import clustered_wilson, student, wilson
+from scenario_gen.method.evaluation import clustered_wilson, wilson
 
 
 def moved(scenario, x, y, yaw):
@@ -44,11 +43,6 @@ def test_rates_of_copies_have_the_interval_of_one_of_each():
     assert sum(bool(one.origin.copy_of) for one in outcomes) == 6
     goals = rates(outcomes)["off_road"]
     assert (goals.count, goals.of) == (0, 12) and goals.share.high == pytest.approx(wilson(0, 6, 0.95).high)
-
-
-@pytest.mark.parametrize("freedom", [1, 2, 3, 5, 9, 30, 200])
-def test_students_quantile(freedom):
-    assert student(0.95, freedom) == pytest.approx(t.ppf(0.975, freedom), rel=6e-3)
 
 
 def test_units_of_one_sample_each_give_wilsons_interval():

@@ -62,7 +62,6 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "base/folders/claim.py": "what is none is no claim: test/base/folders",
     "base/folders/marker.py": "what is none is no marker: test/base/folders",
     "corpus/grouping.py": "tables of meetings that the run before it has just written",
-    "numerics/kernel_cache.py": "source files of the package, for a digest",
     "numerics/kernels.py": "source files of the package, to see which have kernels",
     "output/report/html.py": "assets of the package",
     "output/results.py": "whether a folder is an earlier result: anything else is none",

@@ -137,7 +137,7 @@ def test_the_normal_equations_are_those_of_their_rows():
     heading, speed = np.arctan(np.cos(place / 4.0) / 4.0), np.full(40, 3.0)
     weight = 1.0 / np.square(np.radians(2.0)) * np.ones(40)
     path = fit_path(place, points, np.ones(40), 0.2, speed, Headings(heading, weight))
-    knots, n = path.curve.knots, len(path.curve.coefficients)
+    knots, n = path.curve.t, len(path.curve.c)
     step, spread = knots[1] - knots[0], np.gradient(place)
     fixes = BSpline.design_matrix(place, knots, 3).toarray() * np.sqrt(np.clip(spread / 0.2, 0.005, 1.0))[:, None] / 0.2
     slope = BSpline(knots, np.eye(n), 3)(place, 1) * np.sqrt(weight * np.clip(spread, 0.02, 1.0))[:, None]
@@ -154,7 +154,7 @@ def test_the_normal_equations_are_those_of_their_rows():
     target = np.zeros(len(rows))
     target[:80] = np.concatenate(right)
     best = np.linalg.lstsq(rows, target, rcond=None)[0]
-    np.testing.assert_allclose(path.curve.coefficients.T.ravel(), best, atol=1e-6)
+    np.testing.assert_allclose(path.curve.c.T.ravel(), best, atol=1e-6)
 
 
 def test_noise_of_the_fixes_is_no_lateral_acceleration():

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from scenario_gen.numerics import exact
 from scenario_gen.numerics.curve import Curve
 
 
@@ -18,11 +17,11 @@ def over_all_edges(curve, xy):
     line = np.vstack((ends[:1], curve.points, ends[1:]))[:, :2]
     at = np.concatenate(([-1e4], curve.station, [curve.length + 1e4]))
     edge = np.diff(line, axis=0)
-    size = exact.hypot(edge[:, 0], edge[:, 1])
+    size = np.hypot(edge[:, 0], edge[:, 1])
     along = edge / size[:, None]
     rel = xy[:, None, :] - line[None, :-1, :]
     t = np.clip(rel[..., 0] * along[:, 0] + rel[..., 1] * along[:, 1], 0.0, size)
-    gap = exact.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
+    gap = np.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
     best, rows = np.argmin(gap, axis=1), np.arange(len(xy))
     side = along[best, 0] * rel[rows, best, 1] - along[best, 1] * rel[rows, best, 0]
     return at[best] + t[rows, best], np.sign(side) * gap[rows, best]

@@ -28,7 +28,6 @@ UNIT = re.compile(
     re.IGNORECASE,
 )
 WITHOUT_UNITS = (  # mathematics of any quantity
-    "scenario_gen/numerics/exact/",
     "scenario_gen/method/segmentation/",
     "scenario_gen/numerics/arrays.py",
     "scenario_gen/method/sampling/gp.py",

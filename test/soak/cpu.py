@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Every recorded encounter on two roads, under every setting that another CPU would choose: the same bytes."""
+"""Every recorded encounter on two roads, under every setting that another CPU would choose: same decisions, within 1 cm."""
 
 from collections.abc import Iterable, Iterator
 import json
 import os
 from pathlib import Path
+from typing import Any
 
-from cpu_settings import CODE, digests, ROOT, SETTINGS
+from cpu_settings import apart, CODE, MOST_APART_M, results_under, ROOT, SETTINGS
 from figures import Figure
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", ROOT.parent / "shared" / "data"))
@@ -16,24 +17,25 @@ ROADS = ("corridor", "t_intersection")
 COUNT, SEED = 30, 7
 
 
-def results(setting: dict[str, str], logs: list[Path], file: Path) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the digests of each log on each road; what `file` holds already is not run again."""
-    known: dict[str, dict[str, str]] = json.loads(file.read_text()) if file.exists() else {}
+def results(setting: dict[str, str], logs: list[Path], state: Path) -> Iterator[tuple[str, Any]]:
+    """Yield the results of each log on each road; what lies in `state` already is not run again."""
+    state.mkdir(parents=True, exist_ok=True)
     for log in logs:
         for road in ROADS:
-            label = f"{log.stem} {road}"
-            if label not in known:
-                known[label] = json.loads(digests(setting, COUNT, SEED, str(log), road))
-                file.write_text(json.dumps(known))
-            yield label, known[label]
+            file = state / f"{log.stem} {road}.json"
+            if not file.exists():
+                file.write_text(json.dumps(results_under(setting, COUNT, SEED, str(log), road)))
+            yield from ((f"{log.stem}: {name}", each) for name, each in json.loads(file.read_text()).items())
 
 
 def run(state: Path) -> Iterable[Figure]:
     """Compare every setting with the machine as it is."""
     logs = sorted((DATA / "trajectories").glob("*/encounter_*.csv"))
     every = SETTINGS | {name: value | {"NUMBA_CACHE_DIR": str(state.resolve() / "numba")} for name, value in CODE.items()}
-    own = dict(results({}, logs, state / "as it is.json"))
+    own = dict(results({}, logs, state / "as it is"))
     for name, setting in list(every.items())[1:]:
-        differ = [label for label, found in results(setting, logs, state / f"{name}.json") if found != own[label]]
-        seen = f"{len(own) - len(differ)} of {len(own)}" + (f"; not {differ[0]}" if differ else "")
-        yield Figure(f"the same bytes: {name}", f"{len(logs)} encounters × {len(ROADS)} roads", seen, bool(own) and not differ)
+        found = {label: apart(own[label], each) for label, each in results(setting, logs, state / name)}
+        worst = max(found, key=lambda label: found[label], default="none")
+        seen = f"at most {found.get(worst, float('inf')) * 1e3:.4f} mm, {worst}"
+        bound = f"{len(logs)} encounters × {len(ROADS)} roads: the same decisions, < {MOST_APART_M * 1e3:.0f} mm"
+        yield Figure(name, bound, seen, bool(own) and all(each < MOST_APART_M for each in found.values()))

@@ -12,6 +12,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from scipy import special
+
 from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
@@ -29,7 +31,6 @@ from scenario_gen.closed_loop.trials import find_planner, Rate, trial_runner
 from scenario_gen.method.evaluation import wilson
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, SamplingConfig
 from scenario_gen.method.validity import Limits
-from scenario_gen.numerics import exact
 from scenario_gen.output.report.html import render_page
 from scenario_gen.types import EgoSlot, GenerationResult, Request, ScenarioSet, token, with_witness
 
@@ -141,7 +142,7 @@ class SearchResult:
         """Natural drives that would give an interval as narrow; NaN where no failure was found."""
         rate = self.estimate.rate
         half = 0.5 * (rate.high - rate.low)
-        z = float(exact.ndtri(0.5 + 0.5 * LEVEL))
+        z = float(special.ndtri(0.5 + 0.5 * LEVEL))
         return z * z * rate.value * (1.0 - rate.value) / (half * half) if rate.value > 0.0 and half > 0.0 else math.nan
 
     def sentences(self) -> list[str]:

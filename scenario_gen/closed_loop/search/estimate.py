@@ -19,11 +19,11 @@ import math
 from typing import Protocol, TypeVar
 
 import numpy as np
+from scipy import special
 
-from scenario_gen.closed_loop.search.gamma import gamma_quantile
 from scenario_gen.closed_loop.search.surrogate import Surrogate
 from scenario_gen.method.evaluation import wilson
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Interval
 
 POPULATION, LARGEST = 24, 96  # drives of a level of an exploration; it grows with the drives so far, up to the largest
@@ -210,7 +210,7 @@ class Search:
         """Drive in `count` certified natural scenarios; none are returned if hardly any can be certified."""
         found: list[int] = []
         while len(found) < count:
-            z = exact.standard_normal(generator, (BATCH, self.problem.size))
+            z = generator.standard_normal((BATCH, self.problem.size))
             rows, candidates, features = self._certify(z)
             self._drawn += len(z)
             self._certified += len(rows)
@@ -234,7 +234,7 @@ class Search:
             places: list[int] = []
             chosen: list[tuple[Floats, object, tuple[float, ...]]] = []
             for place, head in enumerate(heads):
-                noise = exact.standard_normal(generator, (MOVES, self.problem.size))
+                noise = generator.standard_normal((MOVES, self.problem.size))
                 z = math.sqrt(1.0 - step * step) * self.z[head] + step * noise
                 rows, candidates, features = self._certify(z)
                 if rows:
@@ -250,7 +250,7 @@ class Search:
             self._check_budget()
             population += heads
         share = accepted / (len(seeds) * (SEEDS - 1))
-        return population, min(max(step * float(exact.exp(share - _ACCEPTED)), 0.05), 1.0)
+        return population, min(max(step * float(np.exp(share - _ACCEPTED)), 0.05), 1.0)
 
     def _predictor(self) -> "_Predictor":
         """Return what predicts the parts of a drive from what was driven so far."""
@@ -275,7 +275,7 @@ class Search:
         """
         generator = self._generator(2, self._batches)
         self._batches += 1
-        z = exact.standard_normal(generator, (BATCH, self.problem.size))
+        z = generator.standard_normal((BATCH, self.problem.size))
         rows, candidates, features = self._certify(z)
         choosing = generator.random(BATCH)
         self._drawn += BATCH
@@ -285,7 +285,7 @@ class Search:
         frequent = len([k for k in self._natural if self.responses[k].failed]) / len(self._natural)
         evenly = max(self._evenly, min(OFTEN * frequent, 1.0) if frequent > MOST else 0.0)
         predicted, error = self._predictor()(z[rows], features)
-        near = 2.0 * exact.ndtr(-predicted / (WIDER * error))
+        near = 2.0 * special.ndtr(-predicted / (WIDER * error))
         probability = np.clip(near.max(axis=1), evenly, 1.0)
         chosen = np.flatnonzero(choosing[rows] < probability)
         own = [rows[k] for k in chosen]
@@ -334,7 +334,7 @@ class Search:
         """Return how far a drive's scenario is from the mean, in standard deviations along what the regression goes by."""
         parts = self.responses[k].parts
         slope = self._predictor().surrogates[int(np.argmin(parts)) if parts else 0].direction(self.problem.size)
-        return abs(float(exact.matmul(slope, self.z[k])))
+        return abs(float(slope @ self.z[k]))
 
     def _rate(self) -> Interval:
         """Return the rate over the batches with its interval, the gamma interval of a sum of weights (Fay & Feuer 1997).
@@ -345,10 +345,15 @@ class Search:
         if not len(w):
             return Interval(0.0, 0.0, wilson(0, max(round(self._seen * self._evenly), 1), LEVEL).high)
         total, square = float(w.sum()), float((w * (w - w.sum() / self._seen)).sum())
-        low = gamma_quantile(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
+        low = _gamma_quantile(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
         most = float(w.max())
-        high = gamma_quantile(total + most, square + most * most, 0.5 + 0.5 * LEVEL)
+        high = _gamma_quantile(total + most, square + most * most, 0.5 + 0.5 * LEVEL)
         return Interval(min(total / self._seen, 1.0), min(low / self._seen, 1.0), min(high / self._seen, 1.0))
+
+
+def _gamma_quantile(mean: float, variance: float, share: float) -> float:
+    """The quantile at a share of the gamma distribution with this mean and variance."""
+    return float(special.gammaincinv(mean * mean / variance, share)) * variance / mean
 
 
 @dataclass(frozen=True, eq=False)

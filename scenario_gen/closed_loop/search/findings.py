@@ -16,7 +16,6 @@ from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import Outcome, Trial
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.numerics import exact
 from scenario_gen.types import Scenario
 
 SHOWN = 100  # failures that are kept as scenarios, at most
@@ -98,7 +97,7 @@ def _station(outcome: Outcome) -> float:
     drive, verdict = outcome.drive, outcome.verdict
     times = [verdict.collision.time if verdict.collision else np.nan, verdict.off_road, float(drive.motion.time[-1])]
     position = drive.motion.position[drive.ego]
-    way = np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(position, axis=0).T))])
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(position, axis=0).T))])
     return float(np.interp(np.nanmin(times), drive.motion.time, way))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 
 LEARNED = 500  # drives that it is fitted to, at most
 RIDGES = (1.0, 10.0, 100.0)  # of which the one with the least error of prediction is taken
@@ -52,24 +52,24 @@ class Surrogate:
         scale[len(scale) - features :] /= TELLING
         x = (x - mean) / scale
         level = float(y.mean())
-        kernel = exact.matmul(x, x.T)
+        kernel = x @ x.T
         best: tuple[float, Floats] | None = None
         for ridge in RIDGES:
-            inverse = exact.solve_positive(kernel + ridge * np.eye(len(x)), np.eye(len(x)))
-            dual = exact.matmul(inverse, y - level)
+            inverse = np.linalg.inv(kernel + ridge * np.eye(len(x)))
+            dual = inverse @ (y - level)
             left_out = dual / np.diag(inverse)  # error of the prediction from all others
             near = left_out[counted][: max(int(NEAR * len(counted)), 1)]  # the rows are in ascending order
             error = float(np.sqrt(np.square(near).mean()))
             if best is None or error < best[0]:
                 best = error, dual
         assert best is not None
-        return cls(mean, scale, exact.matmul(x.T, best[1]), level, max(best[0], 1e-9))
+        return cls(mean, scale, x.T @ best[1], level, max(best[0], 1e-9))
 
     def predict(self, columns: Floats) -> Floats:
         """Return the figure (S,), in its own unit, for columns (S, q) in any unit."""
-        return np.asarray(self.level + exact.matmul((columns - self.mean) / self.scale, self.slope))
+        return np.asarray(self.level + ((columns - self.mean) / self.scale) @ self.slope)
 
     def direction(self, size: int) -> Floats:
         """Return the direction (d,), a unit vector in any unit, along which the figure changes most with the first columns."""
         slope = np.asarray(self.slope[:size] / self.scale[:size])
-        return slope / max(float(np.sqrt(exact.matmul(slope, slope))), 1e-300)
+        return slope / max(float(np.sqrt(slope @ slope)), 1e-300)

@@ -28,7 +28,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Observations, RawLog, Segment
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 
 STEP_NS = 100_000_000
 MOVES = 2.0  # m/s from which on a velocity has the vehicle's direction
@@ -78,7 +78,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     for name, (_, one), own in zip(names, found, states, strict=True):
         there = np.flatnonzero(own[:, 5] > 0.0)
         heading = np.radians(own[:, 2]) if degrees else own[:, 2]
-        values = np.column_stack([own[:, :2], heading, exact.hypot(own[:, 3], own[:, 4])])[there]
+        values = np.column_stack([own[:, :2], heading, np.hypot(own[:, 3], own[:, 4])])[there]
         size = (_number(one, "length"), _number(one, "width"))
         vehicles.append(Observations.of_rows(name, there.astype(np.int64) * STEP_NS, values, there + row, size))
         row += len(own)
@@ -113,13 +113,13 @@ def _states(place: str, one: Mapping[str, Any]) -> Floats:
 def _in_degrees(states: Floats) -> bool:
     """Return whether headings agree better with the velocities if they are taken for degrees."""
     heading, velocity = states[:, 2], states[:, 3:5]
-    speed = exact.hypot(velocity[:, 0], velocity[:, 1])
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
     moves = (states[:, 5] > 0.0) & (speed > MOVES) & (speed < PER_OBJECT) & np.isfinite(heading)
     if not moves.any():
         there = states[states[:, 5] > 0.0, 2]
         return bool((np.abs(there) > 2.0 * np.pi).any())
-    course = exact.arctan2(velocity[moves, 1], velocity[moves, 0])
-    agree = [float(exact.cos(course - taken).mean()) for taken in (np.radians(heading[moves]), heading[moves])]
+    course = np.arctan2(velocity[moves, 1], velocity[moves, 0])
+    agree = [float(np.cos(course - taken).mean()) for taken in (np.radians(heading[moves]), heading[moves])]
     return agree[0] > agree[1]
 
 

@@ -18,7 +18,6 @@ from scenario_gen.logs.adapters.formats import Format, FORMATS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, left_out_note, RawLog
 from scenario_gen.logs.tables import from_frame, read_text, reals, segment_of, to_numbers, vehicle_name
-from scenario_gen.numerics import exact
 
 Load = Callable[[Path, Format, int, LogConfig], pd.DataFrame]
 
@@ -174,7 +173,7 @@ def _convert(table: pd.DataFrame, path: Path, known: Format) -> pd.DataFrame:
     if not {"vx", "vy"} <= set(out):
         return out
     vx, vy = out["vx"].to_numpy(float), out["vy"].to_numpy(float)
-    out["speed"] = exact.hypot(vx, vy)
+    out["speed"] = np.hypot(vx, vy)
     if "heading" not in out:
-        out["heading"] = np.where(out["speed"] > 0.1, exact.arctan2(vy, vx), math.nan)
+        out["heading"] = np.where(out["speed"] > 0.1, np.arctan2(vy, vx), math.nan)
     return out

@@ -3,7 +3,7 @@
 
 """DTW features (paper V-B), realism and criticality."""
 
-from scenario_gen.method.evaluation.bootstrap import Bootstrap, clustered_wilson, paired_difference, student, wilson
+from scenario_gen.method.evaluation.bootstrap import Bootstrap, clustered_wilson, paired_difference, wilson
 from scenario_gen.method.evaluation.comparison import compare, comparison_table, Difference, read_evaluations
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
@@ -24,5 +24,5 @@ __all__ = [
     "Template", "at_common", "at_count", "at_period", "clustered_wilson", "compare", "comparison_table", "coverage_of",
     "criticality", "dtw", "dtw_distance", "evaluate", "evaluate_scenarios", "feature_matrix", "footprint_distance",
     "linear_changepoints", "mean_correlation", "mean_error", "mean_feature", "pair_similarities", "paired_difference",
-    "read_evaluations", "replay", "student", "time_to_collision", "uniform_changepoints", "wilson", "without_changepoints",
+    "read_evaluations", "replay", "time_to_collision", "uniform_changepoints", "wilson", "without_changepoints",
 ]  # fmt: skip

@@ -11,8 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import special
 
-from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.types import Interval
 
 Statistic = Callable[[Floats], Floats]
@@ -85,14 +86,14 @@ def mean_of(values: Floats, weights: Floats) -> Floats:
     known = np.isfinite(values)
     total = weights[:, known].sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(exact.matmul(weights[:, known], values[known]) / total)
+        return np.asarray((weights[:, known] @ values[known]) / total)
 
 
 def wilson(count: int, total: int, level: float) -> Interval:
     """Return the share count / total with Wilson's interval (1927), which stays in [0, 1] and is not empty at 0 or 1."""
     if total == 0:
         return Interval(float("nan"))
-    return _wilson(count / total, total, float(exact.ndtri(0.5 + 0.5 * level)))
+    return _wilson(count / total, total, float(special.ndtri(0.5 + 0.5 * level)))
 
 
 def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
@@ -110,11 +111,11 @@ def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
         return wilson(count, total, level)
     share = count / total
     if count in (0, total):
-        return _wilson(share, float(units), float(exact.ndtri(0.5 + 0.5 * level)))
+        return _wilson(share, float(units), float(special.ndtri(0.5 + 0.5 * level)))
     apart = np.bincount(member, weights=hits - share)
     between = float(np.sum(apart * apart)) * units / (units - 1)
     effect = max(between / (total * share * (1.0 - share)), 1.0)
-    return _wilson(share, total / effect, student(level, units - 1))
+    return _wilson(share, total / effect, float(special.stdtrit(units - 1, 0.5 + 0.5 * level)))
 
 
 def paired_difference(differences: Floats, unit: Ints, level: float) -> Interval:
@@ -130,37 +131,13 @@ def paired_difference(differences: Floats, unit: Ints, level: float) -> Interval
         return Interval(float(np.sum(differences)) / total if total else float("nan"), -1.0, 1.0)
     mean = float(np.sum(differences)) / total
     if not differences.any():
-        high = _wilson(0.0, float(units), float(exact.ndtri(0.5 + 0.5 * level))).high
+        high = _wilson(0.0, float(units), float(special.ndtri(0.5 + 0.5 * level))).high
         return Interval(0.0, -high, high)
     apart = np.bincount(member, weights=differences - mean)
-    half = student(level, units - 1) * float(np.sqrt(np.sum(apart * apart) * units / (units - 1))) / total
-    return Interval(mean, max(mean - half, -1.0), min(mean + half, 1.0))
-
-
-def student(level: float, freedom: int) -> float:
-    """Return the two-sided quantile of Student's distribution.
-
-    Source: exact for 1 and 2 degrees of freedom, else the expansion of Abramowitz & Stegun 26.7.5 (0.4 % at 3 and 95 %).
-    """
-    tail = 0.5 + 0.5 * level
-    if freedom == 1:
-        angle = np.pi * (tail - 0.5)
-        return float(exact.sin(angle) / exact.cos(angle))
-    if freedom == 2:
-        return float((2.0 * tail - 1.0) / np.sqrt(2.0 * tail * (1.0 - tail)))
-    z = float(exact.ndtri(tail))
-    s = z * z
-    terms = (
-        (s + 1.0) / 4.0,
-        ((5.0 * s + 16.0) * s + 3.0) / 96.0,
-        (((3.0 * s + 19.0) * s + 17.0) * s - 15.0) / 384.0,
-        ((((79.0 * s + 776.0) * s + 1482.0) * s - 1920.0) * s - 945.0) / 92160.0,
+    half = (
+        float(special.stdtrit(units - 1, 0.5 + 0.5 * level)) * float(np.sqrt(np.sum(apart * apart) * units / (units - 1))) / total
     )
-    result, power = 1.0, 1.0
-    for term in terms:
-        power *= freedom
-        result += term / power
-    return z * result
+    return Interval(mean, max(mean - half, -1.0), min(mean + half, 1.0))
 
 
 def _wilson(share: float, total: float, z: float) -> Interval:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy import special
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.geometry import footprint_distance
 from scenario_gen.method.evaluation.motion import Motion
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 
 SMOOTHING = 0.5
 """Seconds over which acceleration is averaged before it is differentiated to jerk."""
@@ -20,8 +21,6 @@ SMOOTHING = 0.5
 MOST_COUNTS = 20_000_000  # bins of all samples together
 ROUNDING = 1e-6
 """Bins: a value this little below an edge belongs to the bin above, or rounding would move a cruise at 10 m/s."""
-
-_LN2 = 0.6931471805599453
 
 
 @dataclass(frozen=True)
@@ -91,28 +90,26 @@ class Comparison:
 
     def jensen_shannon(self, weights: Floats) -> Floats:
         """Return the Jensen-Shannon divergences (B,) in bits under weights (B, S), between 0 and 1."""
-        return jensen_shannon(exact.matmul(weights, self.samples), self.template)
+        return jensen_shannon(weights @ self.samples, self.template)
 
     def wasserstein_near(self, weights: Floats) -> Floats:
         """Return Wasserstein distances (B,) under weights (B, S), integrated over the grid (for intervals)."""
         with np.errstate(invalid="ignore"):
-            apart = exact.matmul(weights, self.sample_cdf[:, :-1])
-            apart /= exact.matmul(weights, self.sizes)[:, None]  # in place: new arrays of this size cost more than their numbers
+            apart = weights @ self.sample_cdf[:, :-1]
+            apart /= (weights @ self.sizes)[:, None]  # in place: new arrays of this size cost more than their numbers
         apart -= self.template_cdf[:-1]
-        return exact.matmul(np.abs(apart, out=apart), np.diff(self.grid))
+        return np.abs(apart, out=apart) @ np.diff(self.grid)
 
     def coverage(self, weights: Floats) -> Floats:
         """Return the share (B,) of the template's values that lie in a bin which the set visits too."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(exact.matmul((exact.matmul(weights, self.samples)) > 0.0, self.template) / self.template.sum())
+            return np.asarray((((weights @ self.samples) > 0.0) @ self.template) / self.template.sum())
 
 
 def wasserstein(a: Floats, b: Floats) -> float:
     """Wasserstein-1 distance of two samples (n,) and (m,): the area between their distribution functions.
 
     Source: Vallender 1974.
-
-    The same as scipy.stats.wasserstein_distance, whose package takes a second to import at every start.
     """
     values = np.sort(np.concatenate([a, b]))
     below = [np.searchsorted(np.sort(sample), values[:-1], side="right") / sample.size for sample in (a, b)]
@@ -177,9 +174,5 @@ def jensen_shannon(p: Floats, q: Floats) -> Floats:
         p = p / p.sum(axis=-1, keepdims=True)
         q = q / q.sum()
         middle = 0.5 * (p + q)
-
-        def divergence(x: Floats) -> Floats:
-            return np.asarray(np.where(x > 0.0, x * exact.log(np.where(x > 0.0, x, 1.0) / middle), 0.0).sum(axis=-1))
-
-        result = 0.5 * (divergence(p) + divergence(np.broadcast_to(q, p.shape))) / _LN2
+        result = 0.5 * (special.rel_entr(p, middle) + special.rel_entr(q, middle)).sum(axis=-1) / np.log(2.0)
     return np.where(np.isfinite(p.sum(axis=-1)), np.maximum(result, 0.0), np.nan)

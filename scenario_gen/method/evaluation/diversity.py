@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 
 
 def displacements(position: Floats, there: Bools | None = None) -> Floats:
@@ -19,7 +19,7 @@ def displacements(position: Floats, there: Bools | None = None) -> Floats:
     table = np.zeros((samples, samples))
     for s in range(samples - 1):
         step = position[s + 1 :] - position[s]
-        table[s, s + 1 :] = _mean(exact.hypot(step[..., 0], step[..., 1]), there)
+        table[s, s + 1 :] = _mean(np.hypot(step[..., 0], step[..., 1]), there)
     return table + table.T
 
 
@@ -28,7 +28,7 @@ def diversity(table: Floats, weights: Floats) -> Floats:
 
     A sample drawn twice makes no pair with itself, or resampling would shrink the diversity.
     """
-    total = (exact.matmul(weights, table) * weights).sum(axis=1)
+    total = ((weights @ table) * weights).sum(axis=1)
     pairs = np.square(weights.sum(axis=1)) - np.square(weights).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(total / pairs)
@@ -47,7 +47,7 @@ def displacement_to(position: Floats, target: Floats, there: Bools | None = None
     Source: the average displacement error (Pellegrini et al. 2009).
     """
     step = position - target
-    return _mean(exact.hypot(step[..., 0], step[..., 1]), there)
+    return _mean(np.hypot(step[..., 0], step[..., 1]), there)
 
 
 def weighted_min(values: Floats, weights: Floats) -> Floats:

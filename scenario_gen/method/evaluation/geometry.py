@@ -6,7 +6,7 @@
 import numpy as np
 
 from scenario_gen.method.evaluation.motion import Motion
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
 from scenario_gen.types import once_per_object
 
@@ -40,7 +40,7 @@ def _nearness(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
 @once_per_object
 def _directions(motion: Motion) -> Floats:
     """(N, T, 2) unit vectors along the headings."""
-    return np.stack([exact.cos(motion.heading), exact.sin(motion.heading)], axis=-1)
+    return np.stack([np.cos(motion.heading), np.sin(motion.heading)], axis=-1)
 
 
 @kernel(F2, F2, F1, F2, F2, F1, F2, OUT1, OUT1)
@@ -101,5 +101,5 @@ def _corner_distance(
         ahead, left = other_length if k < 2 else -other_length, other_width if k % 3 == 0 else -other_width
         dx, dy = ox + ahead * oc + left * -os - x, oy + ahead * os + left * oc - y
         along, across = abs(dx * c + dy * s) - length, abs(dy * c - dx * s) - width
-        least = min(least, exact.hypot(max(along, 0.0), max(across, 0.0)))
+        least = min(least, np.hypot(max(along, 0.0), max(across, 0.0)))
     return least

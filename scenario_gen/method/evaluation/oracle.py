@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import cut, Encounter, Fit, FittedVehicle, Scenario
 
 MIN_CHORD = 0.5
@@ -50,13 +50,13 @@ def _replayed(position: Floats, heading: Floats, speed: Floats, index: np.ndarra
             continue
         offset = position[piece] - position[i]
         u, v = offset[-1], end[:2] - start[:2]
-        chord, target = exact.hypot(*u), exact.hypot(*v)
+        chord, target = np.hypot(*u), np.hypot(*v)
         if chord < MIN_CHORD or target < MIN_CHORD:
             scale, turn = 1.0, start[2] - heading[i]
         else:
-            scale, turn = target / chord, exact.arctan2(u[0] * v[1] - u[1] * v[0], exact.matmul(u, v))
-        c, s = exact.cos(turn), exact.sin(turn)
-        moved = exact.matmul(scale * offset, np.array([[c, s], [-s, c]]))
+            scale, turn = target / chord, np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v)
+        c, s = np.cos(turn), np.sin(turn)
+        moved = (scale * offset) @ np.array([[c, s], [-s, c]])
         miss = v - moved[-1]  # zero to rounding unless the chord was too short
         out[piece, :2] = start[:2] + moved + np.linspace(0.0, 1.0, j - i + 1)[:, None] * miss
         out[piece, 2] = heading[piece] + turn

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.method.evaluation.dtw import blocks, Distance, feature_extents, feature_rows
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +38,12 @@ class PairSimilarity:
 
     def _shares(self, weights: Floats) -> Floats:
         """Return weights (B, U) divided by the weight of all samples."""
-        return np.asarray(weights / exact.matmul(weights, self.count)[:, None])
+        return np.asarray(weights / (weights @ self.count)[:, None])
 
     def error(self, weights: Floats) -> Floats:
         """Return E (B,) under weights (B, U); NaN if T is zero (both vehicles stand throughout)."""
         shares = self._shares(weights)
-        square = (exact.matmul(shares, self.gram) * shares).sum(axis=1)
+        square = ((shares @ self.gram) * shares).sum(axis=1)
         norm = self.template[2]
         return np.sqrt(np.maximum(square, 0.0) / norm) if norm > 0.0 else np.full(len(weights), np.nan)
 
@@ -52,9 +52,9 @@ class PairSimilarity:
         shares = self._shares(weights)
         count, first, second = self.template
         variance = second - first * first / count
-        total = exact.matmul(shares, self.total)
-        covariance = exact.matmul(shares, self.cross) - total * first / count
-        spread = (exact.matmul(shares, self.gram) * shares).sum(axis=1) - np.square(total) / count
+        total = shares @ self.total
+        covariance = shares @ self.cross - total * first / count
+        spread = ((shares @ self.gram) * shares).sum(axis=1) - np.square(total) / count
         generated = variance + 2.0 * covariance + spread
         with np.errstate(invalid="ignore", divide="ignore"):
             result = (variance + covariance) / np.sqrt(variance * generated)
@@ -97,8 +97,8 @@ def pair_similarity(
             for own_unit, row in zip(unit, difference, strict=True):
                 pooled[own_unit] += row
             difference = pooled
-        gram += exact.gram(difference)
-        cross += exact.matmul(difference, target)
+        gram += difference @ difference.T
+        cross += difference @ target
         total += difference.sum(axis=1)
         first += float(target.sum())
         second += float(np.square(target).sum())

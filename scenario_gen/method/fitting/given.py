@@ -12,7 +12,7 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.finish import STAND_SPEED
 from scenario_gen.method.fitting.placement import check_scale, has_room, max_repair, Placement, rotated, share_with_room
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import draw_route
 from scenario_gen.template import clean_tracks, own_paths, Track
@@ -119,9 +119,9 @@ def _joint_similarity(tracks: tuple[Track, ...], states: Floats) -> tuple[float,
     u, v = source[:, :2] - source[:, :2].mean(axis=0), target[:, :2] - target[:, :2].mean(axis=0)
     if all(track.still for track in tracks) or (np.square(u)).sum() < 1e-6:
         off = target[:, 2] - source[:, 2]
-        return float(exact.arctan2(exact.sin(off).sum(), exact.cos(off).sum())), 1.0
+        return float(np.arctan2(np.sin(off).sum(), np.cos(off).sum())), 1.0
     sine, cosine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()), float((u * v).sum())
-    return float(exact.arctan2(sine, cosine)), float(exact.hypot(sine, cosine) / (np.square(u)).sum())
+    return float(np.arctan2(sine, cosine)), float(np.hypot(sine, cosine) / (np.square(u)).sum())
 
 
 def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, config: FittingConfig) -> tuple[Track, float, str]:
@@ -129,11 +129,11 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
     start, goal = ends[0], ends[1]
     v = goal[:2] - start[:2]
     if track.still:
-        if exact.hypot(*v) > _SAME_PLACE:
+        if np.hypot(*v) > _SAME_PLACE:
             raise RefusedError(
-                f"vehicle {vehicle.id} waits throughout the template, but its start and goal are {exact.hypot(*v):.1f} m apart"
+                f"vehicle {vehicle.id} waits throughout the template, but its start and goal are {np.hypot(*v):.1f} m apart"
             )
-        ahead = start[:3] + np.array([exact.cos(start[2]), exact.sin(start[2]), 0.0])
+        ahead = start[:3] + np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
         return replace(track, curve=Curve(np.array([start[:3], ahead]))), 1.0, "a wait"
 
     template_turn = float(track.curve.points[-1, 2] - track.curve.points[0, 2])
@@ -144,12 +144,12 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
             placed = replace(track, curve=route.cut(0.0, route.length, 0.25), progress=frozen(scale * track.progress))
             return placed, scale, f"along a drawn route (s = {scale:.2f})"
     u = (track.poses[-1] - track.poses[0])[:2]
-    if exact.hypot(*u) < _CHORD:
+    if np.hypot(*u) < _CHORD:
         (turn, scale), how = joint, "rotation and scale from all vehicles"
     else:
-        turn = float(exact.arctan2(u[0] * v[1] - u[1] * v[0], exact.matmul(u, v)))  # eq 8a
-        scale, how = float(exact.hypot(*v) / exact.hypot(*u)), "similarity"
-    check_scale(scale, f"vehicle {vehicle.id} (template chord {exact.hypot(*u):.1f} m, asked {exact.hypot(*v):.1f} m)", config)
+        turn = float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))  # eq 8a
+        scale, how = float(np.hypot(*v) / np.hypot(*u)), "similarity"
+    check_scale(scale, f"vehicle {vehicle.id} (template chord {np.hypot(*u):.1f} m, asked {np.hypot(*v):.1f} m)", config)
     points = track.curve.points.copy()
     points[:, :2] = rotated(scale * (points[:, :2] - points[0, :2]), turn) + start[:2]  # eqs 8b, 9
     share = track.curve.station / track.curve.length

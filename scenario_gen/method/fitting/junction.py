@@ -22,7 +22,7 @@ from scenario_gen.method.fitting.junction_solver import Choice, FAR, HEADING, OW
 from scenario_gen.method.fitting.kept import count_lost, find_unused, refuse_lost_turns
 from scenario_gen.method.fitting.placement import check_scale, has_room, Placement, separated
 from scenario_gen.method.fitting.relations import find_relations, Relation
-from scenario_gen.numerics import exact, Floats, frozen, Ints, wrap_angle
+from scenario_gen.numerics import Floats, frozen, Ints, wrap_angle
 from scenario_gen.numerics.kernels import F2, F3, kernel, OUTI2
 from scenario_gen.roads import draw_ring_route, draw_route, draw_u_turn, relative, ring_of
 from scenario_gen.template import in_words, manoeuvre_of, MOST_CHANGE, sharpness_of, Track, turn_of
@@ -111,7 +111,7 @@ def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[Way]]:
     drawn: dict[tuple[float, float, float, bool], list[Way]] = {}
     ways = []
     for track in tracks:
-        sharpness = float(exact.exp(round(float(exact.log(sharpness_of(track))) / _SHARPNESS_STEP) * _SHARPNESS_STEP))
+        sharpness = float(np.exp(round(float(np.log(sharpness_of(track))) / _SHARPNESS_STEP) * _SHARPNESS_STEP))
         size = (np.ceil(2.0 * track.vehicle.length) / 2.0, np.ceil(10.0 * track.vehicle.width) / 10.0)
         key = (*size, sharpness, track.makes_u_turn)
         if key not in drawn:
@@ -131,7 +131,7 @@ def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool, sharpness: float |
             if curve is not None:
                 everything.append(Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
             elif u_turns:
-                reach = max(float(exact.hypot(*(other[:2] - entry[:2]))) for other in road.exits)
+                reach = max(float(np.hypot(*(other[:2] - entry[:2]))) for other in road.exits)
                 for apex in _APEXES * reach:
                     curve = draw_u_turn(entry, leave, float(apex), fits)
                     if curve is not None:
@@ -186,7 +186,7 @@ class _Laying:
                 if id(way) not in known:
                     known[id(way)] = way.curve.at(np.linspace(0.0, way.curve.length, _SAMPLES)), way.curve.length / (_SAMPLES - 1)
             points = np.stack([known[id(way)][0] for way in own])
-            self.samples.append(np.concatenate((points, exact.cos(points[..., 2:]), exact.sin(points[..., 2:])), axis=-1))
+            self.samples.append(np.concatenate((points, np.cos(points[..., 2:]), np.sin(points[..., 2:])), axis=-1))
             self.spacing.append(np.array([known[id(way)][1] for way in own]))
             turn = turn_of(track)
             shift = np.array([abs(relative(way.curve.points[0], way.curve.points[-1, :2])[1]) > 1.0 for way in own])
@@ -222,7 +222,7 @@ class _Laying:
 
     def _rated(self, motion: Floats) -> tuple[float, list[tuple[Floats, Floats, Floats]]]:
         """The cost of a motion [m²]; for each vehicle the cost of its ways (W,), how far it is beside them and where (W, K)."""
-        cos, sin = exact.cos(motion[2]), exact.sin(motion[2])
+        cos, sin = np.cos(motion[2]), np.sin(motion[2])
         total, nearest = 0.0, []
         for poses, samples, spacing, extra in zip(self.poses, self.samples, self.spacing, self.extra, strict=True):
             d = self.scale * (poses[:, :2] - self.middle)
@@ -234,7 +234,7 @@ class _Laying:
             along = off[..., 0] * near[..., 3] + off[..., 1] * near[..., 4]
             aside = off[..., 1] * near[..., 3] - off[..., 0] * near[..., 4]
             miss = np.square(aside) + np.square(np.maximum(np.abs(along) - spacing[:, None], 0.0))
-            turned = 1.0 - exact.cos(poses[:, 2] + motion[2] - near[..., 2])
+            turned = 1.0 - np.cos(poses[:, 2] + motion[2] - near[..., 2])
             costs = (np.minimum(miss, FAR * FAR) + HEADING * turned).mean(axis=1) + extra
             total += float(costs.min())
             nearest.append((costs, aside, near))
@@ -243,7 +243,7 @@ class _Laying:
     def _refined(self, motion: Floats, nearest: list[tuple[Floats, Floats, Floats]]) -> Floats:
         """One step of point-to-line registration (Chen & Medioni 1991), with the headings."""
         rows, values = [], []
-        cos, sin = exact.cos(motion[2]), exact.sin(motion[2])
+        cos, sin = np.cos(motion[2]), np.sin(motion[2])
         for poses, (costs, aside, near) in zip(self.poses, nearest, strict=True):
             w = int(np.argmin(costs))
             d = self.scale * (poses[:, :2] - self.middle)
@@ -257,7 +257,7 @@ class _Laying:
             values.append(np.sqrt(HEADING / 2.0) * wrap_angle(near[w, :, 2] - poses[:, 2] - motion[2]))
         rows.append(_LATERAL_ONLY * np.eye(3))
         values.append(np.zeros(3))
-        return motion + exact.lstsq(np.concatenate(rows), np.concatenate(values))
+        return np.asarray(motion + np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0])
 
 
 @kernel(F2, F3, OUTI2)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.method.fitting.relations import Equation, equations, Relation
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template import Track
 
@@ -45,7 +45,7 @@ class Rigid(NamedTuple):
 
     def of(self, points: Floats) -> Floats:
         """Return where points (M, 2) [m] go."""
-        return exact.matmul(points, self.matrix.T) + self.shift
+        return points @ self.matrix.T + self.shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +117,8 @@ class Solver:
             return most / 2.0
         starts = np.linspace(0.0, most, int(np.ceil(most)) + 1)
         off = curve.at((starts[:, None] + self.driven[i]).ravel())[:, 2].reshape(len(starts), -1) - self.poses[i][:, 2]
-        alike = exact.hypot(
-            exact.cos(off).mean(axis=1), exact.sin(off).mean(axis=1)
+        alike = np.hypot(
+            np.cos(off).mean(axis=1), np.sin(off).mean(axis=1)
         )  # 1 where way and template differ by one rotation throughout
         best = starts[alike >= alike.max() - 1e-3]
         return float(best[np.argmin(np.abs(best - most / 2.0))])
@@ -131,11 +131,11 @@ class Solver:
         a, b = self.scale * source[:, :2], target[:, :2]
         ca, cb = a.mean(axis=0), b.mean(axis=0)
         u, v = a - ca, b - cb
-        sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()) + 10.0 * float(exact.sin(target[:, 2] - source[:, 2]).sum())
-        cosine = float((u * v).sum()) + 10.0 * float(exact.cos(target[:, 2] - source[:, 2]).sum())
-        yaw = float(exact.arctan2(sine, cosine))
-        rotation = np.array([[exact.cos(yaw), -exact.sin(yaw)], [exact.sin(yaw), exact.cos(yaw)]])
-        return Rigid(self.scale * rotation, cb - exact.matmul(rotation, ca), yaw)
+        sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()) + 10.0 * float(np.sin(target[:, 2] - source[:, 2]).sum())
+        cosine = float((u * v).sum()) + 10.0 * float(np.cos(target[:, 2] - source[:, 2]).sum())
+        yaw = float(np.arctan2(sine, cosine))
+        rotation = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+        return Rigid(self.scale * rotation, cb - rotation @ ca, yaw)
 
     def _checked(self, ways: dict[int, Way], start: dict[int, float], lost: int, rigid: Rigid) -> Choice:
         """The cost of ways and starts: how unlike the template the vehicles are then, each seen from the others."""
@@ -148,11 +148,11 @@ class Solver:
         for i in members:
             curve = ways[i].curve
             fitted = curve.at(start[i] + self.driven[i])
-            miss = exact.hypot(*(fitted[:, :2] - exact.matmul(self.poses[i][:, :2], rigid.matrix.T) - rigid.shift).T)
+            miss = np.hypot(*(fitted[:, :2] - self.poses[i][:, :2] @ rigid.matrix.T - rigid.shift).T)
             off = np.abs(wrap_angle(fitted[:, 2] - self.poses[i][:, 2] - rigid.yaw))
             own = float((fitted[-1, 2] - fitted[0, 2]) - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
             whole = float(ways[i].turn - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
-            alike = np.mean(np.square(np.minimum(miss, FAR))) + HEADING * np.mean(1.0 - exact.cos(off))
+            alike = np.mean(np.square(np.minimum(miss, FAR))) + HEADING * np.mean(1.0 - np.cos(off))
             alike += _OWN_TURN * np.square(own) + WHOLE_TURN * np.square(whole)
             cost += float(alike) / len(members)
             turned = max(turned, float(off.mean()), abs(own) - OWN_SLACK)
@@ -180,5 +180,5 @@ def _least_squares(members: list[int], system: list[Equation]) -> dict[int, floa
         for i, factor in equation.terms:
             matrix[row, tied.index(i)] = equation.weight * factor
         value[row] = equation.weight * equation.value
-    solution = exact.lstsq(matrix, value)
+    solution = np.linalg.lstsq(matrix, value, rcond=None)[0]
     return {i: float(a) for i, a in zip(tied, solution, strict=True)}

@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.placement import Placement
-from scenario_gen.numerics import Bools, exact, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.roads import arms_of, unused_arms
 from scenario_gen.template import Conflict, find_conflicts, in_words, keeps, Track, turn_of, turns_to_keep
 from scenario_gen.types import Encounter, Loss, Road
@@ -166,7 +166,7 @@ def _lost_neighbours(encounter: Encounter, own: Floats, poses: Floats) -> list[L
 def _side(path: Floats, other: Floats, reach: float, wider: float = 0.0) -> Ints:
     """(T,) 1 where `other` (T, 3) is to the left of `path`, side by side and the same way, -1 to the right, 0 elsewhere."""
     d = other[:, :2] - path[:, :2]
-    cos, sin = exact.cos(path[:, 2]), exact.sin(path[:, 2])
+    cos, sin = np.cos(path[:, 2]), np.sin(path[:, 2])
     ahead, left = d[:, 0] * cos + d[:, 1] * sin, d[:, 1] * cos - d[:, 0] * sin
     same = np.abs(wrap_angle(other[:, 2] - path[:, 2])) < _SAME_WAY
     beside = same & (np.abs(ahead) < reach) & (np.abs(left) > _NEAREST) & (np.abs(left) < _FARTHEST + wider)

@@ -15,7 +15,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import find_unused, refuse_lost_turns
 from scenario_gen.method.fitting.placement import check_scale, Placement, separated, share_with_room
-from scenario_gen.numerics import exact, Floats, frozen, wrap_angle
+from scenario_gen.numerics import Floats, frozen, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import arms_of, footprint_fits, line_between, relative, reverse
 from scenario_gen.template import FrenetTracks, main_line, MainLine, manoeuvre_of, to_frenet, Track, turn_of
@@ -123,16 +123,16 @@ def _straight_axes(road: Road, tracks: tuple[Track, ...]) -> list[_Axis]:
         if any(_belongs(entry, axis) for axis in axes):
             continue
         yaw = float(entry[2])
-        normal = np.array([-exact.sin(yaw), exact.cos(yaw)])
+        normal = np.array([-np.sin(yaw), np.cos(yaw)])
         ahead_lanes, against = [], []
         for other, _ in through:
             turned = abs(float(wrap_angle(np.asarray(other[2] - yaw))))
-            offset = float(exact.matmul(other[:2] - entry[:2], normal))
+            offset = float((other[:2] - entry[:2]) @ normal)
             if turned < _PARALLEL:
                 ahead_lanes.append(offset)
             elif turned > np.pi - _PARALLEL:
                 against.append(offset)
-        end = entry + size * np.array([exact.cos(yaw), exact.sin(yaw), 0.0])
+        end = entry + size * np.array([np.cos(yaw), np.sin(yaw), 0.0])
         axes.append(_Axis(Curve(np.stack((entry, end))), frozen(sorted(ahead_lanes, reverse=True)), frozen(sorted(against))))
     return axes
 
@@ -180,4 +180,4 @@ def _blend(driven: Floats, change: Floats, s: Floats, width: float) -> Floats:
     reach = max((last - first) / 0.5, np.sqrt(width * 5.7735 / _SHIFT_CURVATURE), 1.0)
     middle = np.clip((first + last) / 2.0, min(reach / 2.0, s[-1] / 2.0), max(s[-1] - reach / 2.0, s[-1] / 2.0))
     x = np.clip((s - middle) / min(reach, s[-1]) + 0.5, 0.0, 1.0)
-    return np.asarray(exact.power(x, 3) * (10.0 - 15.0 * x + 6.0 * np.square(x)))
+    return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * np.square(x)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads import footprint_fits, nearest_pose_with_room
 from scenario_gen.template import separate, smallest_gaps, Track
 from scenario_gen.types import Loss, Road, Vehicle
@@ -101,8 +101,8 @@ def separated(placement: Placement, config: FittingConfig, *, sideways: float, o
 
 def rotated(points: Floats, yaw: float) -> Floats:
     """Turn points (M, 2) [m] about the origin by `yaw` [rad]."""
-    cos, sin = exact.cos(yaw), exact.sin(yaw)
-    return exact.matmul(points, np.array([[cos, sin], [-sin, cos]]))
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]))
 
 
 def has_room(road: Road, vehicle: Vehicle, poses: Floats) -> bool:

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.template import path_crossing, Track
 
@@ -80,7 +80,7 @@ def _on_path(pose: Floats, track: Track) -> float | None:
 def equations(relation: Relation, first: Curve, second: Curve, scale: float) -> tuple[Equation, ...] | None:
     """The relation on two routes as equations, or None if these routes do not have it."""
     a, b, la, lb = relation.a, relation.b, scale * relation.at_a, scale * relation.at_b
-    starts, ends = (float(exact.hypot(*(first.points[k, :2] - second.points[k, :2]))) for k in (0, -1))
+    starts, ends = (float(np.hypot(*(first.points[k, :2] - second.points[k, :2]))) for k in (0, -1))
     if relation.kind is Kind.SHARED_START:
         return None if starts > _SAME_END else (Equation(((a, 1.0), (b, -1.0)), lb - la, 2.0),)
     if relation.kind is Kind.SHARED_END:

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.method.routing.search.dubins import shortest_into, TURNS
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.types import Road, Vehicle
 
 SPACING = 0.2  # [m]
@@ -45,21 +45,21 @@ def candidates(start: Floats, end: Floats, limit: float) -> Iterator[Floats]:
 
 def hermite(start: Floats, end: Floats, stretch: float, limit: float) -> Floats | None:
     """A cubic Hermite curve as poses (P, 3), if it has no cusp and its curvature stays within the limit [1/m]."""
-    chord = float(exact.hypot(*(end - start)[:2]))
+    chord = float(np.hypot(*(end - start)[:2]))
     count = max(int(np.ceil(chord / SPACING)) + 1, 8)
     t = np.linspace(0.0, 1.0, count)[:, None]
-    a, b = (stretch * chord * np.array([exact.cos(pose[2]), exact.sin(pose[2])]) for pose in (start, end))
+    a, b = (stretch * chord * np.array([np.cos(pose[2]), np.sin(pose[2])]) for pose in (start, end))
     rise = end[:2] - start[:2]
     points = start[:2] + rise * np.square(t) * (3 - 2 * t) + a * t * np.square(1 - t) + b * np.square(t) * (t - 1)
     first = 6.0 * rise * t * (1 - t) + a * (1 - t) * (1 - 3 * t) + b * t * (3 * t - 2)
     second = 6.0 * rise * (1 - 2 * t) + a * (6 * t - 4) + b * (6 * t - 2)
-    speed = exact.hypot(*first.T)
+    speed = np.hypot(*first.T)
     if speed.min() < 0.1 * chord:
         return None
-    bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / exact.power(speed, 3)
+    bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3
     if bend.max() > limit:
         return None
-    return np.column_stack((points, exact.arctan2(first[:, 1], first[:, 0])))
+    return np.column_stack((points, np.arctan2(first[:, 1], first[:, 0])))
 
 
 def _by_an_arc(start: Floats, end: Floats, limit: float) -> Iterator[Floats]:
@@ -68,11 +68,11 @@ def _by_an_arc(start: Floats, end: Floats, limit: float) -> Iterator[Floats]:
     if not PARALLEL < abs(turn) < np.pi - PARALLEL:
         return
     d = end[:2] - start[:2]
-    cos, sin = exact.cos(start[2]), exact.sin(start[2])
+    cos, sin = np.cos(start[2]), np.sin(start[2])
     ahead, left = d[0] * cos + d[1] * sin, d[1] * cos - d[0] * sin
-    after = left / exact.sin(turn)  # from where the lines meet to the end
-    before = ahead - after * exact.cos(turn)
-    half = float(exact.tan(0.5 * abs(turn)))
+    after = left / np.sin(turn)  # from where the lines meet to the end
+    before = ahead - after * np.cos(turn)
+    half = float(np.tan(0.5 * abs(turn)))
     tightest, widest = 1.0 / limit, min(min(before, after) / half, WIDEST)
     steps = 0 if widest < tightest else max(math.ceil((widest - tightest) / 2.0), 1)
     for radius in np.linspace(widest, tightest, steps + 1) if steps else ():
@@ -91,9 +91,9 @@ def chained(start: Floats, parts: list[tuple[float, float]]) -> Floats:
         s = np.linspace(0.0, length, int(np.ceil(length / SPACING)) + 1)[1:]
         heading = yaw + curvature * s
         if curvature == 0.0:
-            piece = (x + s * exact.cos(yaw), y + s * exact.sin(yaw), heading)
+            piece = (x + s * np.cos(yaw), y + s * np.sin(yaw), heading)
         else:
-            sin, cos = (exact.sin(heading) - exact.sin(yaw)) / curvature, (exact.cos(heading) - exact.cos(yaw)) / curvature
+            sin, cos = (np.sin(heading) - np.sin(yaw)) / curvature, (np.cos(heading) - np.cos(yaw)) / curvature
             piece = (x + sin, y - cos, heading)
         poses.append(np.column_stack(piece))
     return np.concatenate(poses)

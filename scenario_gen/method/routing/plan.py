@@ -26,7 +26,7 @@ from scenario_gen.method.routing.search.planner import (  # fmt: skip
 from scenario_gen.method.routing.search.pose_planner import PlansPoses, PoseQuery, Wishes
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
-from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads import clearance_field, footprint_fits, nearest_pose_with_room, own_ground
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, Vehicle
 
@@ -117,7 +117,7 @@ def _on_own_lanes(task: _Task) -> Route:
 
 def deviations(route: Route, fitted: FittedVehicle) -> Floats:
     """How far [m] the route passes from each anchor: (K + 2,)."""
-    return np.asarray(exact.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
+    return np.asarray(np.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
 
 
 def make_planner(config: PlanningConfig) -> Planner:
@@ -133,7 +133,7 @@ def _route(task: _Task) -> Route:
                 f"{task.name(k)} is blocked: its footprint, {task.vehicle.length:.2f} m by {task.vehicle.width:.2f} m, "
                 f"has no room there on road {task.road.name!r}"
             )
-    if task.fitted.stands.all() or exact.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
+    if task.fitted.stands.all() or np.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
         return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1), joined=0, searched=0)
     waypoints = _waypoints(anchors, task.fitted.stands, task.config.max_curvature)
     if not task.config.drivable:
@@ -227,7 +227,7 @@ def _legs(task: _Task, waypoints: list[int]) -> tuple[list[_Leg], list[int], tup
 def _eased(task: _Task, before: Floats, pose: Floats, after: Floats) -> Floats:
     """A pose (3,) near to `pose` that heads from the waypoint before to the one after it, with some room around it."""
     onward = (after - before)[:2]
-    turned = np.array([pose[0], pose[1], exact.arctan2(onward[1], onward[0])])
+    turned = np.array([pose[0], pose[1], np.arctan2(onward[1], onward[0])])
     length, width = task.vehicle.length + 2.0 * EASE, task.vehicle.width + 2.0 * EASE
     roomy = nearest_pose_with_room(task.road, turned, length, width, FARTHEST)
     return pose if roomy is None else roomy[0]
@@ -248,12 +248,12 @@ def _waypoints(anchors: Floats, stands: Bools, limit: float) -> list[int]:
 def _leads(start: Floats, end: Floats, limit: float) -> bool:
     """Whether `end` lies ahead of `start`, both seen from their headings, without a turn much sharper than `limit`."""
     dx, dy = (end - start)[:2]
-    chord = float(exact.hypot(dx, dy))
+    chord = float(np.hypot(dx, dy))
     if chord < CLOSE:
         return False
     for yaw in (start[2], end[2]):
-        off = abs(float((exact.arctan2(dy, dx) - yaw + np.pi) % (2.0 * np.pi) - np.pi))
-        if off > SHARP or 2.0 * exact.sin(min(off, 0.5 * np.pi)) / chord > SLACK * limit:
+        off = abs(float((np.arctan2(dy, dx) - yaw + np.pi) % (2.0 * np.pi) - np.pi))
+        if off > SHARP or 2.0 * np.sin(min(off, 0.5 * np.pi)) / chord > SLACK * limit:
             return False
     return True
 
@@ -266,8 +266,8 @@ def _weights(anchors: Floats, waypoints: list[int]) -> Floats:
         chord = (anchors[b] - anchors[a])[:2]
         for k in range(a + 1, b):
             from_a, to_b = (anchors[k] - anchors[a])[:2], (anchors[b] - anchors[k])[:2]
-            between = exact.matmul(from_a, chord) > 0.0 and exact.matmul(to_b, chord) > 0.0
-            if between and min(exact.hypot(*from_a), exact.hypot(*to_b)) > CLOSE:
+            between = from_a @ chord > 0.0 and to_b @ chord > 0.0
+            if between and min(np.hypot(*from_a), np.hypot(*to_b)) > CLOSE:
                 weight[k] = SOFT_WEIGHT
     return weight
 
@@ -293,14 +293,14 @@ def _fitted_piece(task: _Task, start: Floats, end: Floats) -> Floats | None:
     path = task.fitted.path
     if len(path) < 2:
         return None
-    first, last = (int(np.argmin(exact.hypot(*(path - pose)[:, :2].T))) for pose in (start, end))
+    first, last = (int(np.argmin(np.hypot(*(path - pose)[:, :2].T))) for pose in (start, end))
     if last - first < 2:
         return None
     poses = np.vstack([start[None], path[first + 1 : last], end[None]])
     if max(distances_to_line(np.stack([start, end]), path)) > ON_PATH:
         return None
-    step = exact.hypot(*np.diff(poses[:, :2], axis=0).T)
-    bend = np.abs(wrap_angle(np.diff(path[first : last + 1, 2]))) / exact.hypot(*np.diff(path[first : last + 1, :2], axis=0).T)
+    step = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    bend = np.abs(wrap_angle(np.diff(path[first : last + 1, 2]))) / np.hypot(*np.diff(path[first : last + 1, :2], axis=0).T)
     if bend.max() > task.config.max_curvature or step.min() < 1e-6:
         return None
     free = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
@@ -357,7 +357,7 @@ def _sides(config: PlanningConfig, against: float, away: float) -> tuple[float, 
 def _own_side(guide: Floats, config: PlanningConfig) -> Floats:
     """Poses on a guide (G, 3), and some metres beside it, away from oncoming traffic."""
     sign = 1.0 if config.traffic_side == "right" else -1.0
-    aside = sign * np.column_stack((exact.sin(guide[:, 2]), -exact.cos(guide[:, 2]), np.zeros(len(guide))))
+    aside = sign * np.column_stack((np.sin(guide[:, 2]), -np.cos(guide[:, 2]), np.zeros(len(guide))))
     return np.concatenate([guide + metres * aside for metres in (0.0, 1.0, 2.0, 3.0)])
 
 
@@ -423,7 +423,7 @@ def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
     nearest = monotone_matching(per_group)
     offset = task.anchors[:, :2] - poses[nearest[group], :2]
     yaw = poses[nearest[group], 2]
-    ahead = np.bincount(group, offset[:, 0] * exact.cos(yaw) + offset[:, 1] * exact.sin(yaw)) / np.bincount(group)
+    ahead = np.bincount(group, offset[:, 0] * np.cos(yaw) + offset[:, 1] * np.sin(yaw)) / np.bincount(group)
     step = length[1] if len(length) > 1 else 0.0
     refined = length[nearest] + np.clip(ahead, -step, step)  # between the dense points
     refined[0], refined[-1] = 0.0, length[-1]
@@ -435,8 +435,8 @@ def _polyline(task: _Task, waypoints: list[int]) -> Route:
     legs = [_searched(task, a, b) for a, b in itertools.pairwise(waypoints)]
     path = np.concatenate([legs[0]] + [leg[1:] for leg in legs[1:]])
     edge = np.diff(path, axis=0)
-    at = np.concatenate(([0.0], np.cumsum(exact.hypot(*edge.T))))
-    yaw = np.unwrap(exact.arctan2(edge[:, 1], edge[:, 0]))
+    at = np.concatenate(([0.0], np.cumsum(np.hypot(*edge.T))))
+    yaw = np.unwrap(np.arctan2(edge[:, 1], edge[:, 0]))
 
     def poses_at(length: Floats) -> Floats:
         which = np.clip(np.searchsorted(at, length, side="right") - 1, 0, len(yaw) - 1)
@@ -457,5 +457,5 @@ def _reason(task: _Task, curve: Curve) -> str:
     if len(curve.off_road):
         where = curve.off_road[len(curve.off_road) // 2, :2]
         reasons.append(f"its footprint leaves the road at ({where[0]:.2f}, {where[1]:.2f}) m")
-    nearest = task.name(int(np.argmin(exact.hypot(*(task.anchors[:, :2] - where).T))))
+    nearest = task.name(int(np.argmin(np.hypot(*(task.anchors[:, :2] - where).T))))
     return f"no drivable route for vehicle {task.vehicle.id} on road {task.road.name!r} near {nearest}: " + "; ".join(reasons)

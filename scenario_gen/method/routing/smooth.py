@@ -12,17 +12,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from scenario_gen.method.routing.band import relax
 from scenario_gen.method.routing.config import PlanningConfig
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.roads import clearance_field
 from scenario_gen.types import Road, Vehicle
 
 ROUNDS, STEPS = 40, 8  # the band is resampled between rounds
-BEND = exact.power(4.0, 4)  # [m^4] with hold = 1 a kink spreads over about 4 m
+BEND = 4.0**4  # [m^4] with hold = 1 a kink spreads over about 4 m
 ANCHOR_WEIGHT = 200.0  # weight of an anchor
 DISCS = 5  # that cover a footprint
 TAPER = 0.05  # how fast the wanted clearance rises from what there is at the ends
@@ -49,7 +50,7 @@ class Targets:
 class Curve:
     """A verified or failed curve: the spline over `knots` (G,) [m], and what is wrong with it."""
 
-    spline: exact.CubicSpline
+    spline: CubicSpline
     end: float
     curvature: float
     sharpest: Floats  # (2,) where that is
@@ -58,8 +59,8 @@ class Curve:
     @cached_property
     def _arc(self) -> tuple[Floats, Floats]:
         u = np.linspace(0.0, self.end, int(np.ceil(self.end / CHECK)) + 1)
-        speed = exact.hypot(*self.spline(u, 1).T)
-        middle = exact.hypot(*self.spline(0.5 * (u[1:] + u[:-1]), 1).T)
+        speed = np.hypot(*self.spline(u, 1).T)
+        middle = np.hypot(*self.spline(0.5 * (u[1:] + u[:-1]), 1).T)
         pieces = np.diff(u) * (speed[:-1] + 4.0 * middle + speed[1:]) / 6.0  # Simpson
         return u, np.concatenate(([0.0], np.cumsum(pieces)))
 
@@ -72,7 +73,7 @@ class Curve:
         """Poses (M, 3) at arc lengths (M,); yaw unwrapped."""
         u = np.interp(length, self._arc[1], self._arc[0])
         slope = self.spline(u, 1)
-        return np.column_stack((self.spline(u), np.unwrap(exact.arctan2(slope[:, 1], slope[:, 0]))))
+        return np.column_stack((self.spline(u), np.unwrap(np.arctan2(slope[:, 1], slope[:, 0]))))
 
 
 def smooth(
@@ -93,7 +94,7 @@ def smooth(
         The first curve within the limits; if there is none, the last one, with what is wrong about it.
     """
     disc = (np.arange(DISCS) - 0.5 * (DISCS - 1)) * vehicle.length / DISCS
-    cover = float(exact.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS))
+    cover = float(np.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS))
     headings = np.stack([_ahead(start), _ahead(end)])
     guess = resampled(guess, config.spacing)
     points = guess.points
@@ -129,14 +130,14 @@ def smooth(
 def _room(road: Road, points: Floats, disc: Floats) -> Floats:
     """Clearance (G, D) [m] of the discs of a footprint along a polyline (G, 2) [m]."""
     tangent = np.gradient(points, axis=0)
-    tangent /= np.maximum(exact.hypot(*tangent.T), 1e-9)[:, None]
+    tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
     row, column, inside = road.cells(points[:, None] + disc[None, :, None] * tangent[:, None])
     return np.where(inside, clearance_field(road)[row, column], 0.0)
 
 
 def _ahead(pose: Floats) -> Floats:
     """Unit vector of a pose's heading."""
-    return np.array([exact.cos(pose[2]), exact.sin(pose[2])])
+    return np.array([np.cos(pose[2]), np.sin(pose[2])])
 
 
 def _wished(road: Road, disc: Floats, wish: float, start: Floats, end: Floats, spacing: float, count: int) -> Floats:
@@ -152,13 +153,13 @@ def _wished(road: Road, disc: Floats, wish: float, start: Floats, end: Floats, s
 
 def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: Floats) -> Curve:
     """Lay the clamped spline through the band (G, 2) [m], from pose to pose (3,), and measure it."""
-    knots = np.concatenate(([0.0], np.cumsum(exact.hypot(*np.diff(points, axis=0).T))))
-    spline = exact.cubic_spline(knots, points, (_ahead(start), _ahead(end)))
+    knots = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    spline = CubicSpline(knots, points, bc_type=((1, _ahead(start)), (1, _ahead(end))))
     u = np.linspace(0.0, knots[-1], int(np.ceil(knots[-1] / CHECK)) + 1)
     first, second = spline(u, 1), spline(u, 2)
-    bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / exact.power(exact.hypot(*first.T), 3)
-    poses = np.column_stack((spline(u), exact.arctan2(first[:, 1], first[:, 0])))
-    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(exact.hypot(*np.diff(poses[:, :2], axis=0).T), 1e-6)
+    bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.hypot(*first.T) ** 3
+    poses = np.column_stack((spline(u), np.arctan2(first[:, 1], first[:, 0])))
+    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(np.hypot(*np.diff(poses[:, :2], axis=0).T), 1e-6)
     bend[1:] = np.maximum(bend[1:], turned)  # a cusp on a straight line has no curvature, but turns round
     poses[0], poses[-1] = start, end
     fits = sweep_is_free(road, poses, vehicle.length, vehicle.width)[:, 0] > 0.0
@@ -167,7 +168,7 @@ def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: F
 
 def resampled(guess: Guess, spacing: float, count: int | None = None) -> Guess:
     """The polyline at equal distances of about `spacing` (or with `count` points)."""
-    step = exact.hypot(*np.diff(guess.points, axis=0).T)
+    step = np.hypot(*np.diff(guess.points, axis=0).T)
     at = np.concatenate(([0.0], np.cumsum(step)))
     count = count or max(int(np.ceil(at[-1] / spacing)) + 1, 8)
     s = np.linspace(0.0, at[-1], count)

@@ -18,7 +18,7 @@ from scenario_gen.method.sampling.freedom import Freedom, onward, seconds_onward
 from scenario_gen.method.sampling.path import BasePath, states
 from scenario_gen.method.sampling.speed_profile.model import SpeedModel
 from scenario_gen.method.sampling.time_warp import Clock, DT, template_times
-from scenario_gen.numerics import Bools, exact, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.types import Scenario, Vehicle
 
 _APART = 0.05  # m, from which on two poses tell a curvature
@@ -62,7 +62,7 @@ class VehicleModel:
     def draw(self, z: Floats, scale: Scale, shared: Clock, nominal: Clock) -> "_Drawn":
         """Draw S candidates of this vehicle from numbers z (S, size), on the clocks that all share."""
         across, along = self.lateral_root.shape[1], self.lateral_root.shape[1] + self.speed.size
-        deviation = exact.matmul(scale.lateral * z[:, :across], self.lateral_root.T)
+        deviation = (scale.lateral * z[:, :across]) @ self.lateral_root.T
         clock, vehicles, faster = shared, [self.vehicle] * len(z), np.zeros((len(z), 2))
         if self.freedom is not None:
             free = z[:, along:]
@@ -86,7 +86,7 @@ class VehicleModel:
 
 def curvature(two: Floats) -> Floats:
     """Curvature (S,) [1/m] between two states (S, 2, 5) that follow each other."""
-    apart = exact.hypot(*(two[:, 1, :2] - two[:, 0, :2]).T)
+    apart = np.hypot(*(two[:, 1, :2] - two[:, 0, :2]).T)
     return np.asarray(np.where(apart > _APART, wrap_angle(two[:, 1, 2] - two[:, 0, 2]) / np.maximum(apart, _APART), 0.0))
 
 

@@ -6,11 +6,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.gp import Features, Observations, Regression
+from scenario_gen.method.sampling.gp import Features, Observations, principal, Regression
 from scenario_gen.method.sampling.path import BasePath
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.roads import along_lanes
 from scenario_gen.types import Road, Vehicle
 
@@ -72,7 +73,7 @@ class Steering:
         width = 2 * round(0.5 * _COURSE / dt) + 1
         course = yaw
         for _ in range(2):
-            course = exact.moving_mean(course, width)
+            course = ndimage.uniform_filter1d(course, width, mode="nearest")
         inside = np.flatnonzero(speed[width : len(yaw) - width] > _MOVES) + width
         if len(inside) < width:
             return cls(0.0, 1.0, driven, passed)
@@ -119,7 +120,7 @@ def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig
     seen = Observations(x, np.zeros(len(x)), noise, (0, 0, 1, 1, *(0 for _ in inside)))
     factor = Regression(Features(0.0, path.length, sigma, length), seen).predict(path.arc).factor
     factor = np.hstack([factor, config.steering * steering.root(path.arc)])
-    return np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)[:, None] * exact.compact(factor, 1e-6 * sigma)
+    return np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)[:, None] * principal(factor, 1e-6 * sigma)
 
 
 def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> Floats:
@@ -129,7 +130,7 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
     ahead and behind, such as the edge of the map where a vehicle enters, does not count.
     """
     flank = np.linspace(-0.5, 0.5, int(np.ceil(vehicle.length / _FLANK_STEP)) + 1) * vehicle.length
-    ahead = np.stack([exact.cos(path.node[:, 2]), exact.sin(path.node[:, 2])], axis=-1)[:, None, :]
+    ahead = np.stack([np.cos(path.node[:, 2]), np.sin(path.node[:, 2])], axis=-1)[:, None, :]
     left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
     axis = path.node[:, None, :2] + flank[:, None] * ahead
     room, free = np.zeros(len(path.node)), np.ones(len(path.node), dtype=np.bool_)
@@ -138,10 +139,10 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
             free &= road.drivable_at(axis + side * left).all(axis=1)
         room[free] = min(step, most)
     reach = int(np.ceil(_SMOOTHING / max(path.spacing, 1e-9))) if len(room) > 1 else 0
-    smooth = exact.moving_min(room, 4 * reach + 1)
+    smooth = ndimage.minimum_filter1d(room, 4 * reach + 1, mode="nearest")
     for _ in range(2):
-        smooth = exact.moving_mean(smooth, 2 * reach + 1)
-    return smooth
+        smooth = ndimage.uniform_filter1d(smooth, 2 * reach + 1, mode="nearest")
+    return np.asarray(smooth)
 
 
 def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Floats:
@@ -154,7 +155,7 @@ def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Fl
         return metres
     for end, sign in ((0, -1.0), (-1, 1.0)):
         x, y, yaw = path.node[end].tolist()
-        ahead = np.array([float(exact.cos(yaw)), float(exact.sin(yaw))])
+        ahead = np.array([float(np.cos(yaw)), float(np.sin(yaw))])
         step = np.arange(_FLANK_STEP, most[end] + 0.5 * vehicle.length + _FLANK_STEP, _FLANK_STEP)
         side = np.array([-0.5, 0.0, 0.5]) * (vehicle.width + 2.0 * _SIDE)
         points = np.array([x, y]) + sign * step[:, None, None] * ahead + side[:, None] * np.array([-ahead[1], ahead[0]])
@@ -171,5 +172,5 @@ def soft_clipped(deviation: Floats, room: Floats) -> Floats:
     share = np.abs(deviation) / np.maximum(room, 1e-9)
     if (share <= BEND_FROM_SHARE).all():
         return deviation
-    bent = BEND_FROM_SHARE + (1.0 - BEND_FROM_SHARE) * exact.tanh((share - BEND_FROM_SHARE) / (1.0 - BEND_FROM_SHARE))
+    bent = BEND_FROM_SHARE + (1.0 - BEND_FROM_SHARE) * np.tanh((share - BEND_FROM_SHARE) / (1.0 - BEND_FROM_SHARE))
     return np.asarray(np.where(share <= BEND_FROM_SHARE, deviation, np.sign(deviation) * bent * room))

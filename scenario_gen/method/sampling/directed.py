@@ -18,9 +18,10 @@ from dataclasses import dataclass, field
 import math
 
 import numpy as np
+from scipy import linalg, special
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import Cause, Encounter, Measure, Pair, Scenario, Target, UNITS
 
 NATURAL_SHARE = 0.1  # of the proposal's candidates that are drawn as without a target
@@ -126,16 +127,16 @@ class Proposal:
 
     def moved(self, z: Floats, chooser: Floats) -> Floats:
         """Return samples (S, d) of standard normal numbers z (S, d) and chooser (S,), which says who stays natural."""
-        u = exact.matmul(z, self.basis.T)
-        step = exact.matmul(self.mean + (self.sigma - 1.0) * u, self.basis)
-        natural = exact.ndtr(chooser) < NATURAL_SHARE
+        u = z @ self.basis.T
+        step = (self.mean + (self.sigma - 1.0) * u) @ self.basis
+        natural = special.ndtr(chooser) < NATURAL_SHARE
         return np.where(natural[:, None], z, z + step)
 
     def ratio(self, z: Floats) -> Floats:
         """Return q(z) / phi(z) (S,), a plain number, at samples z (S, d)."""
-        u = exact.matmul(z, self.basis.T)
+        u = z @ self.basis.T
         power = 0.5 * (np.square(u) - np.square((u - self.mean) / self.sigma)).sum(axis=1)
-        return np.asarray(NATURAL_SHARE + (1.0 - NATURAL_SHARE) * exact.exp(np.minimum(power, 600.0)) / np.prod(self.sigma))
+        return np.asarray(NATURAL_SHARE + (1.0 - NATURAL_SHARE) * np.exp(np.minimum(power, 600.0)) / np.prod(self.sigma))
 
     def weights(self, z: Floats) -> Floats:
         """Return the importance weights phi(z) / q(z) (S,), at most 1 / NATURAL_SHARE."""
@@ -238,9 +239,9 @@ class Seen:
             mixture += len(own) / len(z) * (1.0 if proposal is None else proposal.ratio(z[elite]))
         weight = 1.0 / mixture
         weight /= weight.sum()
-        u = exact.matmul(z[elite], basis.T)
-        mean = exact.matmul(weight, u)
-        spread = np.sqrt(exact.matmul(weight, np.square(u - mean)))
+        u = z[elite] @ basis.T
+        mean = weight @ u
+        spread = np.sqrt(weight @ np.square(u - mean))
         return Proposal(basis, mean, np.clip(_SPREAD * spread, _LEAST, _MOST))
 
 
@@ -267,13 +268,13 @@ def directions(z: Floats, guides: Floats) -> Floats:
         prior = np.full(rows.shape[1], 1.0 / rows.shape[1])
         for _ in range(_PASSES):
             scaled = rows * prior
-            kernel = exact.matmul(scaled, rows.T) * variance
+            kernel = (scaled @ rows.T) * variance
             kernel[np.diag_indices(len(kernel))] += _RIDGE * variance
-            beta = variance * exact.matmul(scaled.T, exact.solve_positive(kernel, response))
+            beta = variance * (scaled.T @ linalg.solve(kernel, response, assume_a="pos"))
             square = np.square(beta) + 1e-4 * float(np.square(beta).max())
             prior = square / square.sum()
         for other in found:
-            beta = beta - exact.dot(beta, other) * other
+            beta = beta - (beta @ other) * other
         length = float(np.sqrt(np.square(beta).sum()))
         if length > 1e-9:
             found.append(beta / length)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 
 POOL_SHARE = 10  # valid candidates that are drawn per scenario wanted
 FAR = 100.0  # bins to which what is infinite is taken
@@ -50,5 +50,5 @@ def _distance(points: Floats, centre: Floats) -> Floats:
     step = points - centre
     total = np.zeros(len(points))
     for column in step.T:
-        total = exact.hypot(total, column)
+        total = np.hypot(total, column)
     return total

@@ -14,10 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import special
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.time_warp import Clock, LONGEST_SHARE, SHORTEST_SHARE
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import BoundaryStates, Encounter, Request, Vehicle
 
 CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
@@ -39,8 +40,8 @@ _FASTEST = 0.5  # m/s by which a speed may leave what the template has near its 
 
 def cut(z: Floats, bound: float) -> Floats:
     """Standard normal numbers (any shape) cut at +-bound: truncated normal ones with the same probability."""
-    low = exact.ndtr(np.array(-bound))
-    return np.asarray(exact.ndtri(low + (1.0 - 2.0 * low) * exact.ndtr(z)))
+    low = special.ndtr(np.array(-bound))
+    return np.asarray(special.ndtri(low + (1.0 - 2.0 * low) * special.ndtr(z)))
 
 
 def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request) -> BoundaryStates:
@@ -159,11 +160,11 @@ class OwnClock:
         off = scale * self.sigma * cut(z, self.bound)
         waits = np.clip(off[:, 2:], self.low, self.high)
         rate = off[:, :1] * self.shift_rate + off[:, 1:2] * self.pace_rate
-        runs = shared.rate + exact.matmul(waits, self.made_up)
+        runs = shared.rate + waits @ self.made_up
         room = np.where(rate < 0.0, runs - SHORTEST_SHARE * nominal.rate, LONGEST_SHARE * nominal.rate - runs)
         damped = np.clip((np.maximum(room, 0.0) / np.maximum(np.abs(rate), 1e-9)).min(axis=1), 0.0, 1.0)[:, None]
-        time = shared.time + damped * (off[:, :1] * self.shift + off[:, 1:2] * self.pace) + exact.matmul(waits, self.waits)
-        return Clock(shared.grid, time, shared.rate + damped * rate + exact.matmul(waits, self.wait_rates))
+        time = shared.time + damped * (off[:, :1] * self.shift + off[:, 1:2] * self.pace) + waits @ self.waits
+        return Clock(shared.grid, time, shared.rate + damped * rate + waits @ self.wait_rates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +205,7 @@ class Freedom:
         """The vehicle in the size that each of the numbers z (S,) chooses."""
         if len(self.sizes) == 0:
             return [own] * len(z)
-        chosen = np.minimum((exact.ndtr(z) * len(self.sizes)).astype(np.int64), len(self.sizes) - 1)
+        chosen = np.minimum((special.ndtr(z) * len(self.sizes)).astype(np.int64), len(self.sizes) - 1)
         return [replace(own, length=float(length), width=float(width)) for length, width in self.sizes[chosen].tolist()]
 
 
@@ -219,11 +220,11 @@ def onward(state: Floats, bend: Floats, since: Floats, sign: float) -> Floats:
     """
     x, y, yaw, speed, acceleration = (column[:, None] for column in state.T)
     gains, fades = sign * acceleration, _fades(state, sign)[:, None]
-    left = exact.exp(-since / fades)
+    left = np.exp(-since / fades)
     driven = speed * since + gains * fades * (2.0 * since - 3.0 * fades + (3.0 * fades + since) * left)
     out = np.empty((*since.shape, 5))
     turned, along, aside = _eased(sign * bend[:, None], driven)
-    cos, sin = exact.cos(yaw), exact.sin(yaw)
+    cos, sin = np.cos(yaw), np.sin(yaw)
     out[..., 0], out[..., 1] = x + sign * (along * cos - aside * sin), y + sign * (along * sin + aside * cos)
     out[..., 2], out[..., 3] = yaw + turned, speed + gains * (2.0 * fades - (2.0 * fades + since) * left)
     out[..., 4] = acceleration * (1.0 + since / fades) * left
@@ -236,11 +237,11 @@ def _eased(bend: Floats, driven: Floats) -> tuple[Floats, Floats, Floats]:
     along, aside = np.zeros_like(driven), np.zeros_like(driven)
     for node, weight in zip(_GAUSS_NODES.tolist(), _GAUSS_WEIGHTS.tolist(), strict=True):
         part = curved * (0.5 + 0.5 * node)
-        turned = bend * EASES * (1.0 - exact.exp(-part / EASES))
-        along, aside = along + 0.5 * weight * curved * exact.cos(turned), aside + 0.5 * weight * curved * exact.sin(turned)
-    turned = bend * EASES * (1.0 - exact.exp(-curved / EASES))
+        turned = bend * EASES * (1.0 - np.exp(-part / EASES))
+        along, aside = along + 0.5 * weight * curved * np.cos(turned), aside + 0.5 * weight * curved * np.sin(turned)
+    turned = bend * EASES * (1.0 - np.exp(-curved / EASES))
     rest = driven - curved
-    return turned, along + rest * exact.cos(turned), aside + rest * exact.sin(turned)
+    return turned, along + rest * np.cos(turned), aside + rest * np.sin(turned)
 
 
 def _fades(state: Floats, sign: float) -> Floats:

@@ -9,22 +9,44 @@ covariance (Rasmussen & Williams, Gaussian Processes for Machine Learning, §2.7
 
 On an interval the kernel is numerically of low rank: k(x, x') = φ(x)ᵀφ(x') to rounding, φ built from r Chebyshev nodes.
 Regression is then least squares in r + p + 1 weights. Observations without noise are equality constraints and are
-eliminated by an orthonormal basis of their null space; the rest is one QR factorisation. No matrix is ever squared and
-none needs a jitter: mean and covariance agree with a dense reference to rounding, at a cost of O(n r² + m r S).
+eliminated by an orthonormal basis of their null space; the rest is one QR factorisation. None needs a jitter: mean and
+covariance agree with a dense reference to rounding, at a cost of O(n r² + m r S).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from scipy import linalg
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
+
+RELATIVE_RANK = 1e-15  # of the largest variance: what is below is rounding
 
 
 def squared_exponential(a: Floats, b: Floats, sigma: float, length: float) -> Floats:
     """Kernel matrix (n, m) of eq 14 for a (n,) and b (m,): sigma² exp(-(a - b)² / (2 length²))."""
-    return np.asarray(np.square(sigma) * exact.exp(-0.5 * np.square((a[:, None] - b[None, :]) / length)))
+    return np.asarray(np.square(sigma) * np.exp(-0.5 * np.square((a[:, None] - b[None, :]) / length)))
+
+
+def covariance_root(covariance: Floats) -> Floats:
+    """Return an f (n, r) with f fᵀ = covariance (n, n), positive semidefinite, to rounding; r is the numerical rank."""
+    variance, direction = np.linalg.eigh(covariance)
+    carries = variance > RELATIVE_RANK * variance.max(initial=0.0)
+    return np.asarray(direction[:, carries] * np.sqrt(variance[carries]))
+
+
+def principal(factor: Floats, tolerance: float) -> Floats:
+    """Return the principal directions (n, c) of a Gaussian with the covariance factor factorᵀ, factor (n, r), largest first.
+
+    They depend on the covariance alone: whatever basis the factor comes in, on any CPU, the same standard normal numbers give
+    the same draw. Those with a standard deviation of at most `tolerance` are left out; the sign of each is fixed.
+    """
+    direction, deviation, _ = np.linalg.svd(factor, full_matrices=False)
+    direction = direction[:, deviation > tolerance]
+    sign = np.where((direction / np.arange(1.0, len(direction) + 1.0)[:, None]).sum(axis=0) < 0.0, -1.0, 1.0)
+    return np.asarray(direction * sign * deviation[deviation > tolerance])
 
 
 class Features:
@@ -45,13 +67,13 @@ class Features:
         self.low, self.high, self.degree = low, high, degree
         ratio = (high - low) / length
         n = 20 + int(np.ceil(3.0 * ratio))
-        node = exact.cos(np.pi * (np.arange(n) + 0.5) / n)
+        node = np.cos(np.pi * (np.arange(n) + 0.5) / n)
         kernel = squared_exponential(node, node, sigma, 2.0 / ratio)
-        root = exact.root(kernel)
+        root = covariance_root(kernel)
         # Values at the nodes -> Chebyshev coefficients, by the discrete orthogonality of T_j on these nodes.
         transform = chebyshev.chebvander(node, n - 1).T * (2.0 / n)
         transform[0] *= 0.5
-        self._coefficients = exact.matmul(transform, root)
+        self._coefficients = transform @ root
 
     @property
     def rank(self) -> int:
@@ -62,12 +84,12 @@ class Features:
         """Features (m, rank + degree + 1) at x (m,), or their derivative of that order."""
         scale = 2.0 / (self.high - self.low)
         u = scale * (np.asarray(x, dtype=np.float64) - self.low) - 1.0
-        power = exact.power(scale, derivative)
+        power = scale**derivative
         coefficients = chebyshev.chebder(self._coefficients, derivative) * power if derivative else self._coefficients
-        columns = [exact.matmul(chebyshev.chebvander(u, coefficients.shape[0] - 1), coefficients)]
+        columns = [chebyshev.chebvander(u, coefficients.shape[0] - 1) @ coefficients]
         if self.degree >= 0:
             mean = np.polynomial.legendre.legder(np.eye(self.degree + 1), derivative) if derivative else np.eye(self.degree + 1)
-            columns.append(exact.matmul(np.polynomial.legendre.legvander(u, mean.shape[0] - 1), mean) * power)
+            columns.append((np.polynomial.legendre.legvander(u, mean.shape[0] - 1) @ mean) * power)
         return np.hstack(columns)
 
 
@@ -115,11 +137,11 @@ class Posterior:
     @property
     def covariance(self) -> Floats:
         """(m, m) covariance."""
-        return exact.matmul(self.factor, self.factor.T)
+        return self.factor @ self.factor.T
 
     def sample(self, z: Floats) -> Floats:
         """Curves (S, m) from standard normal numbers z (S, r)."""
-        return self.mean + exact.matmul(z, self.factor.T)
+        return self.mean + z @ self.factor.T
 
 
 class Regression:
@@ -145,18 +167,18 @@ class Regression:
         certain = seen.noise == 0.0
         noisy, y, noise = rows[~certain], seen.y[~certain], seen.noise[~certain]
         start, basis = _constrained(rows[certain], seen.y[certain], width)
-        stacked = np.vstack([exact.matmul(noisy / noise[:, None], basis), basis[: width - p]])
-        target = np.concatenate([(y - exact.matmul(noisy, start)) / noise, -start[: width - p]])
-        q, r, _ = exact.qr(stacked)
+        stacked = np.vstack([(noisy / noise[:, None]) @ basis, basis[: width - p]])
+        target = np.concatenate([(y - noisy @ start) / noise, -start[: width - p]])
+        q, r = np.linalg.qr(stacked)
         if r.shape[0] < r.shape[1] or np.abs(np.diag(r)).min(initial=np.inf) < 1e-13 * np.abs(r).max(initial=0.0):
             raise InputError(f"{len(seen.x)} observations are too few for a mean of degree {features.degree}")
-        self._weights = start + exact.matmul(basis, exact.solve_triangular(r, exact.matmul(q.T, target)))
-        self._root = exact.solve_triangular(r, basis.T, transposed=True).T  # basis·r⁻¹
+        self._weights = start + basis @ linalg.solve_triangular(r, q.T @ target)
+        self._root = linalg.solve_triangular(r, basis.T, trans="T").T  # basis·r⁻¹
 
     def predict(self, x: Floats, derivative: int = 0) -> Posterior:
         """The posterior of f, or of its derivative of that order, at x (m,)."""
         rows = self.features(x, derivative)
-        return Posterior(exact.matmul(rows, self._weights), exact.matmul(rows, self._root))
+        return Posterior(rows @ self._weights, rows @ self._root)
 
 
 def _constrained(rows: Floats, values: Floats, width: int) -> tuple[Floats, Floats]:
@@ -164,8 +186,8 @@ def _constrained(rows: Floats, values: Floats, width: int) -> tuple[Floats, Floa
     if len(rows) == 0:
         return np.zeros(width), np.eye(width)
     norm = np.sqrt(np.square(rows).sum(axis=1))
-    q, r, _ = exact.qr((rows / norm[:, None]).T, full=True)
+    q, r = np.linalg.qr((rows / norm[:, None]).T, mode="complete")
     c = len(rows)
     if c > width or np.abs(np.diag(r)).min() < 1e-12:
         raise InputError("two exact observations of a Gaussian process repeat or contradict one another")
-    return exact.matmul(q[:, :c], exact.solve_triangular(r[:c], values / norm, transposed=True)), q[:, c:]
+    return q[:, :c] @ linalg.solve_triangular(r[:c], values / norm, trans="T"), q[:, c:]

@@ -17,7 +17,7 @@ lag and gain g of the edge:
 - yielder y, first o: ℓ_y(leaves)ᵀz_y − [ℓ_o(clears) − d_o(clears) / v_o]ᵀz_o = ε, 0.6 s.
 
 Given the numbers of the vehicles it reacts to, those of a vehicle are again Gaussian. With the whitened equations
-A z + B z_others = η, Aᵀ = QR and WWᵀ = I + RRᵀ they are z = ε + Q (W⁻ᵀ − I) Qᵀ ε − Q (I + RRᵀ)⁻¹ R B z_others. So all numbers
+A z + B z_others = η and A = U S Vᵀ they are z = ε + V ((I + S²)^−½ − I) Vᵀ ε − V S (I + S²)⁻¹ Uᵀ B z_others. So all numbers
 follow from independent ones, ε, vehicle by vehicle in the order of the graph. A vehicle that reacts to nobody keeps its own ε.
 """
 
@@ -25,10 +25,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from scenario_gen.method.sampling.candidates import Scale, VehicleModel
 from scenario_gen.method.sampling.time_warp import Clock
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import FOLLOW, Reaction, ReactionGraph
 
 _STEP, _MOST = 0.8, 60  # [s] between the equations of a follower; largest number of them
@@ -91,7 +92,7 @@ class Mixing:
         """Numbers (S, size) of candidates from independent ones (S, size)."""
         z = eps.copy()
         for step in self.steps:
-            z[:, step.own] += exact.matmul(exact.matmul(z, step.into), step.out)
+            z[:, step.own] += z @ step.into @ step.out
         return z
 
 
@@ -99,22 +100,18 @@ def _step(n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[int]
     """The numbers of vehicle n given equations (rows, covariance of residuals): rows times numbers, plus residual, are 0."""
     own, others, k = [], [], 0
     for rows, covariance in equations:
-        root = np.ascontiguousarray(exact.cholesky(covariance).T)
         whole = np.zeros((len(covariance), first[-1]))
         for m, row in rows.items():
             whole[:, first[m] : first[m + 1]] += row
-        white = exact.solve_triangular(root, whole, transposed=True)
+        white = linalg.solve_triangular(np.linalg.cholesky(covariance), whole, lower=True)
         own.append(white[:, first[n] : first[n + 1]].copy())
         white[:, first[n] : first[n + 1]] = 0.0
         others.append(white)
         k += len(white)
-    q, r, _ = exact.qr(np.vstack(own).T)
-    upper = np.ascontiguousarray(exact.cholesky(np.eye(len(r)) + exact.matmul(r, r.T)).T)
-    inverse = exact.solve_triangular(upper, np.eye(len(r)))  # of the root of the remaining covariance
-    pull = exact.matmul(exact.matmul(inverse, inverse.T), r)
-    into = -exact.matmul(np.vstack(others).T, pull.T)
-    into[first[n] : first[n + 1]] = exact.matmul(q, (inverse - np.eye(len(r))).T)
-    return Step(slice(first[n], first[n + 1]), into, np.ascontiguousarray(q.T))
+    u, s, v = np.linalg.svd(np.vstack(own), full_matrices=False)
+    into = -np.vstack(others).T @ (u * (s / (1.0 + np.square(s))))
+    into[first[n] : first[n + 1]] = v.T * (1.0 / np.sqrt(1.0 + np.square(s)) - 1.0)
+    return Step(slice(first[n], first[n + 1]), into, v)
 
 
 def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, scale: Scale) -> list[tuple[Rows, Floats]]:
@@ -152,13 +149,13 @@ def _answered(edge: Reaction, leader: VehicleModel, at: Floats, scale: Scale) ->
 
 def _alike(at: Floats, length: float) -> Floats:
     """(q, q) correlation, with a length [s], of values at times (q,) [s]."""
-    return exact.exp(-0.5 * np.square((at[:, None] - at) / length))
+    return np.exp(-0.5 * np.square((at[:, None] - at) / length))
 
 
 def _speeds(model: VehicleModel, at: Floats) -> Floats:
     """The speeds (q,) [m/s] of a vehicle without deviations at template times (q,) [s]."""
     spline = model.speed.spline
-    return exact.matmul(spline.design(np.clip(at, spline.breaks[0], spline.breaks[-1])), model.speed.mean)
+    return spline.design(np.clip(at, spline.breaks[0], spline.breaks[-1])) @ model.speed.mean
 
 
 def lateness(model: VehicleModel, at: Floats, nominal: Clock, scale: Scale) -> Floats:
@@ -180,8 +177,8 @@ def advance(model: VehicleModel, at: Floats, scale: Scale) -> Floats:
     spline = model.speed.spline
     driven = spline.driven(np.clip(at, spline.breaks[0], spline.breaks[-1]))
     begin = model.lateral_root.shape[1]
-    rows[:, begin : begin + model.speed.size] = scale.longitudinal * exact.matmul(driven, model.speed.factor)
+    rows[:, begin : begin + model.speed.size] = scale.longitudinal * (driven @ model.speed.factor)
     if model.freedom is not None:
         end = begin + model.speed.size + model.freedom.clock.size + 1
-        rows[:, end : end + 2] = scale.longitudinal * exact.matmul(driven, model.speed.faster) * model.freedom.end_speed
+        rows[:, end : end + 2] = scale.longitudinal * (driven @ model.speed.faster) * model.freedom.end_speed
     return rows

@@ -11,9 +11,10 @@ there, they meet as before, and it is known before the bend.
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import ndimage
 
 from scenario_gen.method.sampling.time_warp import Clock
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Encounter
 
 GRID = 0.1  # s
@@ -37,9 +38,9 @@ def slowed_clock(grid: Floats, slowdowns: Sequence[Floats], most: float) -> Cloc
     slowdown = np.maximum(np.max(slowdowns, axis=0), 1.0)
     step = float(grid[1] - grid[0])
     width = 2 * max(round(REACH / step / 3.0), 1) + 1
-    rate = exact.moving_max(slowdown, 3 * (width - 1) + 1)
+    rate = ndimage.maximum_filter1d(slowdown, 3 * (width - 1) + 1, mode="nearest")
     for _ in range(3):
-        rate = exact.moving_mean(rate, width)
+        rate = ndimage.uniform_filter1d(rate, width, mode="nearest")
     extra = rate - 1.0
     longer = 0.5 * step * float((extra[1:] + extra[:-1]).sum())
     room = (most - 1.0) * float(grid[-1] - grid[0])

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from scenario_gen.numerics import exact, Floats, frozen, Ints
+from scenario_gen.numerics import Floats, frozen, Ints
 from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, OUT2, OUT3
 from scenario_gen.types import Route
 
@@ -43,20 +44,20 @@ class BasePath:
         points = route.points
         if len(points) == 1:
             return cls(frozen(points), 0.0, frozen(np.zeros(len(route.anchor))))
-        chord = np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(points[:, :2], axis=0).T))])
-        ends = [np.array([exact.cos(yaw), exact.sin(yaw)]) for yaw in points[[0, -1], 2]]
-        curve = exact.cubic_spline(chord, points[:, :2], (ends[0], ends[1]))
+        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+        ends = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in points[[0, -1], 2]]
+        curve = CubicSpline(chord, points[:, :2], bc_type=((1, ends[0]), (1, ends[1])))
         fine = np.linspace(chord[:-1], chord[1:], 8, endpoint=False).T.ravel()
         fine = np.append(fine, chord[-1])
         middle = 0.5 * (fine[:-1] + fine[1:])
-        speed = exact.hypot(*curve(fine, 1).T)
-        simpson = (speed[:-1] + 4.0 * exact.hypot(*curve(middle, 1).T) + speed[1:]) / 6.0
+        speed = np.hypot(*curve(fine, 1).T)
+        simpson = (speed[:-1] + 4.0 * np.hypot(*curve(middle, 1).T) + speed[1:]) / 6.0
         arc = np.concatenate([[0.0], np.cumsum(simpson * np.diff(fine))])
         count = max(MIN_NODES, int(np.ceil(arc[-1] / NODE_SPACING)) + 1)
         u = np.linspace(0.0, arc[-1], count)
-        at = exact.cubic_spline(arc, fine)(u)
+        at = CubicSpline(arc, fine)(u)
         tangent = curve(at, 1)
-        yaw = np.unwrap(exact.arctan2(tangent[:, 1], tangent[:, 0]))
+        yaw = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
         return cls(frozen(np.column_stack([curve(at), yaw])), float(u[1]), frozen(arc[route.anchor * 8]))
 
     @property
@@ -87,7 +88,7 @@ class BasePath:
         curve, arc = np.zeros((*shape, 4)), np.zeros(shape)
         if shape[1] == 1:
             curve[:, 0, :2] = self.node[0, :2]
-            curve[:, 0, 2:] = exact.cos(self.node[0, 2]), exact.sin(self.node[0, 2])
+            curve[:, 0, 2:] = np.cos(self.node[0, 2]), np.sin(self.node[0, 2])
         else:
             _displace(self.node, self.spacing, np.ascontiguousarray(deviation), curve, arc)
         return curve, arc
@@ -117,7 +118,7 @@ def _displace(node: Floats, h: float, deviation: Floats, curve: Floats, arc: Flo
     samples, g = deviation.shape
     cos, sin, ratio = np.empty(g), np.empty(g), np.empty(g)
     for j in range(g):
-        cos[j], sin[j] = exact.cos(node[j, 2]), exact.sin(node[j, 2])
+        cos[j], sin[j] = np.cos(node[j, 2]), np.sin(node[j, 2])
     for j in range(1, g - 1):
         ratio[j] = 1.0 / (4.0 - (ratio[j - 1] if j > 1 else 0.0))
     for s in range(samples):
@@ -161,7 +162,7 @@ def _pose(c: Floats, j: int, h: float, x: float, out: Floats) -> None:
     e, f, d = 6.0 * x * y / h, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
     dx = e * (c[j + 1, 0] - c[j, 0]) + f * c[j, 2] + d * c[j + 1, 2]
     dy = e * (c[j + 1, 1] - c[j, 1]) + f * c[j, 3] + d * c[j + 1, 3]
-    out[2] = exact.arctan2(dy, dx)
+    out[2] = np.arctan2(dy, dx)
 
 
 @kernel(F3, F2, F, F1, I1, F3, F2, F2, F2, F2, I1, OUT3)
@@ -222,7 +223,7 @@ def states(
             out[s, k, 4] = (du - u / r * slope[s, k]) / (r * r)
             if g == 1:
                 out[s, k, 0], out[s, k, 1] = c[0, 0], c[0, 1]
-                out[s, k, 2] = exact.arctan2(c[0, 3], c[0, 2])
+                out[s, k, 2] = np.arctan2(c[0, 3], c[0, 2])
                 continue
             at = start + x * (p[0] + x * (p[1] / 2.0 + x * (p[2] / 3.0 + x * p[3] / 4.0)))
             if at == before:  # stands

@@ -27,7 +27,7 @@ from scenario_gen.method.sampling.speed_profile.mean import Bounds, Motion
 from scenario_gen.method.sampling.speed_profile.model import speed_model
 from scenario_gen.method.sampling.speed_profile.stops import least_shares, standing_part
 from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.template import least_gaps, reactions_of
 from scenario_gen.types import Encounter, FOLLOW, ReactionGraph, Road
 
@@ -165,7 +165,7 @@ def _model(
     shift = routed.largest_shift(mean)
     if shift > _REPORTED_SHIFT:
         sentences.append(f"{name} passes changepoints up to {shift:.2f} m from their place")
-    jerk = float(np.abs(exact.matmul(motion.jerk, mean)).max())
+    jerk = float(np.abs(motion.jerk @ mean).max())
     if jerk > bounds.jerk + _REPORTED_JERK:
         sentences.append(f"{name} needs a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth")
     room = lateral_room(path, routed.vehicle, road, MAX_ROOM_SIGMAS * config.lateral_sigma)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.deviations import Steering
@@ -16,7 +17,7 @@ from scenario_gen.method.sampling.speed_profile.mean import Bounds, mean_speed, 
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
 from scenario_gen.method.sampling.speed_profile.stops import lengthened, SHORTEST_WAIT, standing_within
 from scenario_gen.method.sampling.time_warp import Clock
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.template import clean_tracks, Track, Wait, WAIT_SPEED
 from scenario_gen.types import BoundaryStates, Encounter, Route, Vehicle
 
@@ -103,7 +104,7 @@ class RoutedVehicle:
                 longest = f"{clock.time[-1]:.1f} s"
                 return f"cannot drive {self.path.length:.1f} m{limit} in {longest} within the limits"
             sideways = np.clip(self._own_sideways(at) / config.max_lateral_acceleration, _CURVE_MARGIN, _OWN_MARGIN)
-            allowed = self._bend_speed(exact.matmul(spline.driven(at), mean), sideways * config.max_lateral_acceleration)
+            allowed = self._bend_speed(spline.driven(at) @ mean, sideways * config.max_lateral_acceleration)
             if (mean <= allowed * pace * 1.01 + 1e-6)[1:-1].all():
                 return mean, motion, bounds
             most, limit = np.minimum(most, allowed * pace), " through its curves"
@@ -113,14 +114,14 @@ class RoutedVehicle:
         """Return the largest distance [m] of the mean (d,) from a changepoint's place when it is due."""
         if len(self.path.node) == 1:
             return 0.0
-        return float(np.abs(exact.matmul(self.spline.driven(self.times), mean) - self.anchor).max())
+        return float(np.abs(self.spline.driven(self.times) @ mean - self.anchor).max())
 
     def slowdown(self, mean: Floats, grid: Floats) -> Floats:
         """By how much the clock must be slowed at template times (G,) [s], so that bends are driven comfortably."""
         if len(self.path.node) == 1:
             return np.ones(len(grid))
         there = (grid >= self.times[0]) & (grid <= self.times[-1])
-        s, v = (exact.matmul(rows, mean) for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there])))
+        s, v = ((rows @ mean) for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there])))
         slowdown = np.ones(len(grid))
         slowdown[there] = v / self._bend_speed(s, np.maximum(self._own_sideways(grid[there]), self.bend))
         return slowdown
@@ -203,7 +204,9 @@ def _at_rest(knots: SpeedKnots, times: Floats) -> list[tuple[float, float]]:
 def _bends(path: BasePath) -> Floats:
     """(G,) the sharpest curvature [1/m] near each node."""
     reach = 2 * int(np.ceil(_CURVE_REACH / path.spacing)) + 1
-    return np.asarray(exact.moving_max(exact.moving_mean(np.abs(path.curvature), 3), reach))
+    return np.asarray(
+        ndimage.maximum_filter1d(ndimage.uniform_filter1d(np.abs(path.curvature), 3, mode="nearest"), reach, mode="nearest")
+    )
 
 
 def _largest_jerk(speed: Floats, dt: float) -> float:
@@ -217,7 +220,7 @@ def _largest_sideways(encounter: Encounter, n: int) -> float:
     yaw = clean_tracks(encounter)[n].poses[first : last + 1, 2]
     width = 2 * round(0.5 * _SMOOTH / encounter.dt) + 1
     sideways = np.gradient(yaw, encounter.dt) * encounter.speed[n, first : last + 1]
-    return float(np.abs(exact.moving_mean(sideways, width)).max())
+    return float(np.abs(ndimage.uniform_filter1d(sideways, width, mode="nearest")).max())
 
 
 def _sideways(track: Track, speed: Floats) -> Floats:

@@ -13,7 +13,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.sampling.candidates import Batch, Scale
 from scenario_gen.method.sampling.directed import Proposal
 from scenario_gen.method.sampling.model import CandidateModel
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Scenario, with_witness
 
 Label = Callable[[Scenario], dict[str, str]]
@@ -135,5 +135,5 @@ class Sampler:
         variates, Hammersley and Morton 1956).
         """
         generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, level, number])))
-        z = exact.standard_normal(generator, (BLOCK // 2, size))
+        z = generator.standard_normal((BLOCK // 2, size))
         return np.stack([z, -z], axis=1).reshape(BLOCK, -1)

@@ -11,10 +11,11 @@ Between the points of a grid the clock is a cubic: rate and its slope are those 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import special
 
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.gp import Features, Observations, Regression
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.method.sampling.gp import Features, Observations, principal, Regression
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT2
 
 DT = 0.1  # s, the grid of published scenarios
@@ -86,7 +87,7 @@ class TimeWarp:
             self._end_sigma, self._factor, self._rates = 0.0, np.zeros((len(grid), 0)), np.zeros((len(grid), 0))
             return
         self._end_sigma = float(np.sqrt(np.square(free.factor).sum()))
-        both = exact.compact(np.vstack([value.factor, slope.factor]), 1e-9)
+        both = principal(np.vstack([value.factor, slope.factor]), 1e-9)
         self._factor, self._rates = both[: len(grid)], both[len(grid) :]
 
     @property
@@ -98,8 +99,8 @@ class TimeWarp:
         """Clocks from numbers z (S, size), deviations multiplied by `scale`; they end on the published grid."""
         nominal = self.nominal
         end = scale * self._end(z[:, 0])[:, None]
-        delta = end * self._share + scale * exact.matmul(z[:, 1:], self._factor.T)
-        rate = end * self._share_rate + scale * exact.matmul(z[:, 1:], self._rates.T)
+        delta = end * self._share + scale * (z[:, 1:] @ self._factor.T)
+        rate = end * self._share_rate + scale * (z[:, 1:] @ self._rates.T)
         room = np.where(rate < 0.0, 1.0 - self._least_share, LONGEST_SHARE - 1.0) * nominal.rate
         damped = np.minimum(1.0, (room / np.maximum(np.abs(rate), 1e-9)).min(axis=1))[:, None]
         ends = nominal.time[-1] + damped[:, 0] * delta[:, -1]
@@ -113,8 +114,8 @@ class TimeWarp:
         low, high = self._shortest * DT - self.nominal.time[-1], self._longest * DT - self.nominal.time[-1]
         if self._end_sigma < 1e-9 or high - low < 1e-9:
             return np.zeros_like(z)
-        a, b = exact.ndtr(low / self._end_sigma), exact.ndtr(high / self._end_sigma)
-        return np.asarray(self._end_sigma * exact.ndtri(a + (b - a) * exact.ndtr(z)))
+        a, b = special.ndtr(low / self._end_sigma), special.ndtr(high / self._end_sigma)
+        return np.asarray(self._end_sigma * special.ndtri(a + (b - a) * special.ndtr(z)))
 
 
 @kernel(F1, F2, F2, F2, I1, OUT2, OUT2, OUT2)

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Tracks
 
 STANDING = 0.5
@@ -20,7 +20,7 @@ def describe_motion(speed: Floats, heading: Floats, dt: float) -> str:
     """Describe speed [m/s] and heading [rad], both (n,), of one vehicle in one primitive."""
     n = len(speed)
     line = np.column_stack([np.arange(n) * dt, np.ones(n)])
-    slope, level = exact.lstsq(line, speed).tolist() if n > 1 else (0.0, float(speed[0]))
+    slope, level = np.linalg.lstsq(line, speed, rcond=None)[0].tolist() if n > 1 else (0.0, float(speed[0]))
     first, last = max(level, 0.0), max(level + slope * (n - 1) * dt, 0.0)
     if np.median(speed) < STANDING and max(first, last) < 2.0 * STANDING:
         return "stands"

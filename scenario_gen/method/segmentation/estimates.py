@@ -6,12 +6,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import Problem
 from scenario_gen.method.segmentation.hdp_hmm.smoother import expected_statistics
 from scenario_gen.method.segmentation.posterior import Posterior
-from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 
 ROUNDS, SETTLED = 50, 1e-7
 RIDGE = 1e-12  # of a variance, on covariances that channels which follow from others make singular
@@ -38,9 +39,9 @@ def hidden_channels(problem: Problem) -> Bools:
 def whitened(regression: Floats, covariance: Floats) -> Floats:
     """(D, P + D) map of (z, y) to the whitened residual, from A (D, P) and Σ (D, D)."""
     spread = np.diag(covariance)
-    factor = exact.cholesky(covariance + RIDGE * np.diag(np.where(spread > 0.0, spread, 1.0)))
-    root = exact.solve_triangular(factor.T, np.eye(len(spread)), transposed=True)
-    return np.hstack([-exact.matmul(root, regression), root])
+    factor = np.linalg.cholesky(covariance + RIDGE * np.diag(np.where(spread > 0.0, spread, 1.0)))
+    root = linalg.solve_triangular(factor, np.eye(len(spread)), lower=True)
+    return np.hstack([-(root @ regression), root])
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,22 +111,22 @@ def settle_emissions(problem: Problem, share: Floats, posterior: Posterior) -> E
     total = share.sum(axis=1)
     now = Emissions(np.repeat(mean[None], states, axis=0), np.repeat(np.eye(d)[None], states, axis=0))
     if p == 1:
-        now.regression[:, :, 0] = exact.matmul(share, problem.y) / np.maximum(total, 1e-300)[:, None]
+        now.regression[:, :, 0] = (share @ problem.y) / np.maximum(total, 1e-300)[:, None]
     outer, sums = np.empty((p + d, p + d)), np.empty(2)
     for _ in range(ROUNDS):
         regression, scatter = np.empty_like(now.regression), np.empty_like(now.covariance)
         for k in range(states):
             coef = whitened(now.regression[k], now.covariance[k])
             expected_statistics(problem.v, hidden, unused, share[k], coef, weight, posterior.dof, outer, sums)
-            pull = exact.matmul(mean, precision) + weight * outer[p:, :p]
-            a = exact.solve_positive(precision + weight * outer[:p, :p], pull.T).T
-            cross = exact.matmul(a, outer[:p, p:])
-            scatter[k] = outer[p:, p:] - cross - cross.T + exact.matmul(exact.matmul(a, outer[:p, :p]), a.T)
+            pull = mean @ precision + weight * outer[p:, :p]
+            a = linalg.solve(precision + weight * outer[:p, :p], pull.T, assume_a="pos").T
+            cross = a @ outer[:p, p:]
+            scatter[k] = outer[p:, p:] - cross - cross.T + a @ outer[:p, :p] @ a.T
             regression[k] = a
         samples = float(total.sum())
         within = scatter.sum(axis=0) / max(samples - p * states, 0.5 * samples, 1.0)
         shift = regression - mean
-        covariance = freedom * within + weight * scatter + exact.matmul(exact.matmul(shift, precision), shift.transpose(0, 2, 1))
+        covariance = freedom * within + weight * scatter + shift @ precision @ shift.transpose(0, 2, 1)
         before, now = now, Emissions(regression, covariance / (freedom + weight * total)[:, None, None])
         moved = max(np.abs(now.regression - before.regression).max(), np.abs(now.covariance - before.covariance).max())
         if moved < SETTLED:

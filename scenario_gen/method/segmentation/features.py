@@ -18,7 +18,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Tracks
 
 STAND_SPEED = 0.5
@@ -41,12 +41,12 @@ def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Call
     width = min(width, samples)
     middle = (width - 1) / 2.0
     powers = np.vander(np.arange(width) - middle, degree + 1, increasing=True)
-    fit = exact.lstsq(powers, np.eye(width)).T
+    fit = np.linalg.pinv(powers).T
     coefficients, misfit = [], np.zeros(samples - width + 1)
     for signal in signals:
         windows = sliding_window_view(signal, width)
-        found = exact.matmul(windows, fit)
-        misfit += np.square(windows - exact.matmul(found, powers.T)).sum(axis=1)
+        found = windows @ fit
+        misfit += np.square(windows - found @ powers.T).sum(axis=1)
         coefficients.append(found)
     t = np.arange(samples)
     offsets = [width - 1, (3 * width) // 4, width // 2, width // 4, 0]
@@ -97,7 +97,7 @@ def lateral_acceleration(position: Floats, dt: float, window: float) -> Floats:
         velocity = np.stack([c[0][:, 1], c[1][:, 1]]) / dt
         acceleration = 2.0 * np.stack([c[0][:, 2], c[1][:, 2]]) / np.square(dt)
         cross = velocity[0] * acceleration[1] - velocity[1] * acceleration[0]
-        return np.asarray(cross / np.maximum(exact.hypot(velocity[0], velocity[1]), 1.0))
+        return np.asarray(cross / np.maximum(np.hypot(velocity[0], velocity[1]), 1.0))
 
     if len(position) < 4:
         return np.zeros(len(position))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from scenario_gen.base.documents import check_shape, COUNT, NUMBER, read_json
 from scenario_gen.base.errors import guarded, InputError
@@ -19,7 +20,7 @@ from scenario_gen.method.segmentation.features import driving_features
 from scenario_gen.method.segmentation.posterior import in_order
 from scenario_gen.method.segmentation.segmenter import cut, DEFAULT, on_trends, relabel, SegmentationConfig
 from scenario_gen.method.segmentation.series import segment_series
-from scenario_gen.numerics import exact, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import Floats, frozen, frozen_ints, Ints
 from scenario_gen.types import Encounter, Segmentation
 
 FORMAT = "scenario_gen primitive library 1"
@@ -127,7 +128,7 @@ class PrimitiveLibrary:
         with guarded(f"{what}: covariances", remedy="each must be symmetric and positive definite"):
             covariances = np.array(values["covariances"])
             for covariance in covariances:
-                exact.cholesky(covariance)
+                np.linalg.cholesky(covariance)
         if not np.allclose(covariances, covariances.swapaxes(1, 2)):
             raise InputError(f"{what}: covariances must be symmetric")
         known = {name: values[name] for name in cls.__dataclass_fields__}
@@ -210,14 +211,12 @@ def _summarise(
     means = np.array([x[labels == j].mean(axis=0) for j in range(k)])
     within = x - means[labels]
     within -= within.mean(axis=0)
-    pooled = exact.matmul(within.T, within) / (len(x) - 1) + np.diag(np.square(blur))
+    pooled = (within.T @ within) / (len(x) - 1) + np.diag(np.square(blur))
     covariances = np.empty((k, x.shape[1], x.shape[1]))
     prior = 3.0 * x.shape[1]
     for j in range(k):
         rest = x[labels == j] - means[j]
-        covariances[j] = (prior * pooled + exact.matmul(rest.T, rest) + len(rest) * np.diag(np.square(blur))) / (
-            prior + len(rest)
-        )
+        covariances[j] = (prior * pooled + rest.T @ rest + len(rest) * np.diag(np.square(blur))) / (prior + len(rest))
     return PrimitiveLibrary(
         vehicles=len(example.vehicles),
         means=means,
@@ -256,25 +255,25 @@ def _smooth(library: PrimitiveLibrary, x: Floats) -> tuple[Floats, Floats]:
     """(T, K) probability of each primitive and (T,) of a change, at each sample of x (T, D)."""
     log_likelihood = np.empty((len(x), len(library.means)))
     for k, (mean, covariance) in enumerate(zip(library.means, library.covariances, strict=True)):
-        factor = exact.cholesky(covariance)
-        rest = exact.solve_triangular(factor.T, (x - mean).T, transposed=True)
-        log_likelihood[:, k] = -0.5 * np.square(rest).sum(axis=0) - exact.log(np.diag(factor)).sum()
+        factor = np.linalg.cholesky(covariance)
+        rest = linalg.solve_triangular(factor, (x - mean).T, lower=True)
+        log_likelihood[:, k] = -0.5 * np.square(rest).sum(axis=0) - np.log(np.diag(factor)).sum()
     log_likelihood *= library.weight
-    likelihood = exact.exp(log_likelihood - log_likelihood.max(axis=1, keepdims=True)) + 1e-300
+    likelihood = np.exp(log_likelihood - log_likelihood.max(axis=1, keepdims=True)) + 1e-300
     forward = np.empty_like(likelihood)
     backward = np.ones_like(likelihood)
     forward[0] = library.initial * likelihood[0]
     forward[0] /= forward[0].sum()
     for t in range(1, len(x)):
-        forward[t] = exact.matmul(forward[t - 1], library.transition) * likelihood[t]
+        forward[t] = (forward[t - 1] @ library.transition) * likelihood[t]
         forward[t] /= forward[t].sum()
     for t in range(len(x) - 2, -1, -1):
-        backward[t] = exact.matmul(library.transition, likelihood[t + 1] * backward[t + 1])
+        backward[t] = library.transition @ (likelihood[t + 1] * backward[t + 1])
         backward[t] /= backward[t].sum()
     smooth = forward * backward
     smooth /= smooth.sum(axis=1, keepdims=True)
     changed = np.zeros(len(x))
     same = forward[:-1] * np.diag(library.transition) * likelihood[1:] * backward[1:]
-    every = (exact.matmul(forward[:-1], library.transition) * likelihood[1:] * backward[1:]).sum(axis=1)
+    every = ((forward[:-1] @ library.transition) * likelihood[1:] * backward[1:]).sum(axis=1)
     changed[1:] = np.clip(1.0 - same.sum(axis=1) / every, 0.0, 1.0)
     return smooth, changed

@@ -20,7 +20,7 @@ from scenario_gen.method.segmentation.features import POSITION_FLOOR, SPEED_FLOO
 from scenario_gen.method.segmentation.library import PrimitiveLibrary
 from scenario_gen.method.segmentation.segment_classes import FinishedSegment, SegmentClasses
 from scenario_gen.method.segmentation.trends import Trends
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 
 UNJUDGED = 2  # samples at the end that may be outliers: nothing after them says
 
@@ -143,8 +143,8 @@ def chance_of_knot(gain: float, trends: Trends, points: list[int], i: int) -> fl
     """
     edges = [0, *points, trends.samples - 1]
     n = edges[i + 2] - edges[i]
-    odds = 0.5 * (gain - len(trends.signals) * exact.log(float(n))) - exact.log(float(n))
-    return float(1.0 / (1.0 + exact.exp(-min(max(odds, -50.0), 50.0))))
+    odds = 0.5 * (gain - len(trends.signals) * np.log(float(n))) - np.log(float(n))
+    return float(1.0 / (1.0 + np.exp(-min(max(odds, -50.0), 50.0))))
 
 
 def segment_features(trends: Trends, speed: Floats, a: int, b: int, dt: float) -> tuple[Floats, Floats]:

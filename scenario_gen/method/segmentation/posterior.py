@@ -6,8 +6,8 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-from scenario_gen.method.segmentation.assignment import best_partners
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
 
 MOST_SAMPLES = 400  # labels of more sweeps than these are thinned evenly; traces are not
@@ -157,7 +157,7 @@ def in_order(labels: Ints) -> Ints:
 def matched_labels(samples: Ints, reference: Ints, size: int) -> Ints:
     """Rename each row's labels (S, T), below `size`, to agree with `reference` (T,) in as many samples as possible."""
     overlaps = [np.bincount(row * size + reference, minlength=size * size).reshape(size, size) for row in samples]
-    partners = [np.array(best_partners(overlap)) for overlap in overlaps]
+    partners = [linear_sum_assignment(overlap, maximize=True)[1] for overlap in overlaps]
     return np.stack([partner[row] for partner, row in zip(partners, samples, strict=True)]).astype(np.int64)
 
 

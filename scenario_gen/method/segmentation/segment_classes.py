@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.method.segmentation.library import PrimitiveLibrary
-from scenario_gen.numerics import exact, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import Floats, frozen, frozen_ints, Ints
 
 NEW = 1.0  # segments that the chance of a class never seen is worth
 WITHIN = (0.25, 0.25, 0.2)  # spread in a class: longitudinal, lateral acceleration [m/s²], moving 0..1
@@ -73,13 +73,13 @@ class SegmentClasses:
             labels = np.arange(len(self._library.means))
             spread = np.array([np.diag(covariance) for covariance in self._library.covariances])
             score = log_normal(features, self._library.means, spread + variance)
-            probability = normalised(score + exact.log(np.maximum(self._library.segments, 0.5)))
+            probability = normalised(score + np.log(np.maximum(self._library.segments, 0.5)))
             return FinishedSegment(start, stop, features, int(labels[probability.argmax()]), labels, probability)
         shrunk = self._counts[:, None] / self._within + 1.0 / self._between
         mean, spread = self._sums / self._within / shrunk, 1.0 / shrunk
         mean, spread = np.vstack([mean, np.zeros((1, len(features)))]), np.vstack([spread, self._between[None]])
         score = log_normal(features, mean, spread + self._within + variance)
-        probability = normalised(score + exact.log(np.append(self._counts, NEW)))
+        probability = normalised(score + np.log(np.append(self._counts, NEW)))
         labels = np.append(self._names, self._next)
         chosen = int(probability.argmax())
         if chosen == len(self._names):
@@ -96,12 +96,12 @@ class SegmentClasses:
 
 def log_normal(x: Floats, mean: Floats, variance: Floats) -> Floats:
     """(C,) log density of x (D,) under independent normals of mean and variance (C, D), up to a constant."""
-    result: Floats = -0.5 * (np.square(x - mean) / variance + exact.log(variance)).sum(axis=1)
+    result: Floats = -0.5 * (np.square(x - mean) / variance + np.log(variance)).sum(axis=1)
     return result
 
 
 def normalised(score: Floats) -> Floats:
     """Exponentials of score (C,), scaled to sum to 1."""
-    likelihood: Floats = exact.exp(score - score.max())
+    likelihood: Floats = np.exp(score - score.max())
     share: Floats = likelihood / likelihood.sum()
     return share

@@ -14,7 +14,7 @@ from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import new_top, Place, Problem
 from scenario_gen.method.segmentation.hdp_hmm.start import FAR_QUANTILE, find_start, MOST_STATES, other_start, Start
 from scenario_gen.method.segmentation.posterior import pool, Posterior, r_hat
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 
 SPARE_STATES = 5  # beyond those that the start has
 FIRST_CHECK = 40  # sweeps before the chains are first compared
@@ -164,9 +164,9 @@ def independent(x: Floats) -> Ints:
         rest = column
         for _ in range(2):
             for direction in basis:
-                rest = rest - exact.dot(direction, rest) * direction
-        length = np.sqrt(exact.dot(rest, rest))
-        if length > COLLINEAR * np.sqrt(exact.dot(column, column)):
+                rest = rest - (direction @ rest) * direction
+        length = np.linalg.norm(rest)
+        if length > COLLINEAR * np.linalg.norm(column):
             basis.append(rest / length)
             kept.append(i)
     return np.array(kept, dtype=np.int64)
@@ -200,8 +200,8 @@ def sample(problem: Problem, config: SamplerConfig, seed: int, ends: Ints, chann
             break
         places, states = [chain.place for chain in chains], min(2 * states, MOST_STATES)
     posterior = pool([chain.samples for chain in chains], [chain.trace for chain in chains], ends, problem.lead)
-    drawn = exact.log(np.array([[chain.prior.extra, chain.prior.worth] for chain in chains]))
-    extra, worth = exact.exp(drawn.mean(axis=0)).tolist()
+    drawn = np.log(np.array([[chain.prior.extra, chain.prior.worth] for chain in chains]))
+    extra, worth = np.exp(drawn.mean(axis=0)).tolist()
     return replace(
         posterior,
         states=states,

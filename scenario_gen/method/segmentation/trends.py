@@ -15,9 +15,10 @@ import math
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy import special
 
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, kernel, OUT1
 from scenario_gen.types import ALWAYS, canonical_presence
 
@@ -200,8 +201,8 @@ def chi2_above(degrees: int, chance: float) -> float:
     low, high = 0.0, 1.0
 
     def exceeds(x: float) -> bool:
-        terms = [i * exact.log(x) - exact.lgamma(i + 1.0) - x for i in range(degrees // 2)]
-        return math.fsum(exact.exp(term) for term in terms) > chance
+        terms = [i * np.log(x) - special.gammaln(i + 1.0) - x for i in range(degrees // 2)]
+        return math.fsum(np.exp(term) for term in terms) > chance
 
     while exceeds(high):
         low, high = high, 2.0 * high
@@ -216,10 +217,10 @@ def course(position: Floats, speed: Floats, dt: float) -> tuple[Floats, Floats]:
     half = max(1, min(round(COURSE_WINDOW / dt) // 2, (len(speed) - 1) // 2))
     steps = np.arange(-half, half + 1)
     padded = np.pad(position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
-    velocity = exact.matmul(sliding_window_view(padded, 2 * half + 1, axis=0), steps) / (exact.matmul(steps, steps) * dt)
+    velocity = (sliding_window_view(padded, 2 * half + 1, axis=0) @ steps) / ((steps @ steps) * dt)
     pace = moving_mean(speed, 2 * half + 1)
     moves = pace > LEAST_SPEED
-    angle = exact.arctan2(velocity[:, 1], velocity[:, 0])
+    angle = np.arctan2(velocity[:, 1], velocity[:, 0])
     if moves.any():
         last = np.maximum.accumulate(np.where(moves, np.arange(len(speed)), 0))
         angle = angle[np.maximum(last, int(np.argmax(moves)))]

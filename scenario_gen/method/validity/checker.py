@@ -16,7 +16,7 @@ from scenario_gen.method.validity import dynamics
 from scenario_gen.method.validity.dynamics import control_points, is_motion
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
-from scenario_gen.numerics import Bools, exact, Floats, runs
+from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.roads import blocked_before, clearance_in_cells, drives_against, RuleCheck
 from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, required_orders, time_gaps, Wait
 from scenario_gen.types import (
@@ -201,7 +201,7 @@ class Checker:
             # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
             ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), states.tolist(), strict=True)
             for i, ((x, y), speed, (x_requested, y_requested, _, speed_requested)) in enumerate(ends):
-                distance, difference = exact.hypot(x - x_requested, y - y_requested), abs(speed - speed_requested)
+                distance, difference = np.hypot(x - x_requested, y - y_requested), abs(speed - speed_requested)
                 far, off = self._within_a_step(scenario, i, k)
                 free, faster = relaxed[i][k]
                 far, off = far + free + limits.position_tolerance, off + faster + limits.speed_tolerance
@@ -406,7 +406,7 @@ class Checker:
     def _slow(self, scenario: Scenario, i: int, limit: float) -> list[tuple[int, int]]:
         """First and last sample of each stretch in which neither published speed nor displacement reaches the limit [m/s]."""
         slow = scenario.speed[i] < limit
-        moved = exact.hypot(*np.diff(scenario.position[i], axis=0).T)
+        moved = np.hypot(*np.diff(scenario.position[i], axis=0).T)
         still = slow[:-1] & slow[1:] & (moved < limit * np.diff(scenario.time))
         still &= scenario.there[i, :-1] & scenario.there[i, 1:]
         return runs(still)  # of T - 1 steps: a step's end is a sample
@@ -416,7 +416,7 @@ class Checker:
         if self.requested is None or begins > float(scenario.time[scenario.present[i, 0]]):
             return False
         off = self.requested.end[i, :2] - self.requested.start[i, :2]
-        return bool(exact.hypot(off[0], off[1]) <= self._limits.position_tolerance)
+        return bool(np.hypot(off[0], off[1]) <= self._limits.position_tolerance)
 
 
 def spans(scenario: Scenario) -> list[tuple[slice, slice]]:

@@ -12,7 +12,7 @@ axis). Where no such line is found the stretch is halved, until it is proven, an
 import numpy as np
 
 from scenario_gen.method.validity.dynamics import stretch
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, OUT2
 
 BLOCK = 16  # intervals that share one bounding box
@@ -27,12 +27,12 @@ def _gap(d: Floats, yaw_a: float, yaw_b: float, half_a: Floats, half_b: Floats, 
     The headings are within turn_a and turn_b of yaw_a and yaw_b. A box's extent along its own axis l grows by at most
     w sin(turn) <= w turn, along any other line by at most (half diagonal) turn.
     """
-    radius_a, radius_b = exact.hypot(half_a[0], half_a[1]), exact.hypot(half_b[0], half_b[1])
-    cos, sin = abs(exact.cos(yaw_a - yaw_b)), abs(exact.sin(yaw_a - yaw_b))
+    radius_a, radius_b = np.hypot(half_a[0], half_a[1]), np.hypot(half_b[0], half_b[1])
+    cos, sin = abs(np.cos(yaw_a - yaw_b)), abs(np.sin(yaw_a - yaw_b))
     best = -np.inf
     for axis in range(4):
         own, other, yaw = (half_a, half_b, yaw_a) if axis < 2 else (half_b, half_a, yaw_b)
-        nx, ny = exact.cos(yaw), exact.sin(yaw)
+        nx, ny = np.cos(yaw), np.sin(yaw)
         if axis % 2 == 0:
             extent = own[0] + other[0] * cos + other[1] * sin
             grown = own[1]
@@ -124,7 +124,7 @@ def first_contacts(
         for j in range(i + 1, n):
             pair += 1
             out[pair, 0] = PROVEN
-            reach = exact.hypot(half[i, 0], half[i, 1]) + exact.hypot(half[j, 0], half[j, 1]) + clearance + ROUNDING
+            reach = np.hypot(half[i, 0], half[i, 1]) + np.hypot(half[j, 0], half[j, 1]) + clearance + ROUNDING
             for b in range(bounds.shape[1]):
                 if out[pair, 0] != PROVEN:
                     break

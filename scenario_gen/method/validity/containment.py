@@ -12,7 +12,7 @@ Where neither suffices the stretch is halved, until it is proven, the footprint 
 import numpy as np
 
 from scenario_gen.method.validity.dynamics import stretch
-from scenario_gen.numerics import Counts, exact, Floats
+from scenario_gen.numerics import Counts, Floats
 from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, N2, OUT2
 
 CONTACT = 1e-9  # cells, an overlap this small only touches
@@ -83,7 +83,7 @@ def _first_exit(
         stretch(b, middle, middle, part)
         x, y, at, turn = part[0, 0], part[0, 1], yaw[0] + yaw[1] * middle, 0.5 * step * abs(yaw[1])
         stretch(b, u, u + step, part)
-        c, s = exact.cos(at), exact.sin(at)
+        c, s = np.cos(at), np.sin(at)
         ahead = aside = 0.0
         for i in range(4):
             dx, dy = part[i, 0] - x, part[i, 1] - y

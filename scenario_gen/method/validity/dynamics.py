@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F1, F2, F3, kernel, OUT3, OUT4
 from scenario_gen.types import Cause
 
@@ -35,10 +35,10 @@ def control_points(time: Floats, position: Floats, heading: Floats, speed: Float
     """Fill `out` (N, T - 1, 4, 2) with the control points [m] of every vehicle in every interval."""
     n, t = heading.shape
     for i in range(n):
-        vx, vy = speed[i, 0] * exact.cos(heading[i, 0]), speed[i, 0] * exact.sin(heading[i, 0])
+        vx, vy = speed[i, 0] * np.cos(heading[i, 0]), speed[i, 0] * np.sin(heading[i, 0])
         for k in range(t - 1):
             third = (time[k + 1] - time[k]) / 3.0
-            wx, wy = speed[i, k + 1] * exact.cos(heading[i, k + 1]), speed[i, k + 1] * exact.sin(heading[i, k + 1])
+            wx, wy = speed[i, k + 1] * np.cos(heading[i, k + 1]), speed[i, k + 1] * np.sin(heading[i, k + 1])
             out[i, k, 0, 0], out[i, k, 0, 1] = position[i, k, 0], position[i, k, 1]
             out[i, k, 1, 0], out[i, k, 1, 1] = position[i, k, 0] + third * vx, position[i, k, 1] + third * vy
             out[i, k, 2, 0], out[i, k, 2, 1] = position[i, k + 1, 0] - third * wx, position[i, k + 1, 1] - third * wy
@@ -128,7 +128,7 @@ def _note(out: Floats, row: int, excess: float, value: float, limit: float, time
 @kernel(inline=True)
 def _in_body(yaw: float, x: float, y: float) -> tuple[float, float]:
     """Components ahead and to the left of a vector (x, y) for a heading [rad]."""
-    c, s = exact.cos(yaw), exact.sin(yaw)
+    c, s = np.cos(yaw), np.sin(yaw)
     return c * x + s * y, c * y - s * x
 
 
@@ -192,8 +192,8 @@ def worst_excess(
             if turn > min(TURN_ROUNDING, TURN_DRIFT * h + 1e-8) + curvature * moved:  # headings are rounded to 1 nrad
                 bend = turn / moved
                 _note(out[i], 6, bend - curvature, bend, curvature, now)
-            vx, vy = v * exact.cos(heading[i, k]), v * exact.sin(heading[i, k])
-            wx, wy = w * exact.cos(heading[i, k + 1]), w * exact.sin(heading[i, k + 1])
+            vx, vy = v * np.cos(heading[i, k]), v * np.sin(heading[i, k])
+            wx, wy = w * np.cos(heading[i, k + 1]), w * np.sin(heading[i, k + 1])
             # mean velocity of the displacement against that of the published speeds and headings, in the body's axes
             ex, ey = dx / h - 0.5 * (vx + wx), dy / h - 0.5 * (vy + wy)
             ahead, left = _in_body(0.5 * (heading[i, k] + heading[i, k + 1]), ex, ey)

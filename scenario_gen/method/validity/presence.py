@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Scenario
 
 SAME = 0.5e-9  # s, instants are whole nanoseconds
@@ -33,8 +33,8 @@ def driven_on(scenario: Scenario, margin: float) -> tuple[Floats, Floats, Floats
             rate = (heading[i, inner] - heading[i, end]) / (time[inner] - time[end])
             since = time[beyond] - time[end]
             half = 0.5 * rate * since
-            chord = speed[i, end] * since * np.where(half == 0.0, 1.0, exact.sin(half) / np.where(half == 0.0, 1.0, half))
+            chord = speed[i, end] * since * np.where(half == 0.0, 1.0, np.sin(half) / np.where(half == 0.0, 1.0, half))
             middle = heading[i, end] + half
-            position[i, beyond] = position[i, end] + chord[:, None] * np.stack((exact.cos(middle), exact.sin(middle)), axis=-1)
+            position[i, beyond] = position[i, end] + chord[:, None] * np.stack((np.cos(middle), np.sin(middle)), axis=-1)
             heading[i, beyond] = heading[i, end] + rate * since
     return position, heading, speed, present

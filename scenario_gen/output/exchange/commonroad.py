@@ -16,7 +16,7 @@ import re
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import Lane, stations
@@ -270,7 +270,7 @@ def _placeholder(root: Element, lanes: Sequence[Lane], steps: int) -> None:
     """Append a problem that is solved by standing still, near the beginning of the first lane, on its run-out."""
     middle = lanes[0].middle
     at = min(int(np.searchsorted(stations(middle), 5.0)), len(middle) - 2)
-    yaw = float(exact.arctan2(*(middle[at + 1] - middle[at])[::-1]))
+    yaw = float(np.arctan2(*(middle[at + 1] - middle[at])[::-1]))
     x, y = middle[at].tolist()
     problem = add(root, "planningProblem", id=PROBLEM)
     state = add(problem, "initialState")

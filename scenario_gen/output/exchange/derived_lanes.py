@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from shapely import contains_xy, covers, make_valid, Polygon, polygons, prepare, union_all
 
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.lanes import Lane, LaneMap, lanes_of, network_lanes, Strip
 from scenario_gen.types import LaneNetwork, Road, Scenario
@@ -106,7 +106,7 @@ def _unled(path: Curve, lanes: Sequence[Lane]) -> float:
         if len(inside):
             middle = Curve.through(lane.middle)
             yaw = middle.at(middle.project(path.points[inside, :2])[0])[:, 2]
-            led[inside] |= exact.cos(path.points[inside, 2] - yaw) > exact.cos(ACROSS)
+            led[inside] |= np.cos(path.points[inside, 2] - yaw) > np.cos(ACROSS)
     return float(np.diff(path.station)[~led[1:]].sum())
 
 
@@ -121,12 +121,12 @@ def driven_path(scenario: Scenario, n: int) -> Curve:
     xy = scenario.position[n, first : last + 1]
     kept = [xy[0]]
     for point in xy[1:]:
-        if float(exact.hypot(*(point - kept[-1]))) >= APART:
+        if float(np.hypot(*(point - kept[-1]))) >= APART:
             kept.append(point)
     if len(kept) < 3:
         (x, y), yaw = xy[0].tolist(), float(scenario.heading[n, first])
         ahead = np.array([0.0, 1.0])
-        return Curve(np.column_stack((x + ahead * exact.cos(yaw), y + ahead * exact.sin(yaw), np.full(2, yaw))))
+        return Curve(np.column_stack((x + ahead * np.cos(yaw), y + ahead * np.sin(yaw), np.full(2, yaw))))
     return Curve.through(np.array(kept))
 
 
@@ -134,7 +134,7 @@ def _runs_in(path: Curve, lane: Curve) -> bool:
     """Say whether a path lies in the lane along another one, in the same direction."""
     station, offset = lane.project(path.points[:, :2])
     turn = path.points[:, 2] - lane.at(station)[:, 2]
-    return bool((np.abs(offset) < SAME_LANE).all() and (exact.cos(turn) > exact.cos(SAME_WAY)).all())
+    return bool((np.abs(offset) < SAME_LANE).all() and (np.cos(turn) > np.cos(SAME_WAY)).all())
 
 
 def _lane(
@@ -173,7 +173,7 @@ def outline(scenario: Scenario, n: int, parts: Sequence[float] = (-0.5, 0.0, 0.5
     vehicle = scenario.vehicles[n]
     x, y = scenario.position[n, first : last + 1].T
     yaw = scenario.heading[n, first : last + 1]
-    cos, sin = exact.cos(yaw), exact.sin(yaw)
+    cos, sin = np.cos(yaw), np.sin(yaw)
     points = []
     for u in parts:
         for v in (-0.5, 0.5):

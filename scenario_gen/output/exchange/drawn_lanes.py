@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.derived_lanes import outline, widest_near
 from scenario_gen.output.exchange.lanes import Joint, LaneMap, Strip
@@ -70,7 +70,7 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
     if axis is not None:
         move = arms[0].pose[:2] - axis.points[0, :2]  # the first arm is the axis' beginning
         axis = Curve(axis.points + np.array([*move, 0.0]))
-        if float(exact.hypot(*(axis.points[-1, :2] - arms[1].pose[:2]))) > EVEN:
+        if float(np.hypot(*(axis.points[-1, :2] - arms[1].pose[:2]))) > EVEN:
             return None
     extra = HALF_DIAGONAL * road.resolution
     if len(arms) == 2 and not ramps:
@@ -113,7 +113,7 @@ def _ramps(road: Road, arms: Sequence[Arm], width: float, side: str) -> list[Arm
     offset = width / 2.0 if side == "right" else -width / 2.0  # lanes in lie to the left of who looks out, on the right side
     ramps = []
     for entry in road.entries:
-        if all(float(exact.hypot(*(entry[:2] - place))) > EVEN for place in known):
+        if all(float(np.hypot(*(entry[:2] - place))) > EVEN for place in known):
             out = reverse(entry)
             pose = np.array([*(out[:2] - offset * _left(out)), out[2]])
             ramps.append(Arm(pose, np.array([offset]), np.zeros(0)))
@@ -121,15 +121,15 @@ def _ramps(road: Road, arms: Sequence[Arm], width: float, side: str) -> list[Arm
 
 
 def _left(pose: Floats) -> Floats:
-    return np.array([-exact.sin(pose[2]), exact.cos(pose[2])])
+    return np.array([-np.sin(pose[2]), np.cos(pose[2])])
 
 
 def _between(arms: Sequence[Arm]) -> Curve | None:
     """Return the straight line from the first arm's end to the second's; None if they do not lie on one."""
     ends = np.stack([arm.pose[:2] for arm in arms[:2]])
-    yaw = float(exact.arctan2(*(ends[1] - ends[0])[::-1]))
+    yaw = float(np.arctan2(*(ends[1] - ends[0])[::-1]))
     headings = np.array([arms[0].pose[2] + np.pi, arms[1].pose[2]])
-    if (exact.cos(headings - yaw) < 1.0 - STRAIGHT_LINE).any():
+    if (np.cos(headings - yaw) < 1.0 - STRAIGHT_LINE).any():
         return None
     return Curve(np.column_stack((ends, np.full(2, yaw))))
 
@@ -140,7 +140,7 @@ def _line(arm: Arm, k: int, axis: Curve | None, road: Road) -> Curve:
         return (axis if k == 0 else axis.reversed()).cut(0.0, axis.length / 2.0, STEP)
     x, y, yaw = arm.pose.tolist()
     length = road.resolution * float(road.drivable.shape[0] + road.drivable.shape[1])
-    end = [x - length * float(exact.cos(yaw)), y - length * float(exact.sin(yaw)), yaw + np.pi]
+    end = [x - length * float(np.cos(yaw)), y - length * float(np.sin(yaw)), yaw + np.pi]
     return Curve(np.array([[x, y, yaw + np.pi], end]))
 
 
@@ -157,7 +157,7 @@ def _mouth(road: Road, arm: Arm, line: Curve, width: float, ring: tuple[Floats, 
         return None
     mouth = float(along[int(np.argmax(wider))]) - BEFORE
     if ring is not None:
-        mouth = min(mouth, float(exact.hypot(*(arm.pose[:2] - ring[0]))) - flare_begins(ring[1], width / 2.0) - BEFORE)
+        mouth = min(mouth, float(np.hypot(*(arm.pose[:2] - ring[0]))) - flare_begins(ring[1], width / 2.0) - BEFORE)
     mouth = max(mouth, SHORTEST)
     return _Side(line, mouth, len(arm.inward), len(arm.outward))
 
@@ -218,7 +218,7 @@ def _in_arm(arm: _Side, place: Floats, width: float) -> np.ndarray:
 def _farthest(way: Curve, place: Floats, yaw: Floats) -> float:
     """Return how far [m] positions (P, 2) stray from a way; infinitely if they lead elsewhere."""
     station, offset = way.project(place)
-    if not (exact.cos(yaw - way.at(station)[:, 2]) > 0.5).all():
+    if not (np.cos(yaw - way.at(station)[:, 2]) > 0.5).all():
         return float("inf")
     return float(np.abs(offset).max())
 

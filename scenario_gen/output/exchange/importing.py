@@ -21,7 +21,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, of_system, reading
 from scenario_gen.logs import is_known, is_osi, LogConfig, read_raw
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.output.exchange.openscenario import SPEEDS
 from scenario_gen.output.exchange.xml import number, Place, read_xml
 from scenario_gen.types import Vehicle
@@ -190,7 +190,7 @@ def _followed(follow: Place, name: str, box: Place, speed: float | None, speeds:
     result[:, 4] = np.unwrap(result[:, 4])
     center, size = box.child("Center"), box.child("Dimensions")
     x, y = center.attribute("x"), center.attribute("y")
-    cos, sin = exact.cos(result[:, 4]), exact.sin(result[:, 4])
+    cos, sin = np.cos(result[:, 4]), np.sin(result[:, 4])
     result[:, 1] += x * cos - y * sin
     result[:, 2] += x * sin + y * cos
     if speeds is not None and len(speeds) == len(result):
@@ -248,14 +248,14 @@ def _directions(places: Floats) -> Floats:
     if len(places) < 2:
         return np.zeros(len(places))
     step = np.gradient(places, axis=0)
-    return np.asarray(exact.arctan2(step[:, 1], step[:, 0]))
+    return np.asarray(np.arctan2(step[:, 1], step[:, 0]))
 
 
 def _speeds(rows: Floats, first: float | None) -> Floats:
     """Return (K,) speeds [m/s] along the headings by central differences; `first` is that of the first row, if it is known."""
     order: Literal[1, 2] = 2 if len(rows) > 2 else 1
     velocity = np.gradient(rows[:, 1:3], rows[:, 0], axis=0, edge_order=order)
-    along = velocity[:, 0] * exact.cos(rows[:, 4]) + velocity[:, 1] * exact.sin(rows[:, 4])
+    along = velocity[:, 0] * np.cos(rows[:, 4]) + velocity[:, 1] * np.sin(rows[:, 4])
     if first is not None:
         along[0] = first
     return frozen(np.maximum(along, 0.0))

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.types import LaneNetwork
 
 DECIMALS = 6
@@ -46,7 +46,7 @@ class Strip:
     def beside(self, distance: Floats) -> Floats:
         """Return points (M, 2) at distances (M,) [m] to the left of the reference line."""
         x, y, yaw = self.reference.T
-        return np.column_stack((x - distance * exact.sin(yaw), y + distance * exact.cos(yaw)))
+        return np.column_stack((x - distance * np.sin(yaw), y + distance * np.cos(yaw)))
 
     def edges(self, side: str) -> Floats:
         """Return the edges (L, M, 2) [m] of one side's L - 1 lanes, "right" or "left", from the middle outwards."""
@@ -231,7 +231,7 @@ def _overlapping(edges: Floats) -> Floats:
     result = edges.copy()
     for end, next_to in ((0, 1), (-1, -2)):
         step = result[:, end] - result[:, next_to]
-        result[:, end] += OVERLAP * step / exact.hypot(step[:, 0], step[:, 1])[:, None]
+        result[:, end] += OVERLAP * step / np.hypot(step[:, 0], step[:, 1])[:, None]
     return result
 
 
@@ -251,4 +251,4 @@ def _places(lane_map: LaneMap) -> Iterator[Place]:
 def stations(reference: Floats) -> Floats:
     """Return (M,) the length [m] along a polyline (M, 2+) to each of its points."""
     steps = np.diff(reference[:, :2], axis=0)
-    return np.concatenate([[0.0], np.cumsum(exact.hypot(steps[:, 0], steps[:, 1]))])
+    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Scenario
 
 EVEN = 1e-9  # seconds by which steps may differ and still be one
@@ -58,7 +58,7 @@ def at_times(scenario: Scenario, time: Floats) -> Scenario:
 def _velocity(scenario: Scenario) -> Floats:
     """Return velocities (N, T, 2) [m/s] along the headings."""
     speed, heading = scenario.speed, scenario.heading
-    return np.stack((speed * exact.cos(heading), speed * exact.sin(heading)), axis=-1)
+    return np.stack((speed * np.cos(heading), speed * np.sin(heading)), axis=-1)
 
 
 def _presence(scenario: Scenario, time: Floats) -> Ints:

@@ -14,7 +14,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.output.exchange.lanes import joined, Joint, LaneMap, Strip
 from scenario_gen.output.exchange.xml import add, comment, Element, serialized
 
@@ -146,17 +146,17 @@ Curve3 = tuple[float, ...]  # aU … dU, aV … dV, in the piece's own frame
 def _pieces(reference: Floats) -> Iterator[tuple[float, Curve3 | None]]:
     """Yield length [m] and curve of each piece between two points of a reference line (M, 3); None is a straight line."""
     for (x0, y0, yaw0), (x1, y1, yaw1) in pairwise(reference):
-        cos, sin = float(exact.cos(yaw0)), float(exact.sin(yaw0))
+        cos, sin = float(np.cos(yaw0)), float(np.sin(yaw0))
         u = float((x1 - x0) * cos + (y1 - y0) * sin)
         v = float((y1 - y0) * cos - (x1 - x0) * sin)
         turn = float(wrap_angle(np.asarray(yaw1 - yaw0)))
-        chord = float(exact.hypot(u, v))
+        chord = float(np.hypot(u, v))
         if abs(turn) < STRAIGHT and abs(v) < STRAIGHT * chord:
             yield chord, None
             continue
         half = turn / 2.0
-        reach = chord if abs(half) < 1e-6 else chord * half / float(exact.sin(half))  # that of a circle's arc
-        end_u, end_v = reach * float(exact.cos(turn)), reach * float(exact.sin(turn))
+        reach = chord if abs(half) < 1e-6 else chord * half / float(np.sin(half))  # that of a circle's arc
+        end_u, end_v = reach * float(np.cos(turn)), reach * float(np.sin(turn))
         curve = (
             0.0, reach, 3.0 * u - 2.0 * reach - end_u, -2.0 * u + reach + end_u,
             0.0, 0.0, 3.0 * v - end_v, -2.0 * v + end_v,
@@ -169,7 +169,7 @@ def _length(curve: Curve3) -> float:
     p = _GAUSS
     du = curve[1] + 2.0 * curve[2] * p + 3.0 * curve[3] * p * p
     dv = curve[5] + 2.0 * curve[6] * p + 3.0 * curve[7] * p * p
-    return float(np.sum(_WEIGHTS * exact.hypot(du, dv)))
+    return float(np.sum(_WEIGHTS * np.hypot(du, dv)))
 
 
 def _merged(

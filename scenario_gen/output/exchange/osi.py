@@ -22,7 +22,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.markup import read_xml
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.motion import at_times, EVEN
 from scenario_gen.types import height, is_truck, rear_axle, Scenario, Vehicle, WHEELBASE
@@ -165,7 +165,7 @@ def _objects(part: _Part, k: int) -> Iterator[Any]:
         return
     for n in np.flatnonzero(motion.there[:, k]).tolist():
         vehicle, heading = motion.vehicles[n], motion.heading[n, k]
-        cos, sin = float(exact.cos(heading)), float(exact.sin(heading))
+        cos, sin = float(np.cos(heading)), float(np.sin(heading))
         speed, along, rate = (float(values[n, k]) for values in (motion.speed, motion.acceleration, part.yaw_rate))
         x, y = motion.position[n, k].tolist()
         across = speed * rate

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.numerics import exact
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import Lane
@@ -77,7 +76,7 @@ def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
         return np.where(there if np.ndim(values) == 1 else there[:, None], values, 0.0).astype(np.float32)
 
     heading, speed = motion.heading[n], motion.speed[n]
-    velocity = np.stack([speed * exact.cos(heading), speed * exact.sin(heading)], axis=1)
+    velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=1)
     state = {
         "position": masked(np.column_stack([motion.position[n], np.zeros(steps)])),
         "heading": masked(heading),

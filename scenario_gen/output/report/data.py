@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.method.evaluation import at_common, at_count, mean_feature
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, RuleKind, Scenario, Segmentation, UNIFORM, WITHOUT
 
 FRAME_PERIOD = 0.2
@@ -122,7 +122,7 @@ def _turn(encounter: Encounter, fit: Fit | None) -> float:
     if fit is None or not fit.fitted:
         return 0.0
     turned = np.array([fitted.anchors[0, 2] - heading[0] for fitted, heading in zip(fit.fitted, encounter.heading, strict=True)])
-    return _short(float(exact.arctan2(exact.sin(turned).sum(), exact.cos(turned).sum())))
+    return _short(float(np.arctan2(np.sin(turned).sum(), np.cos(turned).sum())))
 
 
 def states(source: Encounter | Scenario, frames: int) -> Floats:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.numerics import Bools, exact, Floats, sealed, wrap_angle
+from scenario_gen.numerics import Bools, Floats, sealed, wrap_angle
 from scenario_gen.numerics.plane import angle_between
 from scenario_gen.roads.clearance import clearance_field, footprint_fits
 from scenario_gen.roads.vector.raster import covered
@@ -114,9 +114,9 @@ def _in_box(lane: Lane, poses: Floats) -> Bools:
 def _along(lane: Lane, poses: Floats) -> Bools:
     """Whether poses (M, 3) in the box about a lane lie in it, about its way."""
     along = np.zeros(len(poses), dtype=np.bool_)
-    half = exact.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
+    half = np.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
     for row, (x, y, heading) in enumerate(poses.tolist()):
-        away = exact.hypot(lane.middle[:, 0] - x, lane.middle[:, 1] - y)
+        away = np.hypot(lane.middle[:, 0] - x, lane.middle[:, 1] - y)
         k = int(np.argmin(away))
         along[row] = away[k] <= half[k] and abs(angle_between(lane.yaw[k], heading)) < _ALONG
     return along

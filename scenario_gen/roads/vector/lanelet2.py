@@ -19,7 +19,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite
 from scenario_gen.logs import local_frame
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_long, refuse_too_many_lanes, speed_of
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
 from scenario_gen.types import RuleKind
@@ -252,7 +252,7 @@ def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[st
     degrees = np.array(list(found.values()))
     latitude, longitude = np.round((degrees.min(axis=0) + degrees.max(axis=0)) / 2.0, 7).tolist()
     metres = local_frame(degrees[:, 0], degrees[:, 1], (latitude, longitude))
-    size = float(exact.hypot(metres[:, 0], metres[:, 1]).max())
+    size = float(np.hypot(metres[:, 0], metres[:, 1]).max())
     if not size <= _FARTHEST:
         if faults.found:  # degrees that are none: most likely metres
             raise InputError(faults.found[0][2])
@@ -283,8 +283,8 @@ def _lanelet(relation: Element, tags: dict[str, str], borders: Sequence[_Border]
     """
     left, right = borders
     a, b, c, d = left.points[0], left.points[-1], right.points[0], right.points[-1]
-    straight = float(exact.hypot(*(a - c)) + exact.hypot(*(b - d)))
-    if float(exact.hypot(*(a - d)) + exact.hypot(*(b - c))) < straight:
+    straight = float(np.hypot(*(a - c)) + np.hypot(*(b - d)))
+    if float(np.hypot(*(a - d)) + np.hypot(*(b - c))) < straight:
         right = right.turned()
     ring = np.concatenate((left.points, right.points[::-1]))
     after = np.roll(ring, -1, axis=0)

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, runs, wrap_angle
+from scenario_gen.numerics import Floats, runs, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
@@ -122,7 +122,7 @@ class Chains:
 
     def near(self, pose: Floats) -> list[int]:
         """Lanes that pass a pose (3,) x, y [m], yaw [rad] nearby, about its way; the nearest first."""
-        away = exact.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
+        away = np.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
         fits = (away <= NEAR) & (np.abs(wrap_angle(self.yaws - pose[2])) <= _HEADING)
         nearest: dict[int, float] = {}
         for k in np.flatnonzero(fits).tolist():
@@ -231,7 +231,7 @@ def _misses(curve: Curve, poses: Floats) -> Floats:
     station, offset = curve.project(poses[:, :2])
     off = poses[:, 2] - curve.at(station)[:, 2]
     beyond = np.maximum(-station, 0.0) + np.maximum(station - curve.length, 0.0)
-    return np.asarray(np.minimum(np.square(offset) + np.square(beyond), _CAPPED) + _YAW * (1.0 - exact.cos(off)))
+    return np.asarray(np.minimum(np.square(offset) + np.square(beyond), _CAPPED) + _YAW * (1.0 - np.cos(off)))
 
 
 def _change(before: Floats, after: Floats) -> tuple[int, float] | None:
@@ -256,7 +256,7 @@ def changed_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
     here = first.at(s)
     there, _ = second.project(here[:, :2])
     x = np.clip((s - station) / reach + 0.5, 0.0, 1.0)
-    share = exact.power(x, 3) * (10.0 - 15.0 * x + 6.0 * np.square(x))
+    share = x**3 * (10.0 - 15.0 * x + 6.0 * np.square(x))
     target = second.at(there)[:, :2]
     kept = (s < station) | ((there > 0.0) & (there < second.length))
     mixed = (here[:, :2] + share[:, None] * (target - here[:, :2]))[kept]
@@ -293,7 +293,7 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
     for i, (course, track) in enumerate(zip(courses, tracks, strict=True)):
         rows += [(one_each[i], start, _STOPPED) for start in _starts_to_stop(network, course, track, scale)]
     factors, values, weights = (np.array(column) for column in zip(*rows, strict=True))
-    solution = exact.lstsq(weights[:, None] * factors, weights * values)
+    solution = np.linalg.lstsq(weights[:, None] * factors, weights * values, rcond=None)[0]
     return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
 
 
@@ -351,7 +351,7 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
         miss = np.minimum(np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED)
-        turned = 1.0 - exact.cos(fitted[:, 2] - poses[:, 2])
+        turned = 1.0 - np.cos(fitted[:, 2] - poses[:, 2])
         cost += float(miss.mean() + _YAW * turned.mean()) / len(tracks)
     for a, b, crossing in pair_crossings(tracks):
         if len(crossings(courses[a].curve, courses[b].curve, _CROSS)):

@@ -14,7 +14,7 @@ import shapely
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
-from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
+from scenario_gen.numerics import Bools, Floats, Ints, runs
 from scenario_gen.numerics.plane import edge_lengths, meeting_shares
 from scenario_gen.roads.vector.signs import DraftRule, rules_of_pieces, with_rules
 from scenario_gen.types import Lane, LaneNetwork
@@ -395,7 +395,7 @@ def lane_ends(network: LaneNetwork) -> tuple[Floats, Floats]:
 
     def pose(lane: Lane, at: int, edge: int) -> list[float]:
         step = lane.centre[edge + 1] - lane.centre[edge]
-        return [*lane.centre[at].tolist(), float(exact.arctan2(step[1], step[0]))]
+        return [*lane.centre[at].tolist(), float(np.arctan2(step[1], step[0]))]
 
     entries = [pose(network.lanes[k], 0, 0) for k in network.entries]
     exits = [pose(network.lanes[k], -1, len(network.lanes[k].centre) - 2) for k in network.exits]

@@ -16,7 +16,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit_left
 from scenario_gen.roads.vector.network import (
     by_id,
@@ -294,7 +294,7 @@ class _Joints:
         first, second = self.lane(a[0]), self.lane(b[0])
         if first is None or second is None:
             return
-        if float(exact.hypot(*(first.middle(a[1]) - second.middle(b[1])))) > _LINKED:
+        if float(np.hypot(*(first.middle(a[1]) - second.middle(b[1])))) > _LINKED:
             self.apart.append(place)
             return
         for lane, end, other in ((first, a, b), (second, b, a)):
@@ -362,7 +362,7 @@ class _Joints:
                 source = self.end_of(incoming, side, int(link.number("from")))
                 lane = self.lane(source[0])
                 if lane is not None:
-                    distance[source] = float(exact.hypot(*(lane.middle(source[1]) - goal.middle(target[1]))))
+                    distance[source] = float(np.hypot(*(lane.middle(source[1]) - goal.middle(target[1]))))
             if distance:
                 self.join(min(distance, key=distance.__getitem__), target, link.place)
 
@@ -371,7 +371,7 @@ def _drafts(roads: dict[str, _Road], joints: _Joints) -> Iterator[Draft]:
     for road in roads.values():
         for section in road.sections:
             for lane in section.lanes.values():
-                wide = float(exact.hypot(*(lane.outer - lane.inner).T).max()) >= 0.1
+                wide = float(np.hypot(*(lane.outer - lane.inner).T).max()) >= 0.1
                 if lane.kind not in _FOR_CARS or not wide:
                     continue
                 yield _draft(road, section, lane, joints, along=lane.forth)

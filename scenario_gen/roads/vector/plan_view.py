@@ -13,7 +13,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.plane import place
 
 _STEP = 1.0  # metres of a spiral that one rule of Gauss integrates
@@ -127,8 +127,8 @@ def _arc(shape: Element, _length: float, ds: Floats) -> tuple[Floats, Floats, Fl
     if abs(curvature) < 1e-12:
         return _line(shape, _length, ds)
     turn = curvature * ds
-    half = exact.sin(0.5 * turn)
-    return exact.sin(turn) / curvature, 2.0 * np.square(half) / curvature, turn
+    half = np.sin(0.5 * turn)
+    return np.sin(turn) / curvature, 2.0 * np.square(half) / curvature, turn
 
 
 def _spiral(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, Floats]:
@@ -139,7 +139,7 @@ def _spiral(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, 
     step = np.diff(knots)
     at = knots[:-1, None] + step[:, None] * _GAUSS[0]
     heading = at * (first + 0.5 * rate * at)
-    parts = [(step[:, None] * _GAUSS[1] * function(heading)).sum(axis=1) for function in (exact.cos, exact.sin)]
+    parts = [(step[:, None] * _GAUSS[1] * function(heading)).sum(axis=1) for function in (np.cos, np.sin)]
     u, v = (np.concatenate(([0.0], np.cumsum(part)))[np.searchsorted(knots, ds)] for part in parts)
     return u, v, ds * (first + 0.5 * rate * ds)
 
@@ -149,9 +149,9 @@ def _poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, F
     a, b, c, d = (shape.number(name) for name in "abcd")
     u = np.linspace(0.0, max(length, 1e-6), max(math.ceil(length / 0.05), 1) + 1)
     v = a + u * (b + u * (c + u * d))
-    arc = np.concatenate(([0.0], np.cumsum(exact.hypot(np.diff(u), np.diff(v)))))
+    arc = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(u), np.diff(v)))))
     at = np.interp(ds, arc, u)
-    return at, a + at * (b + at * (c + at * d)), exact.arctan(b + at * (2.0 * c + at * 3.0 * d))
+    return at, a + at * (b + at * (c + at * d)), np.arctan(b + at * (2.0 * c + at * 3.0 * d))
 
 
 def _param_poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, Floats]:
@@ -161,7 +161,7 @@ def _param_poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Flo
         a, b, c, d = (shape.number(f"{name}{axis}") for name in "abcd")
         values.append((a + p * (b + p * (c + p * d)), b + p * (2.0 * c + p * 3.0 * d)))
     (u, du), (v, dv) = values
-    return u, v, np.asarray(exact.arctan2(dv, du))
+    return u, v, np.asarray(np.arctan2(dv, du))
 
 
 _SHAPE = {"line": _line, "arc": _arc, "spiral": _spiral, "poly3": _poly3, "paramPoly3": _param_poly3}

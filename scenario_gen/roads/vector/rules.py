@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.plane import edge_lengths, meeting_shares, unit
 from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.template import Conflict
@@ -147,7 +147,7 @@ class RuleCheck:
 def _same_way(network: LaneNetwork, lane: int, place: Floats, heading: float) -> bool:
     """Whether a vehicle at a place (2,) [m] drives about the way of a lane there."""
     away = np.square(network.lanes[lane].middle - place).sum(axis=1)
-    return float(exact.cos(network.lanes[lane].yaw[int(np.argmin(away))] - heading)) > _SAME_WAY
+    return float(np.cos(network.lanes[lane].yaw[int(np.argmin(away))] - heading)) > _SAME_WAY
 
 
 def _waits_before(scenario: Scenario, met: Conflict) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.roads.vector.network import crossing_lanes
 from scenario_gen.template import pair_crossings, Track
@@ -57,7 +57,7 @@ class Spot:
 
 def _turned(points: Floats, yaw: Floats | float) -> Floats:
     """Points (..., 2) turned by angles (...) about the origin."""
-    x, y, cos, sin = points[..., 0], points[..., 1], exact.cos(yaw), exact.sin(yaw)
+    x, y, cos, sin = points[..., 0], points[..., 1], np.cos(yaw), np.sin(yaw)
     return np.stack((x * cos - y * sin, x * sin + y * cos), axis=-1)
 
 
@@ -88,7 +88,7 @@ class _Field:
             at = np.floor((points[part] - low) / self.cell).astype(np.int64)
             cells = np.clip(at[:, None] + offsets, 0, size - 1)
             centres = low + (cells + 0.5) * self.cell
-            distance = exact.hypot(centres[..., 0] - points[part, None, 0], centres[..., 1] - points[part, None, 1])
+            distance = np.hypot(centres[..., 0] - points[part, None, 0], centres[..., 1] - points[part, None, 1])
             return distance, cells[..., 1] * size[0] + cells[..., 0]
 
         parts = [slice(k, k + _AT_ONCE) for k in range(0, len(points), _AT_ONCE)]

@@ -16,7 +16,7 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.vector.match import bending, Chains, changed_curve, Course, Match, pressed_aside, speeding, turned_more
 from scenario_gen.template import FrenetTracks, to_frenet, Track
@@ -123,7 +123,7 @@ def _straight_on(chains: Chains, first: int, span: float) -> tuple[int, ...]:
 def _turn_of(chains: Chains, lane: int) -> float:
     centre = chains.network.lanes[lane].centre
     first, last = centre[1] - centre[0], centre[-1] - centre[-2]
-    return abs(float(exact.arctan2(first[0] * last[1] - first[1] * last[0], first[0] * last[0] + first[1] * last[1])))
+    return abs(float(np.arctan2(first[0] * last[1] - first[1] * last[0], first[0] * last[0] + first[1] * last[1])))
 
 
 def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: FrenetTracks, low: float) -> Match | None:
@@ -186,7 +186,7 @@ def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:
     poses = stretch.axis.at(np.linspace(begin, end, max(math.ceil((end - begin) / _EVERY), 1) + 1))
     start = poses[0 if sign > 0 else -1]
     yaw = start[2] + (0.0 if sign > 0 else np.pi)
-    away = exact.hypot(chains.points[:, 0] - start[0], chains.points[:, 1] - start[1])
+    away = np.hypot(chains.points[:, 0] - start[0], chains.points[:, 1] - start[1])
     near = np.flatnonzero((away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL))
     sides: list[_Side] = []
     for first in sorted(set(chains.owner[near].tolist())):
@@ -211,7 +211,7 @@ def _beside(chains: Chains, first: int, poses: Floats, sign: int) -> tuple[int, 
     chain, goal = [first], poses[-1, :2]
     while True:
         centre = chains.network.lanes[chain[-1]].centre
-        if float(exact.hypot(*(centre - goal).T).min()) < _ASIDE and len(chain) > 1 and _passed(centre, poses[-1], sign):
+        if float(np.hypot(*(centre - goal).T).min()) < _ASIDE and len(chain) > 1 and _passed(centre, poses[-1], sign):
             return tuple(chain)
         after = chains.after(chain)
         if not after:
@@ -220,10 +220,10 @@ def _beside(chains: Chains, first: int, poses: Floats, sign: int) -> tuple[int, 
 
 
 def _off(point: Floats, poses: Floats) -> float:
-    return float(exact.hypot(*(poses[:, :2] - point).T).min())
+    return float(np.hypot(*(poses[:, :2] - point).T).min())
 
 
 def _passed(centre: Floats, pose: Floats, sign: int) -> bool:
     """Whether a lane goes on beyond a pose by more than room for a vehicle."""
-    ahead = (centre[-1] - pose[:2]) * np.array([exact.cos(float(pose[2])), exact.sin(float(pose[2]))])
+    ahead = (centre[-1] - pose[:2]) * np.array([np.cos(float(pose[2])), np.sin(float(pose[2]))])
     return bool(sign * float(ahead.sum()) > 10.0)

@@ -33,7 +33,7 @@ from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import make_planner, plan_routes, plan_with_retry, PlanningConfig, Query
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.ros.plumbing.stage_node import Inputs, REQUESTS, StageNode
 from scenario_gen.types import Road, tokens
 
@@ -168,5 +168,5 @@ def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> F
     """
     path = plan_with_retry(make_planner(config), road, query, config.iterations, seed).path
     ahead = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
-    heading = exact.arctan2(ahead[:, 1], ahead[:, 0])
+    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
     return np.column_stack([path, np.append(heading, heading[-1])[: len(path)]])

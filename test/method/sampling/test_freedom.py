@@ -17,7 +17,6 @@ from scenario_gen.method.sampling.freedom import CATALOGUE, cut, FADES, freedom_
 from scenario_gen.method.sampling.pace import clock_of
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.validity import Checker
-from scenario_gen.numerics.exact import random as exact_random
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.request import Request
 
@@ -26,7 +25,7 @@ NOMINAL = clock_of(GRID, np.ones(201))
 
 
 def normal(count, size, seed=0):
-    return exact_random.standard_normal(np.random.Generator(np.random.PCG64(seed)), (count, size))
+    return np.random.default_rng(seed).standard_normal((count, size))
 
 
 def batch(count=300, request=Request(), **parameters):

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from scenario_gen.logs import read_log
-from scenario_gen.numerics import exact
 from scenario_gen.roads import placements, read_network, tracks_on
 from scenario_gen.template import clean_tracks, find_conflicts
 from scenario_gen.types import Encounter, Vehicle
@@ -22,7 +21,7 @@ def left_turn(median, start):
     """One turns left, 76° of it, after an oncoming one has passed, whose lane lies `median` metres to the left."""
     arc = np.minimum(np.maximum(np.arange(STEPS) * DT * 4.0 - 11.0, 0.0), 24.0) / 18.0
     yaw = arc
-    turning = np.cumsum(0.4 * np.column_stack((exact.cos(yaw), exact.sin(yaw))), axis=0) - (11.0, 0.0)
+    turning = np.cumsum(0.4 * np.column_stack((np.cos(yaw), np.sin(yaw))), axis=0) - (11.0, 0.0)
     oncoming = np.column_stack((start - 0.8 * np.arange(STEPS), np.full(STEPS, median)))[:40]
     oncoming = np.concatenate((oncoming, np.repeat(oncoming[-1:], STEPS - 40, axis=0)))
     speed = np.stack((np.full(STEPS, 4.0), np.where(np.arange(STEPS) < 39, 8.0, 0.0)))

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
 from scenario_gen.roads import places, read_network, RuleCheck
 from scenario_gen.template import clean_tracks, find_conflicts
 from scenario_gen.types import Encounter, RuleKind, Scenario, Vehicle
@@ -22,7 +21,7 @@ KINDS = {"206": RuleKind.STOP, "205": RuleKind.GIVE_WAY, "306": RuleKind.PRIORIT
 def drive(arm, speeds, start):
     """Return positions (T, 2), headings (T,) and speeds (T,) of who goes straight over the crossroads from `start` [m] on."""
     along = start + np.concatenate(([0.0], np.cumsum(DT * (speeds[1:] + speeds[:-1]) / 2.0)))
-    heading = float(exact.arctan2(*ARMS[arm][::-1]))
+    heading = float(np.arctan2(*ARMS[arm][::-1]))
     return np.array([at(arm, s, 1.75) for s in along]), np.full(len(along), heading), speeds
 
 

@@ -10,7 +10,7 @@ Source: Dubins 1957; the closed forms are those of Shkel & Lumelsky 2001.
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F, kernel, OUT1
 
 LSL, RSR, LSR, RSL, RLR, LRL = 0, 1, 2, 3, 4, 5
@@ -38,20 +38,20 @@ def shortest(  # noqa: PLR0912
     """
     dx, dy = (x1 - x0) / radius, (y1 - y0) / radius
     d = np.sqrt(dx * dx + dy * dy)
-    direction = exact.arctan2(dy, dx) if d > 0.0 else 0.0
+    direction = np.arctan2(dy, dx) if d > 0.0 else 0.0
     alpha, beta = yaw0 - direction, yaw1 - direction
-    sa, ca, sb, cb = exact.sin(alpha), exact.cos(alpha), exact.sin(beta), exact.cos(beta)
+    sa, ca, sb, cb = np.sin(alpha), np.cos(alpha), np.sin(beta), np.cos(beta)
     cab = ca * cb + sa * sb
     best, word, t, p, q = np.inf, LSL, 0.0, 0.0, 0.0
 
     square = 2.0 + d * d - 2.0 * cab + 2.0 * d * (sa - sb)
-    across = exact.arctan2(cb - ca, d + sa - sb)
+    across = np.arctan2(cb - ca, d + sa - sb)
     first, middle, last = _turned(across - alpha), np.sqrt(max(square, 0.0)), _turned(beta - across)
     if first + middle + last < best:
         best, word, t, p, q = first + middle + last, LSL, first, middle, last
 
     square = 2.0 + d * d - 2.0 * cab + 2.0 * d * (sb - sa)
-    across = exact.arctan2(ca - cb, d - sa + sb)
+    across = np.arctan2(ca - cb, d - sa + sb)
     first, middle, last = _turned(alpha - across), np.sqrt(max(square, 0.0)), _turned(across - beta)
     if first + middle + last < best:
         best, word, t, p, q = first + middle + last, RSR, first, middle, last
@@ -60,7 +60,7 @@ def shortest(  # noqa: PLR0912
     if square >= 0.0:
         middle = np.sqrt(square)
         if middle < best:
-            across = exact.arctan2(-ca - cb, d + sa + sb) - exact.arctan2(-2.0, middle)
+            across = np.arctan2(-ca - cb, d + sa + sb) - np.arctan2(-2.0, middle)
             first, last = _turned(across - alpha), _turned(across - beta)
             if first + middle + last < best:
                 best, word, t, p, q = first + middle + last, LSR, first, middle, last
@@ -69,7 +69,7 @@ def shortest(  # noqa: PLR0912
     if square >= 0.0:
         middle = np.sqrt(square)
         if middle < best:
-            across = exact.arctan2(ca + cb, d - sa - sb) - exact.arctan2(2.0, middle)
+            across = np.arctan2(ca + cb, d - sa - sb) - np.arctan2(2.0, middle)
             first, last = _turned(alpha - across), _turned(beta - across)
             if first + middle + last < best:
                 best, word, t, p, q = first + middle + last, RSL, first, middle, last
@@ -77,15 +77,15 @@ def shortest(  # noqa: PLR0912
     if d < 4.0:  # three arcs reach no farther
         cosine = 0.125 * (6.0 - d * d + 2.0 * cab + 2.0 * d * (sa - sb))
         if abs(cosine) <= 1.0:
-            middle = FULL - exact.arctan2(np.sqrt(1.0 - cosine * cosine), cosine)
-            first = _turned(alpha - exact.arctan2(ca - cb, d - sa + sb) + 0.5 * middle)
+            middle = FULL - np.arctan2(np.sqrt(1.0 - cosine * cosine), cosine)
+            first = _turned(alpha - np.arctan2(ca - cb, d - sa + sb) + 0.5 * middle)
             last = _turned(alpha - beta - first + middle)
             if first + middle + last < best:
                 best, word, t, p, q = first + middle + last, RLR, first, middle, last
         cosine = 0.125 * (6.0 - d * d + 2.0 * cab + 2.0 * d * (sb - sa))
         if abs(cosine) <= 1.0:
-            middle = FULL - exact.arctan2(np.sqrt(1.0 - cosine * cosine), cosine)
-            first = _turned(-alpha + exact.arctan2(cb - ca, d + sa - sb) + 0.5 * middle)
+            middle = FULL - np.arctan2(np.sqrt(1.0 - cosine * cosine), cosine)
+            first = _turned(-alpha + np.arctan2(cb - ca, d + sa - sb) + 0.5 * middle)
             last = _turned(beta - alpha - first + middle)
             if first + middle + last < best:
                 best, word, t, p, q = first + middle + last, LRL, first, middle, last
@@ -96,10 +96,10 @@ def shortest(  # noqa: PLR0912
 def onward(x: float, y: float, yaw: float, turn: float, length: float, radius: float) -> tuple[float, float, float]:
     """The pose `length` farther on, by an arc (turn 1 left, -1 right) or straight on (0)."""
     if turn == 0.0:
-        return x + length * exact.cos(yaw), y + length * exact.sin(yaw), yaw
+        return x + length * np.cos(yaw), y + length * np.sin(yaw), yaw
     end = yaw + turn * length / radius
     side = turn * radius
-    return x + side * (exact.sin(end) - exact.sin(yaw)), y - side * (exact.cos(end) - exact.cos(yaw)), end
+    return x + side * (np.sin(end) - np.sin(yaw)), y - side * (np.cos(end) - np.cos(yaw)), end
 
 
 @kernel(inline=True)

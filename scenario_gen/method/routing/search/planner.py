@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads import common_component, segments_free
 from scenario_gen.types import Road
 
@@ -132,4 +132,4 @@ def check_query(road: Road, query: Query) -> int:
 
 def path_length(path: Floats) -> float:
     """Length of a polyline (P, 2), in its unit, metres or cells."""
-    return float(exact.hypot(*np.diff(path, axis=0).T).sum())
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())

@@ -17,7 +17,7 @@ from scenario_gen.method.routing.search.planner import BlockedError, Budget, Bud
 from scenario_gen.method.routing.search.pose_path import shorten, trace
 from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig, string_pulled
 from scenario_gen.method.routing.search.sweep import SWEEP
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.roads import (
     blocked_before,
     clearance_in_cells,
@@ -257,7 +257,7 @@ class PoseRrtStarConnect:
         best: Floats | None = None
         cost, known = np.inf, np.inf
         history: list[tuple[int, float, float]] = []
-        straight = float(exact.hypot(*(search.ends[1] - search.ends[0])[:2]))
+        straight = float(np.hypot(*(search.ends[1] - search.ends[0])[:2]))
         while not (budget.cancelled and budget.cancelled()):
             if search.best < known:
                 known = search.best
@@ -335,10 +335,10 @@ class PoseRrtStarConnect:
 def along(line: Floats, spacing: float) -> Floats:
     """Poses (M, 3) about `spacing` apart on a polyline (P, 2) [m]."""
     edge = np.diff(line, axis=0)
-    size = exact.hypot(*edge.T)
+    size = np.hypot(*edge.T)
     at = np.concatenate(([0.0], np.cumsum(size)))
     s = np.linspace(0.0, at[-1], max(int(np.ceil(at[-1] / spacing)) + 1, 2))
-    yaw = exact.arctan2(edge[:, 1], edge[:, 0])
+    yaw = np.arctan2(edge[:, 1], edge[:, 0])
     which = np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(edge) - 1)
     return np.column_stack((np.interp(s, at, line[:, 0]), np.interp(s, at, line[:, 1]), yaw[which]))
 

@@ -41,7 +41,7 @@ from scenario_gen.method.routing.search.tree_nodes import (  # fmt: skip
     ZETA,
 )
 from scenario_gen.method.routing.search.tree_samples import Random, RandomState, uniform
-from scenario_gen.numerics import Counts, exact, Floats, Ints
+from scenario_gen.numerics import Counts, Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, kernel, N2, OUT1, OUT2, OUTI1
 
 YAW, WORD, PART_A, PART_B, PART_C = 4, 5, 6, 7, 8
@@ -111,7 +111,7 @@ def _nearest(
 @kernel(inline=True)
 def _is_free(x: float, y: float, yaw: float, blocked: Counts, setting: Floats, low: Floats, high: Floats) -> bool:
     """Whether the footprint at a pose is free."""
-    c, s = exact.cos(yaw), exact.sin(yaw)
+    c, s = np.cos(yaw), np.sin(yaw)
     return bool(swept_free(blocked, x, y, c, s, x, y, c, s, setting[HALF_LENGTH], setting[HALF_WIDTH], 0.0, low, high))
 
 
@@ -134,7 +134,7 @@ def _sample(
             k = int(uniform(random) * about.shape[0])
             scale = FINER[int(uniform(random) * FINER.size)]
             aside, ahead = scale * setting[SPREAD] * _bell(random), setting[SPREAD] * _bell(random)
-            c, s = exact.cos(about[k, 2]), exact.sin(about[k, 2])
+            c, s = np.cos(about[k, 2]), np.sin(about[k, 2])
             x, y = about[k, 0] + c * ahead - s * aside, about[k, 1] + s * ahead + c * aside
             yaw = about[k, 2] + scale * setting[YAW_SPREAD] * _bell(random)
         else:
@@ -236,7 +236,7 @@ def _extend(
         return TRAPPED, -1
     first, last = _range(tree, node, counter)
     n = float(max(last - first, 2))
-    reach = min(setting[GAMMA] * np.sqrt(np.sqrt(exact.log(n) / n)), setting[ZETA])  # eq 10, d = 4
+    reach = min(setting[GAMMA] * np.sqrt(np.sqrt(np.log(n) / n)), setting[ZETA])  # eq 10, d = 4
     count = 0
     for k in range(first, last):
         dx, dy = node[k, X] - x, node[k, Y] - y

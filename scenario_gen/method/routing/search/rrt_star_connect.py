@@ -14,7 +14,7 @@ from scenario_gen.method.routing.search import tree_nodes as trees
 from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
 from scenario_gen.method.routing.search.shortcut import pull_string
 from scenario_gen.method.routing.search.tree_kernels import grow
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.roads import clearance_in_cells, component_cells, to_cells, to_metres
 from scenario_gen.types import Road
 
@@ -142,7 +142,7 @@ class RrtStarConnect:
         label = check_query(road, query)
         started = thread_time()
         search = _Trees(road, query, label, self.config, seed)
-        straight = float(exact.hypot(*(search.ends[1] - search.ends[0])))
+        straight = float(np.hypot(*(search.ends[1] - search.ends[0])))
         shortest: Floats | None = None
         cost, known, batch = np.inf, np.inf, BATCH
         history: list[tuple[int, float, float]] = []

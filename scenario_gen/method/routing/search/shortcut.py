@@ -8,7 +8,9 @@ vertex out; slide it along one of its edges as far as its other neighbour can se
 between its neighbours. Where none helps the string is string_pulled.
 """
 
-from scenario_gen.numerics import exact, Floats
+import numpy as np
+
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F, F2, I, kernel, OUT2
 from scenario_gen.roads import segment_free
 
@@ -63,16 +65,16 @@ def pull_string(clearance: Floats, n: int, radius: float, passes: int, path: Flo
         v = 1
         while v < n - 1:
             ax, ay, vx, vy, bx, by = path[v - 1, 0], path[v - 1, 1], path[v, 0], path[v, 1], path[v + 1, 0], path[v + 1, 1]
-            before = exact.hypot(vx - ax, vy - ay) + exact.hypot(bx - vx, by - vy)
+            before = np.hypot(vx - ax, vy - ay) + np.hypot(bx - vx, by - vy)
             if segment_free(clearance, ax, ay, bx, by, radius):
                 for k in range(v, n - 1):
                     path[k, 0], path[k, 1] = path[k + 1, 0], path[k + 1, 1]
                 n -= 1
-                shorter += before - exact.hypot(bx - ax, by - ay)
+                shorter += before - np.hypot(bx - ax, by - ay)
                 continue
             moved = _slide(clearance, path, v - 1, v, v + 1, radius)
             moved |= _slide(clearance, path, v + 1, v, v - 1, radius)
-            after = exact.hypot(path[v, 0] - ax, path[v, 1] - ay) + exact.hypot(bx - path[v, 0], by - path[v, 1])
+            after = np.hypot(path[v, 0] - ax, path[v, 1] - ay) + np.hypot(bx - path[v, 0], by - path[v, 1])
             if before - after < 1e-6 * before and n < path.shape[0]:
                 vx, vy = path[v, 0], path[v, 1]
                 free, blocked = 0.0, 1.0
@@ -91,7 +93,7 @@ def pull_string(clearance: Floats, n: int, radius: float, passes: int, path: Flo
                     path[v, 0], path[v, 1] = vx + free * (ax - vx), vy + free * (ay - vy)
                     path[v + 1, 0], path[v + 1, 1] = vx + free * (bx - vx), vy + free * (by - vy)
                     v += 1
-                    saved = exact.hypot(ax - vx, ay - vy) + exact.hypot(bx - vx, by - vy) - exact.hypot(bx - ax, by - ay)
+                    saved = np.hypot(ax - vx, ay - vy) + np.hypot(bx - vx, by - vy) - np.hypot(bx - ax, by - ay)
                     after -= free * saved
             shorter += before - after
             v += 1

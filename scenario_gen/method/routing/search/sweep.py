@@ -10,7 +10,7 @@ cells: the swept area lies in it, so nothing slips between two poses.
 import numpy as np
 
 from scenario_gen.method.routing.search.dubins import shortest, TURNS
-from scenario_gen.numerics import Counts, exact, Floats
+from scenario_gen.numerics import Counts, Floats
 from scenario_gen.numerics.kernels import F, F2, kernel, N2, OUT2
 from scenario_gen.roads import blocked_before, clearance_in_cells, CONTACT, to_cells
 from scenario_gen.types import Road
@@ -119,7 +119,7 @@ def offset_from(x: float, y: float, guide: Floats) -> float:
         if square < best:
             best, nearest = square, k
     yaw = guide[nearest, 2]
-    return float(exact.cos(yaw) * (y - guide[nearest, 1]) - exact.sin(yaw) * (x - guide[nearest, 0]))
+    return float(np.cos(yaw) * (y - guide[nearest, 1]) - np.sin(yaw) * (x - guide[nearest, 0]))
 
 
 @kernel(inline=True)
@@ -155,7 +155,7 @@ def follow(
         Length up to the first pose that is not free (infinity: all is), and the cost up to there.
     """
     gone, cost, since, dear = 0.0, 0.0, np.inf, 0.0
-    cos, sin = exact.cos(yaw), exact.sin(yaw)
+    cos, sin = np.cos(yaw), np.sin(yaw)
     for part in range(3):
         turn = TURNS[word, part]
         length = a if part == 0 else b if part == 1 else c
@@ -165,7 +165,7 @@ def follow(
         h = length / steps
         ahead, aside, dc, ds = h, 0.0, 1.0, 0.0
         if turn != 0.0:
-            dc, ds = exact.cos(h / radius), turn * exact.sin(h / radius)
+            dc, ds = np.cos(h / radius), turn * np.sin(h / radius)
             ahead, aside = radius * turn * ds, turn * radius * (1.0 - dc)
         bulge = (radius + half_length) * h * h / (8.0 * radius * radius) if turn != 0.0 else 0.0
         slack = 0.5 * h * (1.0 + half_length / radius)
@@ -207,8 +207,8 @@ def check_sweep(clearance: Floats, blocked: Counts, poses: Floats, half_length: 
     low, high = np.empty(rows), np.empty(rows)
     for m in range(poses.shape[0]):
         k = max(m - 1, 0)
-        x0, y0, c0, s0 = poses[k, 0], poses[k, 1], exact.cos(poses[k, 2]), exact.sin(poses[k, 2])
-        x1, y1, c1, s1 = poses[m, 0], poses[m, 1], exact.cos(poses[m, 2]), exact.sin(poses[m, 2])
+        x0, y0, c0, s0 = poses[k, 0], poses[k, 1], np.cos(poses[k, 2]), np.sin(poses[k, 2])
+        x1, y1, c1, s1 = poses[m, 0], poses[m, 1], np.cos(poses[m, 2]), np.sin(poses[m, 2])
         sure, out[m, 1] = room_beside(clearance, x1, y1, c1, s1, half_length, half_width)
         dx, dy = x1 - x0, y1 - y0
         moved = np.sqrt(dx * dx + dy * dy) + half_length * (abs(c1 - c0) + abs(s1 - s0))

@@ -40,7 +40,7 @@ from scenario_gen.method.routing.search.tree_nodes import (  # fmt: skip
     ZETA,
 )
 from scenario_gen.method.routing.search.tree_samples import detour, next_sample, Random, RandomState
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, kernel, OUT1, OUT2, OUTI1, OUTI2
 from scenario_gen.roads import free_length, segment_free
 
@@ -121,7 +121,7 @@ def _extend(  # noqa: PLR0912
     """
     side, radius, step, bound = setting[SIDE], setting[RADIUS], setting[STEP], setting[BOUND]
     n = float(max(counter[tree], 2))
-    reach = min(setting[GAMMA] * np.sqrt(exact.log(n) / n), setting[ZETA])  # eq 10 with exponent 1/d, d = 2
+    reach = min(setting[GAMMA] * np.sqrt(np.log(n) / n), setting[ZETA])  # eq 10 with exponent 1/d, d = 2
     count = 0
     if nearest < 0 and reach <= step:  # nearly always the nearest node is near: one search for both
         count = near_nodes(tree, qx, qy, reach, node, chunk, head, side, columns, near, gap)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenario_gen.method.routing.search.tree_nodes import BOUND, CORNERS, DRAWN, NODES_A, NODES_B, SIDE, USED
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 AHEAD = 8  # so many nodes per sample drawn ahead: the trees' density hardly changes within a batch
@@ -69,7 +69,7 @@ def _sample(
     for _ in range(100):
         if small:  # Gammell, Srinivasa & Barfoot 2014: sample the ellipse directly
             angle, r = 2.0 * np.pi * uniform(random), np.sqrt(uniform(random))
-            u, v = major * r * exact.cos(angle), minor * r * exact.sin(angle)
+            u, v = major * r * np.cos(angle), minor * r * np.sin(angle)
             c, s = (dx / straight, dy / straight) if straight > 0.0 else (1.0, 0.0)
             x = 0.5 * (ends[0, 0] + ends[1, 0]) + c * u - s * v
             y = 0.5 * (ends[0, 1] + ends[1, 1]) + s * u + c * v

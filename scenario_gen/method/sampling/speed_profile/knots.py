@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, exact, Floats, frozen, Ints, runs
+from scenario_gen.numerics import Bools, Floats, frozen, Ints, runs
 
 STAND = 0.05  # m/s; an asked speed below this is met by standing
 SHORTEST = 0.2  # s, between two knots in the template
@@ -180,7 +180,7 @@ def _joined_lines(time: Floats, speed: Floats, knot: Floats, still: Bools) -> Fl
     lines = np.where(free, np.interp(knot, time, speed), 0.0)
     moving = ~still[at]
     if free.any():  # changes to the speeds met at the knots: none where no sample says anything
-        lines[free] += exact.lstsq(hats[np.ix_(moving, free)], (speed - exact.matmul(hats, lines))[moving])
+        lines[free] += np.linalg.lstsq(hats[np.ix_(moving, free)], (speed - hats @ lines)[moving], rcond=None)[0]
     return np.asarray(np.maximum(lines, 0.0))
 
 
@@ -194,5 +194,5 @@ def best_knot(time: Floats, speed: Floats, a: float, b: float) -> float:
     cost = []
     for knot in candidates:
         basis = np.column_stack([np.ones_like(t), t - a, np.maximum(t - knot, 0.0)])
-        cost.append(float(np.square(v - exact.matmul(basis, exact.lstsq(basis, v))).sum()))
+        cost.append(float(np.square(v - basis @ np.linalg.lstsq(basis, v, rcond=None)[0]).sum()))
     return float(candidates[int(np.argmin(np.round(cost, 9)))])

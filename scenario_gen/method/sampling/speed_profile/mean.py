@@ -15,10 +15,11 @@ from dataclasses import dataclass
 
 import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
+from scipy import linalg, sparse
 
 from scenario_gen.method.sampling.speed_profile.knots import SpeedKnots
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 
 SMOOTHING = 0.5  # s, ℓ: kinks of the lines are rounded over about this time
 SHARP_WEIGHT = 0.3  # of how near the lines are to the speeds before they are rounded; it decides what rounding hides
@@ -117,29 +118,29 @@ def rounded_lines(spline: SpeedSpline, knots: SpeedKnots, time: Floats, speed: F
     right = np.column_stack([spline.projected(knots.knot, hat) for hat in hats])
     loose = np.flatnonzero(~given)
     rounded, base = np.zeros((spline.size, len(hats))), value.copy()
-    rounded[loose] = exact.solve_positive(stiff[np.ix_(loose, loose)], right[loose])
-    base[loose] -= exact.solve_positive(stiff[np.ix_(loose, loose)], exact.matmul(stiff[loose], value))
+    rounded[loose] = linalg.solve(stiff[np.ix_(loose, loose)], right[loose], assume_a="pos")
+    base[loose] -= linalg.solve(stiff[np.ix_(loose, loose)], stiff[loose] @ value, assume_a="pos")
     seen = spline.design(time)
     guess = lines[free]
     lines = np.where(free, lines, 0.0)
     sharp = SHARP_WEIGHT * np.array([np.interp(time, knots.knot, hat) for hat in hats]).T
-    rest = speed - exact.matmul(seen, base + exact.matmul(rounded, guess))
+    rest = speed - seen @ (base + rounded @ guess)
     sharp_rest = SHARP_WEIGHT * (speed - np.interp(time, knots.knot, lines))
-    lines[free] += exact.lstsq(np.vstack([exact.matmul(seen, rounded), sharp]), np.concatenate([rest, sharp_rest]))
+    lines[free] += np.linalg.lstsq(np.vstack([seen @ rounded, sharp]), np.concatenate([rest, sharp_rest]), rcond=None)[0]
     return np.asarray(np.maximum(lines, 0.0))
 
 
 def _smoothness(spline: SpeedSpline) -> Floats:
     """(n, n) of the quadratic form ∫ u² + ℓ⁴ u″² dτ."""
-    return np.asarray(spline.gram + exact.power(SMOOTHING, 4) * spline.bending)
+    return np.asarray(spline.gram + SMOOTHING**4 * spline.bending)
 
 
 def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Bounds) -> Floats | None:
     """Coefficients (n,) [m/s] of the mean speed, None if none meets the bounds."""
     n, m = spline.size, len(spline.stations)
     reach = spline.driven(target.anchor_time)
-    hessian = _smoothness(spline) + ANCHOR_WEIGHT * exact.matmul(reach.T, reach)
-    linear = spline.projected(target.time, target.speed) + ANCHOR_WEIGHT * exact.matmul(reach.T, target.anchor)
+    hessian = _smoothness(spline) + ANCHOR_WEIGHT * (reach.T @ reach)
+    linear = spline.projected(target.time, target.speed) + ANCHOR_WEIGHT * (reach.T @ target.anchor)
     given, value = fixed_coefficients(spline, target.ends)
     known = np.flatnonzero(given)
     unit = np.eye(n)
@@ -156,7 +157,7 @@ def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Boun
         (np.zeros((m, n)), -excess, np.zeros(m)),
     ]
     if not (~given).any():
-        return value if abs(float(exact.matmul(spline.length, value)) - target.length) < 1e-6 else None
+        return value if abs(float(spline.length @ value) - target.length) < 1e-6 else None
     quadratic = np.zeros((n + m, n + m))
     quadratic[:n, :n] = 2.0 * hessian
     price = JERK_PRICE * np.gradient(spline.stations)
@@ -166,9 +167,9 @@ def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Boun
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
-    upper = exact.Columns.of_dense(np.triu(quadratic))
+    upper = sparse.csc_array(np.triu(quadratic))
     solver = clarabel.DefaultSolver(
-        upper, np.concatenate([-2.0 * linear, price]), exact.Columns.of_dense(constraints), right, cones, settings
+        upper, np.concatenate([-2.0 * linear, price]), sparse.csc_array(constraints), right, cones, settings
     )
     solution = solver.solve()
     if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):

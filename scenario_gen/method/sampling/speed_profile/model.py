@@ -16,10 +16,12 @@ from functools import cached_property
 
 import daqp
 import numpy as np
+from scipy import linalg, ndimage
 
+from scenario_gen.method.sampling.gp import covariance_root, principal
 from scenario_gen.method.sampling.speed_profile.mean import Bounds, fixed_coefficients, Motion
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
-from scenario_gen.numerics import Bools, exact, Floats, runs
+from scenario_gen.numerics import Bools, Floats, runs
 
 SHARE = 0.85  # of the template's own deviation from the mean is drawn
 PASSES = 2  # of that window: a strength that changes at once is a jerk of high frequency
@@ -69,7 +71,7 @@ class SpeedModel:
     @cached_property
     def bounded(self) -> Floats:
         """(b, r) what each standard normal number adds to what is bounded."""
-        return exact.matmul(self.rows, self.factor)
+        return self.rows @ self.factor
 
     def draw(self, z: Floats, longer: Floats, pace: Floats, ends: Floats, faster: Floats) -> tuple[Floats, Bools]:
         """Coefficients (S, n) [m/s] and whether they keep what must hold (S,).
@@ -82,12 +84,12 @@ class SpeedModel:
             faster: (S, 2) m/s by which the vehicle is faster at the ends.
         """
         base = self.mean + longer[:, None] * self.longer
-        base = base + exact.matmul((ends - 1.0) * self.mean[[0, -1]] + faster, self.faster.T)
+        base = base + ((ends - 1.0) * self.mean[[0, -1]] + faster) @ self.faster.T
         ok = np.ones(len(z), dtype=np.bool_)
-        coefficients = base + exact.matmul(z, self.factor.T)
+        coefficients = base + z @ self.factor.T
         if len(self.rows):
             scale = np.select([self.order == 1.0, self.order == 2.0], [pace, pace * pace], pace * pace * pace)
-            middle, seen = exact.matmul(base, self.rows.T), exact.matmul(coefficients, self.rows.T)
+            middle, seen = base @ self.rows.T, coefficients @ self.rows.T
             low, high = self.low * scale, self.high * scale
             sense = np.where(self.order < 3.0, 0, _SOFT).astype(np.intc)
             broken = ((seen < low - _TOLERANCE) | (seen > high + _TOLERANCE)).any(axis=1)
@@ -95,7 +97,7 @@ class SpeedModel:
                 x, _, flag, _ = daqp.solve(np.eye(self.size), -z[s], self.bounded, high[s] - middle[s], low[s] - middle[s], sense)
                 ok[s] = flag > 0
                 if ok[s]:
-                    coefficients[s] = base[s] + exact.matmul(self.factor, np.asarray(x))
+                    coefficients[s] = base[s] + self.factor @ np.asarray(x)
         return np.maximum(coefficients, 0.0), ok
 
 
@@ -130,11 +132,11 @@ def speed_model(
     high = np.concatenate([bounds.most[free], np.full(m, bounds.speeding), np.full(m, bounds.jerk)])
     order = np.repeat([1.0, 2.0, 3.0], [int(free.sum()), m, m])
     at = np.concatenate([spline.middle[free], spline.stations, spline.stations])
-    driven = exact.matmul(rows, mean)
+    driven = rows @ mean
     jerky = order == 3.0
     low = np.where(jerky, np.minimum(JERK_ROOM * low, driven), np.minimum(low, driven))  # the mean itself is always kept
     high = np.where(jerky, np.maximum(JERK_ROOM * high, driven), np.maximum(high, driven))
-    spread = np.sqrt(np.square(exact.matmul(rows, factor)).sum(axis=1))
+    spread = np.sqrt(np.square(rows @ factor).sum(axis=1))
     near = (driven - low < _NEAR * spread) | (high - driven < _NEAR * spread)
     return SpeedModel(spline, mean, longer, faster, factor, rows[near], low[near], high[near], order[near], at[near])
 
@@ -149,29 +151,29 @@ def _spread_length(spline: SpeedSpline) -> tuple[Floats, Floats]:
     longer, faster = np.zeros(spline.size), np.zeros((spline.size, 2))
     if len(free) == 0:
         return longer, faster
-    stiff = spline.gram + exact.power(LENGTH_SMOOTHING, 4) * spline.bending
+    stiff = spline.gram + LENGTH_SMOOTHING**4 * spline.bending
     loose = stiff[np.ix_(free, free)]
-    way = exact.solve_positive(loose, spline.length[free])
-    longer[free] = way / float(exact.matmul(way, spline.length[free]))
+    way = linalg.solve(loose, spline.length[free], assume_a="pos")
+    longer[free] = way / float(way @ spline.length[free])
     for k, end in enumerate((0, spline.size - 1)):
         if not spline.still[end]:
             faster[end, k] = 1.0
-            faster[free, k] = -exact.solve_positive(loose, stiff[free, end])
-            faster[:, k] -= longer * float(exact.matmul(spline.length, faster[:, k]))
+            faster[free, k] = -linalg.solve(loose, stiff[free, end], assume_a="pos")
+            faster[:, k] -= longer * float(spline.length @ faster[:, k])
     return longer, faster
 
 
 def kernel_root(time: Floats, amplitude: Floats, length: float) -> Floats:
     """Square root (n, r) of the covariance a a' (1 - x) exp(-x / 2) at times (n,) [s], with amplitudes (n,) and a length [s]."""
     x = np.square((time[:, None] - time) / length)
-    return np.asarray(amplitude[:, None] * exact.root((1.0 - x) * exact.exp(-0.5 * x)))
+    return np.asarray(amplitude[:, None] * covariance_root((1.0 - x) * np.exp(-0.5 * x)))
 
 
 def _process(spline: SpeedSpline, mean: Floats, time: Floats, speed: Floats, sigma: float, length: float) -> Floats:
     """Square root (n, r) of the covariance of the coefficients, without conditions."""
     at = spline.middle
     inside = (time >= spline.breaks[0]) & (time <= spline.breaks[-1])
-    rest = speed[inside] - exact.matmul(spline.design(time[inside]), mean)
+    rest = speed[inside] - spline.design(time[inside]) @ mean
     dt = float(time[1] - time[0])
     parts = [kernel_root(at, np.full(len(at), sigma / length), length)] if sigma > 0.0 else []
     curve = np.diff(rest, 2) / (dt * dt) if len(rest) > 2 else np.zeros(1)
@@ -181,12 +183,12 @@ def _process(spline: SpeedSpline, mean: Floats, time: Floats, speed: Floats, sig
         width = 2 * round(0.5 * WINDOW / dt) + 1
         local = np.square(rest)
         for _ in range(PASSES):
-            local = np.maximum(exact.moving_mean(local, width), 0.0)
+            local = np.maximum(ndimage.uniform_filter1d(local, width, mode="nearest"), 0.0)
         local = np.sqrt(local)
         parts.append(kernel_root(at, SHARE * np.interp(at, time[inside], local), scale))
     if not parts:
         return np.zeros((len(at), 0))
-    return exact.lstsq(spline.design(at), np.hstack(parts))
+    return np.asarray(np.linalg.solve(spline.design(at), np.hstack(parts)))
 
 
 def _conditioned(spline: SpeedSpline, factor: Floats) -> Floats:
@@ -207,7 +209,9 @@ def _conditioned(spline: SpeedSpline, factor: Floats) -> Floats:
         parts.append(_tied(piece, known[np.abs(known).max(axis=1, initial=0.0) > 0.0]))
         parts[-1][given] = 0.0
     whole = np.hstack([np.zeros((spline.size, 0)), *parts])
-    return exact.compact(_tied(whole, exact.matmul(spline.length, whole)[None] / float(spline.length.sum())), 1e-4)
+    root = principal(_tied(whole, (spline.length @ whole)[None] / float(spline.length.sum())), 1e-4)
+    root[given] = 0.0  # to the last bit: a stand stands
+    return root
 
 
 def _tied(factor: Floats, known: Floats) -> Floats:
@@ -216,7 +220,4 @@ def _tied(factor: Floats, known: Floats) -> Floats:
     known = known[norm > 1e-9]
     if len(known) == 0:
         return factor
-    q, r, _ = exact.qr(known.T, full=True, pivot=True)
-    size = np.abs(np.diag(r))
-    rank = int((size > 1e-9 * size[0]).sum())
-    return np.asarray(exact.matmul(factor, q[:, rank:]))
+    return np.asarray(factor @ linalg.null_space(known, rcond=1e-9))

@@ -12,8 +12,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import BSpline
 
-from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
 
 KNOT_SPACING = 0.25  # s; farther apart, the steps of jerk between knots are told from what a driver does
 MOST_KNOTS = 600  # of long encounters the knots are farther apart
@@ -85,23 +86,7 @@ class SpeedSpline:
 
     def design(self, at: Floats, derivative: int = 0) -> Floats:
         """Values (q, n) of all basis functions, or of their derivatives, at times (q,) [s] inside the basis' interval."""
-        t, degree = self.knots, DEGREE - derivative
-        cell = self.first[np.clip(np.searchsorted(self.breaks, at, side="right") - 1, 0, len(self.breaks) - 2)] + DEGREE
-        basis = np.zeros((len(at), DEGREE + 2))  # functions cell - p to cell of degree p, and a zero on either side
-        basis[:, 1] = 1.0
-        for p in range(1, DEGREE + 1):
-            i = cell[:, None] + np.arange(-p, 1)
-            low, high = t[i], t[i + p + 1]
-            left, right = t[i + p] - low, high - t[i + 1]
-            if p <= degree:  # Cox and de Boor
-                left, right = _ratio(at[:, None] - low, left), _ratio(high - at[:, None], right)
-                basis[:, 1 : p + 2] = left * basis[:, : p + 1] + right * basis[:, 1 : p + 2]
-            else:  # the derivative of degree p has differences of its coefficients
-                top = np.array(float(p))
-                basis[:, 1 : p + 2] = basis[:, : p + 1] * _ratio(top, left) - basis[:, 1 : p + 2] * _ratio(top, right)
-        out = np.zeros((len(at), self.size))
-        out[np.arange(len(at))[:, None], cell[:, None] + np.arange(-DEGREE, 1)] = basis[:, 1:]
-        return out
+        return np.asarray(BSpline(self.knots, np.eye(self.size), DEGREE)(at, derivative))
 
     @cached_property
     def length(self) -> Floats:
@@ -139,7 +124,7 @@ class SpeedSpline:
         """(n, n) integrals of products of derivatives of two basis functions."""
         at, weight = self._quadrature()
         basis = self.design(at.ravel(), derivative)
-        return frozen(exact.matmul((basis * weight.ravel()[:, None]).T, basis))
+        return frozen((basis * weight.ravel()[:, None]).T @ basis)
 
     def projected(self, at: Floats, values: Floats) -> Floats:
         """(n,) integrals of each basis function times the straight lines through `values` (q,) at times `at` (q,) [s]."""
@@ -147,7 +132,7 @@ class SpeedSpline:
         half, middle = 0.5 * np.diff(t), 0.5 * (t[1:] + t[:-1])
         points = (middle[:, None] + half[:, None] * _GAUSS_X).ravel()
         weight = (half[:, None] * _GAUSS_W).ravel()
-        return exact.matmul(self.design(points).T, weight * np.interp(points, at, values))
+        return np.asarray(self.design(points).T @ (weight * np.interp(points, at, values)))
 
     @cached_property
     def pieces(self) -> Floats:
@@ -165,8 +150,3 @@ class SpeedSpline:
         """Points and weights (m, 4) [s] of Gauss' rule on every interval."""
         half, middle = 0.5 * np.diff(self.breaks), 0.5 * (self.breaks[1:] + self.breaks[:-1])
         return middle[:, None] + half[:, None] * _GAUSS_X, half[:, None] * _GAUSS_W
-
-
-def _ratio(a: Floats, b: Floats) -> Floats:
-    """A / b, and 0 where b is: a knot that stands several times."""
-    return np.asarray(np.where(b > 0.0, a / np.where(b > 0.0, b, 1.0), 0.0))

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.random import gamma_draw, normal, State
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 BLOCK = 64
@@ -116,9 +116,9 @@ def log_diagonal(matrix: Floats) -> float:
     for i in range(len(matrix)):
         product *= matrix[i, i]
         if not 1.0 / MOST_PRODUCT < product < MOST_PRODUCT:
-            value += exact.log(product)
+            value += np.log(product)
             product = 1.0
-    return value + exact.log(product)
+    return value + math.log(product)
 
 
 @kernel(inline=True)
@@ -127,16 +127,16 @@ def log_gammas(a: float, d: int) -> float:
     value = 0.0
     for least in range(max(d - 2, 0), d):
         x = a - 0.5 * least
-        base, ratio, product = exact.lgamma(x), 1.0, 1.0
+        base, ratio, product = math.lgamma(x), 1.0, 1.0
         value += base
         for step in range(least // 2):
             ratio *= x + step
             product *= ratio
             value += base
             if product > MOST_PRODUCT:
-                base, value = base + exact.log(ratio), value + exact.log(product)
+                base, value = base + np.log(ratio), value + np.log(product)
                 ratio, product = 1.0, 1.0
-        value += exact.log(product)
+        value += np.log(product)
     return value
 
 
@@ -343,7 +343,7 @@ def joint_prior(mean: Floats, precision: Floats, scale: Floats) -> Floats:
     """Return G0 (P + D, P + D) of an MNIW prior with mean M (D, P), K (P, P) and S0 (D, D)."""
     return np.block(
         [
-            [precision, exact.matmul(precision, mean.T)],
-            [exact.matmul(mean, precision), scale + exact.matmul(exact.matmul(mean, precision), mean.T)],
+            [precision, precision @ mean.T],
+            [mean @ precision, scale + mean @ precision @ mean.T],
         ]
     )

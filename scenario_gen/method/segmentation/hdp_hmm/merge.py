@@ -3,11 +3,13 @@
 
 """Greedy merging of states by marginal likelihood: what Gibbs sampling alone does with difficulty."""
 
+import math
+
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import accumulate, log_marginal, posterior_factor
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, F2, I, I1, kernel, OUTI1
 
 
@@ -27,17 +29,17 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
         if k not in (i, j):
             joint = n[i, k] + n[j, k]
             joint_row += joint
-            gain += exact.lgamma(move + joint) - exact.lgamma(move + n[i, k]) - exact.lgamma(move + n[j, k]) + exact.lgamma(move)
+            gain += math.lgamma(move + joint) - math.lgamma(move + n[i, k]) - math.lgamma(move + n[j, k]) + math.lgamma(move)
             joint = n[k, i] + n[k, j]
-            gain += exact.lgamma(move + joint) - exact.lgamma(move + n[k, i]) - exact.lgamma(move + n[k, j]) + exact.lgamma(move)
+            gain += math.lgamma(move + joint) - math.lgamma(move + n[k, i]) - math.lgamma(move + n[k, j]) + math.lgamma(move)
     home = n[i, i] + n[i, j] + n[j, i] + n[j, j]
     joint_row += home
-    gain += exact.lgamma(stay + home) - exact.lgamma(stay)
-    gain -= exact.lgamma(stay + n[i, i]) - exact.lgamma(stay) + exact.lgamma(stay + n[j, j]) - exact.lgamma(stay)
-    gain -= exact.lgamma(move + n[i, j]) - exact.lgamma(move) + exact.lgamma(move + n[j, i]) - exact.lgamma(move)
+    gain += math.lgamma(stay + home) - math.lgamma(stay)
+    gain -= math.lgamma(stay + n[i, i]) - math.lgamma(stay) + math.lgamma(stay + n[j, j]) - math.lgamma(stay)
+    gain -= math.lgamma(move + n[i, j]) - math.lgamma(move) + math.lgamma(move + n[j, i]) - math.lgamma(move)
     total = stay + states * move
-    gain += exact.lgamma(total) - exact.lgamma(total + joint_row)
-    gain += -2.0 * exact.lgamma(total) + exact.lgamma(total + row_i) + exact.lgamma(total + row_j)
+    gain += math.lgamma(total) - math.lgamma(total + joint_row)
+    gain += -2.0 * math.lgamma(total) + math.lgamma(total + row_i) + math.lgamma(total + row_j)
     return gain
 
 

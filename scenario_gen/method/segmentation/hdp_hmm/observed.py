@@ -15,7 +15,7 @@ import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import cholesky, square
 from scenario_gen.method.segmentation.hdp_hmm.random import log_gamma_draw, normal, State
-from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 
@@ -61,7 +61,7 @@ def without_hidden(v: Floats, hidden: Bools, coef: Floats, factor: Floats, shift
             shift[i] -= factor[i, j] * shift[j]
         shift[i] /= factor[i, i]
         total -= shift[i] * shift[i]
-        half += exact.log(factor[i, i])
+        half += np.log(factor[i, i])
     return max(total, 0.0), half
 
 
@@ -76,7 +76,7 @@ def log_radial(square: float, n: float, weight: float, dof: float) -> float:
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
     """
     if dof > 0.0:
-        return -0.5 * (dof + n) * exact.log(1.0 + weight * square / dof)
+        return -0.5 * (dof + n) * math.log(1.0 + weight * square / dof)
     return -0.5 * weight * square
 
 
@@ -127,7 +127,7 @@ def draw_masses(
                 seen = d
                 total = square(coef[k], v[t])
             total += shape[k, 1] * seen / d
-            mass[t] = exact.exp(log_gamma_draw(state, 0.5 * (dof + weight * seen))) / (0.5 * (dof + weight * total))
+            mass[t] = np.exp(log_gamma_draw(state, 0.5 * (dof + weight * seen))) / (0.5 * (dof + weight * total))
 
 
 @kernel(inline=True)
@@ -160,5 +160,5 @@ def log_masses(mass: Floats, power: float, dof: float) -> float:
     value = 0.0
     for t in range(len(mass)):
         if mass[t] > 0.0:
-            value += (0.5 * (power + dof) - 1.0) * exact.log(mass[t]) - 0.5 * dof * mass[t]
+            value += (0.5 * (power + dof) - 1.0) * np.log(mass[t]) - 0.5 * dof * mass[t]
     return value

@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import cholesky, log_marginal, posterior_factor
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 
@@ -91,6 +91,6 @@ def sample_prior(
         top = logs.max()
         total = 0.0
         for option in range(len(options)):
-            logs[option] = exact.exp(logs[option] - top)
+            logs[option] = np.exp(logs[option] - top)
             total += logs[option]
         chosen[side] = pick(logs, uniform(state) * total, -1)

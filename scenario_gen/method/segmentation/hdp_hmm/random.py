@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import kernel
 
 State = np.ndarray[Any, np.dtype[np.uint64]]
@@ -71,7 +71,7 @@ def normal(state: State) -> float:
         if x >= EDGES[layer + 1]:
             if layer == 0:
                 x = beyond(state)
-            elif HEIGHTS[layer] + uniform(state) * (HEIGHTS[layer + 1] - HEIGHTS[layer]) >= exact.exp(-0.5 * x * x):
+            elif HEIGHTS[layer] + uniform(state) * (HEIGHTS[layer + 1] - HEIGHTS[layer]) >= np.exp(-0.5 * x * x):
                 continue
         return x if bits & _SIGN else -x
 
@@ -80,8 +80,8 @@ def normal(state: State) -> float:
 def beyond(state: State) -> float:
     """Return a standard normal number above `TAIL` (Marsaglia 1964)."""
     while True:
-        x = -exact.log(uniform(state)) / TAIL
-        if -2.0 * exact.log(uniform(state)) > x * x:
+        x = -math.log(uniform(state)) / TAIL
+        if -2.0 * math.log(uniform(state)) > x * x:
             return TAIL + x
 
 
@@ -96,7 +96,7 @@ def gamma_draw(state: State, shape: float) -> float:
         if v > 0.0:
             v = v * v * v
             u = uniform(state)
-            if u < 1.0 - 0.0331 * x**4 or exact.log(u) < 0.5 * x * x + d - d * v + d * exact.log(v):
+            if u < 1.0 - 0.0331 * x**4 or np.log(u) < 0.5 * x * x + d - d * v + d * np.log(v):
                 return d * v
 
 
@@ -104,8 +104,8 @@ def gamma_draw(state: State, shape: float) -> float:
 def log_gamma_draw(state: State, shape: float) -> float:
     """Logarithm of a Gamma(shape, 1) draw, which survives shapes near 0."""
     if shape < 1.0:
-        return exact.log(gamma_draw(state, shape + 1.0)) + exact.log(uniform(state)) / shape
-    return exact.log(gamma_draw(state, shape))
+        return math.log(gamma_draw(state, shape + 1.0)) + math.log(uniform(state)) / shape
+    return math.log(gamma_draw(state, shape))
 
 
 @kernel(inline=True)
@@ -114,7 +114,7 @@ def log_beta_draw(state: State, a: float, b: float) -> tuple[float, float]:
     x = log_gamma_draw(state, a)
     y = log_gamma_draw(state, b)
     top = max(x, y)
-    total = top + exact.log(exact.exp(x - top) + exact.exp(y - top))
+    total = top + np.log(np.exp(x - top) + np.exp(y - top))
     return x - total, y - total
 
 
@@ -144,13 +144,13 @@ def dirichlet_draw(state: State, weights: Floats, out: Floats) -> None:
         a = weights[k]
         out[k] = 0.0
         if a < 1.0:
-            out[k] = exact.log(uniform(state)) / a
+            out[k] = np.log(uniform(state)) / a
             a += 1.0
         weights[k] = gamma_draw(state, a)
         top = max(top, out[k])
     total = 0.0
     for k in range(n):
-        out[k] = weights[k] if out[k] == top else weights[k] * exact.exp(max(out[k] - top, -700.0))
+        out[k] = weights[k] if out[k] == top else weights[k] * np.exp(max(out[k] - top, -700.0))
         total += out[k]
     for k in range(n):
         out[k] = max(out[k] / total, 1e-100)

@@ -9,7 +9,7 @@ import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import add_sample
 from scenario_gen.method.segmentation.hdp_hmm.observed import log_radial, without_hidden
-from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import B2, F, F1, F2, F3, I1, kernel, OUT1, OUT2
 
 LEAST_LOG = -600.0
@@ -35,7 +35,7 @@ def log_densities(v: Floats, hidden: Bools, coef: Floats, weight: float, dof: fl
     for k in range(states):
         whole = 0.0
         for i in range(d):
-            whole += exact.log(coef[k, i, p + i])
+            whole += np.log(coef[k, i, p + i])
         for t in range(len(v)):
             seen = d - hidden[t].sum()
             if seen == 0:
@@ -45,9 +45,9 @@ def log_densities(v: Floats, hidden: Bools, coef: Floats, weight: float, dof: fl
             n = weight * seen
             out[t, k] = weight * (whole - half) + log_radial(square, n, weight, dof)
             if dof > 0.0:
-                out[t, k] += exact.lgamma(0.5 * (dof + n)) - exact.lgamma(0.5 * dof) - 0.5 * n * exact.log(math.pi * dof)
+                out[t, k] += math.lgamma(0.5 * (dof + n)) - math.lgamma(0.5 * dof) - 0.5 * n * np.log(math.pi * dof)
             else:
-                out[t, k] -= 0.5 * n * exact.log(2.0 * math.pi)
+                out[t, k] -= 0.5 * n * np.log(2.0 * math.pi)
 
 
 @kernel(inline=True)
@@ -66,7 +66,7 @@ def relative_likelihood(log_density: Floats, out: Floats) -> float:
     """Fill out (K,) with the exponentials of log_density (K,) less its largest, which is returned."""
     best: float = log_density.max()
     for k in range(len(out)):
-        out[k] = exact.exp(max(log_density[k] - best, LEAST_LOG))
+        out[k] = np.exp(max(log_density[k] - best, LEAST_LOG))
     return best
 
 
@@ -90,7 +90,7 @@ def smooth(log_density: Floats, transition: Floats, initial: Floats, ends: Ints,
         total += relative_likelihood(log_density[t], likelihood)
         for k in range(states):
             out[t, k] = ahead[k] * likelihood[k]
-        total += exact.log(scaled(out[t]))
+        total += np.log(scaled(out[t]))
         if t + 1 == ends[sequence]:
             sequence += 1
             ahead[:] = initial

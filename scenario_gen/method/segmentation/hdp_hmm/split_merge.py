@@ -9,6 +9,8 @@ of their own, a few rounds of fitting and labelling bring them to rest, and the 
 time, so that their probability is known. A merge draws such a pair, too, to know how probable the way back is.
 """
 
+import math
+
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import (
@@ -21,7 +23,7 @@ from scenario_gen.method.segmentation.hdp_hmm.emission import (
 )
 from scenario_gen.method.segmentation.hdp_hmm.random import log_beta_draw, State, uniform
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions, log_transitions
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 ROUNDS = 2
@@ -109,7 +111,7 @@ def likelihood_ratios(
         block_log_likelihood(vt, start, stop, coef, shape, weight, 0.0, work[:2], work[2])
         for r in range(start, stop):
             log_ratio = alike + mass[r] * (work[1, r - start] - work[0, r - start])
-            ratio[r] = exact.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO)) if mass[r] > 0.0 else 1.0
+            ratio[r] = np.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO)) if mass[r] > 0.0 else 1.0
     ratio[anchors[0]] = 1.0 / CERTAIN
     ratio[anchors[1]] = CERTAIN
 
@@ -155,9 +157,9 @@ def draw_sides(state: State, ratio: Floats, opens: Ints, stay: float, message: F
             side[r] = 1 if uniform(state) * (1.0 + odds) < odds else 0
         product *= (odds if side[r] == 1 else 1.0) / (1.0 + odds)
         if product < LEAST_PRODUCT:
-            value += exact.log(product)
+            value += np.log(product)
             product = 1.0
-    return value + exact.log(product)
+    return value + math.log(product)
 
 
 @kernel(inline=True)
@@ -233,7 +235,7 @@ def predecessors(n: Ints, k: int) -> int:
 @kernel(inline=True)
 def log_share(a: float, first: int, second: int, log_first: float, log_second: float) -> float:
     """Dirichlet prior of a pair of β over the density its shares are drawn with, Beta(a + first, a + second); logarithm."""
-    value = exact.lgamma(a + first) + exact.lgamma(a + second) - exact.lgamma(2.0 * a + first + second)
+    value = math.lgamma(a + first) + math.lgamma(a + second) - math.lgamma(2.0 * a + first + second)
     return value - first * log_first - second * log_second
 
 
@@ -327,7 +329,7 @@ def log_pair(members: int, left: int, right: int, used: int, empty: int) -> floa
         used: states in use when they are one.
         empty: states not in use then.
     """
-    return exact.log(float(empty) * members * (members - 1.0) / ((used + 1.0) * left * right))
+    return math.log(float(empty) * members * (members - 1.0) / ((used + 1.0) * left * right))
 
 
 @kernel(inline=True)
@@ -371,7 +373,7 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
         factors: (L, M, M) Cholesky factors of the posteriors, updated.
         own: (L,) log marginal likelihood of each state's samples, updated.
     """
-    threshold = exact.log(uniform(state))
+    threshold = np.log(uniform(state))
     splits = uniform(state) < 0.5
     counts = n.sum(axis=0)
     pair = np.empty(4, np.int64)
@@ -408,7 +410,7 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
     here, there = (0 if splits else predecessors(n, j)), (predecessors(n_after, j) if splits else 0)
     share_i, share_j = log_beta_draw(state, a + predecessors(n_after, i), a + there)
     gain += log_share(a, predecessors(n_after, i), there, share_i, share_j)
-    gain -= log_share(a, predecessors(n, i), here, exact.log(beta[i] / both), exact.log(beta[j] / both))
+    gain -= log_share(a, predecessors(n, i), here, np.log(beta[i] / both), np.log(beta[j] / both))
     used, right = (counts > 0).sum(), side.sum() if splits else counts[j]
     if splits:
         gain += log_pair(members, members - right, right, used, len(counts) - used)
@@ -416,7 +418,7 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
         gain -= log_pair(members, members - right, right, used - 1, len(counts) - used + 1)
     gain -= log_transitions(n, top[1], top[2], beta)
     keep_i, keep_j = beta[i], beta[j]
-    beta[i], beta[j] = max(both * exact.exp(share_i), 1e-100), max(both * exact.exp(share_j), 1e-100)
+    beta[i], beta[j] = max(both * np.exp(share_i), 1e-100), max(both * np.exp(share_j), 1e-100)
     gain += log_transitions(n_after, top[1], top[2], beta)
     if not splits and gain >= threshold:
         members_of(labels, ends, i, j, index, opens)

@@ -6,11 +6,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import special
 
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import compact, moving_mean, new_top, Place, Prior, Problem
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, kernel, OUT2, OUTI1
 
 
@@ -190,14 +191,14 @@ def tails(problem: Problem, place: Place) -> float:
     if n == 0:
         return 0.0
     scale = n * d / max(float(squares.sum()), 1e-300)
-    gaussian = 0.5 * n * d * (exact.log(scale) - 1.0)
+    gaussian = 0.5 * n * d * (np.log(scale) - 1.0)
     best, chosen = LEAST_GAIN / problem.weight, 0.0
     for dof in DEGREES_OF_FREEDOM:
         c = scale
         for _ in range(30):
             c = n * d / float(((dof + d) * squares / (dof + c * squares)).sum())
-        value = n * (exact.lgamma(0.5 * (dof + d)) - exact.lgamma(0.5 * dof) - 0.5 * d * exact.log(0.5 * dof))
-        value += 0.5 * n * d * exact.log(c) - 0.5 * (dof + d) * float(exact.log(1.0 + c * squares / dof).sum())
+        value = n * (special.gammaln(0.5 * (dof + d)) - special.gammaln(0.5 * dof) - 0.5 * d * np.log(0.5 * dof))
+        value += 0.5 * n * d * np.log(c) - 0.5 * (dof + d) * float(np.log(1.0 + c * squares / dof).sum())
         if value - gaussian > best:
             best, chosen = value - gaussian, dof
     return chosen

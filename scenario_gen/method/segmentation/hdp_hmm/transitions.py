@@ -3,6 +3,8 @@
 
 """Labels' transitions: counts, what they say of concentrations and stickiness, and draws of π (Fox et al. 2011, algorithm 3)."""
 
+import math
+
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.random import (
@@ -13,7 +15,7 @@ from scenario_gen.method.segmentation.hdp_hmm.random import (
     tables_draw,
     uniform,
 )
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 # Hyperpriors in the order of `hyper`; what follows them there is the weight of a sample, the noise's degrees of freedom (0:
@@ -73,11 +75,11 @@ def sample_tables(state: State, n: Ints, top: Floats, beta: Floats, tables: Floa
 def log_rising(a: float, n: int) -> float:
     """Return log Γ(a + n) / Γ(a); small n are multiplied out."""
     if n > 6:
-        return exact.lgamma(a + n) - exact.lgamma(a)
+        return math.lgamma(a + n) - math.lgamma(a)
     product = a
     for i in range(1, n):
         product *= a + i
-    return exact.log(product)
+    return math.log(product)
 
 
 @kernel(inline=True)
@@ -100,13 +102,13 @@ def log_transitions(n: Ints, total: float, rho: float, beta: Floats) -> float:
 @kernel(inline=True)
 def log_concentration(n: Ints, hyper: Floats, beta: Floats, x: float, y: float) -> float:
     """Log density of x = log(α+κ) and y = logit ρ, given counts n (L + 1, L) and β (L,), π integrated out, up to a constant."""
-    total = exact.exp(x)
-    rho = 1.0 / (1.0 + exact.exp(-y))
+    total = np.exp(x)
+    rho = 1.0 / (1.0 + np.exp(-y))
     value = log_transitions(n, total, rho, beta)
     if hyper[2] > 0.0:
         value += hyper[2] * x - hyper[3] * total
     if hyper[4] > 0.0:
-        value += hyper[4] * exact.log(rho) + hyper[5] * exact.log(1.0 - rho)
+        value += hyper[4] * np.log(rho) + hyper[5] * np.log(1.0 - rho)
     return value
 
 
@@ -129,7 +131,7 @@ def slice_concentration(
     Returns:
         x and y after the step, and `log_concentration` there.
     """
-    height = value + exact.log(uniform(state))
+    height = value + np.log(uniform(state))
     here = x if along == 0 else y
     low = here - SLICE_WIDTH * uniform(state)
     high = low + SLICE_WIDTH
@@ -168,16 +170,16 @@ def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: F
     Tables and π are integrated out.
     The usual draws given tables (Fox et al. 2011, appendix) move by little: tables nearly determine both.
     """
-    x = exact.log(top[1])
-    y = exact.log(top[2] / (1.0 - top[2]))
+    x = np.log(top[1])
+    y = np.log(top[2] / (1.0 - top[2]))
     value = log_concentration(n, hyper, beta, x, y)
     for _ in range(SLICE_ROUNDS):
         if hyper[2] > 0.0:
             x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 0)
         if hyper[4] > 0.0:
             x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 1)
-    top[1] = exact.exp(x)
-    top[2] = min(max(1.0 / (1.0 + exact.exp(-y)), 1e-9), 1.0 - 1e-9)
+    top[1] = np.exp(x)
+    top[2] = min(max(1.0 / (1.0 + np.exp(-y)), 1e-9), 1.0 - 1e-9)
 
 
 @kernel(inline=True)
@@ -207,7 +209,7 @@ def sample_transitions(state: State, n: Ints, hyper: Floats, top: Floats, beta: 
         for k in range(states):
             considered += tables[k]
         log_eta = log_beta_draw(state, top[0], considered)[0]
-        top[0] = exact.exp(log_gamma_draw(state, hyper[0] + dishes)) / (hyper[1] - log_eta)
+        top[0] = np.exp(log_gamma_draw(state, hyper[0] + dishes)) / (hyper[1] - log_eta)
     for k in range(states):
         weights[k] = top[0] / states + tables[k]
     dirichlet_draw(state, weights, beta)
