@@ -6,7 +6,7 @@
 Vehicles are not sampled at the same instants, so nothing is joined by exact time. All messages of a vehicle in a half second give
 one row, driven on to the middle of it with its speed and heading. Rows of the same half second meet in cells as wide as the
 proximity and what a vehicle drives in between: each looks into its own cell and into half of those around it. The database only
-proposes: what decides is computed from the messages from them.
+proposes: what decides is computed from the messages.
 """
 
 from collections.abc import Sequence
