@@ -25,7 +25,16 @@ BEFORE = {  # what is installed before each; ROS's wheels may come from a source
     "ros-test": ("core", "run", "ros", "extras", "test"),
     "bench": ("core", "run", "extras", "test"),
 }  # the others are installed into environments of their own
-OPTIONS = "--universal --python-version 3.11 --fork-strategy fewest --generate-hashes --no-header --no-annotate".split()
+OPTIONS = (
+    "--universal",
+    "--python-version",
+    "3.11",
+    "--fork-strategy",
+    "fewest",
+    "--generate-hashes",
+    "--no-header",
+    "--no-annotate",
+)
 
 
 def pins(text: str) -> dict[str, str]:
@@ -40,7 +49,9 @@ def main() -> None:
         out = Path(folder) / "whole.lock"
         for name in dict.fromkeys([*BEFORE, *sorted(path.stem for path in REQUIREMENTS.glob("*.in"))]):
             before, lock = BEFORE.get(name, ()), REQUIREMENTS / f"{name}.lock"
-            known = dict.fromkeys(chain(*(whole[each].values() for each in before), pins(lock.read_text(encoding="utf-8")).values()))
+            known = dict.fromkeys(
+                chain(*(whole[each].values() for each in before), pins(lock.read_text(encoding="utf-8")).values())
+            )
             out.write_text("".join(known), encoding="utf-8")
             lists = [str(REQUIREMENTS / f"{each}.in") for each in (*before, name)]
             command = ["uv", "pip", "compile", "--quiet", *OPTIONS, *lists, "--output-file", str(out)]
