@@ -11,6 +11,8 @@ SOURCED := $(if $(AMENT_PREFIX_PATH),$(shell $(PYTHON) -c 'import os, rclpy, sys
 	print("yes" if not wheel and any(rclpy.__file__.startswith(path + os.sep) for path in paths) else "")' 2>/dev/null))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --no-deps
 LOCKED := $(PIP) --require-hashes
+# A worker that crashes ends the run, with the name of its test: xdist's loadgroup would wait for ever for the one that replaces it.
+PYTEST := $(BIN)/python -m pytest -n 3 --dist loadgroup --max-worker-restart 0 --timeout 600
 
 .PHONY: demo test soak bench judges audit licences core counts docs install tools clean
 
@@ -25,7 +27,7 @@ demo: $(RUN)
 test: $(TEST) tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n 3 --dist loadgroup --timeout 600 --durations=10; tests=$$?; wait $$types && exit $$tests
+	@$(BIN)/mypy & types=$$!; $(PYTEST) --durations=10; tests=$$?; wait $$types && exit $$tests
 
 # Long tests: `make soak PART=kills` runs one part; a part that was stopped goes on where it was. One table at the end.
 soak: $(TEST)
@@ -36,9 +38,10 @@ bench: $(TEST) .venv-judges-verifai/.ready
 	$(LOCKED) -r requirements/bench.lock
 	$(BIN)/python -m benchmarks all
 
-# Known vulnerabilities of all that is locked. It fails, too, where it could not look everything up.
+# Known vulnerabilities of all that is locked. It fails, too, where a package could not be looked up.
 audit: .venv-audit/.ready
-	.venv-audit/bin/python test/packaging/audit.py requirements/*.lock
+	@found=0; for lock in requirements/*.lock; do echo $$lock; \
+	.venv-audit/bin/pip-audit --strict --require-hashes --disable-pip --progress-spinner off -r $$lock || found=1; done; exit $$found
 
 .venv-audit/.ready: requirements/audit.lock
 	$(PYTHON) -m venv .venv-audit
@@ -60,7 +63,7 @@ judges: $(TEST) .venv-judges-commonroad/.ready .venv-judges-asam/.ready .venv-ju
 core: $(TEST)
 	$(BIN)/python test/packaging/core_install.py
 
-# The counts in docs/architecture.md, which a test holds up to date.
+# The counts in docs/architecture.md. A test holds their budget.
 counts: $(TEST)
 	$(BIN)/python test/packaging/counts.py --write docs/architecture.md
 

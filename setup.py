@@ -64,7 +64,10 @@ setup(
     maintainer_email="scenario_gen@users.noreply.github.com",
     python_requires=">=3.11,<3.14",
     packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
-    package_data={NAME: ["py.typed", "*.pyi", "resources/*", "resources/**/*", "output/report/assets/*"]},
+    package_data={
+        NAME: ["py.typed", "*.pyi", "resources/*", "resources/**/*", "output/report/assets/*"],
+        "msg_conventions": ["py.typed"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -8,7 +8,6 @@ from contextlib import suppress
 import os
 import signal
 import sys
-import threading
 
 from scenario_gen.base.errors import MissingExtraError, needs
 from scenario_gen.base.interrupts import leave, SIGNALS
@@ -33,24 +32,23 @@ def command() -> None:
 
 def main() -> None:
     """Run the command line, and end the process."""
+    code: int | None = None
+
+    def end() -> None:
+        """End the process: to take Python and the compiler down costs a quarter of a second."""
+        if code is not None:
+            for stream in (sys.stdout, sys.stderr):
+                with suppress(OSError, ValueError):
+                    stream.flush()
+            os._exit(code)
+
+    atexit.register(end)  # what is registered first runs last
     try:
         command()
-    except SystemExit as end:
-        if not isinstance(end.code, int | None):
-            raise
-        _end(end.code or 0)
-    _end(0)
-
-
-def _end(code: int) -> None:
-    """End the process after what was registered for it: to take Python and the compiler down costs a quarter of a second."""
-    if threading.active_count() > 1:  # whose work is not done
-        sys.exit(code)
-    atexit._run_exitfuncs()
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):
-            stream.flush()
-    os._exit(code)
+    except SystemExit as stop:
+        code = stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+        raise
+    code = 0
 
 
 if __name__ == "__main__":

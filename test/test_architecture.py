@@ -6,7 +6,6 @@
 import ast
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
-import importlib
 from pathlib import Path
 import re
 import subprocess
@@ -17,80 +16,53 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "scenario_gen"
 
-# The data flow, first to last: a room is a folder or a module of scenario_gen. What each imports, besides the foundation.
+# The data flow, first to last: a room is a folder or a module of scenario_gen, and imports none that stands behind it.
 FOUNDATION = {"base", "numerics", "types"}
-ROOMS = {
-    "base": set(),
-    "numerics": set(),
-    "types": set(),
-    "bags": set(),
-    "logs": {"bags"},
-    "template": set(),
-    "roads": {"logs", "template"},
-    "method": {"bags", "logs", "roads", "template"},
-    "pipeline": {"method", "roads"},
-    "output": {"bags", "logs", "method", "pipeline", "roads", "template"},
-    "closed_loop": {"bags", "method", "output", "roads", "template"},
-    "corpus": {"bags", "logs", "method", "output", "pipeline", "roads", "template"},
-    "ros": {"bags", "closed_loop", "logs", "method", "roads", "template"},
-    "cli": {"bags", "closed_loop", "corpus", "logs", "method", "output", "pipeline", "roads", "ros"},
-    "__main__": {"cli"},
+ROOMS = ("base", "numerics", "types", "bags", "logs", "template", "roads", "method", "pipeline", "output")
+ROOMS += ("closed_loop", "corpus", "ros", "cli", "__main__")
+# The same of the stages, folders or modules of scenario_gen/method.
+STAGES = (
+    "segmentation",
+    "fitting",
+    "routing",
+    "validity",
+    "sampling",
+    "evaluation",
+    "config",
+    "attempt",
+    "suitable_roads",
+    "nearest",
+)
+# Each concept, its one home, and what would show a second one: a regular expression, searched in the whole text of a file.
+CONCEPTS = {
+    "rectangles: corners, overlap, distance": (
+        "numerics/plane.py",
+        r"def \w*(?:corners|overlaps|box_distance|footprint_(?:gap|distance))\(",
+    ),
+    "gap of two motions in space and time": ("logs/gap.py", r"def \w*space_time_gap\("),
+    "growing of groups": ("logs/growing.py", r"class Growth\b|def \w*grow_groups?\("),
+    "least squares of a placement": ("method/fitting/", r"def \w*(?:least_squares|joint_similarity)\("),
+    "RRT*-Connect": ("method/routing/search/pose_tree.py", r"def _?cheapest_parent\("),
+    "fit, plan, sample": ("method/chain.py", r"(?s)\A(?=.*\bfit_template\()(?=.*\bplan_routes\()"),
+    "latitude and longitude": ("logs/geodesy.py", r"(?:import|from) pyproj|6_?378_?137|6_?371_?0"),
+    "folders that replace others": ("base/folders/", r"\bfilelock\b|renameat2"),
+    "object stores": ("base/stores/", r"(?:import|from) fsspec"),
+    "files of bags": ("bags/storage/", r"(?:import|from) (?:rosbags|mcap)\b"),
 }
-# The same of the stages, folders or modules of scenario_gen/method: what one makes, `pipeline` hands to the next.
-STAGES = {
-    "segmentation": set(),
-    "fitting": set(),
-    "routing": set(),
-    "validity": set(),
-    "sampling": {"validity"},
-    "evaluation": set(),
-    "config": {"segmentation", "fitting", "routing", "validity", "sampling", "evaluation"},
-    "attempt": {"config", "fitting", "routing", "sampling", "evaluation"},
-    "suitable_roads": {"config", "segmentation", "fitting"},
-    "nearest": {"attempt", "segmentation", "fitting", "sampling", "suitable_roads"},
-}
-# Rooms and stages that others enter by their packages alone; behind the door stand what an extra brings, and what is slow.
-DOORS = {"types", "template", "roads", "logs", *(f"method.{stage}" for stage in STAGES)}
-BESIDE_THE_DOOR = {
-    "logs.tables": "needs pandas",
-    "method.validity.collision": "kernels, named by what they prove",
-    "method.validity.containment": "kernels, named by what they prove",
-}
-# What may be imported inside a function, and why: libraries, and modules of ours that load such.
-LATE = {
-    "arviz": "tests alone install it",
-    "betterosi": "extra osi",
-    "ast": "read when the first public name is used",
-    "dask": "extra corpus",
-    "distributed": "extra corpus",
-    "duckdb": "extra corpus",
-    "fsspec": "extra stores",
-    "concurrent": "slow to load",
-    "jsonschema": "slow to load",
-    "matplotlib": "extra plot",
-    "multiprocessing": "slow to load",
-    "pandas": "slow to load",
-    "protobuf": "extra osi",
-    "pyarrow": "extra parquet",
-    "rclpy": "extra ros",
-    "rich": "extra cli",
-    "rosbags": "extra bags",
-    "sklearn": "tests alone install it",
-    "std_msgs": "extra ros",
-    "yaml": "slow to load",
-}
-LATE_OURS = {
-    "__main__.py": "a command loads what it needs",
-    "cli/": "a command loads what it needs",
-    "logs/adapters/tracks.py": "needs pyarrow",
-    "logs/read.py": "adapters need extras",
-    "logs/tables.py": "needs pyarrow",
-    "method/routing/search/ompl/planners.py": "needs ompl",
-    "ros/plumbing/doctor.py": "works without what it looks for",
-    "ros/plumbing/sampling_requests.py": "loads all stages, and few requests need them",
-    "ros/plumbing/start.py": "loads rclpy",
-    "types/generation.py": "its methods call public functions, which are loaded when they are first used",
-    "types/scenario.py": "likewise",
+SECOND_HOMES = {  # that are there still; it may only shrink
+    "rectangles: corners, overlap, distance": {
+        "closed_loop/advance.py",
+        "closed_loop/picture.py",
+        "logs/quality.py",
+        "method/evaluation/geometry.py",
+        "method/validity/checker.py",
+        "method/validity/collision.py",
+        "template/separation.py",
+    },
+    "gap of two motions in space and time": {"corpus/kinds.py", "logs/groups.py"},
+    "fit, plan, sample": {"method/attempt.py", "output/review/regenerate.py", "pipeline.py", "ros/nodes/planner.py"},
+    "RRT*-Connect": {"method/routing/search/tree_kernels.py"},
+    "files of bags": {"output/exchange/osi.py"},
 }
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
 
@@ -122,71 +94,35 @@ def stage(path: Path) -> str:
     return path.relative_to(PACKAGE / "method").parts[0].removesuffix(".py")
 
 
-def test_every_room_imports_what_the_table_says_and_nothing_behind_it():
+def rooms_imported() -> dict[str, set[str]]:
+    """Return which rooms each room imports."""
     found: dict[str, set[str]] = {name: set() for name in ROOMS}
     for path in (path for path in PYTHON_FILES if PACKAGE in path.parents and room(path) != "__init__"):
         names = {name.split(".")[1] for name in imported(path) if name.startswith("scenario_gen.")}
         found[room(path)] |= (names & set(ROOMS)) - {room(path)}
-    order = list(ROOMS)
-    assert all(order.index(other) < order.index(name) for name, others in found.items() for other in others)
-    assert {name: others - FOUNDATION for name, others in found.items()} == ROOMS
-
-
-def test_every_stage_imports_what_the_table_says_and_nothing_behind_it():
-    found: dict[str, set[str]] = {name: set() for name in STAGES}
-    for path in (path for path in (PACKAGE / "method").rglob("*.py") if stage(path) != "__init__"):
-        parts = [name.split(".") for name in imported(path)]
-        found[stage(path)] |= {part[2] for part in parts if part[:2] == ["scenario_gen", "method"] and len(part) > 2}
-    order = list(STAGES)
-    assert all(order.index(other) <= order.index(name) for name, others in found.items() for other in others)
-    assert {name: others - {name} for name, others in found.items()} == STAGES
-
-
-def door(name: str) -> str:
-    """Return the room or stage with a door that a module stands in, "" if there is none."""
-    parts = name.split(".")[1:] if name.startswith("scenario_gen.") else []
-    own = ".".join(parts[: 2 if parts[:1] == ["method"] else 1])
-    return own if own in DOORS else ""
-
-
-def test_rooms_and_stages_are_entered_by_their_doors():
-    modules = {module(path) for path in PYTHON_FILES}
-    used = set()
-    for path in (path for path in PYTHON_FILES if path != PACKAGE / "__init__.py"):
-        for name in modules_imported(path, modules):
-            entered = door(name)
-            package, _, last = name.rpartition(".")
-            is_public = package == f"scenario_gen.{entered}" and last in importlib.import_module(package).__all__
-            if entered and entered != door(module(path)) and name != f"scenario_gen.{entered}" and not is_public:
-                assert name.removeprefix("scenario_gen.") in BESIDE_THE_DOOR, f"{path} imports {name}"
-                used.add(name.removeprefix("scenario_gen."))
-    assert used == set(BESIDE_THE_DOOR)
-
-
-def imports_in_functions(path: Path) -> set[str]:
-    """Return the modules that are imported inside functions of a file."""
-    functions = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
-    found: set[str] = set()
-    for node in (node for function in functions for node in ast.walk(function)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found.add(node.module)
     return found
 
 
-def test_functions_import_extras_and_what_is_slow_to_load_alone():
-    used, libraries = set(), set()
-    for path in PYTHON_FILES:
-        name = path.relative_to(PACKAGE if PACKAGE in path.parents else ROOT).as_posix()
-        for imported_name in imports_in_functions(path):
-            if imported_name.split(".")[0] in LATE:
-                libraries.add(imported_name.split(".")[0])
-                continue
-            own = [known for known in LATE_OURS if name.startswith(known)]
-            assert own and imported_name.split(".")[0] == "scenario_gen", f"{name} imports {imported_name} inside a function"
-            used.add(own[0])
-    assert used == set(LATE_OURS) and libraries == set(LATE)
+def test_no_room_imports_what_stands_behind_it():
+    found = rooms_imported()
+    assert not [(name, other) for name, others in found.items() for other in others if ROOMS.index(other) > ROOMS.index(name)]
+
+
+def test_no_stage_imports_what_stands_behind_it():
+    for path in (path for path in (PACKAGE / "method").rglob("*.py") if stage(path) != "__init__"):
+        parts = [name.split(".") for name in imported(path)]
+        used = {part[2] for part in parts if part[:2] == ["scenario_gen", "method"] and len(part) > 2}
+        assert not [other for other in used if STAGES.index(other) > STAGES.index(stage(path))], path
+
+
+def test_every_concept_has_one_home():
+    homes: dict[str, set[str]] = {}
+    for path in (path for path in PYTHON_FILES if PACKAGE in path.parents):
+        name, text = path.relative_to(PACKAGE).as_posix(), path.read_text()
+        for concept, (home, pattern) in CONCEPTS.items():
+            if not name.startswith(home) and re.search(pattern, text):
+                homes.setdefault(concept, set()).add(name)
+    assert not {concept: more for concept, names in homes.items() if (more := names - SECOND_HOMES.get(concept, set()))}
 
 
 def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():

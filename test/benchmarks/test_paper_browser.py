@@ -14,6 +14,8 @@ from scenario_gen.logs.synthetic import bundled
 
 FIGURES = 4
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):

@@ -199,7 +199,7 @@ def test_a_store_that_fails_now_and_then_gives_the_same_bytes(bucket, failing, c
     assert tables(out) == tables(corpus[0])
 
 
-@pytest.mark.parametrize("seconds", [1.5, 2.5, 3.5])
+@pytest.mark.parametrize("seconds", [2.5, *(pytest.param(long, marks=pytest.mark.long) for long in (1.5, 3.5))])
 def test_a_killed_run_is_gone_on_with(bucket, corpus, seconds):
     out = place(f"{bucket}/killed")
     words = ("mine", f"{bucket}/spmd", "--out", f"{bucket}/killed", "--workers", "1")

@@ -84,6 +84,7 @@ assert "| **Speed** |" in evaluation.to_markdown()
 """
 
 
+@pytest.mark.long
 def test_the_library_takes_all_by_name(python):
     python("-c", USE)
 

@@ -153,4 +153,4 @@ def test_reading_twice_gives_the_same_bytes(one, data):
     for a, b in zip(first.encounters, again.encounters, strict=True):
         for field in ("position", "heading", "speed"):
             assert getattr(a, field).tobytes() == getattr(b, field).tobytes()
-    assert first.quality == again.quality
+    assert repr(first.quality) == repr(again.quality)  # some of it is NaN

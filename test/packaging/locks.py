@@ -3,9 +3,12 @@
 
 """Write the locks that `make` installs, with uv, onto those that are there, whose pins stay: python test/packaging/locks.py.
 
+One version for all Pythons wherever wheels allow it.
+
 Each lock holds what its list asks for beyond the locks that are installed before it. Then `make licences`.
 """
 
+from itertools import chain
 from pathlib import Path
 import re
 import subprocess
@@ -20,8 +23,18 @@ BEFORE = {  # what is installed before each; ROS's wheels may come from a source
     "extras": ("core", "run"),
     "test": ("core", "run", "extras"),
     "ros-test": ("core", "run", "ros", "extras", "test"),
-}
-OPTIONS = ("--universal", "--python-version", "3.11", "--generate-hashes", "--no-header", "--no-annotate")
+    "bench": ("core", "run", "extras", "test"),
+}  # the others are installed into environments of their own
+OPTIONS = (
+    "--universal",
+    "--python-version",
+    "3.11",
+    "--fork-strategy",
+    "fewest",
+    "--generate-hashes",
+    "--no-header",
+    "--no-annotate",
+)
 
 
 def pins(text: str) -> dict[str, str]:
@@ -31,21 +44,21 @@ def pins(text: str) -> dict[str, str]:
 
 def main() -> None:
     """Write all of them."""
-    known = "".join((REQUIREMENTS / f"{name}.lock").read_text(encoding="utf-8") for name in BEFORE)
     whole: dict[str, dict[str, str]] = {}
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "whole.lock"
-        for name, before in BEFORE.items():
-            out.write_text(known, encoding="utf-8")
-            lists = [str(REQUIREMENTS / f"{each}.in") for each in (*before, name)]
-            subprocess.run(
-                ["uv", "pip", "compile", "--quiet", *OPTIONS, *lists, "--output-file", str(out)],
-                check=True,
-                stdout=subprocess.DEVNULL,
+        for name in dict.fromkeys([*BEFORE, *sorted(path.stem for path in REQUIREMENTS.glob("*.in"))]):
+            before, lock = BEFORE.get(name, ()), REQUIREMENTS / f"{name}.lock"
+            known = dict.fromkeys(
+                chain(*(whole[each].values() for each in before), pins(lock.read_text(encoding="utf-8")).values())
             )
+            out.write_text("".join(known), encoding="utf-8")
+            lists = [str(REQUIREMENTS / f"{each}.in") for each in (*before, name)]
+            command = ["uv", "pip", "compile", "--quiet", *OPTIONS, *lists, "--output-file", str(out)]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
             whole[name] = pins(out.read_text(encoding="utf-8"))
             new = [block for first, block in whole[name].items() if not any(first in whole[each] for each in before)]
-            (REQUIREMENTS / f"{name}.lock").write_text("".join(new), encoding="utf-8")
+            lock.write_text("".join(new), encoding="utf-8")
 
 
 if __name__ == "__main__":

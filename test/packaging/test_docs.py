@@ -32,6 +32,13 @@ def test_files_links_and_targets_of_a_page_are_there(page):
     assert set(re.findall(r"`make ([a-z]+)", text)) <= targets
 
 
+def test_every_function_that_contributing_names_is_in_its_file():
+    rows = re.findall(r"^\|.*\| `(scenario_gen/[\w/]+\.py)` \| (`.*?`) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE)
+    names = [(file, name) for file, cell in rows for name in re.findall(r"(\w+)`", cell)]
+    assert len(names) > 30
+    assert not [(file, name) for file, name in names if not re.search(rf"(?:def|class) {name}\b", (ROOT / file).read_text())]
+
+
 def test_every_public_name_is_on_the_page_of_the_library_and_every_page_on_the_site():
     page = (ROOT / "docs" / "library.md").read_text()
     shown = dict(re.findall(r"\{py:(?:class|func)\}`(\w+) <([\w.]+)>`", page))

@@ -30,7 +30,7 @@ def run(command, folder):
     )
 
 
-@pytest.mark.parametrize("page", ["docs/tutorial.md", "docs/howto_data.md"])
+@pytest.mark.parametrize("page", [pytest.param("docs/tutorial.md", marks=pytest.mark.long), "docs/howto_data.md"])
 def test_commands_of_a_page_run(page, tmp_path):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     for language, text in blocks(page):
@@ -57,6 +57,7 @@ def test_the_table_of_columns_is_the_code_s():
     assert shown == {quantity: (names, tuple(UNITS[quantity])) for quantity, names in NAMES.items()}
 
 
+@pytest.mark.long
 def test_the_tasks_of_the_library_run_and_are_short(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib").use("Agg")
     (tmp_path / "examples").symlink_to(ROOT / "examples")

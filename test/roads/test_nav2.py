@@ -95,7 +95,7 @@ def test_broken_files_are_errors_too(tmp_path):
     ("text", "said"),
     [
         ("a: &a [1]\nimage: map.pgm\norigin: *a\n", "line 3, column 9: the alias"),
-        ("[" * 5000, "nested more than 32 deep"),
+        ("[" * 5000, "nested more than 32 deep|nesting depth"),
         ("image: map.pgm\nresolution: !!float x\n", "does not suit its tag"),
         ("image: map.pgm\nresolution: 0.5\norigin: !!timestamp x\n", "line 3.*the tag"),
         (f"resolution: {'9' * 5000}\n", "does not suit"),

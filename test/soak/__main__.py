@@ -20,7 +20,7 @@ from figures import Figure
 from rich.console import Console
 from rich.table import Table
 
-PARTS = ("cpu", "cuts", "fuzz", "kills", "long", "properties", "recorded", "ros", "search", "tests")
+PARTS = ("cpu", "cuts", "fuzz", "kills", "long", "newest", "properties", "recorded", "ros", "search", "tests")
 OUT = Path("out/soak")
 
 
