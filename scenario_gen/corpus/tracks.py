@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap, unwrapped
-from scenario_gen.logs import APART, shortest, ticks, windows
+from scenario_gen.corpus.kinds import kind_of, Motion, unwrapped
+from scenario_gen.logs import APART, shortest, space_time_gap, ticks, windows
 from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
@@ -107,7 +107,7 @@ def meetings(a: Track, b: Track, span: tuple[int, int], config: CorpusConfig) ->
             travel = max(float(m.speed.sum()) for m in (p, q)) * config.log.period
             if travel < config.log.travel:
                 continue
-            gap, _, _ = space_time_gap(p, q, config.log.period)
+            gap, _, _ = space_time_gap(p.position, q.position, config.log.period)
             if gap > config.interaction:
                 continue
             found.append({

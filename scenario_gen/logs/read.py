@@ -24,7 +24,8 @@ from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
-from scenario_gen.logs.groups import distances, driven, find_groups, Group, ticks
+from scenario_gen.logs.groups import distances, driven, find_groups, ticks
+from scenario_gen.logs.growing import Group, Meeting
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
@@ -101,7 +102,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     if not groups:
         raise NoEncounterError(explain_no_encounter(log, pieces, config))
     notes += notes_on_vehicles(
-        vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.members}, config
+        vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.spans}, config
     )
     encounters = []
     for k, group in enumerate(groups):
@@ -195,18 +196,19 @@ def encounter_quality(encounter: Encounter) -> EncounterQuality:
 
 def cut_encounter(
     name: str,
-    group: Group,
+    group: Group[Meeting],
     pieces: Sequence[Piece],
     origin_ns: int,
     origin: tuple[float, float] | None,
     config: LogConfig,
 ) -> tuple[Encounter, tuple[str, ...]]:
     """Cut a group out of its pieces; a vehicle of unknown heading faces east, with a note."""
-    members = [pieces[m] for m in group.members]
+    spans = dict(sorted(group.spans.items()))
+    members = [pieces[m] for m in spans]
     notes = []
     position, heading, speed = [], [], []
-    for piece, (first, last) in zip(members, group.spans, strict=True):
-        at = np.clip(np.arange(group.first, group.last), first, last - 1) - piece.first
+    for piece, (first, last) in zip(members, spans.values(), strict=True):
+        at = np.clip(np.arange(group.start, group.end), first, last - 1) - piece.first
         position.append(piece.smooth.position[at])
         speed.append(piece.smooth.speed[at])
         facing = piece.smooth.heading[at]
@@ -218,13 +220,13 @@ def cut_encounter(
     encounter = Encounter(
         name=name,
         vehicles=tuple(Vehicle(p.track.id, p.track.length, p.track.width) for p in members),
-        start_ns=origin_ns + group.first * dt_ns,
+        start_ns=origin_ns + group.start * dt_ns,
         dt_ns=dt_ns,
         position=np.array(position),
         heading=np.array(heading),
         speed=np.array(speed),
         origin=origin,
-        present=np.array(group.spans) - group.first - np.array([0, 1]),
+        present=np.array(list(spans.values())) - group.start - np.array([0, 1]),
     )
     return encounter, tuple(notes)
 
