@@ -71,7 +71,8 @@ def _at_least(one: Floats, other: Floats) -> float:
     x = one[0] + mine * one[2] - other[0] - its * other[2]
     y = one[1] + mine * one[3] - other[1] - its * other[3]
     apart: float = max(np.sqrt(x * x + y * y) - one[6] - other[6], 0.0)
-    return apart + METRES_PER_SECOND_APART * max(one[4] - other[5], other[4] - one[5], 0.0)
+    seconds: float = max(one[4] - other[5], other[4] - one[5], 0.0)
+    return apart + METRES_PER_SECOND_APART * seconds
 
 
 @kernel(inline=True)
