@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.kinds import kind_of, Motion, unwrapped
-from scenario_gen.logs import APART, shortest, space_time_gap, ticks, windows
+from scenario_gen.logs import APART, metres_per_degree, shortest, space_time_gap, ticks, windows
 from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
@@ -130,8 +130,8 @@ def _at(track: Track, at: Ints, origin: tuple[float, float], config: CorpusConfi
     low, high = np.searchsorted(track.t, [at[0], at[-1]])
     own = slice(max(int(low) - 1, 0), int(high) + 1)
     t = track.t[own]
-    wide = LONGITUDE * exact.cos(origin[0] * (np.pi / 180.0))
-    place = np.stack([(track.lon[own] - origin[1]) * wide, (track.lat[own] - origin[0]) * NORTH], axis=1)
+    north, east = metres_per_degree(origin)
+    place = np.stack([(track.lon[own] - origin[1]) * east, (track.lat[own] - origin[0]) * north], axis=1)
     seconds, when = (t - at[0]) * 1e-6, (at - at[0]) * 1e-6
     position = np.stack([np.interp(when, seconds, place[:, 0]), np.interp(when, seconds, place[:, 1])], axis=1)
     after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)

@@ -165,9 +165,11 @@ def ticks(seconds: float, config: LogConfig) -> int:
 
 
 def distances(a: Piece, b: Piece) -> Floats:
-    """Return the distances (T,) [m] of two pieces at their common ticks; empty where they have none."""
+    """Return the distances (T,) [m] of two pieces at their common ticks, infinite at two sites; empty where they have none."""
     first = max(a.first, b.first)
     last = max(min(a.last, b.last), first)
+    if a.track.origin != b.track.origin:
+        return np.full(last - first, np.inf)
     apart: Floats = np.hypot(*(a.position(first, last) - b.position(first, last)).T)
     return apart
 

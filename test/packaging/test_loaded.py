@@ -17,11 +17,8 @@ HEAVY = {
         "plotly.graph_objs",
         "rclpy",
         "scipy.interpolate",
-        "scipy.ndimage",
         "scipy.optimize",
         "scipy.signal",
-        "scipy.sparse",
-        "scipy.special",
     ),
     *("scipy.stats", "sklearn"),
 }

@@ -44,6 +44,7 @@ KEYS = {  # rosdep's, of what the lists in requirements/ name; looked up in rosd
     "numba": "python3-numba",
     "rosbags": "python3-rosbags-pip",
     "pandas": "python3-pandas",
+    "pyproj": "python3-pyproj",
     "shapely": "python3-shapely",
     "pillow": "python3-pil",
     "pyyaml": "python3-yaml",
