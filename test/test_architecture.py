@@ -72,6 +72,7 @@ LATE = {
     "pandas": "slow to load",
     "protobuf": "extra osi",
     "pyarrow": "extra parquet",
+    "pyproj": "slow to load",
     "rclpy": "extra ros",
     "rich": "extra cli",
     "rosbags": "extra bags",

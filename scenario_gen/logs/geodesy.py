@@ -11,6 +11,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints, wrap_angle
@@ -81,16 +84,14 @@ def on_sphere(degrees: Floats) -> Floats:
 
 def sites_of(degrees: Floats) -> Ints:
     """Return the number (F,) of the site of each place (F, 2) [degrees]; sites are `SITE_M` apart or more."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
-    cells, cell_of = np.unique(np.floor(on_sphere(degrees) / SITE_M), axis=0, return_inverse=True)
+    place = np.floor(on_sphere(degrees) / SITE_M)
+    _, first, cell_of = np.unique(place @ (4096.0**2, 4096.0, 1.0), return_index=True, return_inverse=True)
+    cells = place[first]
     i, j = cKDTree(cells).query_pairs(1.0, p=np.inf, output_type="ndarray").T
     _, site = connected_components(
         coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(cells), len(cells))), directed=False
     )
-    return np.asarray(site, dtype=np.int64)[cell_of.ravel()]
+    return np.asarray(site, dtype=np.int64)[cell_of]
 
 
 def about_its_middle(encounter: Encounter) -> Encounter:
