@@ -12,13 +12,13 @@ import sys
 import tempfile
 import time
 
+from benchmarks._archive import write_archive
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import clean_found
 from scenario_gen.corpus.grouping import group_partition
 from scenario_gen.corpus.meetings import search_hours
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import clean_tasks, group_tasks, hour_tasks, inventory
-from scenario_gen.corpus.synthetic import ArchiveConfig, write_archive
 
 STAGES = ("parse", "search", "group", "clean")
 
@@ -41,7 +41,7 @@ def work(name: str, archive: Path, out: Path) -> Iterator[Callable[[], object]]:
 def warm(name: str) -> None:
     """Do the same on next to nothing, so that libraries and kernels are loaded."""
     with tempfile.TemporaryDirectory() as folder:
-        archive = write_archive(Path(folder) / "archive", ArchiveConfig(rows=6000, encounters=2, outside=0))
+        archive = write_archive(Path(folder) / "archive", rows=6000, encounters=2, outside=0)
         for before in STAGES[: STAGES.index(name) + 1]:
             for task in work(before, archive, Path(folder) / "corpus"):
                 task()
@@ -51,7 +51,7 @@ def main() -> None:
     """Run what the command line names: a stage, the archive, the corpus; or `write`, the archive, its settings."""
     name, archive, rest = sys.argv[1:]
     if name == "write":
-        write_archive(Path(archive), ArchiveConfig(**json.loads(rest)), seed=11)
+        write_archive(Path(archive), 11, **json.loads(rest))
         return
     warm(name)
     found = []

@@ -23,6 +23,7 @@ import time
 
 import numpy as np
 
+from benchmarks._archive import Planted, read_planted
 from benchmarks._corpus_kills import killed_batch
 from benchmarks._corpus_peers import costs, missing
 from benchmarks._corpus_primitives import f1, planted_encounter, score
@@ -36,7 +37,6 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, labels_of, pair_encounters, SHARED
 from scenario_gen.corpus.mine import mine
-from scenario_gen.corpus.synthetic import Planted, read_planted
 from scenario_gen.logs.tables import COLUMNS
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.segmentation.library import assign, build_library, PrimitiveLibrary

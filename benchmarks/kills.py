@@ -21,14 +21,14 @@ import tempfile
 import time
 from typing import Any
 
+from benchmarks._archive import write_archive
 from benchmarks._kills_processes import BUCKET, end, Process, Processes, worker_of
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.corpus.synthetic import ArchiveConfig, write_archive
 
 KILLS = sized(15, quick=1)  # of each victim
 VICTIMS = ("client", "worker", "scheduler", "store")
-ARCHIVE = ArchiveConfig(rows=sized(160_000, quick=40_000), hours=6.0, encounters=20, outside=10)
+ARCHIVE = {"rows": sized(160_000, quick=40_000), "hours": 6.0, "encounters": 20, "outside": 10}
 SETTINGS = ["--set", "range_size=1", "--set", "task_rows=10000", "--set", "task_encounters=2"]
 PATIENCE = 240.0  # s after which a run counts as one that hangs
 PAUSE = 0.3  # s, at most, from the object at which a kill comes
@@ -57,7 +57,7 @@ def run(part: str = "all") -> list[Row]:
         return []
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        archive = write_archive(folder / "archive", ARCHIVE, seed=5)
+        archive = write_archive(folder / "archive", 5, **ARCHIVE)
         words = [sys.executable, "-m", "scenario_gen", "mine", str(archive), "--out", str(folder / "whole"), *SETTINGS]
         subprocess.run(words, check=True, capture_output=True)
         whole = {path.name: path.read_bytes() for path in _tables_in(folder / "whole")}

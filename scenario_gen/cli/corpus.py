@@ -79,24 +79,6 @@ def mine(
     conclude(result.failed, corpus)
 
 
-@commands.command("synthetic-archive")
-def synthetic_archive(
-    out: Annotated[Path, typer.Argument(help="Folder for the files. An earlier synthetic archive there is replaced.")],
-    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same files.")] = 0,
-    assignments: Annotated[
-        list[str] | None, typer.Option("--set", help="Set rows, hours, encounters, outside, loss, duplicates, …, as name=value.")
-    ] = None,
-) -> None:
-    """Write a synthetic archive with known encounters, in the format of the Safety Pilot."""
-    from scenario_gen.corpus.synthetic import ArchiveConfig, read_planted, write_archive
-
-    config = assigned_all(ArchiveConfig(), assignments)
-    planted = read_planted(write_archive(out, config, seed))
-    inside = sum(int(one.inside) for one in planted)
-    give(out=out, encounters=inside, outside=len(planted) - inside)
-    lines([f"{out}: synthetic, {inside} encounters to find, {len(planted) - inside} just beyond a threshold"])
-
-
 @dataclass(frozen=True)
 class Batch:
     """The options of `batch`."""

@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.logs import LogConfig
+from scenario_gen.logs import INTERACTS_M, LogConfig
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class CorpusConfig(Parameters):
         10.0, "metres beyond the proximity within which a coarse position still makes a candidate", unit="m", low=0.0, high=100.0
     )
     interaction: float = parameter(
-        6.0,
+        INTERACTS_M,
         "space-time gap below which two vehicles have to do with each other: a second counts 2 m",
         unit="m",
         low=0.1,

@@ -21,10 +21,10 @@ from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label, part_of, read_found
-from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
+from scenario_gen.corpus.kinds import kind_of, Motion
 from scenario_gen.corpus.messages import DEGREE
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.logs import encounters_of, NoEncounterError, Observations, RawLog, read_log, Segment
+from scenario_gen.logs import encounters_of, NoEncounterError, Observations, RawLog, read_log, Segment, space_time_gap
 from scenario_gen.logs.tables import EPOCH_NS
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Encounter
@@ -144,7 +144,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         apart = np.sqrt(np.square(encounter.position[i, both] - encounter.position[j, both]).sum(axis=1))
         both = both[apart < config.log.proximity] if (apart < config.log.proximity).sum() > 1 else both
         a, b = (Motion(encounter.position[n, both], encounter.heading[n, both], encounter.speed[n, both]) for n in (i, j))
-        gap, _, _ = space_time_gap(a, b, encounter.dt)
+        gap, _, _ = space_time_gap(a.position, b.position, encounter.dt)
         pairs.append((gap, i, j, kind_of(a, b, encounter.dt), float(apart.min())))
     pairs.sort()
     latitude, longitude = encounter.origin or (None, None)

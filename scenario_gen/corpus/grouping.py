@@ -1,22 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who is joined to whom: meetings of two vehicles -> encounters of two to twelve.
-
-As `logs.groups` does with tracks, here with the table of meetings alone. An encounter grows from the strongest meeting that is
-left, one of at least `min_duration`; its time is the encounter's. Who is near a member for at least `min_presence` of that time
-joins, the longest first, if it meets at least half of the members. Meetings of two members are used up, but for what of them lies
-outside.
+"""Who is joined to whom: meetings of two vehicles -> encounters of two to twelve, by the rule of every log (`logs.growing`).
 
 Only meetings that overlap in time influence each other. An instant that no meeting spans therefore divides the archive, and each
 task groups the meetings between two such instants.
 """
 
-from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timedelta, UTC
-import heapq
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +17,8 @@ import numpy as np
 from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.logs import LogConfig, SHARED
+from scenario_gen.logs import Growth, LogConfig
+from scenario_gen.logs import Meeting as Met
 from scenario_gen.numerics import Ints
 
 START = datetime(2004, 1, 1, tzinfo=UTC)
@@ -32,22 +26,13 @@ PARTITION = 5000  # meetings that one task groups, at least
 
 
 @dataclass(frozen=True, order=True)
-class Meeting:
-    """Two vehicles near each other from `start` to `end` [µs since 2004]; a smaller gap [m] interacts more."""
+class Meeting(Met):
+    """Two vehicles near each other, times in µs since 2004, with what the table says of them."""
 
-    gap: float
-    start: int
-    a: int
-    b: int
-    end: int
     kind: str
     distance: float
     lat: float
     lon: float
-
-    def other(self, device: int) -> int:
-        """Return the vehicle that is not this one."""
-        return self.b if device == self.a else self.a
 
 
 @dataclass(frozen=True)
@@ -119,59 +104,9 @@ def label(device: int) -> str:
 
 def group(meetings: Sequence[Meeting], config: LogConfig) -> list[Found]:
     """Return the encounters, in order of time."""
-    shortest, least = round(config.min_duration * 1e6), round(config.min_presence * 1e6)
-    by_device: dict[int, set[Meeting]] = defaultdict(set)
-    for one in meetings:
-        for device in (one.a, one.b):
-            by_device[device].add(one)
-    left = set(meetings)
-    queue = [(one.gap, one.start - one.end, one) for one in meetings if one.end - one.start >= shortest]
-    heapq.heapify(queue)
-    found = []
-    while queue:
-        _, _, seed = heapq.heappop(queue)
-        if seed not in left:
-            continue
-        members = _grow(seed, by_device, least, config)
-        inside = [
-            one
-            for device in members
-            for one in by_device[device]
-            if one.a == device and one.b in members and one.start < seed.end and one.end > seed.start
-        ]
-        found.append(Found(tuple(sorted(members)), seed.start, seed.end, tuple(sorted(inside))))
-        for one in inside:
-            left.discard(one)
-            for device in (one.a, one.b):
-                by_device[device].discard(one)
-            for start, end in ((one.start, min(one.end, seed.start)), (max(one.start, seed.end), one.end)):
-                if end - start >= least:
-                    rest = replace(one, start=start, end=end)
-                    left.add(rest)
-                    for device in (one.a, one.b):
-                        by_device[device].add(rest)
-                    if end - start >= shortest:
-                        heapq.heappush(queue, (rest.gap, start - end, rest))
+    growth = Growth[Meeting](round(config.min_duration * 1e6), round(config.min_presence * 1e6), config.max_vehicles)
+    found = [Found(tuple(sorted(one.spans)), one.start, one.end, one.meetings) for one in growth.groups(meetings)]
     return sorted(found, key=lambda one: (one.start, one.devices))
-
-
-def _grow(seed: Meeting, by_device: dict[int, set[Meeting]], least: int, config: LogConfig) -> set[int]:
-    """Return the vehicles of the encounter that a meeting makes."""
-    members, refused = {seed.a, seed.b}, set[int]()
-    while len(members) < config.max_vehicles:
-        near: dict[int, list[Meeting]] = defaultdict(list)
-        for device in members:
-            for one in by_device[device]:
-                if one.other(device) not in members | refused and one.start < seed.end and one.end > seed.start:
-                    near[one.other(device)].append(one)
-        spans = {other: max(min(one.end, seed.end) - max(one.start, seed.start) for one in ones) for other, ones in near.items()}
-        spans = {other: span for other, span in spans.items() if span >= least}
-        if not spans:
-            break
-        best = min(spans, key=lambda other: (-spans[other], min(near[other]).gap, other))
-        met = len({one.other(best) for one in near[best]})
-        (members if met >= SHARED * len(members) else refused).add(best)
-    return members
 
 
 def group_partition(task: GroupTask) -> None:

@@ -18,8 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.logs import LAG
-from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUTB1
 
 KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")
@@ -31,8 +30,7 @@ STEP = 4.0  # m between the points of a path
 MOVES = 0.5  # m/s below which a heading tells nothing new
 PARALLEL = 1e-12  # m²: of two steps of ways that meet nowhere
 MEETS = 1e-6  # of a step: ways that cross in the end of one cross, whatever is rounded
-EVERY = 0.3  # s between the samples that are compared with all others
-FINE = 15  # parts of that in which the nearest are compared once more: at 38 m/s two such samples are 11 m apart
+EVERY = 0.3  # s between the samples that are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,39 +48,6 @@ class Motion:
     def every(self, step: int) -> "Motion":
         """Return each `step`-th sample."""
         return Motion(self.position[::step], self.heading[::step], self.speed[::step])
-
-
-def space_time_gap(a: Motion, b: Motion, dt: float) -> tuple[float, int, int]:
-    """Return min over t, t' of |a(t) - b(t')| + 2 m/s |t - t'| [m], and the samples t and t' at which it is taken.
-
-    Args:
-        a: (T,) samples.
-        b: (T,) samples at the same times.
-        dt: s between two samples.
-    """
-    step = max(round(EVERY / dt), 1)
-    one, other = a.position[::step], b.position[::step]
-    time: Floats = np.arange(len(one), dtype=np.float64) * (step * dt)
-    i, j, _ = _least_gap(one, other, time, time)
-    fine = np.arange(-FINE, FINE + 1) / FINE * (step * dt)
-    when = [np.clip(time[k] + fine, 0.0, time[-1]) for k in (i, j)]
-    near = [
-        np.stack([np.interp(at, time, places[:, 0]), np.interp(at, time, places[:, 1])], axis=1)
-        for at, places in zip(when, (one, other), strict=True)
-    ]
-    return float(_least_gap(*near, *when)[2]), i * step, j * step
-
-
-@kernel(F2, F2, F1, F1)
-def _least_gap(one: Floats, other: Floats, when: Floats, then: Floats) -> tuple[int, int, float]:
-    """The first pair of samples of places (T, 2) and (S, 2) at times (T,) and (S,) [s] whose gap is the least, and that [m]."""
-    i, j, least = 0, 0, np.inf
-    for m in range(len(one)):
-        for n in range(len(other)):
-            cost = np.hypot(one[m, 0] - other[n, 0], one[m, 1] - other[n, 1]) + LAG * abs(when[m] - then[n])
-            if cost < least:
-                i, j, least = m, n, cost
-    return i, j, least
 
 
 def kind_of(a: Motion, b: Motion, dt: float) -> str:

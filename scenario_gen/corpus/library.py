@@ -29,9 +29,9 @@ from scenario_gen.base.provenance import parameter_texts
 from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
-from scenario_gen.corpus.kinds import Motion, space_time_gap
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tasks import agreed, arriving, spread, undone, Workers
+from scenario_gen.logs import space_time_gap
 from scenario_gen.method.segmentation import (
     assign,
     Assignment,
@@ -109,11 +109,10 @@ def pair_encounters(encounter: Encounter, interaction: float) -> Iterator[Encoun
         if (last - first) * encounter.dt < SHORTEST:
             continue
         own = slice(first, last + 1)
-        a, b = (Motion(encounter.position[n, own], encounter.heading[n, own], encounter.speed[n, own]) for n in (i, j))
-        gap, when_a, when_b = space_time_gap(a, b, encounter.dt)
+        gap, when_a, when_b = space_time_gap(encounter.position[i, own], encounter.position[j, own], encounter.dt)
         if gap > interaction and len(encounter.vehicles) > 2:
             continue
-        faster = float(b.speed.mean()) > float(a.speed.mean())
+        faster = float(encounter.speed[j, own].mean()) > float(encounter.speed[i, own].mean())
         order = [j, i] if when_b < when_a or (when_a == when_b and faster) else [i, j]
         vehicles = tuple(encounter.vehicles[n] for n in order)
         yield Encounter(

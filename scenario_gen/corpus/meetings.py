@@ -22,8 +22,8 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR, quoted, write_messages
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import FASTEST, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
-from scenario_gen.logs import APART, LAG, shortest
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.logs import APART, METRES_PER_SECOND_APART, shortest
+from scenario_gen.numerics import Bools, exact, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel
 
 BIN = 500_000  # µs
@@ -244,7 +244,7 @@ def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bo
         "ORDER BY device, bin"
     ).fetchnumpy()
     own = {int(rows["device"][first]): slice(first, last) for first, last in runs_of(rows["device"])}
-    steps = int(config.interaction / LAG / (BIN * 1e-6)) + 1
+    steps = int(config.interaction / METRES_PER_SECOND_APART / (BIN * 1e-6)) + 1
     reach = config.interaction + config.slack + FASTEST * BIN * 0.25e-6
     north = rows["lat"] * NORTH
     kept = np.zeros(len(pairs["a"]), dtype=bool)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap, unwrapped
-from scenario_gen.logs import APART, shortest, ticks, windows
-from scenario_gen.numerics import Bools, Floats, Ints, runs
+from scenario_gen.corpus.kinds import kind_of, Motion, unwrapped
+from scenario_gen.logs import APART, metres_per_degree, shortest, space_time_gap, ticks, windows
+from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
 FASTEST = 35.0  # m/s: what a vehicle drives in a bin widens the cells
@@ -107,7 +107,7 @@ def meetings(a: Track, b: Track, span: tuple[int, int], config: CorpusConfig) ->
             travel = max(float(m.speed.sum()) for m in (p, q)) * config.log.period
             if travel < config.log.travel:
                 continue
-            gap, _, _ = space_time_gap(p, q, config.log.period)
+            gap, _, _ = space_time_gap(p.position, q.position, config.log.period)
             if gap > config.interaction:
                 continue
             found.append({
@@ -130,8 +130,8 @@ def _at(track: Track, at: Ints, origin: tuple[float, float], config: CorpusConfi
     low, high = np.searchsorted(track.t, [at[0], at[-1]])
     own = slice(max(int(low) - 1, 0), int(high) + 1)
     t = track.t[own]
-    wide = LONGITUDE * np.cos(origin[0] * (np.pi / 180.0))
-    place = np.stack([(track.lon[own] - origin[1]) * wide, (track.lat[own] - origin[0]) * NORTH], axis=1)
+    north, east = metres_per_degree(origin)
+    place = np.stack([(track.lon[own] - origin[1]) * east, (track.lat[own] - origin[0]) * north], axis=1)
     seconds, when = (t - at[0]) * 1e-6, (at - at[0]) * 1e-6
     position = np.stack([np.interp(when, seconds, place[:, 0]), np.interp(when, seconds, place[:, 1])], axis=1)
     after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)

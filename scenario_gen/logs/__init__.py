@@ -6,8 +6,10 @@
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.geodesy import latitude_longitude, local_frame
-from scenario_gen.logs.groups import APART, LAG, SHARED, shortest, ticks, windows
+from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_time_gap
+from scenario_gen.logs.geodesy import latitude_longitude, local_frame, metres_per_degree, middle_of
+from scenario_gen.logs.groups import APART, shortest, ticks, windows
+from scenario_gen.logs.growing import Growth, Meeting
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment
 from scenario_gen.logs.read import (
     encounters_of,
@@ -26,7 +28,8 @@ from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
-    "APART", "CASES", "LAG", "SHARED", "LogConfig", "LogFormat", "LogResult", "NoEncounterError", "Observations", "RawLog",
-    "Rows", "Segment", "Streams", "bundled", "encounters_of", "is_bag", "is_commonroad", "is_known", "is_nocturne", "is_osi",
-    "is_spmd", "is_table", "latitude_longitude", "local_frame", "read_log", "read_raw", "shortest", "ticks", "windows",
+    "APART", "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "Growth", "LogConfig", "LogFormat", "LogResult", "Meeting",
+    "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "bundled", "encounters_of", "is_bag",
+    "is_commonroad", "is_known", "is_nocturne", "is_osi", "is_spmd", "is_table", "latitude_longitude", "local_frame",
+    "metres_per_degree", "middle_of", "read_log", "read_raw", "shortest", "space_time_gap", "ticks", "windows",
 ]  # fmt: skip

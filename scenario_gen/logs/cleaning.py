@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig, picked
-from scenario_gen.logs.geodesy import local_frame
+from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
 from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Bools, Floats, Ints
@@ -45,12 +45,12 @@ class Drops:
         return tuple(Dropped(reason, count, log.where(self.first[reason])) for reason, count in self.count.items())
 
 
-def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Drops, tuple[float, float] | None]:
+def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Drops]:
     """Drop impossible values and bring every vehicle into the local frame.
 
     Returns:
-        The vehicles with at least two fixes, in metres, stamps strictly increasing, no NaN but in headings; the drops; the
-        frame's origin (latitude, longitude) or None.
+        The vehicles with at least two fixes, in metres, stamps strictly increasing, no NaN but in headings, one after another for
+        each site (`in_metres`); and the drops.
 
     Raises:
         InputError: nothing usable is left, or `strict` is set and a row had to be repaired.
@@ -66,14 +66,15 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
         raise InputError(
             f"{log.name}: no position between {config.start:g} s and {config.end:g} s; change --set log.start=… or log.end=…"
         )
-    origin, sound = to_metres(log, sound, config)
     sound = [in_order(vehicle, log, drops) for vehicle in sound]
     check_clock(sound, log, config)
-    tracks = [without_jumps(vehicle, drops, config) for vehicle in sound]
+    tracks = [without_jumps(vehicle, drops, config, geographic=log.geographic) for vehicle in sound]
     if config.strict and drops.count:
         worst = drops.of(log)[0]
         raise InputError(f"{worst.first}: {worst.reason} ({worst.count} such rows), and strict is set")
-    return tuple(track for track in tracks if len(track.fix_ns) >= 2), drops, origin
+    if log.geographic:
+        tracks = in_metres(tracks, config)
+    return tuple(track for track in tracks if len(track.fix_ns) >= 2), drops
 
 
 def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) -> Observations:
@@ -154,22 +155,25 @@ def within(vehicle: Observations, first: int, last: int) -> Observations:
     )
 
 
-def to_metres(
-    log: RawLog, vehicles: list[Observations], config: LogConfig
-) -> tuple[tuple[float, float] | None, list[Observations]]:
-    """Project latitude and longitude to east and north of an origin: azimuthal equidistant on the WGS 84 ellipsoid.
+def in_metres(vehicles: list[Observations], config: LogConfig) -> list[Observations]:
+    """Project latitude and longitude to east and north of the parameter `origin`, or else of the middle of their site.
 
-    Distances and directions from the origin are exact; between two points 10 km away from it the scale is right to 1e-6.
+    Sites are groups of fixes far from each other (`geodesy.sites_of`), however far: each has a frame of its own. A vehicle that
+    is recorded at two sites is returned once for each.
     """
-    if not log.geographic:
-        return None, vehicles
     everything = np.concatenate([vehicle.fix for vehicle in vehicles])
-    if config.origin:
-        origin = parse_origin(config.origin)
-    else:
-        middle = np.round(np.percentile(everything, [5, 95], axis=0).mean(axis=0), 5)  # robust against a few wrong fixes
-        origin = (float(middle[0]), float(middle[1]))
-    return origin, [replace(vehicle, fix=local_frame(vehicle.fix[:, 0], vehicle.fix[:, 1], origin)) for vehicle in vehicles]
+    site = np.zeros(len(everything), dtype=np.int64) if config.origin else sites_of(everything)
+    origins = [
+        parse_origin(config.origin) if config.origin else middle_of(everything[site == k], left_out=5.0, digits=5)
+        for k in range(int(site.max()) + 1)
+    ]
+    found = []
+    for vehicle, own in zip(vehicles, np.split(site, np.cumsum([len(vehicle.fix) for vehicle in vehicles])[:-1]), strict=True):
+        at = own[np.clip(np.searchsorted(vehicle.fix_ns, vehicle.speed_ns), 0, len(own) - 1)] if len(own) else own
+        for k in np.unique(own):
+            part = select(vehicle, own == k, at == k)
+            found.append(replace(part, fix=local_frame(part.fix[:, 0], part.fix[:, 1], origins[k]), origin=origins[k]))
+    return found
 
 
 def parse_origin(text: str) -> tuple[float, float]:
@@ -214,10 +218,8 @@ def in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
 
 def first_of_each(stamps: Ints) -> tuple[Ints, Ints]:
     """Return, of stamps (T,), the indices of the first row of each in order of time, and of the rows that repeat one."""
-    order = np.argsort(stamps, kind="stable")
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = np.diff(stamps[order]) > 0
-    return order[new], order[~new]
+    _, keep = np.unique(stamps, return_index=True)
+    return keep, np.delete(np.arange(len(stamps)), keep)
 
 
 def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig) -> None:
@@ -258,14 +260,15 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
         )
 
 
-def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Observations:
+def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig, *, geographic: bool) -> Observations:
     """Drop fixes that the vehicle cannot have reached at its measured speeds, except several in a row that agree."""
     limit = reach(vehicle)
-    step = np.hypot(*np.diff(vehicle.fix, axis=0).T)
+    places = on_sphere(vehicle.fix) if geographic else vehicle.fix
+    step = np.linalg.norm(np.diff(places, axis=0), axis=1)
     seconds = np.diff(vehicle.fix_ns) * 1e-9
     keep = np.ones(len(vehicle.fix_ns), dtype=bool)
     if (step > JUMP_SLACK + limit[1:] * seconds).any():
-        keep = reachable(vehicle.fix_ns.astype(np.float64) * 1e-9, vehicle.fix, limit)
+        keep = reachable(vehicle.fix_ns.astype(np.float64) * 1e-9, places, limit)
         drops.add("position jumps", vehicle.fix_row[~keep])
     length = vehicle.length if np.isfinite(vehicle.length) else config.length
     width = vehicle.width if np.isfinite(vehicle.width) else config.width
@@ -285,16 +288,16 @@ def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
 
     Args:
         seconds: (F,) their stamps.
-        fix: (F, 2) [m].
+        fix: (F, 2) or (F, 3) [m].
         limit: (F,) the highest speeds that the vehicle may have had [m/s].
     """
     keep = np.ones(len(fix), dtype=bool)
     last, n_doubted = 0, 0
     for i in range(1, len(fix)):
-        if np.hypot(*(fix[i] - fix[last])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
+        if np.linalg.norm(fix[i] - fix[last]) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
             last, n_doubted = i, 0
             continue
-        agrees = n_doubted and np.hypot(*(fix[i] - fix[i - 1])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
+        agrees = n_doubted and np.linalg.norm(fix[i] - fix[i - 1]) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
         n_doubted = n_doubted + 1 if agrees else 1
         keep[i] = False
         if n_doubted >= RELOCATED:

@@ -1,23 +1,34 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The local frame of a log: metres east and north of an origin, from latitude and longitude (WGS84).
+"""Local frames: metres east and north of an origin, from degrees, in PROJ's azimuthal equidistant projection (WGS 84).
 
-The plane touches the ellipsoid at the origin; distances from the origin are measured along the ground, as in the azimuthal
-equidistant projection, which this agrees with to 0.1 mm within 10 km and 2 mm within 50 km (tested against PROJ).
-PROJ itself calls the C library's functions, whose last bit depends on the CPU.
+Distances and directions from the origin are exact; between two points r from it the scale is right to (r / 6371 km)² / 6.
+pyproj takes a tenth of a second to load, so it is loaded where degrees are read.
 """
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.types import Encounter
 
-SEMI_MAJOR, FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS84
-ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
-_RADIANS = np.pi / 180.0
-_STEPS = 8  # of the inverse: each brings the error down by 1e-3 or more within 10 km
+EARTH_M = 6_371_000.0  # mean radius
+SITE_M = 10_000.0  # places nearer to each other than this are of one site, and so are those that a chain of such places joins
+OWN_FRAME_M = 1000.0  # from the middle of its site at which an encounter has a frame of its own
+LEVER_M = 100.0  # ahead of a vehicle, a point that tells how its heading turns from frame to frame
+
+
+def _projection(origin: tuple[float, float]) -> Any:
+    import pyproj
+
+    return pyproj.Proj(proj="aeqd", lat_0=origin[0], lon_0=origin[1], ellps="WGS84")
 
 
 def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]) -> Floats:
@@ -28,38 +39,73 @@ def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]
         longitude: degrees, of the same shape.
         origin: latitude and longitude in degrees.
     """
-    sin_lat, cos_lat = np.sin(latitude * _RADIANS), np.cos(latitude * _RADIANS)
-    turned = (longitude - origin[1]) * _RADIANS
-    sin0, cos0 = np.sin(origin[0] * _RADIANS), np.cos(origin[0] * _RADIANS)
-    normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.square(sin_lat))
-    normal0 = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.square(sin0))
-    # From the earth's centre: outwards in the origin's meridian, east of it, and up along the axis.
-    out = normal * cos_lat * np.cos(turned) - normal0 * cos0
-    east = normal * cos_lat * np.sin(turned)
-    up = (1.0 - ECCENTRICITY2) * (normal * sin_lat - normal0 * sin0)
-    north = cos0 * up - sin0 * out
-    # A chord's shadow on the plane is shorter than the arc: R sin(s / R) instead of s.
-    meridian = normal0 * (1.0 - ECCENTRICITY2) / (1.0 - ECCENTRICITY2 * np.square(sin0))
-    share = (np.square(east) / normal0 + np.square(north) / meridian) / np.where(
-        (east == 0.0) & (north == 0.0), 1.0, np.square(east) + np.square(north)
-    )  # 1 / R in this direction (Euler)
-    bend = (np.square(east) + np.square(north)) * np.square(share)
-    longer = 1.0 + bend * (1.0 / 6.0 + bend * (3.0 / 40.0 + bend * (15.0 / 336.0)))
-    return np.stack([east * longer, north * longer], axis=-1)
+    return np.stack(_projection(origin)(longitude, latitude), axis=-1)
 
 
 def geodetic(position: Floats, origin: tuple[float, float]) -> tuple[Floats, Floats]:
-    """Return latitude and longitude in degrees of positions (..., 2), the inverse of `local_frame` to 1e-9 m within 10 km."""
-    sin0, cos0 = np.sin(origin[0] * _RADIANS), np.cos(origin[0] * _RADIANS)
-    normal0 = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.square(sin0))
-    meridian = normal0 * (1.0 - ECCENTRICITY2) / (1.0 - ECCENTRICITY2 * np.square(sin0))
-    latitude = np.full(position.shape[:-1], origin[0])
-    longitude = np.full(position.shape[:-1], origin[1])
-    for _ in range(_STEPS):
-        off = position - local_frame(latitude, longitude, origin)
-        latitude = latitude + off[..., 1] / (meridian * _RADIANS)
-        longitude = longitude + off[..., 0] / (normal0 * max(cos0, 1e-9) * _RADIANS)
+    """Return latitude and longitude in degrees of positions (..., 2) [m], the inverse of `local_frame`."""
+    longitude, latitude = _projection(origin)(position[..., 0], position[..., 1], inverse=True)
     return latitude, longitude
+
+
+def metres_per_degree(origin: tuple[float, float]) -> tuple[float, float]:
+    """Return the metres of a degree of latitude and of longitude at a place, from geodesics of 0.001 degree."""
+    import pyproj
+
+    globe, (latitude, longitude), part = pyproj.Geod(ellps="WGS84"), origin, 1e-3
+    north = globe.inv(longitude, latitude - part / 2.0, longitude, latitude + part / 2.0)[2]
+    east = globe.inv(longitude - part / 2.0, latitude, longitude + part / 2.0, latitude)[2]
+    return north / part, east / part
+
+
+def middle_of(degrees: Floats, left_out: float = 0.0, digits: int = 7) -> tuple[float, float]:
+    """Return the middle of latitudes and longitudes (F, 2) [degrees], also where they lie on both sides of the 180th meridian.
+
+    Args:
+        degrees: of places less than half the globe apart.
+        left_out: per cent of the places at either end that do not count, for a few may be wrong.
+        digits: to which it is rounded.
+    """
+    turned = np.column_stack([degrees[:, 0], _wrapped(degrees[:, 1] - degrees[0, 1])])
+    latitude, longitude = np.percentile(turned, [left_out, 100.0 - left_out], axis=0).mean(axis=0)
+    return round(float(latitude), digits), round(float(_wrapped(longitude + degrees[0, 1])), digits)
+
+
+def _wrapped(longitude: Any) -> Any:
+    return (longitude + 180.0) % 360.0 - 180.0
+
+
+def on_sphere(degrees: Floats) -> Floats:
+    """Return places (F, 3) [m] about the middle of a spherical earth, of latitudes and longitudes (F, 2) [degrees]."""
+    latitude, longitude = np.radians(degrees).T
+    around = np.cos(latitude)
+    return EARTH_M * np.column_stack([around * np.cos(longitude), around * np.sin(longitude), np.sin(latitude)])
+
+
+def sites_of(degrees: Floats) -> Ints:
+    """Return the number (F,) of the site of each place (F, 2) [degrees]; sites are `SITE_M` apart or more."""
+    place = np.floor(on_sphere(degrees) / SITE_M)
+    _, first, cell_of = np.unique(place @ (4096.0**2, 4096.0, 1.0), return_index=True, return_inverse=True)
+    cells = place[first]
+    i, j = cKDTree(cells).query_pairs(1.0, p=np.inf, output_type="ndarray").T
+    _, site = connected_components(
+        coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(cells), len(cells))), directed=False
+    )
+    return np.asarray(site, dtype=np.int64)[cell_of]
+
+
+def about_its_middle(encounter: Encounter) -> Encounter:
+    """Return an encounter in the frame about its own middle, if that is farther than `OWN_FRAME_M` from its frame's origin."""
+    if encounter.origin is None or not np.hypot(*encounter.position.reshape(-1, 2).T).max() > OWN_FRAME_M:
+        return encounter
+    origin = middle_of(latitude_longitude(encounter).reshape(-1, 2), digits=5)
+    ahead = LEVER_M * np.stack([np.cos(encounter.heading), np.sin(encounter.heading)], axis=-1)
+    position, ahead = (
+        local_frame(*geodetic(places, encounter.origin), origin) for places in (encounter.position, encounter.position + ahead)
+    )
+    course = np.arctan2(*np.moveaxis(ahead - position, -1, 0)[::-1])
+    heading = encounter.heading + wrap_angle(course - encounter.heading)
+    return replace(encounter, position=position, heading=heading, origin=origin)
 
 
 def latitude_longitude(encounter: Encounter) -> Floats:

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
-from scipy import linalg
-from scipy.interpolate import BSpline
+from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 
@@ -198,8 +196,8 @@ def headings_of(heading: Floats, course: Floats, speed: Floats) -> Headings | No
         own = slice(begin, end)
         if moves[own].sum() < 3 or np.median(off[own][moves[own]]) > CONTRADICTS:
             continue
-        square = np.pad(np.square(np.diff(turn[begin : end - 1])) / 6.0, NEAR + 1, mode="edge")
-        scatter = sliding_window_view(square, 2 * NEAR + 1).mean(axis=1)
+        square = np.pad(np.square(np.diff(turn[begin : end - 1])) / 6.0, 1, mode="edge")
+        scatter = np.maximum(uniform_filter1d(square, 2 * NEAR + 1, mode="nearest"), 0.0)
         noise = np.sqrt(np.square(HEADING_NOISE) + SCATTER * scatter)
         weight[known[own]] = np.minimum(1.0, 2.0 * noise / np.maximum(off[own], 1e-9)) / np.square(noise)  # Huber's
     return Headings(np.where(np.isfinite(heading), heading, 0.0), weight) if weight.any() else None

@@ -33,6 +33,7 @@ class Observations:
         speed_row: (S,) rows of the log.
         length: metres, NaN if it is not recorded.
         width: metres, NaN if it is not recorded.
+        origin: latitude and longitude [degrees] of the frame into which `fix` was projected, if it was.
     """
 
     id: str
@@ -45,6 +46,7 @@ class Observations:
     speed_row: Ints
     length: float = np.nan
     width: float = np.nan
+    origin: tuple[float, float] | None = None
 
     @classmethod
     def of_rows(

@@ -24,7 +24,9 @@ from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
-from scenario_gen.logs.groups import distances, driven, find_groups, Group, ticks
+from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
+from scenario_gen.logs.groups import distances, driven, find_groups, ticks
+from scenario_gen.logs.growing import Group, Meeting
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
@@ -36,6 +38,7 @@ TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
 OSI = (b"net.asam.osi", b"osi3.", b"ground_truth")  # what is near the beginning or the end of a trace of OSI
 NEAR = 65_536  # bytes
+FAR_M = 200_000.0  # from an origin that is given: there distances are 0.02 % too long
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
 
 
@@ -82,8 +85,8 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     """
     if log.encounters:
         return as_recorded(log, config)
-    tracks, drops, origin = clean(log, config)
-    if len(tracks) < 2:
+    tracks, drops = clean(log, config)
+    if len({track.id for track in tracks}) < 2:
         raise InputError(explain_few_vehicles(log, [track.id for track in tracks], drops))
     tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
     dt_ns = round(config.period * 1e9)
@@ -100,13 +103,14 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     groups, notes = find_groups(pieces, config)
     if not groups:
         raise NoEncounterError(explain_no_encounter(log, pieces, config))
+    notes += notes_on_origin(tracks, config)
     notes += notes_on_vehicles(
-        vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.members}, config
+        vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.spans}, config
     )
     encounters = []
     for k, group in enumerate(groups):
         name = log.name if len(groups) == 1 else f"{log.name}-{k + 1:0{len(str(len(groups)))}d}"
-        encounter, remarks = cut_encounter(name, group, pieces, origin_ns, origin, config)
+        encounter, remarks = cut_encounter(name, group, pieces, origin_ns, config)
         encounters.append(encounter)
         notes += remarks
     summary = Quality(
@@ -124,6 +128,18 @@ def unusable(log: RawLog, tracks: Sequence[Observations], config: LogConfig) -> 
     """Return the vehicles of a log of which fewer than two positions were left."""
     requested = picked([vehicle.id for vehicle in log.vehicles], config, log.name)
     return sorted(set(requested) - {track.id for track in tracks}, key=natural)
+
+
+def notes_on_origin(tracks: Sequence[Observations], config: LogConfig) -> tuple[str, ...]:
+    """Return a note if the parameter `origin` is so far away that distances are wrong."""
+    far = max(float(np.hypot(*track.fix.T).max()) for track in tracks) if config.origin else 0.0
+    if far < FAR_M:
+        return ()
+    longer = (far / EARTH_M) / max(math.sin(far / EARTH_M), 1e-3) - 1.0
+    return (
+        f"positions are up to {far / 1000.0:.0f} km from the parameter origin: distances there are up to {100 * longer:.1g} % "
+        "too long; name an origin that is nearer, or none",
+    )
 
 
 def notes_on_vehicles(
@@ -194,19 +210,15 @@ def encounter_quality(encounter: Encounter) -> EncounterQuality:
 
 
 def cut_encounter(
-    name: str,
-    group: Group,
-    pieces: Sequence[Piece],
-    origin_ns: int,
-    origin: tuple[float, float] | None,
-    config: LogConfig,
+    name: str, group: Group[Meeting], pieces: Sequence[Piece], origin_ns: int, config: LogConfig
 ) -> tuple[Encounter, tuple[str, ...]]:
     """Cut a group out of its pieces; a vehicle of unknown heading faces east, with a note."""
-    members = [pieces[m] for m in group.members]
+    spans = dict(sorted(group.spans.items()))
+    members = [pieces[m] for m in spans]
     notes = []
     position, heading, speed = [], [], []
-    for piece, (first, last) in zip(members, group.spans, strict=True):
-        at = np.clip(np.arange(group.first, group.last), first, last - 1) - piece.first
+    for piece, (first, last) in zip(members, spans.values(), strict=True):
+        at = np.clip(np.arange(group.start, group.end), first, last - 1) - piece.first
         position.append(piece.smooth.position[at])
         speed.append(piece.smooth.speed[at])
         facing = piece.smooth.heading[at]
@@ -218,15 +230,15 @@ def cut_encounter(
     encounter = Encounter(
         name=name,
         vehicles=tuple(Vehicle(p.track.id, p.track.length, p.track.width) for p in members),
-        start_ns=origin_ns + group.first * dt_ns,
+        start_ns=origin_ns + group.start * dt_ns,
         dt_ns=dt_ns,
         position=np.array(position),
         heading=np.array(heading),
         speed=np.array(speed),
-        origin=origin,
-        present=np.array(group.spans) - group.first - np.array([0, 1]),
+        origin=members[0].track.origin,
+        present=np.array(list(spans.values())) - group.start - np.array([0, 1]),
     )
-    return encounter, tuple(notes)
+    return encounter if config.origin else about_its_middle(encounter), tuple(notes)
 
 
 def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
@@ -246,9 +258,9 @@ def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig
         f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.min_duration:g} s while one "
         f"drives {config.travel:g} m"
     )
-    pairs = [(a, b) for a, b in combinations(pieces, 2) if a.track.id != b.track.id and len(distances(a, b))]
+    pairs = [(a, b) for a, b in combinations(pieces, 2) if a.track.id != b.track.id and np.isfinite(distances(a, b)).any()]
     if not pairs:
-        return f"{rule}: no two vehicles are recorded at the same time"
+        return f"{rule}: no two vehicles are recorded at the same time and site"
     met = [(*time_near(a, b, config), a.track.id, b.track.id) for a, b in pairs]
     seconds, travel, nearest, first, second = max(met, key=lambda one: (one[0], one[1], -one[2]))
     if seconds <= 0.0:

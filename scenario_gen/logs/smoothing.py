@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy import sparse
+from scipy.ndimage import median_filter
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
@@ -341,8 +341,7 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
     """
     dt = ticks[1] - ticks[0]
     half = round(0.2 / dt)
-    padded = np.pad(np.interp(ticks, speed_t, speed), half, mode="edge")
-    smooth = np.median(sliding_window_view(padded, 2 * half + 1), axis=1)
+    smooth = median_filter(np.interp(ticks, speed_t, speed), 2 * half + 1, mode="nearest")
     stands = np.zeros(len(ticks), dtype=bool)
     for begin, end in runs(smooth < STANDS):
         still = begin + np.flatnonzero(smooth[begin:end] <= max(STILL, 1.5 * float(np.median(smooth[begin:end]))))

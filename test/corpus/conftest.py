@@ -3,10 +3,10 @@
 
 """One small archive and its corpus for all tests of the folder; they share a worker."""
 
+from archives import ArchiveConfig, write_archive
 import pytest
 
 from scenario_gen.corpus.mine import mine
-from scenario_gen.corpus.synthetic import ArchiveConfig, write_archive
 
 SMALL = ArchiveConfig(rows=60_000, hours=2.0, encounters=14, outside=6, repeated_ids=0.1, damaged=0.001)
 

@@ -7,7 +7,6 @@ import pytest
 from source_files import ROOT
 
 from scenario_gen.corpus.mine import inventory, mine
-from scenario_gen.logs.read import is_spmd
 
 SPMD = ",".join(["1"] * 19) + "\n"
 
@@ -30,19 +29,6 @@ def test_each_file_of_an_archive_is_one_thing(tmp_path):
     messages, logs, others = inventory([tmp_path])
     names = [[path.relative_to(tmp_path).as_posix() for path in own] for own in (messages, *logs, others)]
     assert names == [["a/deep/two.txt", "a/one.csv"], ["b/log.csv"], ["c/d/log.csv"], ["bag"], ["c/loose.mcap"], ["b/readme.md"]]
-
-
-def test_each_file_is_looked_at_once(tmp_path, monkeypatch):
-    """A set that was built again for each file took an hour for 100,000."""
-    for k in range(300):
-        (tmp_path / f"{k:03}.csv").write_text(SPMD)
-    seen = []
-    monkeypatch.setattr("scenario_gen.corpus.mine.is_spmd", lambda path: seen.append(path) or is_spmd(path))
-    hashed = []
-    monkeypatch.setattr("pathlib.PurePath.__hash__", lambda path: hashed.append(path) or hash(str(path)))
-    messages, logs, others = inventory([tmp_path])
-    assert (len(messages), logs, others) == (300, [], []) and len(seen) == 300
-    assert len(hashed) < 10 * 300
 
 
 def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ import json
 import os
 import pickle
 
+from archives import read_planted
 from hypothesis import given, strategies
 import numpy as np
 import pytest
@@ -19,11 +20,10 @@ from scenario_gen.corpus import grouping
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.grouping import group, label, Meeting, partitions
-from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
+from scenario_gen.corpus.kinds import kind_of, Motion
 from scenario_gen.corpus.meetings import _together, in_order, TOGETHER
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import clean_tasks, mine
-from scenario_gen.corpus.synthetic import read_planted
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.template.reactions import reactions_of
@@ -152,7 +152,7 @@ def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_p
     assert [note for note in mined.notes if "DSecond" in note and "41000" in note] and not mined.failed
     off, good = (mined.files[str(tmp_path / "in" / name)] for name in ("TripStart_bsmrx_41000_p001.csv", "plain.csv"))
     assert off["said: stamps of another day"] > 1900 and not [why for why in off if "clocks" in why]
-    assert good.get("said: stamps that run backwards") == off.get("said: stamps that run backwards")
+    assert 0 < good["said: stamps that run backwards"] <= off["said: stamps that run backwards"]  # one clock tells less
 
 
 def test_nothing_to_read_is_an_error(tmp_path):
@@ -193,17 +193,6 @@ def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case
     cos, sin = np.cos(turned), np.sin(turned)
     a, b = (straight(cos * x - sin * y, sin * x + cos * y, heading + turned, 10.0) for x, y, heading in both)
     assert kind_of(a, b, 0.1) == kind == kind_of(b, a, 0.1)
-
-
-@given(start=strategies.floats(-40.0, 40.0), turned=strategies.floats(0.0, 6.0), speed=strategies.floats(3.0, 20.0))
-def test_the_gap_is_the_least_of_all_pairs_of_samples(start, turned, speed):
-    a, b = straight(0.0, 0.0, 0.0, 10.0), straight(start, 5.0, turned, speed)
-    apart = np.linalg.norm(a.position[::3, None] - b.position[None, ::3], axis=2)
-    time = 0.3 * np.arange(len(apart))
-    cost = apart + 2.0 * np.abs(time[:, None] - time)
-    gap, i, j = space_time_gap(a, b, 0.1)
-    assert cost[i // 3, j // 3] == pytest.approx(cost.min(), abs=1e-9)
-    assert cost.min() - 0.3 * (10.0 + speed) <= gap <= cost.min() + 1e-9  # the nearest are compared once more, finer
 
 
 def test_messages_are_in_the_same_order_however_they_were_read():

@@ -58,7 +58,6 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "corpus/mine.py": "its own intermediate tables, which are written whole or not at all",
     "corpus/tasks.py": "its own note in its own folder, through `documents`",
     "corpus/meetings.py": "its own intermediate tables, likewise",
-    "corpus/synthetic.py": "the truth of the archive that it wrote",
     "base/folders/claim.py": "what is none is no claim: test/base/folders",
     "base/folders/marker.py": "what is none is no marker: test/base/folders",
     "corpus/grouping.py": "tables of meetings that the run before it has just written",

@@ -166,13 +166,6 @@ def test_kinds_of_stamps_are_read_alike(tmp_path, kind, missing):
     assert {drop.reason: drop.count for drop in result.quality.dropped} == ({"stamp is not a number": 1} if missing else {})
 
 
-def test_nullable_integers_stay_exact(tmp_path):
-    stamps = pa.array([None if k == 60 else int(ns) for k, ns in enumerate(NS)])
-    path = table_with(tmp_path, stamps)
-    (encounter,) = read_log(path, LogConfig(columns="time=time:ns")).encounters
-    assert encounter.start_ns == int(NS[0])
-
-
 @pytest.mark.parametrize(
     ("stamps", "said"),
     [

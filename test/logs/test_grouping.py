@@ -12,7 +12,8 @@ import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.groups import Group, part_of
+from scenario_gen.logs.groups import part_of
+from scenario_gen.logs.growing import Group
 
 
 def car(name, begin, end, x, y, vx=0.0, vy=0.0):
@@ -84,12 +85,12 @@ def test_nobody_is_left_out_in_silence(tmp_path):
 
 
 def test_a_part_of_a_group_keeps_who_is_there_for_long_enough():
-    group = Group((3, 5, 8), 0, 300, ((0, 300), (0, 120), (95, 300)))
+    group = Group(0, 300, {3: (0, 300), 5: (0, 120), 8: (95, 300)})
     part, left = part_of(group, 0, 100, LogConfig())
-    assert part == Group((3, 5), 0, 100, ((0, 100), (0, 100)))
+    assert part == Group(0, 100, {3: (0, 100), 5: (0, 100)})
     assert left == [(8, (95, 100))]
     part, left = part_of(group, 90, 300, LogConfig())
-    assert part == Group((3, 8), 90, 300, ((90, 300), (95, 300)))
+    assert part == Group(90, 300, {3: (90, 300), 8: (95, 300)})
     assert left == [(5, (90, 120))]
 
 

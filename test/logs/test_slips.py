@@ -104,8 +104,6 @@ REFUSED = {
         {"quoting": 3, "escapechar": " "},
         "write 0.5, not 0,5",
     ),
-    "UTF-16 without a mark": (plain, {"encoding": "utf-16-le"}, "save the table as UTF-8 text"),
-    "Latin-1": (lambda rows: plain(rows).replace({"id": {"a": "ä"}}), {"encoding": "latin-1"}, "is not UTF-8 text"),
     "a slip in a name": (
         lambda rows: plain(rows).rename(columns={"t": "timstamp"}),
         {},

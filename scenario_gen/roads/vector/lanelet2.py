@@ -18,8 +18,8 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite
-from scenario_gen.logs import local_frame
-from scenario_gen.numerics import Floats
+from scenario_gen.logs import local_frame, middle_of
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_long, refuse_too_many_lanes, speed_of
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
 from scenario_gen.types import RuleKind
@@ -250,7 +250,7 @@ def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[st
     if local:
         return found, "coordinates are the tags local_x and local_y, in metres"
     degrees = np.array(list(found.values()))
-    latitude, longitude = np.round((degrees.min(axis=0) + degrees.max(axis=0)) / 2.0, 7).tolist()
+    latitude, longitude = middle_of(degrees)
     metres = local_frame(degrees[:, 0], degrees[:, 1], (latitude, longitude))
     size = float(np.hypot(metres[:, 0], metres[:, 1]).max())
     if not size <= _FARTHEST:

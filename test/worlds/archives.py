@@ -16,14 +16,11 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyproj
 
-from scenario_gen.base.errors import InputError, needs
-from scenario_gen.base.folders import Kind, replaced_folder, write_text
-from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats, Ints
 
 TRUTH = "synthetic.json"
-SYNTHETIC = Kind("synthetic archive")
 KINDS = ("crossing", "opposing", "following", "merging", "turning")
 THRESHOLDS = ("proximity", "duration", "presence", "travel", "beside", "late")
 """Of the miner, at each of which encounters are planted inside and outside: the distance, how long the pass takes, how long both
@@ -37,21 +34,19 @@ NEVER = 9e9
 
 
 @dataclass(frozen=True)
-class ArchiveConfig(Parameters):
-    """What a synthetic archive holds."""
+class ArchiveConfig:
+    """What a synthetic archive holds: shares are of rows, `repeated_ids` is of encounters, `noise` in metres of a drive."""
 
-    rows: int = parameter(100_000, "rows, about", low=5000)
-    hours: float = parameter(1.0, "time over which the encounters are spread", unit="h", low=0.1, high=10_000.0)
-    encounters: int = parameter(30, "encounters planted that are to be found", low=1)
-    outside: int = parameter(12, "encounters planted just outside of a threshold", low=0)
-    loss: float = parameter(0.03, "share of messages lost", low=0.0, high=0.5)
-    duplicates: float = parameter(0.18, "share of messages that a second vehicle heard", low=0.0, high=1.0)
-    wrong_times: float = parameter(0.001, "share of rows with a wrong stamp", low=0.0, high=0.1)
-    damaged: float = parameter(0.0001, "share of rows that are no rows", low=0.0, high=0.1)
-    repeated_ids: float = parameter(
-        0.02, "share of the encounters of which a vehicle's id is also somebody else's", low=0.0, high=1.0
-    )
-    noise: float = parameter(0.3, "standard deviation of a drive's position error", unit="m", low=0.0, high=3.0)
+    rows: int = 100_000
+    hours: float = 1.0
+    encounters: int = 30
+    outside: int = 12
+    loss: float = 0.03
+    duplicates: float = 0.18
+    wrong_times: float = 0.001
+    damaged: float = 0.0001
+    repeated_ids: float = 0.02
+    noise: float = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,30 +122,23 @@ class _Draft:
 
 
 def write_archive(folder: Path, config: ArchiveConfig = ArchiveConfig(), seed: int = 0) -> Path:
-    """Write a synthetic archive: SPMD files of about a million rows, and what is planted in them; same seed, same bytes.
+    """Write SPMD files of about a million rows and, in `synthetic.json`, what is planted in them; same seed, same bytes.
 
     Args:
-        folder: of the files; an earlier synthetic archive there is replaced.
+        folder: of the files; it may be there if it is empty.
         config: what it holds.
         seed: of all randomness.
 
-    Returns:
-        `folder`, with `synthetic.json` beside the files.
-
     Raises:
-        InputError: the folder may not be replaced, or the rows cannot hold that many encounters.
+        ValueError: the rows cannot hold that many encounters, or files are there.
     """
-    needs("corpus", "pyarrow")
     drives, planted = plan(config, seed)
-    with replaced_folder(folder, SYNTHETIC) as place:
-        counts = _write(place, drives, config, np.random.default_rng([seed, 1]))
-        document = {
-            "synthetic": True,
-            "seed": seed,
-            **counts,
-            "planted": [vars(encounter) for encounter in planted],
-        }
-        write_text(place / TRUTH, json.dumps(document, indent=1) + "\n")
+    folder.mkdir(parents=True, exist_ok=True)
+    if any(folder.iterdir()):
+        raise ValueError(f"{folder} is not empty; name another folder")
+    counts = _write(folder, drives, config, np.random.default_rng([seed, 1]))
+    document = {"synthetic": True, "seed": seed, **counts, "planted": [vars(encounter) for encounter in planted]}
+    (folder / TRUTH).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return folder
 
 
@@ -164,7 +152,7 @@ def plan(config: ArchiveConfig, seed: int) -> tuple[Drives, list[Planted]]:
     """Return all drives of an archive, and what is planted among them.
 
     Raises:
-        InputError: the encounters alone take more than the rows.
+        ValueError: the encounters alone take more than the rows.
     """
     draft = _Draft(np.random.default_rng([seed, 0]))
     wide = int(np.ceil(np.sqrt(config.encounters + config.outside)))
@@ -195,10 +183,10 @@ def _lone(draft: _Draft, config: ArchiveConfig, rows: float, shared: list[dict[s
     """Add vehicles that meet nobody: for ten minutes each, a fifth of them side by side, and somebody for each shared id.
 
     Raises:
-        InputError: there is no room for any.
+        ValueError: there is no room for any.
     """
     if rows < 0.0:
-        raise InputError(f"parameter rows: the encounters alone take {-rows:.0f} rows more than {config.rows}")
+        raise ValueError(f"rows: the encounters alone take {-rows:.0f} rows more than {config.rows}")
     lasts = min(600.0, 3600.0 * config.hours)
     count = int(np.ceil(rows / (10.0 * lasts)))
     north = begin = 0.0
@@ -385,14 +373,9 @@ def _rows(
     position, heading, speed = states(drives, who, time)
     off = config.noise * random.standard_normal((len(drives.x), 2))
     position = position + off[who] + 0.05 * (random.random((len(who), 2)) - 0.5)
-    # metres of a degree on the ellipsoid; about each encounter's own origin, so that its shape is right to 1e-4
-    north0 = PLACE[0] + drives.north[who] / 111_000.0
-    r0 = north0 * (np.pi / 180.0)
-    metres_north = 111_132.954 - 559.822 * np.cos(2.0 * r0) + 1.175 * np.cos(4.0 * r0)
-    metres_east = 111_412.84 * np.cos(r0) - 93.5 * np.cos(3.0 * r0)
-    latitude = north0 + (position[:, 1] - drives.north[who]) / metres_north
-    east0 = PLACE[1] + drives.east[who] / 80_000.0
-    longitude = east0 + (position[:, 0] - drives.east[who]) / metres_east
+    away = position - np.column_stack([drives.east[who], drives.north[who]])  # from its encounter's own place on the globe
+    middle = PLACE[1] + drives.east[who] / 80_000.0, PLACE[0] + drives.north[who] / 111_000.0
+    longitude, latitude, _ = pyproj.Geod(ellps="WGS84").fwd(*middle, np.degrees(np.arctan2(*away.T)), np.hypot(*away.T))
     stamp = (np.round(time * 1e6) + FIRST_DAY * 86400e6).astype(np.int64)
     second = stamp // 1000 % 60_000
     kept = random.random(len(who)) >= config.loss

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""`mine` and `read_log` find the same encounters in the same file."""
+
+from archives import ArchiveConfig, read_planted, write_archive
+import numpy as np
+import pyproj
+import pytest
+
+from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.mine import mine
+from scenario_gen.logs import read_log
+
+pytestmark = pytest.mark.xdist_group("corpus")
+GLOBE = pyproj.Proj(proj="aeqd", lat_0=42.3, lon_0=-83.7, ellps="WGS84")
+
+
+def column(folder, count, behind, speed):
+    """Basic safety messages of cars in one lane for 20 s, each `behind` seconds after the one before."""
+    folder.mkdir()
+    lines = []
+    for k in range(count):
+        for tick in range(200):
+            longitude, latitude = GLOBE(speed * (0.1 * tick - behind * k), 0.0, inverse=True)
+            stamp = 259_203_600_000_000 + 100_000 * tick
+            row = [9, 1, k + 1, stamp, 0, 0, stamp // 1000 % 60_000, f"{latitude:.7f}", f"{longitude:.7f}", 250, speed, 90]
+            lines.append(",".join(map(str, [*row, 0, 0, 0, 0, 0, 0, 100])))
+    (folder / "a.csv").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def both(folder, out):
+    """The encounters, as (vehicles, begin and end to a second), of both."""
+    mine([folder], out)
+    mined = [encounter_of(row) for row in rows_of(tables_of(out))]
+    read = read_log(sorted(folder.glob("*.csv"))).encounters
+    return (
+        sorted(
+            (sorted(int(v.id) for v in one.vehicles), round(one.start_ns * 1e-9), round(one.start_ns * 1e-9 + one.duration))
+            for one in found
+        )
+        for found in (mined, read)
+    )
+
+
+@pytest.mark.parametrize(("behind", "speed"), [(2.0, 33.0), (1.9, 33.0), (2.5, 25.0), (1.2, 38.0)])
+def test_a_column_of_13(tmp_path, behind, speed):
+    mined, read = both(column(tmp_path / "in", 13, behind, speed), tmp_path / "out")
+    assert read == mined
+    assert {name for names, _, _ in read for name in names} == set(range(1, 14))
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_an_archive(tmp_path, seed):
+    config = ArchiveConfig(30_000, 0.2, 12, 4, wrong_times=0.0, damaged=0.0, repeated_ids=0.0)
+    planted = read_planted(write_archive(tmp_path / "in", config, seed))
+    mined, read = both(tmp_path / "in", tmp_path / "out")
+    assert [names for names, _, _ in read] == [names for names, _, _ in mined]
+    assert np.allclose([times for _, *times in read], [times for _, *times in mined], atol=1.0)
+    assert {tuple(names) for names, _, _ in read} == {tuple(sorted(one.devices)) for one in planted if one.inside}
