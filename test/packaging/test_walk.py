@@ -14,8 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-MOST_FILES = 12
-WRAPPERS = {"scenario_gen/method/nearest.py"}  # `suggest_nearest` wraps `generate`: between two files, and no step of the way
+MOST_FILES = 13
 
 # Runs `scenario-gen generate` and prints each function entered, in this order, with the function of ours that called it first.
 TRACE = """
@@ -33,15 +32,15 @@ def place(frame):
 
 def note(frame, event, _):
     if event == "call" and frame.f_code.co_filename.startswith(package) and place(frame) not in entered:
-        caller, skipped = frame.f_back, set(sys.argv[1].split())
-        while caller and (not caller.f_code.co_filename.startswith(package) or place(caller)[0] in skipped):
+        caller = frame.f_back
+        while caller and not caller.f_code.co_filename.startswith(package):
             caller = caller.f_back
         if not caller or caller.f_code.co_name != "<module>":  # what runs while a module is loaded is no step
             entered[place(frame)] = place(caller) if caller else ("", "")
 
 sys.setprofile(note)
 try:
-    app(sys.argv[2:], standalone_mode=False)
+    app(sys.argv[1:], standalone_mode=False)
 finally:
     sys.setprofile(None)
 print(json.dumps(list(entered.items())))
@@ -96,7 +95,7 @@ def entered(tmp_path_factory) -> dict[tuple[str, str], tuple[str, str]]:
     """Each function that one `generate` enters, in order, and who called it first."""
     log, out = ROOT / "scenario_gen" / "resources" / "synthetic_b", tmp_path_factory.mktemp("walk") / "out"
     words = ["generate", str(log), "--road", "t_intersection", "--count", "2", "--out", str(out)]
-    command = [sys.executable, "-c", TRACE, " ".join(WRAPPERS), *words]
+    command = [sys.executable, "-c", TRACE, *words]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     return {tuple(function): tuple(caller) for function, caller in json.loads(run.stdout.splitlines()[-1])}
 
