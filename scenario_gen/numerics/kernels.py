@@ -73,7 +73,15 @@ def _output(name: str, declared: types.Array) -> Callable[[Any], Any]:
     return take
 
 
+def named(fields: type, *declared: Any) -> types.NamedTuple:
+    """Return the type of an argument that is a NamedTuple, from the types of its fields."""
+    return types.NamedTuple(declared, fields)
+
+
 def _argument(name: str, declared: Any) -> Callable[[Any], Any]:
+    if isinstance(declared, types.NamedTuple):
+        takes = [_argument(f"{name}: {field}", each) for field, each in zip(declared.fields, declared.types, strict=True)]
+        return lambda values: declared.instance_class(*[take(value) for take, value in zip(takes, values, strict=True)])
     if isinstance(declared, types.Array):
         return _output(name, declared) if declared.mutable else _input(name, declared)
     return operator.index if declared == I else bool if declared == B else float
