@@ -78,10 +78,26 @@ def named(fields: type, *declared: Any) -> types.NamedTuple:
     return types.NamedTuple(declared, fields)
 
 
+def _tuple(name: str, declared: types.NamedTuple) -> Callable[[Any], Any]:
+    """Return what makes a NamedTuple the declared one; the same one again, of which all was right, is not looked at anew."""
+    takes = [_argument(f"{name}: {field}", each) for field, each in zip(declared.fields, declared.types, strict=True)]
+    right = None
+
+    def take(values: Any) -> Any:
+        nonlocal right
+        if values is right:
+            return values
+        taken = declared.instance_class(*[take(value) for take, value in zip(takes, values, strict=True)])
+        if all(one is other for one, other in zip(taken, values, strict=True)):
+            right = None if any(getattr(each, "mutable", False) for each in declared.types) else values  # outputs are large
+        return taken
+
+    return take
+
+
 def _argument(name: str, declared: Any) -> Callable[[Any], Any]:
     if isinstance(declared, types.NamedTuple):
-        takes = [_argument(f"{name}: {field}", each) for field, each in zip(declared.fields, declared.types, strict=True)]
-        return lambda values: declared.instance_class(*[take(value) for take, value in zip(takes, values, strict=True)])
+        return _tuple(name, declared)
     if isinstance(declared, types.Array):
         return _output(name, declared) if declared.mutable else _input(name, declared)
     return operator.index if declared == I else bool if declared == B else float
