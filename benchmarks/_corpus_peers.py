@@ -17,7 +17,7 @@ import warnings
 import numpy as np
 
 from benchmarks._segmentation_peers import installed, jax_moseq, posterior_of, sweeps_run
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
@@ -50,7 +50,7 @@ def costs(encounter: Encounter, name: str, count: int, seed: int) -> dict[str, f
     config = PipelineConfig()
     begun = process_time()
     road = build_road(name, encounter, config.road)
-    made = Attempt(encounter, segment(encounter, config.segmentation, seed), road, config, count=count, seed=seed).run()
+    made = Chain(encounter, segment(encounter, config.segmentation, seed), road, config, count=count, seed=seed).run()
     found = {"ours": process_time() - begun}
     features, posterior = posterior_of(encounter, config.segmentation, seed)
     jitter = 1e-6 * np.random.default_rng(0).standard_normal(features.shape)

@@ -13,7 +13,7 @@ from time import process_time
 from benchmarks._size import sized
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import evaluate_scenarios, replay
 from scenario_gen.method.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
@@ -84,7 +84,7 @@ def _measure(
     """One case with every seed of planning and sampling; none where the segmenter's arm is refused."""
     try:
         road = build_road(name, encounter, config.road)
-        made = {seed: Attempt(encounter, segmentation, road, config, count=COUNT, seed=seed).run() for seed in SEEDS}
+        made = {seed: Chain(encounter, segmentation, road, config, count=COUNT, seed=seed).run() for seed in SEEDS}
     except (InputError, RefusedError) as error:
         say(f"{encounter.name} on {Path(name).stem}: {error}")
         return []
@@ -98,7 +98,7 @@ def _measure(
         arms = {WITH: arm}
         for name_of, reference in references.items():
             try:
-                arms[name_of] = Attempt(encounter, reference, road, config, count=COUNT, seed=seed, waits=()).run()
+                arms[name_of] = Chain(encounter, reference, road, config, count=COUNT, seed=seed, waits=()).run()
             except RefusedError as error:
                 say(f"{encounter.name} on {road.name}, seed {seed}, {name_of}: {error}")
         found.append(_evaluated(encounter, arms, road, own_road=own_road, seed=seed))

@@ -15,7 +15,7 @@ from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import footprint_distance, Motion
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of
@@ -32,7 +32,7 @@ def natural_scenarios() -> NaturalScenarios:
     config = PipelineConfig()
     (encounter,) = read_log([bundled("b")]).encounters
     road, encounter = road_and_template("t_intersection", encounter, config.road)
-    attempt = Attempt(encounter, segment(encounter, config.segmentation, SEED), road, config, seed=SEED)
+    attempt = Chain(encounter, segment(encounter, config.segmentation, SEED), road, config, seed=SEED)
     plan = plan_of(attempt.plan(), config.sampling, Request())
     checker = checker_of(plan, config.sampling, config.limits, Request())
     return NaturalScenarios.of(plan, checker.check, config.sampling, SEED)

@@ -117,7 +117,8 @@ def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, va
     from scenario_gen.method.evaluation import EvaluationConfig
     from scenario_gen.pipeline import generate, PipelineConfig
 
-    config: Any = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
+    compare: Any = {"compare": True} if hasattr(EvaluationConfig(), "compare") else {}  # older versions always do
+    config: Any = PipelineConfig(evaluation=EvaluationConfig(resamples=10, **compare))
     if hasattr(config.sampling, "variety"):  # older versions have one preset
         config = replace(config, sampling=replace(config.sampling, variety=variety))
     started = process_time()

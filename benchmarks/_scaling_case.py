@@ -20,7 +20,9 @@ import numpy as np
 from shapely import box, union_all
 
 from scenario_gen import pipeline
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.method.routing.search.planner import Budget
 from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
 from scenario_gen.roads import build_road, clearance_in_cells, RoadConfig
@@ -31,9 +33,9 @@ SPEED, GAP, LANE = 10.0, 14.0, 1.75  # m/s, m, m
 BLOCK = 29.0  # m between two streets of a map: 10⁴ lanes are just below the 300 km that are searched
 HALF = 5.0  # m, half the width of the streets of a grid
 STAGES = {
-    "generation": ("road_and_template", "segment", "fit_template", "plan_routes", "sample_scenarios"),
-    "references": ("with_references",),
-    "evaluation": ("evaluate", "coverage_of"),
+    "generation": ((pipeline, "road_and_template"), (pipeline, "segment"), (Chain, "plan"), (Chain, "sample")),
+    "references": ((pipeline, "with_references"),),
+    "evaluation": ((pipeline, "evaluate"), (pipeline, "coverage_of")),
 }
 
 
@@ -57,7 +59,8 @@ def group(vehicles: int, seconds: float) -> Encounter:
 def generated(vehicles: int, seconds: float, count: int, cell: float) -> dict[str, float]:
     """CPU seconds of `generate` and, of these, of its stages."""
     encounter, begun = group(vehicles, seconds), process_time()
-    pipeline.generate(encounter, ROAD, PipelineConfig(road=RoadConfig(resolution=cell, max_cells=MOST)), count=count, seed=1)
+    road, compare = RoadConfig(resolution=cell, max_cells=MOST), EvaluationConfig(compare=True)
+    pipeline.generate(encounter, ROAD, PipelineConfig(road=road, evaluation=compare), count=count, seed=1)
     return {"all": process_time() - begun}
 
 
@@ -131,8 +134,8 @@ def main() -> None:
     if kind == "generate":
         generated(2, 20.0, 2, 0.5)
         for share, names in STAGES.items():
-            for name in names:
-                setattr(pipeline, name, _timed(spent, share, getattr(pipeline, name)))
+            for home, name in names:
+                setattr(home, name, _timed(spent, share, getattr(home, name)))
         found = generated(int(words[0]), float(words[1]), int(words[2]), float(words[3])) | spent
     else:
         measure, least = (planned, 200) if kind == "grid" else (placed, 400)

@@ -18,12 +18,13 @@ PARTS = {  # by the module that calls them
     "scenario_gen.pipeline": {
         "road_and_template": "road",
         "segment": "segment",
+        "evaluate": "evaluate",
+        "coverage_of": "evaluate",
+    },
+    "scenario_gen.method.chain": {
         "fit_template": "fit and plan",
         "plan_routes": "fit and plan",
         "sample_scenarios": "sample",
-        "with_references": "references",
-        "evaluate": "evaluate",
-        "coverage_of": "evaluate",
     },
     "scenario_gen.output.results": {"add_results": "bag", "write_report": "page"},
 }

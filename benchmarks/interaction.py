@@ -31,7 +31,7 @@ from benchmarks.row import Row
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.evaluation.measures import measure
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.arrays import Floats
@@ -122,7 +122,7 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
     try:
         road, segmentation = build_road(road_name, encounter, config.road), segment(encounter, config.segmentation, SEED)
         begun = process_time()
-        made = Attempt(encounter, segmentation, road, config, count=count, seed=SEED).run()
+        made = Chain(encounter, segmentation, road, config, count=count, seed=SEED).run()
         seconds = process_time() - begun
     except ScenarioGenError as error:
         case.figures["refused"] = str(error)

@@ -58,9 +58,10 @@ STAGES = {
     "sampling": {"validity"},
     "evaluation": set(),
     "config": {"segmentation", "fitting", "routing", "validity", "sampling", "evaluation"},
-    "attempt": {"config", "fitting", "routing", "sampling", "evaluation"},
+    "chain": {"config", "fitting", "routing", "sampling", "evaluation"},
+    "reference_sets": {"config", "chain", "evaluation"},
     "suitable_roads": {"config", "segmentation", "fitting"},
-    "nearest": {"attempt", "segmentation", "fitting", "sampling", "suitable_roads"},
+    "nearest": {"config", "chain", "segmentation", "fitting", "sampling", "suitable_roads"},
 }
 # Rooms and stages that others enter by their packages alone; behind the door stand what an extra brings, and what is slow.
 DOORS = {"types", "template", "roads", "logs", *(f"method.{stage}" for stage in STAGES)}
@@ -101,7 +102,7 @@ LATE_OURS = {
     "logs/tables.py": "needs pyarrow",
     "method/routing/search/ompl/planners.py": "needs ompl",
     "ros/plumbing/doctor.py": "works without what it looks for",
-    "ros/plumbing/sampling_requests.py": "loads all stages, and few requests need them",
+    "ros/plumbing/sampling_requests.py": "only a refusal needs it",
     "ros/plumbing/start.py": "loads rclpy",
     "types/generation.py": "its methods call public functions, which are loaded when they are first used",
     "types/scenario.py": "likewise",

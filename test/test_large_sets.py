@@ -22,7 +22,7 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method import attempt
+from scenario_gen.method import reference_sets
 from scenario_gen.method.evaluation import EvaluationConfig, MEASURED
 from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.sampling import Plan, regenerate, sample, sampler
@@ -131,10 +131,10 @@ def test_memory_does_not_grow_with_the_number_of_scenarios(chain, monkeypatch, t
 def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
     """In the terminal, the page and the figures; the references are made no larger than they are measured."""
     evaluating = sys.modules[measured.__module__]  # the package has a function of that name
-    for module in (evaluating, attempt):
+    for module in (evaluating, reference_sets):
         monkeypatch.setattr(module, "MEASURED", 10)
     monkeypatch.setattr(evaluating, "RUNS", 2)
-    config = pipeline.PipelineConfig(evaluation=EvaluationConfig(resamples=20))
+    config = pipeline.PipelineConfig(evaluation=EvaluationConfig(resamples=20, compare=True))
     case = pipeline.generate(chain.encounter, "t_intersection", config, count=24, seed=7)
     rows = {row["name"]: row for row in json.loads(case.evaluation.to_json())["rows"]}
     assert [rows[name]["samples"] for name in (WITH, WITHOUT, UNIFORM)] == [10, 10, 10]

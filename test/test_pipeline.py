@@ -27,7 +27,7 @@ from scenario_gen.types.generation import NARROW, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.request import Request
 
-QUICK = EvaluationConfig(resamples=50)
+QUICK = EvaluationConfig(resamples=50, compare=True)
 WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replayed": ORACLE}
 
 
@@ -57,13 +57,20 @@ def test_the_report_shows_it(case):
     assert '"uniform":{"states"' in page
 
 
-def test_it_can_be_left_out_and_changes_nothing_else(encounter, case):
-    config = PipelineConfig(evaluation=replace(QUICK, uniform=False))
-    plain = generate(encounter, "t_intersection", config, count=4, seed=3)
-    assert UNIFORM not in plain.references and plain.evaluation.row(UNIFORM) is None
+def test_by_default_no_further_set_is_drawn_and_nothing_else_changes(encounter, case, tmp_path):
+    plain = generate(encounter, "t_intersection", PipelineConfig(evaluation=replace(QUICK, compare=False)), count=4, seed=3)
+    assert not EvaluationConfig().compare and not plain.references and not plain.refusals and plain.compared == (WITH,)
     rows = [{row["name"]: row for row in json.loads(one.evaluation.to_json())["rows"]} for one in (plain, case)]
-    assert set(rows[1]) - set(rows[0]) == {UNIFORM}
+    assert set(rows[1]) - set(rows[0]) == {WITHOUT, UNIFORM, NARROW}
     assert all(rows[0][name] == rows[1][name] for name in rows[0])
+    write_results(tmp_path, [plain], seed=3, title="", quality=(), provenance={})
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "--compare" in page and not any(f">{name}" in page.lower() for name in (WITHOUT, UNIFORM))
+    (figures,) = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
+    assert set(figures["similarity"]["compared"]) == {WITH} and set(figures["similarity"]["beside"]) == {ORACLE}
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([plain]))
+    assert "--compare" in (text := console.export_text()) and "uniform" not in text and "|" not in text
 
 
 def test_what_is_compared_is_drawn_with_the_same_freedom(case):

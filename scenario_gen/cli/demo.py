@@ -12,6 +12,7 @@ from scenario_gen.bags.recordings.write import scenario_bytes
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.cli.folder import Advance, FolderRequest, generate_folder
 from scenario_gen.logs import bundled
+from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.output.results import namespaces
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types import GenerationResult
@@ -30,7 +31,7 @@ def run_demo(
     progress: Callable[[], AbstractContextManager[Advance]],
     status: Callable[[], AbstractContextManager[Callable[[str], None]]],
 ) -> tuple[list[GenerationResult], list[str]]:
-    """Generate scenarios of the bundled log to a folder, as `generate_folder` does.
+    """Generate scenarios of the bundled log to a folder, as `generate_folder` does, with sets to compare with.
 
     Args:
         out: the folder.
@@ -44,7 +45,7 @@ def run_demo(
         InputError: ROS 2 is not installed, or `out` may not be replaced.
         ScenarioGenError: the nodes' scenarios are others, which is a fault of ours.
     """
-    config = PipelineConfig()
+    config = PipelineConfig(evaluation=EvaluationConfig(compare=True))
     jobs = [((bundled(case),), (road,)) for case, road in ROADS.items()]
     record = recorder(config, count, seed, status) if ros else None
     return generate_folder(out, FolderRequest(jobs, config, count, seed, TITLE), record=record, progress=progress)

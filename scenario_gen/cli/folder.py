@@ -12,6 +12,7 @@ from pathlib import Path
 from scenario_gen.base.errors import did_you_mean, InputError, RefusedError
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.logs import LogResult, NoEncounterError, read_log
+from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import FAULTY
@@ -189,7 +190,8 @@ def generate_all(
         try:
             case = generate(encounter, road, config, count=drawn, seed=seed, request=request, progress=report, **further)
         except RefusedError as error:
-            refusals.append(f"{encounter.name} on {road}: {as_options(str(error))}")
+            answer = answer_refusal(error, encounter, road, config, request, drawn, seed)
+            refusals.append(f"{encounter.name} on {road}: {as_options(str(answer))}")
             continue
         if for_testing and not case.generated.scenarios:
             refusals.append(f"{encounter.name} on {road}: none kept: {case.generated.adaptations[-1]}")

@@ -62,6 +62,14 @@ class Generate:
             help="Keep only scenarios in which the --ego has to react: a planner that ignores the others collides.",
         ),
     ] = False
+    compare: Annotated[
+        bool,
+        typer.Option(
+            "--compare",
+            help="Draw and measure further sets, too: without changepoints, with evenly spaced ones, with preset narrow. It "
+            "takes twice the time.",
+        ),
+    ] = False
     order: Annotated[
         str, typer.Option(help="Who goes first. keep: as recorded. free: anyone. swap: the other one at the closest crossing.")
     ] = "keep"
@@ -86,7 +94,8 @@ def generate(options: Generate) -> None:
     from scenario_gen.types import join_pieces, Request
 
     allowed = [f"fitting.allow={options.allow}"] if options.allow else []
-    config = configured(options.parameter_file, [*(options.assignments or []), *allowed])
+    compared = ["evaluation.compare=true"] if options.compare else []
+    config = configured(options.parameter_file, [*(options.assignments or []), *allowed, *compared])
     for text in options.obstacle or []:
         read_obstacles(text, "--obstacle")
     config = updated(config, {"road.obstacles": join_pieces(filter(None, [config.road.obstacles, *(options.obstacle or [])]))})

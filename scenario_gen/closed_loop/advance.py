@@ -5,11 +5,11 @@
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
-from scenario_gen.closed_loop.driver import Manner
+from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, WORLD, World
+from scenario_gen.closed_loop.driver import ACCELERATION, CLOCK, EGO_CLOCK, HELD, MANNER, Manner, RATE, WAITED
 from scenario_gen.closed_loop.others import react
-from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.kernels import B, B1, F, F1, F2, F3, I, I1, kernel, OUT2, OUTB1
+from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics.kernels import B, B1, F, F1, F2, I, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
 BESIDE = 1.5  # metres beside that path at which the ego has left it
@@ -76,80 +76,50 @@ def place(time: Floats, motion: Floats, drivers: Floats, out: Floats) -> None:
     """Write x, y [m], yaw [rad], speed [m/s] (N, 4) of motions (N, T, 6); rows (N, 5) begin with clock [s] and rate."""
     pose = np.empty(5)
     for i in range(out.shape[0]):
-        pose_at(time, motion[i], drivers[i, 0], pose)
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = pose[0], pose[1], pose[2], pose[3] * drivers[i, 1]
+        pose_at(time, motion[i], drivers[i, CLOCK], pose)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = pose[0], pose[1], pose[2], pose[3] * drivers[i, RATE]
 
 
-@kernel(F, F, F1, F3, F2, F2, B1, F3, F, F3, I, F1, I1, F2, OUT2, OUT2, OUT2, OUTB1)
+@kernel(WORLD, MANNER, F, F2, OUT2, OUT2, OUT2, OUTB1)
 def advance(
-    h: float,
-    now: float,
-    time: Floats,
-    motion: Floats,
-    half: Floats,
-    spans: Floats,
-    leaves: Bools,
-    cells: Floats,
-    cell: float,
-    order: Floats,
-    ego: int,
-    driving: Floats,
-    delay: Ints,
-    before: Floats,
-    seen: Floats,
-    after: Floats,
-    vehicles: Floats,
-    there: Bools,
+    world: World, manner: Manner, now: float, before: Floats, seen: Floats, after: Floats, vehicles: Floats, here: Bools
 ) -> None:
     """Move everyone one step on.
 
     Args:
-        h: step [s].
-        now: certified time at its end [s].
-        time: (T,) of the scenario [s].
-        motion: (N, T, 6) as in `Certified`.
-        half: (N, 2) half lengths and widths [m].
-        spans: (N, 2) as in `Certified`.
-        leaves: (N,) likewise.
-        cells: (N, K, 8) as in `Certified`.
-        cell: length of a cell [s].
-        order: (N, N, K) as in `Certified`.
-        ego: index of the ego's witness.
-        driving: (9,) headway [s], standstill gap [m], acceleration, comfortable and strongest braking [m/s²], jerk [m/s³],
-            patience [s], whether the others yield to the ego as the template did, and whether they react at all.
-        delay: (N,) reaction time of each driver in steps.
-        before: (N, 4) clocks [s], their rates, accelerations [m/s²] and patience spent [s], as in `State`.
+        world: the scenario and the step.
+        manner: how the others drive.
+        now: certified time at the step's end [s].
+        before: (N, 4) columns CLOCK … of `driver`.
         seen: (K, 9) as in `State`, at the end of the step; the ego's clock, its rate and whether it is on its path are written.
-        after: (N, 5) likewise at the end of the step, and 1 where the order makes one of the others brake harder than the
+        after: (N, 5) output, at the end of the step; HELD is 1 where the order makes one of the others brake harder than the
             strongest, or more suddenly than the jerk allows.
-        vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] at the end of the step.
-        there: (N,) who is on the scene then.
+        vehicles: (N, 4) output, x, y [m], yaw [rad], speed [m/s] then.
+        here: (N,) output, who is on the scene then.
     """
-    n, react_at_all = motion.shape[0], driving[8] > 0.0
-    pose, body, witness = np.empty(5), seen[0, :6], seen[0, 6:]
-    locate(now, time, motion[ego], body, before[ego, 0], witness)
-    if react_at_all:
-        world = World(h, time, motion, half, spans, leaves, cells, cell, order, ego)
-        manner = Manner(
-            driving[0], driving[1], driving[2], driving[3], driving[4], driving[5], driving[6], driving[7] > 0.0
-        )  # fmt: skip
-        react(world, manner, seen, delay, before, after)
+    h, time, motion, ego = world.step, world.time, world.motion, world.ego
+    pose, body, witness = np.empty(5), seen[0, :EGO_CLOCK], seen[0, EGO_CLOCK:]
+    locate(now, time, motion[ego], body, before[ego, CLOCK], witness)
+    if manner.reacts:
+        react(world, manner, seen, before, after)
     else:
         after[:] = 0.0
-        after[:, 0], after[:, 1] = min(now, time[-1]), 1.0
-    after[ego, 0], after[ego, 1], after[ego, 3], after[ego, 4] = witness[0], witness[1], 0.0, 0.0
+        after[:, CLOCK], after[:, RATE] = min(now, time[-1]), 1.0
+    after[ego, CLOCK], after[ego, RATE], after[ego, WAITED], after[ego, HELD] = witness[0], witness[1], 0.0, 0.0
     place(time, motion, after, vehicles)
     vehicles[ego] = body[:4]
-    for i in range(n):
-        pose_at(time, motion[i], before[i, 0], pose)
-        gained = (vehicles[i, 3] - before[i, 1] * pose[3]) / h
-        if after[i, 4] > 0.0:
-            hard, sudden = gained + driving[4] + HARDER / h, gained - min(before[i, 2], 0.0) + driving[5] * h + SUDDEN / h
-            after[i, 4] = 1.0 if min(hard, sudden) < 0.0 else 0.0
-        if after[i, 4] == 0.0 or vehicles[i, 3] == 0.0:
-            after[i, 2] = gained if vehicles[i, 3] > 0.0 else 0.0
-        after[i, 2] = min(max(after[i, 2], -driving[4]), driving[2])
-        there[i] = i == ego or (after[i, 0] >= spans[i, 0] and not (leaves[i] and after[i, 0] >= spans[i, 1]))
+    for i in range(len(motion)):
+        pose_at(time, motion[i], before[i, CLOCK], pose)
+        speed, was, clock = vehicles[i, 3], before[i, ACCELERATION], after[i, CLOCK]
+        gained = (speed - before[i, RATE] * pose[3]) / h
+        if after[i, HELD] > 0.0:
+            hard, sudden = gained + manner.strongest + HARDER / h, gained - min(was, 0.0) + manner.jerk * h + SUDDEN / h
+            after[i, HELD] = 1.0 if min(hard, sudden) < 0.0 else 0.0
+        if after[i, HELD] == 0.0 or speed == 0.0:
+            after[i, ACCELERATION] = gained if speed > 0.0 else 0.0
+        after[i, ACCELERATION] = min(max(after[i, ACCELERATION], -manner.strongest), manner.acceleration)
+        begin, end = world.spans[i]
+        here[i] = i == ego or (clock >= begin and not (world.leaves[i] and clock >= end))
 
 
 AT = 0.2  # metres before the goal that count as there

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, Floats, frozen
-from scenario_gen.numerics.kernels import F, F1, F2, F3, kernel, OUT3
+from scenario_gen.numerics import Bools, exact, Floats, frozen
+from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT3
 from scenario_gen.template import conflict_of, lag_behind
 from scenario_gen.types import Scenario, tokens, yielders_of
 
@@ -85,6 +85,9 @@ class World(NamedTuple):
     cell: float
     order: Floats
     ego: int
+
+
+WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I)
 
 
 def certified(scenario: Scenario, ego: int | str) -> Certified:

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.kernels import kernel
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.kernels import B, F, I1, kernel, named
 
 AHEAD = 60.0  # metres of its path that it looks along for who is ahead
 HALVINGS = 4  # of a cell in which a vehicle meets what is ahead
@@ -18,8 +18,23 @@ STAND = 0.02  # m/s, certified speed of a stand, which passes whatever there is
 NEARER = 0.1  # metres by which a gap must be smaller than the certified one to be minded
 
 
+CLOCK, RATE, ACCELERATION, WAITED, HELD = range(5)
+"""Columns of what drivers do in a step: `State`'s and, after it, 1 where the order held one back."""
+EGO_CLOCK, EGO_RATE, ON_PATH = range(6, 9)
+"""Columns of `State.seen` behind those of `EgoState`."""
+
+
+class Self(NamedTuple):
+    """A driver at the begin of a step: which, its clock [s], the clock's rate and its acceleration in the step before [m/s²]."""
+
+    i: int
+    clock: float
+    rate: float
+    was: float
+
+
 class Manner(NamedTuple):
-    """How the others drive: fields of `ClosedLoopConfig`."""
+    """How the others drive: fields of `ClosedLoopConfig`; whether they react at all, and (N,) the reaction times in steps."""
 
     headway: float
     standstill: float
@@ -29,6 +44,11 @@ class Manner(NamedTuple):
     jerk: float
     patience: float
     yields: bool
+    reacts: bool
+    delay: Ints
+
+
+MANNER = named(Manner, F, F, F, F, F, F, F, B, B, I1)
 
 
 @kernel(inline=True)
@@ -118,18 +138,17 @@ def _idm(gap: float, u: float, ahead: float, manner: Manner) -> float:
 
 
 @kernel(inline=True)
-def minded(
-    world: World, manner: Manner, i: int, j: int, clock: float, u: float, pose: Floats, box: Floats, speed: float, later: float
-) -> float:
-    """Braking [m/s²] of vehicle i, at speed u [m/s], for j, whose box (7,) and speed [m/s] are given, if it is on its path.
+def minded(world: World, manner: Manner, me: Self, pose: Floats, j: int, box: Floats, speed: float, later: float) -> float:
+    """Braking [m/s²] of a driver at its certified pose (5,) for j, whose box (7,) and speed [m/s] are given, if on its path.
 
-    FREE if j is no nearer than in the certified execution at the same clock; `later` [s] than that of i is what is given of j.
+    FREE if j is no nearer than in the certified execution at the same clock; `later` [s] than its own is what is given of j.
     """
+    i, clock = me.i, me.clock
     gap, at = gap_ahead(world, i, clock, box, pose)
     if at < 0:
         return FREE
     ahead = speed * max(box[2] * world.cells[i, at, 2] + box[3] * world.cells[i, at, 3], 0.0)
-    braking = _idm(gap, u, ahead, manner)
+    braking = _idm(gap, me.rate * pose[3], ahead, manner)
     if braking <= 0.0:
         return FREE
     certain, there = np.empty(5), np.empty(7)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
-from scenario_gen.closed_loop.driver import FREE, Manner, rate_after
+from scenario_gen.closed_loop.driver import EGO_CLOCK, EGO_RATE, FREE, Manner, ON_PATH, rate_after, Self
 from scenario_gen.closed_loop.order import limit, PARTS
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import kernel
@@ -54,11 +54,11 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
     cos, sin = np.cos(seen[2]), np.sin(seen[2])
     usual = 0.0  # the witness' own braking there, in the step that is over and after it
     for back in range(3):
-        pose_at(time, motion, seen[6] - (1.0 - 0.5 * back) * h * seen[7], pose)
+        pose_at(time, motion, seen[EGO_CLOCK] - (1.0 - 0.5 * back) * h * seen[EGO_RATE], pose)
         usual = min(usual, pose[4])
-    on_path = seen[8] > 0.0
-    keeps = on_path and seen[5] > seen[7] * seen[7] * usual - HARDER
-    braking, way, clock = max(-seen[5], 0.0), 0.0, seen[6]
+    on_path = seen[ON_PATH] > 0.0
+    keeps = on_path and seen[5] > seen[EGO_RATE] * seen[EGO_RATE] * usual - HARDER
+    braking, way, clock = max(-seen[5], 0.0), 0.0, seen[EGO_CLOCK]
     if ago == 0:
         out[0] = seen[:4]
     for m in range(1 - ago, out.shape[0]):
@@ -66,24 +66,15 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
         moved = 0.5 * (s + after) * h if after > 0.0 or braking == 0.0 else 0.5 * s * s / braking
         s = after
         if on_path:
-            clock += seen[7] * h if keeps else min(moved / max(pose[3], SLOW), h)
+            clock += seen[EGO_RATE] * h if keeps else min(moved / max(pose[3], SLOW), h)
             pose_at(time, motion, clock, pose)
         way += moved
         if m < 0:
             continue
         if on_path:
-            out[m, :3], out[m, 3] = pose[:3], seen[7] * pose[3] if keeps else s
+            out[m, :3], out[m, 3] = pose[:3], seen[EGO_RATE] * pose[3] if keeps else s
         else:
             out[m, 0], out[m, 1], out[m, 2], out[m, 3] = seen[0] + way * cos, seen[1] + way * sin, seen[2], s
-
-
-class Self(NamedTuple):
-    """A driver at the begin of a step: which, its clock [s], the clock's rate and its acceleration in the step before [m/s²]."""
-
-    i: int
-    clock: float
-    rate: float
-    was: float
 
 
 @kernel(inline=True)

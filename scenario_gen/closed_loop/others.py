@@ -19,8 +19,24 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
-from scenario_gen.closed_loop.driver import FREE, gap_ahead, Manner, minded, rate_after, STAND
-from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, FORESEEN, Foreseen, Self, weakest
+from scenario_gen.closed_loop.driver import (
+    ACCELERATION,
+    CLOCK,
+    EGO_CLOCK,
+    EGO_RATE,
+    FREE,
+    gap_ahead,
+    HELD,
+    Manner,
+    minded,
+    ON_PATH,
+    RATE,
+    rate_after,
+    Self,
+    STAND,
+    WAITED,
+)
+from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, FORESEEN, Foreseen, weakest
 from scenario_gen.closed_loop.order import keep_order, limit
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
@@ -57,21 +73,20 @@ class Now(NamedTuple):
 
 
 @kernel(inline=True)
-def react(world: World, manner: Manner, seen: Floats, delay: Ints, drivers: Floats, after: Floats) -> None:
+def react(world: World, manner: Manner, seen: Floats, drivers: Floats, after: Floats) -> None:
     """Write what becomes of all drivers in a step; the row of the ego is left to the caller.
 
     Args:
         world: the scenario and the step.
         manner: how they drive.
         seen: (K, 9) the ego as in `State.seen`, at the end of this step and before.
-        delay: (N,) reaction time of each driver in steps.
         drivers: (N, 4) as in `Now`.
         after: (N, 5) clock [s], rate, acceleration that the driver wanted [m/s²], patience spent [s], and 1 where the order held
             it back.
     """
     n = drivers.shape[0]
-    now = _begin(world, drivers, seen, delay)
-    level, rate = np.full(n, FREE), drivers[:, 1].copy()
+    now = _begin(world, drivers, seen, manner.delay)
+    level, rate = np.full(n, FREE), drivers[:, RATE].copy()
     _regard_ego(world, manner, now, level, rate, after)
     if n > 2:
         for i in range(n):
@@ -79,7 +94,7 @@ def react(world: World, manner: Manner, seen: Floats, delay: Ints, drivers: Floa
                 foresee_self(world, manner, _me(now, i), level[i], now.coming[i])
         for i in range(n):
             if i != world.ego and now.here[i]:
-                rate[i] = _regard_others(world, manner, now, i, level[i], rate[i], after[i, 3])
+                rate[i] = _regard_others(world, manner, now, i, level[i], rate[i], after[i, WAITED])
     _move(world, now, rate, after)
 
 
@@ -89,19 +104,19 @@ def _begin(world: World, drivers: Floats, seen: Floats, delay: Ints) -> Now:
     n, steps = drivers.shape[0], int(np.ceil(FORESEEN / world.step))
     pose, goes, here = np.empty((n, 5)), np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
     for i in range(n):
-        clock = drivers[i, 0]
+        clock = drivers[i, CLOCK]
         goes[i] = not (world.leaves[i] and clock >= world.spans[i, 1])
         here[i] = goes[i] and clock >= world.spans[i, 0]
         pose_at(world.time, world.motion[i], clock, pose[i])
     coming = np.empty((n, steps + 1))
     for m in range(steps + 1):
-        coming[:, m] = drivers[:, 0] + m * world.step  # of those who have left
+        coming[:, m] = drivers[:, CLOCK] + m * world.step  # of those who have left
     return Now(drivers, pose, goes, here, seen, delay, np.empty((n, steps + 1, 4)), coming)
 
 
 @kernel(inline=True)
 def _me(now: Now, i: int) -> Self:
-    return Self(i, now.drivers[i, 0], now.drivers[i, 1], now.drivers[i, 2])
+    return Self(i, now.drivers[i, CLOCK], now.drivers[i, RATE], now.drivers[i, ACCELERATION])
 
 
 @kernel(inline=True)
@@ -127,8 +142,8 @@ def _expected(world: World, now: Now, i: int, spent: float) -> Foreseen:
     """What driver i expects; it does not wait for the ego where the template did if its patience is spent for good."""
     ago = min(now.delay[i], now.seen.shape[0] - 1)
     ego = now.seen[ago]
-    rate = ego[7] if ego[8] > 0.0 and spent < np.inf else -1.0
-    return Foreseen(now.ahead[i], ego[6] + ego[7] * ago * world.step, rate, now.coming)
+    rate = ego[EGO_RATE] if ego[ON_PATH] > 0.0 and spent < np.inf else -1.0
+    return Foreseen(now.ahead[i], ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step, rate, now.coming)
 
 
 @kernel(inline=True)
@@ -137,15 +152,15 @@ def _spent(world: World, manner: Manner, now: Now, i: int) -> float:
 
     That it does when its patience is over and its path is free of the ego, whom it sees where it expects it to be now.
     """
-    spent: float = now.drivers[i, 3]
-    u, box = now.drivers[i, 1] * now.pose[i, 3], np.empty(7)
+    spent: float = now.drivers[i, WAITED]
+    u, box = now.drivers[i, RATE] * now.pose[i, 3], np.empty(7)
     if spent == np.inf:
         return spent
-    if u > CREEP or now.drivers[i, 1] >= 1.0 or now.pose[i, 3] < STAND or now.ahead[i, 0, 3] > STILL:
+    if u > CREEP or now.drivers[i, RATE] >= 1.0 or now.pose[i, 3] < STAND or now.ahead[i, 0, 3] > STILL:
         return 0.0
     spent += world.step
     _fill_ego(world, now.ahead[i, 0], box)
-    _, at = gap_ahead(world, i, now.drivers[i, 0], box, now.pose[i])
+    _, at = gap_ahead(world, i, now.drivers[i, CLOCK], box, now.pose[i])
     return np.inf if spent >= manner.patience and at < 0 else spent
 
 
@@ -154,11 +169,11 @@ def _regard_ego(world: World, manner: Manner, now: Now, level: Floats, rate: Flo
     """Write each driver's braking with regard to the ego alone [m/s²], its rate after the step, and its patience spent."""
     last, box = -1, np.empty(7)
     for i in range(level.shape[0]):
-        after[i, 3] = now.drivers[i, 3]
+        after[i, WAITED] = now.drivers[i, WAITED]
         if i == world.ego or not now.goes[i]:
             continue
         if not now.here[i]:
-            rate[i] = _come(world, now.seen[0], now.drivers[i, 0], rate[i], i)
+            rate[i] = _come(world, now.seen[0], now.drivers[i, CLOCK], rate[i], i)
             continue
         ago, me, ahead = min(now.delay[i], now.seen.shape[0] - 1), _me(now, i), now.ahead[i]
         if last >= 0 and now.delay[last] == now.delay[i]:
@@ -166,11 +181,11 @@ def _regard_ego(world: World, manner: Manner, now: Now, level: Floats, rate: Flo
         else:
             foresee_ego(world, now.seen[ago], ago, ahead)
         last = i
-        after[i, 3] = _spent(world, manner, now, i)
+        after[i, WAITED] = _spent(world, manner, now, i)
         v, a = now.pose[i, 3], now.pose[i, 4]
         _fill_ego(world, ahead[0], box)
-        least = minded(world, manner, i, world.ego, me.clock, me.rate * v, now.pose[i], box, ahead[0, 3], world.step)
-        level[i] = weakest(world, manner, me, least, _expected(world, now, i, after[i, 3]), False)
+        least = minded(world, manner, me, now.pose[i], world.ego, box, ahead[0, 3], world.step)
+        level[i] = weakest(world, manner, me, least, _expected(world, now, i, after[i, WAITED]), False)
         rate[i] = rate_after(manner, me.rate, v, a, me.was, level[i], 0.0, world.step)
 
 
@@ -179,10 +194,10 @@ def _regard_others(world: World, manner: Manner, now: Now, i: int, level: float,
     """Rate of driver i after the step with regard to the others, too; `rate` is that with its braking for the ego, `level`."""
     me, v, a, box, least = _me(now, i), now.pose[i, 3], now.pose[i, 4], np.empty(7), level
     for j in range(now.pose.shape[0]):
-        if j not in (i, world.ego) and now.here[j] and now.drivers[j, 0] < me.clock:
-            other, speed = now.pose[j], now.drivers[j, 1] * now.pose[j, 3]
+        if j not in (i, world.ego) and now.here[j] and now.drivers[j, CLOCK] < me.clock:
+            other, speed = now.pose[j], now.drivers[j, RATE] * now.pose[j, 3]
             fill_box(other[0], other[1], other[2], world.half[j, 0], world.half[j, 1], box)
-            least = max(least, minded(world, manner, i, j, me.clock, me.rate * v, now.pose[i], box, speed, 0.0))
+            least = max(least, minded(world, manner, me, now.pose[i], j, box, speed, 0.0))
     least = weakest(world, manner, me, least, _expected(world, now, i, spent), True)
     if least <= level:
         return rate
@@ -196,9 +211,9 @@ def _creep(world: World, now: Now, i: int) -> float:
     It creeps, so that nobody waits for one who waits for it. For one whose clock is behind and who does not wait for it, it comes
     to a stand where the order ends its way. The one with the earliest clock creeps in any case.
     """
-    clock, speed = now.drivers[i, 0], CREEP
+    clock, speed = now.drivers[i, CLOCK], CREEP
     for j in range(now.pose.shape[0]):
-        other = now.drivers[j, 0]
+        other = now.drivers[j, CLOCK]
         if j in (i, world.ego) or not now.goes[j] or other >= clock:
             continue
         if limit(world.order[j, i], world.cell, clock) > other + BEHIND:
@@ -211,7 +226,7 @@ def _creep(world: World, now: Now, i: int) -> float:
 def _move(world: World, now: Now, rate: Floats, after: Floats) -> None:
     """Move the clocks as the drivers want, as far as the order lets them."""
     n, h, drivers = rate.shape[0], world.step, now.drivers
-    clock, before, forced = drivers[:, 0].copy(), drivers[:, 1].copy(), np.zeros(n)
+    clock, before, forced = drivers[:, CLOCK].copy(), drivers[:, RATE].copy(), np.zeros(n)
     new_clock, new_rate = clock.copy(), rate.copy()
     for i in range(n):
         if i != world.ego and now.goes[i] and (now.here[i] or rate[i] > 0.0):
@@ -219,6 +234,6 @@ def _move(world: World, now: Now, rate: Floats, after: Floats) -> None:
     keep_order(world, now.goes, clock, before, new_clock, new_rate, forced)
     for i in range(n):
         end = max(now.pose[i, 3] + before[i] * now.pose[i, 4] * h, 0.0)
-        after[i, 0] = min(new_clock[i], world.time[-1]) if now.goes[i] else new_clock[i]
-        after[i, 1], after[i, 2] = new_rate[i], (rate[i] * end - before[i] * now.pose[i, 3]) / h
-        after[i, 4] = 1.0 if new_rate[i] < rate[i] or forced[i] > 0.0 else 0.0
+        after[i, CLOCK] = min(new_clock[i], world.time[-1]) if now.goes[i] else new_clock[i]
+        after[i, RATE], after[i, ACCELERATION] = new_rate[i], (rate[i] * end - before[i] * now.pose[i, 3]) / h
+        after[i, HELD] = 1.0 if new_rate[i] < rate[i] or forced[i] > 0.0 else 0.0

@@ -16,8 +16,9 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.advance import advance, at_goal, overlaps
-from scenario_gen.closed_loop.certified import CELL, Certified, certified
+from scenario_gen.closed_loop.certified import CELL, Certified, certified, World
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
+from scenario_gen.closed_loop.driver import Manner
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import footprint_fits
@@ -167,25 +168,36 @@ class ClosedLoop:
             raise InputError(f"scenario {scenario.index} is in frame {scenario.frame_id!r}, its road in {road.frame_id!r}")
         self.certified: Certified = certified(scenario, ego)
         self.road, self.config = road, config
-        self._driving = np.array(
-            (
-                config.headway,
-                config.standstill_gap,
-                config.acceleration,
-                config.comfortable_braking,
-                config.strongest_braking,
-                config.jerk,
-                config.patience,
-                float(config.yield_to_ego == TEMPLATE),
-                float(config.policy == REACTIVE),
-            )
+        known = self.certified
+        self._world = World(
+            config.step,
+            scenario.time,
+            known.motion,
+            known.half,
+            known.spans,
+            known.leaves,
+            known.cells,
+            CELL,
+            known.order,
+            known.ego,
         )
         reactive = config.policy == REACTIVE
         self.reactions = np.array(
             [reaction_time(scenario, vehicle.id, config.reaction * reactive) for vehicle in scenario.vehicles]
         )
-        self._delays = np.round(self.reactions / config.step).astype(np.int64)
-        self._slowest = int(self._delays.max())
+        self._manner = Manner(
+            config.headway,
+            config.standstill_gap,
+            config.acceleration,
+            config.comfortable_braking,
+            config.strongest_braking,
+            config.jerk,
+            config.patience,
+            config.yield_to_ego == TEMPLATE,
+            reactive,
+            np.round(self.reactions / config.step).astype(np.int64),
+        )
+        self._slowest = int(self._manner.delay.max())
         self._sizes = 2.0 * self.certified.half
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
         self._others = np.arange(len(self._ids)) != self.certified.ego
@@ -233,37 +245,17 @@ class ClosedLoop:
 
     def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
         """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
-        config, known = self.config, self.certified
+        config = self.config
         moved = move(state.ego, asked, config)
         ego, n = moved.state, len(self._ids)
         number = state.step + 1
         time = number * config.step
-        now = self.begin + time
-        before, after = np.empty((n, 4)), np.empty((n, 5))
+        before = np.empty((n, 4))
         before[:, 0], before[:, 1], before[:, 2], before[:, 3] = state.clock, state.rate, state.acceleration, state.waited
         seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
         seen[0, :6], seen[1:] = ego, state.seen[: len(seen) - 1]
-        vehicles, here = np.empty((n, 4)), np.empty(n, dtype=np.bool_)
-        advance(
-            config.step,
-            now,
-            known.scenario.time,
-            known.motion,
-            known.half,
-            known.spans,
-            known.leaves,
-            known.cells,
-            CELL,
-            known.order,
-            self.ego,
-            self._driving,
-            self._delays,
-            before,
-            seen,
-            after,
-            vehicles,
-            here,
-        )
+        after, vehicles, here = np.empty((n, 5)), np.empty((n, 4)), np.empty(n, dtype=np.bool_)
+        advance(self._world, self._manner, self.begin + time, before, seen, after, vehicles, here)
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
         return State(number, time, ego, vehicles, here, clock, rate, acceleration, waited, seen, count, note or moved.fault)

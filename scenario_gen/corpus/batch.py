@@ -28,7 +28,7 @@ from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.base.stores import each_fetched, Place
 from scenario_gen.corpus.encounters import encounter_of, rows_at, rows_of, tables_of
 from scenario_gen.corpus.tasks import agreed, arriving, check_out, held, spread, undone, Workers
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import at_period, criticality
 from scenario_gen.method.fitting import LostConflictError
@@ -219,7 +219,7 @@ def _generate_case(
         encounter = encounter_of(row, table)
         road, encounter = road_and_template(task.road, encounter, request.config.road)
         segmentation = segment(encounter, request.config.segmentation, seed)
-        result = Attempt(encounter, segmentation, road, request.config, count=request.count, seed=seed).run()
+        result = Chain(encounter, segmentation, road, request.config, count=request.count, seed=seed).run()
     except (RefusedError, InputError) as error:
         message = LOST_CONFLICT if isinstance(error, LostConflictError) else str(error).partition(":")[0]
         cause = message if isinstance(error, RefusedError) else "input"

@@ -4,28 +4,25 @@
 """The nearest request that is possible: what an impossible one is answered with, each suggestion tried out before it is made."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property, wraps
-from inspect import signature
+from functools import cached_property
 from itertools import islice
-from typing import ParamSpec
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError, ScenarioGenError
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import LostConflictError
 from scenario_gen.method.sampling import Cancelled, TargetError
 from scenario_gen.method.segmentation import segment
-from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road, suitable_roads, with_suitable_roads
-from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.method.suitable_roads import AUTO, suitable_roads, with_suitable_roads
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import draw_route, footprint_fits, nearest_pose_with_room, road_and_template
 from scenario_gen.template import footprint_gap
-from scenario_gen.types import ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
+from scenario_gen.types import Encounter, ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
 
-P = ParamSpec("P")
 BISECTIONS = 7
 _NAMED = 2  # roads that keep an encounter
 ENOUGH = 10  # valid scenarios by which a request counts as possible, if not fewer are wanted
@@ -82,58 +79,50 @@ class ImpossibleError(RefusedError):
         self.suggestions = suggestions
 
 
-def suggest_nearest(generate: Callable[P, GenerationResult]) -> Callable[P, GenerationResult]:
-    """Wrap `pipeline.generate`: what it refuses is answered with what is possible; road "auto" is the first one that suits."""
+def suggest_nearest(error: RefusedError, requested: Chain, cancelled: Cancelled = lambda: False) -> RefusedError:
+    """Return a refusal with the nearest requests that are possible, for a command or node to answer with.
 
-    @wraps(generate)
-    def answered(*args: P.args, **kwargs: P.kwargs) -> GenerationResult:
-        call = signature(generate).bind(*args, **kwargs)
-        call.apply_defaults()
-        config, request, count, seed = (call.arguments[name] for name in ("config", "request", "count", "seed"))
-        if isinstance(call.arguments["road"], str) and call.arguments["road"] == AUTO:
+    Args:
+        error: what refused the request.
+        requested: what was requested.
+        cancelled: whether to stop looking; then nothing is suggested.
 
-            def on(road: str) -> GenerationResult:
-                call.arguments["road"] = road
-                return generate(*call.args, **call.kwargs)
-
-            return on_first_suitable_road(on, call.arguments["encounter"], config, seed)
-        try:
-            return generate(*args, **kwargs)
-        except RefusedError as error:
-            if not request.moves and not isinstance(error, LostConflictError | TargetError):
-                raise with_suitable_roads(error, call.arguments["encounter"], call.arguments["road"], config, seed) from None
-            road, encounter = road_and_template(call.arguments["road"], call.arguments["encounter"], config.road)
-            segmentation = segment(encounter, config.segmentation, seed)
-            with nearest_if_impossible(Attempt(encounter, segmentation, road, config, request, count, seed)):
-                raise
-
-    return answered
-
-
-@contextmanager
-def nearest_if_impossible(requested: Attempt, cancelled: Cancelled = lambda: False) -> Iterator[None]:
-    """Answer a refusal in the body with the nearest requests that are possible; none if it was cancelled.
-
-    Raises:
-        LostConflictError: a conflict of the template would be lost; it names roads that keep it.
-        ImpossibleError: the requested states cannot be met; it says why, and what nearby can be.
-        RefusedError: as the body, where no states were requested.
+    Returns:
+        A LostConflictError that names roads that keep the conflict; an ImpossibleError with possible requests where states were
+        requested; else the error itself, as where a target or an order is what cannot be had.
     """
-    try:
-        yield
-    except TargetError:  # the states are not what is impossible
-        raise
-    except RefusedError as error:
-        if not requested.request.moves:
-            if not isinstance(error, LostConflictError):
-                raise
-            kept = " or ".join(f"road {name}" for name in roads_that_keep(requested))
-            raise LostConflictError(f"{error}. Nearest possible: {kept}") from error
-        suggestions = tuple(_Search(replace(requested, count=min(requested.count, ENOUGH)), cancelled).run())
-        raise ImpossibleError(str(error), () if cancelled() else suggestions) from error
+    if isinstance(error, TargetError):  # the states are not what is impossible
+        return error
+    if requested.request.moves:
+        search = _Search(replace(requested, count=min(requested.count, ENOUGH)), cancelled)
+        suggestions = tuple(search.run())
+        return ImpossibleError(str(error), () if cancelled() else suggestions)
+    if isinstance(error, LostConflictError):
+        kept = " or ".join(f"road {name}" for name in roads_that_keep(requested))
+        return LostConflictError(f"{error}. Nearest possible: {kept}")
+    return error
 
 
-def roads_that_keep(requested: Attempt) -> list[str]:
+def answer_refusal(
+    error: RefusedError,
+    encounter: Encounter,
+    road: Road | str,
+    config: PipelineConfig,
+    request: Request,
+    count: int,
+    seed: int,
+) -> RefusedError:
+    """Return what a command answers when `pipeline.generate` refused these arguments: with the nearest requests or roads."""
+    if road == AUTO:
+        return error
+    if not request.moves and not isinstance(error, LostConflictError | TargetError):
+        return with_suitable_roads(error, encounter, road, config, seed)
+    road, encounter = road_and_template(road, encounter, config.road)
+    segmentation = segment(encounter, config.segmentation, seed)
+    return suggest_nearest(error, Chain(encounter, segmentation, road, config, request, count, seed))
+
+
+def roads_that_keep(requested: Chain) -> list[str]:
     """Names of the built-in roads that the template fits with all its conflicts, two at most; else `corridor`, its own road."""
     return list(islice(suitable_roads(requested.encounter, requested.segmentation, requested.config), _NAMED)) or ["corridor"]
 
@@ -141,7 +130,7 @@ def roads_that_keep(requested: Attempt) -> list[str]:
 class _Search:
     """Everything that the suggestions for one request need."""
 
-    def __init__(self, requested: Attempt, cancelled: Cancelled) -> None:
+    def __init__(self, requested: Chain, cancelled: Cancelled) -> None:
         self.requested, self.cancelled = requested, cancelled
         self._plans: dict[tuple[str, str], GenerationResult | None] = {}
 

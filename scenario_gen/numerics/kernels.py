@@ -59,8 +59,48 @@ def sources() -> tuple[Path, ...]:
 def folder() -> Path:
     """Return the folder of compiled kernels: in `NUMBA_CACHE_DIR`, the user's cache, or a temporary folder of this process.
 
-    Its name is a hash of all sources of kernels, as numba tells them apart (path, time, size), and of the versions of Python and
-    numba: a kernel is compiled anew when another file that it calls has changed.
+    def take(array: Any) -> Any:
+        if array.dtype != dtype or array.ndim != ndim or not (array.flags.c_contiguous and array.flags.writeable):
+            raise TypeError(f"{name}: an output must be a writable, contiguous array of {ndim} dimensions of {dtype}")
+        return array
+
+    return take
+
+
+def named(fields: type, *declared: Any) -> types.NamedTuple:
+    """Return the type of an argument that is a NamedTuple, from the types of its fields."""
+    return types.NamedTuple(declared, fields)
+
+
+def _tuple(name: str, declared: types.NamedTuple) -> Callable[[Any], Any]:
+    """Return what makes a NamedTuple the declared one; the same one again, of which all was right, is not looked at anew."""
+    takes = [_argument(f"{name}: {field}", each) for field, each in zip(declared.fields, declared.types, strict=True)]
+    right = None
+
+    def take(values: Any) -> Any:
+        nonlocal right
+        if values is right:
+            return values
+        taken = declared.instance_class(*[take(value) for take, value in zip(takes, values, strict=True)])
+        if all(one is other for one, other in zip(taken, values, strict=True)):
+            right = None if any(getattr(each, "mutable", False) for each in declared.types) else values  # outputs are large
+        return taken
+
+    return take
+
+
+def _argument(name: str, declared: Any) -> Callable[[Any], Any]:
+    if isinstance(declared, types.NamedTuple):
+        return _tuple(name, declared)
+    if isinstance(declared, types.Array):
+        return _output(name, declared) if declared.mutable else _input(name, declared)
+    return operator.index if declared == I else bool if declared == B else float
+
+
+class Kernel(CPUDispatcher):  # type: ignore[misc]
+    """A function with one compiled form, to Python and to the kernels that call it.
+
+    numba's own dispatcher compiles another form for every mixture of read-only and writable arrays that it is given.
     """
     stamps = [(str(file), file.stat().st_mtime_ns, file.stat().st_size) for file in sources()]
     name = "kernels-" + sha256(repr((stamps, numba.__version__, platform.python_version())).encode()).hexdigest()[:16]

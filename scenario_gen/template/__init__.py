@@ -22,6 +22,7 @@ from scenario_gen.template.reactions import reactions_of
 from scenario_gen.template.separation import footprint_gap, least_gap, least_gaps, own_paths, separate, smallest_gaps
 from scenario_gen.template.side import mirrored, traffic_side
 from scenario_gen.template.size import MOST_SAMPLES, MOST_VEHICLES, refuse_too_large
+from scenario_gen.template.starts import Equation, solve_starts
 from scenario_gen.template.tracks import clean_tracks, Track
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "STAND_SPEED",
     "WAIT_SPEED",
     "Conflict",
+    "Equation",
     "FrenetTracks",
     "MainLine",
     "Motion",
@@ -59,6 +61,7 @@ __all__ = [
     "separate",
     "sharpness_of",
     "smallest_gaps",
+    "solve_starts",
     "time_gaps",
     "to_frenet",
     "traffic_side",

@@ -13,7 +13,7 @@ from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.logs.synthetic import bundled
 
 LOG = bundled("b")
-QUICK = ("--road", "t_intersection", "--seed", "7", "--set", "evaluation.uniform=false", "--set", "evaluation.resamples=10")
+QUICK = ("--road", "t_intersection", "--seed", "7", "--set", "evaluation.resamples=10")
 
 
 def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(run, tmp_path):

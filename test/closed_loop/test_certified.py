@@ -17,7 +17,7 @@ from scenario_gen.closed_loop.certified import CELL, certified
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
@@ -43,7 +43,7 @@ class Slower:
 
 def generated(encounter, count):
     road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
-    return Attempt(encounter, segmentation, road, CONFIG, count=count, seed=1).run().generated
+    return Chain(encounter, segmentation, road, CONFIG, count=count, seed=1).run().generated
 
 
 @pytest.fixture(scope="module")

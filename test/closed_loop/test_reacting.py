@@ -27,7 +27,7 @@ class FullThrottle(RouteFollower):
 
 
 def generated(out, *words):
-    quick = ("--set", "evaluation.uniform=false", "--set", "evaluation.resamples=10")
+    quick = ("--set", "evaluation.resamples=10")
     command = ["generate", str(bundled("b")), "--road", "t_intersection", "--count", "6", "--for-testing", *quick]
     return CliRunner().invoke(app, [*command, *words, "--out", str(out)])
 

@@ -163,7 +163,7 @@ def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypat
     def lost(attempt):
         raise LostConflictError(f"road {attempt.road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
 
-    monkeypatch.setattr(batches.Attempt, "run", lost)
+    monkeypatch.setattr(batches.Chain, "run", lost)
     made = run_batch(corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1))
     assert made.failures == {LOST_CONFLICT: 4} and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))

@@ -46,7 +46,7 @@ from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import build_road
 
-CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
+CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
 PARTED = b"\n# ---- image ----\n"  # a map as one input: its YAML, this, and its image
 MAGIC = b"\x89MCAP0\r\n"
 OPCODE = struct.Struct("<BQ")

@@ -9,9 +9,11 @@ import pytest
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
+from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import suitable_roads
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.types.request import Request
 
 LOG = Path(__file__).resolve().parents[2] / "examples" / "my_log.csv"
 
@@ -33,10 +35,11 @@ def test_auto_takes_the_first_road_that_keeps_the_conflict_and_says_so(crossing)
     )
 
 
-def test_a_refusal_names_the_roads_that_suit_without_a_chain_of_errors(crossing):
+def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):
     config = PipelineConfig()
     names = list(suitable_roads(crossing, segment(crossing, config.segmentation, 7), config))
     assert "four_way" in names and names[-1] == "corridor" and "t_intersection" not in names
-    with pytest.raises(RefusedError, match=f"choose another road. Roads that take it: {', '.join(names)}$") as caught:
+    with pytest.raises(RefusedError, match=r"choose another road$") as caught:
         generate(crossing, "t_intersection", count=2, seed=7)
-    assert caught.value.__suppress_context__ and caught.value.__cause__ is None
+    answer = answer_refusal(caught.value, crossing, "t_intersection", config, Request(), 2, 7)
+    assert str(answer).endswith(f"Roads that take it: {', '.join(names)}")

@@ -5,10 +5,11 @@
 
 from dataclasses import dataclass, field
 
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
-from scenario_gen.method.nearest import nearest_if_impossible
+from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
@@ -35,6 +36,8 @@ class Given:
 
 def answer(given, request, *, count, cancelled=lambda: False):
     """Return what comes of a request; the nearest possible one is looked for where it cannot be had."""
-    asked = Attempt(given.encounter, given.segmentation, given.road, given.config, request, count, given.seed)
-    with nearest_if_impossible(asked, cancelled):
+    asked = Chain(given.encounter, given.segmentation, given.road, given.config, request, count, given.seed)
+    try:
         return asked.run(Callbacks(cancelled=cancelled))
+    except RefusedError as error:
+        raise suggest_nearest(error, asked, cancelled) from error

@@ -11,7 +11,7 @@ from reaction_scenes import answering, crossing, lane_encounter, platoon, wander
 
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.review.validation import validate_bag
@@ -34,7 +34,7 @@ def late(encounter, who, sample):
 
 def made(encounter, request=Request(), count=30):
     road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
-    return Attempt(encounter, segmentation, road, CONFIG, request, count=count, seed=1).run()
+    return Chain(encounter, segmentation, road, CONFIG, request, count=count, seed=1).run()
 
 
 def wholes(result):

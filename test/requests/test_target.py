@@ -86,7 +86,7 @@ def test_without_measures_a_target_is_refused(chain):
 )
 def test_each_comes_again_bit_for_bit_and_is_valid(chain, request_, tmp_path):
     config = PipelineConfig()
-    config = replace(config, evaluation=replace(config.evaluation, resamples=10, uniform=False))
+    config = replace(config, evaluation=replace(config.evaluation, resamples=10))
     made = generate(chain.encounter, chain.road, config, count=3, seed=7, request=request_)
     made = replace(made, provenance=provenance_of([], 7, 3, ["t_intersection"], config, request_))
     bag = write_recording(tmp_path / "bag", made)

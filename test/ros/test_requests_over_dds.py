@@ -54,7 +54,7 @@ def ask(client, **values):
 
 def in_process(count, **asked):
     (encounter,) = read_log(LOG).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
     case = generate(encounter, ROAD, config, count=count, seed=SEED, request=Request(**asked))
     return encounter, case.generated
 

@@ -21,4 +21,6 @@ class EvaluationConfig(Parameters):
     )
     period: float = parameter(0.1, "sampling period of distributions and criticality", unit="s", low=0.01, high=1.0)
     ttc_horizon: float = parameter(10.0, "times to collision above this count as this", unit="s", low=1.0, high=100.0)
-    uniform: bool = parameter(True, "command line: generate also with as many changepoints evenly spaced in time, a row to beat")
+    compare: bool = parameter(
+        False, "`generate`: draw also sets without changepoints, with evenly spaced ones and with preset narrow, to compare with"
+    )

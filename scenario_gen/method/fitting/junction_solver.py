@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.method.fitting.relations import Equation, equations, Relation
-from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.method.fitting.relations import equations, Relation
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.template import Track
+from scenario_gen.template import Equation, solve_starts, Track
 
 _INSTANTS = 15
 _LOST = 400.0  # cost [m²] of a relation that the routes do not have
@@ -88,7 +88,7 @@ class Solver:
                 if key not in self.by_turn:
                     self.by_turn[key] = self.start_by_turn(i, ways[i].curve)
                 system.append(Equation(((i, 1.0),), self.by_turn[key], _TURN_WEIGHT))
-        start = _least_squares(members, system)
+        start = _starts(members, system)
         if not start:  # nobody is tied down: who turns most is placed by its turn, the others beside it
             i = max(members, key=lambda i: (abs(self._turn(i)), self.driven[i, -1], -i))
             start[i] = self.start_by_turn(i, ways[i].curve)
@@ -163,7 +163,7 @@ class Solver:
         return Choice(ways, start, cost, lost, beyond, turned, len(self.relations))
 
 
-def _least_squares(members: list[int], system: list[Equation]) -> dict[int, float]:
+def _starts(members: list[int], system: list[Equation]) -> dict[int, float]:
     """A for the vehicles that equations tie to the road (those tied only to each other are left out)."""
     absolute = {term[0] for e in system if len(e.terms) == 1 for term in e.terms}
     while True:  # who shares a lane with one that is tied down is tied down too
@@ -172,13 +172,4 @@ def _least_squares(members: list[int], system: list[Equation]) -> dict[int, floa
             break
         absolute |= more
     tied = [i for i in members if i in absolute]
-    used = [e for e in system if all(i in absolute for i, _ in e.terms)]
-    if not tied:
-        return {}
-    matrix, value = np.zeros((len(used), len(tied))), np.zeros(len(used))
-    for row, equation in enumerate(used):
-        for i, factor in equation.terms:
-            matrix[row, tied.index(i)] = equation.weight * factor
-        value[row] = equation.weight * equation.value
-    solution = np.linalg.lstsq(matrix, value, rcond=None)[0]
-    return {i: float(a) for i, a in zip(tied, solution, strict=True)}
+    return solve_starts(tied, (e for e in system if all(i in absolute for i, _ in e.terms))) if tied else {}

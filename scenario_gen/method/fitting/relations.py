@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.template import path_crossing, Track
+from scenario_gen.template import Equation, path_crossing, Track
 
 _SAME_LANE = 1.75  # metres
 _SAME_END = 0.5  # metres between the ends of two routes in one lane
@@ -36,15 +36,6 @@ class Relation:
     b: int
     at_a: float
     at_b: float
-
-
-@dataclass(frozen=True, eq=False)
-class Equation:
-    """coefficients · A = value, with a weight."""
-
-    terms: tuple[tuple[int, float], ...]
-    value: float
-    weight: float
 
 
 def find_relations(tracks: tuple[Track, ...]) -> tuple[Relation, ...]:

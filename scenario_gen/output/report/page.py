@@ -29,6 +29,7 @@ from scenario_gen.types import (
 
 SIGNIFICANT = 0.03
 """Below this, E without changepoints leaves nothing to gain and the case is not counted."""
+UNCOMPARED = "sets to compare with were not requested; `scenario-gen generate --compare` draws them"
 MAX_SAMPLES = 50
 """Scenarios of each arm that a page draws; the figures count all."""
 
@@ -69,6 +70,8 @@ def render(report: ReportInput) -> str:
         verdict=_verdict(views),
         bag=shlex.quote(report.bag) if report.bag else "",
         significant=SIGNIFICANT,
+        compared=any(case.references for case in report.cases),
+        uncompared=next((why for case in report.cases for why in case.refusals.values()), UNCOMPARED),
         facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
         parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
     )

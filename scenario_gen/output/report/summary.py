@@ -27,6 +27,11 @@ from scenario_gen.types import (
 )
 
 SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", ORACLE: "replayed"}
+COMPARED = (
+    "; after | of sets drawn likewise, without changepoints and with K evenly spaced; in brackets, not compared: preset "
+    "narrow, the template replayed"
+)
+UNCOMPARED = "; in brackets, not compared: the template replayed. --compare draws sets to compare with"
 
 
 def summary(cases: Sequence[GenerationResult]) -> RenderableType:
@@ -34,14 +39,11 @@ def summary(cases: Sequence[GenerationResult]) -> RenderableType:
     lines = [line for case in cases for line in _case(case)]
     refused: Counter[Cause] = sum((case.generated.refused for case in cases), Counter())
     causes = ", ".join(f"{count} {words}" for words, count in causes_in_words(refused))
+    beside = COMPARED if any(case.references for case in cases) else UNCOMPARED
     return Group(
         *lines,
         Text(f"refused candidates: {causes}" if causes else "no candidate was refused"),
-        Text(
-            "K: changepoints. E: distance of the delivered set to the template, lower is nearer; after | of sets drawn likewise, "
-            "without changepoints and with K evenly spaced; in brackets, not compared: preset narrow, the template replayed.",
-            style="dim",
-        ),
+        Text(f"K: changepoints. E: distance of the delivered set to the template, lower is nearer{beside}.", style="dim"),
     )
 
 

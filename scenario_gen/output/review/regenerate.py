@@ -17,9 +17,11 @@ from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
 from scenario_gen.base.provenance import read_parameters, versions
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import MEASURES
-from scenario_gen.method.fitting import fit_template, FittingConfig
-from scenario_gen.method.routing import plan_routes, PlanningConfig
+from scenario_gen.method.fitting import FittingConfig
+from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import checker_of, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.method.validity import Limits
@@ -143,17 +145,18 @@ def _replan(found: "_Found", what: str, log: Path | None) -> Replanned:
     values, seed = found.summary.values, found.entry.seed
     requested = Request(**{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)})
     template = found.template(what)
-    encounter, segmentation, routes, (road, fit) = template.encounter, template.segmentation, template.routes, template.placed()
-    if log is not None:
-        encounter, segmentation = _from_log(log, encounter, found.summary, seed, what)
-    sampling = read_parameters(SamplingConfig(), values, "sampling.", what)
+    config = PipelineConfig(sampling=read_parameters(SamplingConfig(), values, "sampling.", what))
+    config = replace(config, limits=read_parameters(Limits(), values, "limits.", what))
+    planned = replace(template, seed=seed)
     if requested.moves or log is not None:  # what the bag has on `fit` need not be this request's
+        encounter, segmentation, road = template.encounter, template.segmentation, template.placed()[0]
+        if log is not None:
+            encounter, segmentation = _from_log(log, encounter, found.summary, seed, what)
         fitting = read_parameters(FittingConfig(), values, "fitting.", what)
         planning = read_parameters(PlanningConfig(), values, "planning.", what)
-        fit = fit_template(encounter, segmentation, road, fitting, request=requested, max_speed=sampling.max_speed)
-        routes = plan_routes(road, fit, planning, seed)
-    planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
-    return Replanned(planned, requested, sampling, read_parameters(Limits(), values, "limits.", what))
+        config = replace(config, fitting=fitting, planning=planning)
+        planned = Chain(encounter, segmentation, road, config, requested, seed=seed).plan()
+    return Replanned(planned, requested, config.sampling, config.limits)
 
 
 def write_regenerated(regenerated: Regenerated, folder: Path, inputs: Sequence[Path] = ()) -> Path:

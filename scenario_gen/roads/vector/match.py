@@ -20,7 +20,7 @@ from scenario_gen.numerics import Floats, runs, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template import find_conflicts, pair_crossings, Track, WAIT_SPEED
+from scenario_gen.template import Equation, find_conflicts, pair_crossings, solve_starts, Track, WAIT_SPEED
 from scenario_gen.types import LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -268,8 +268,7 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
 
     Who stops a little beyond a stop line in the template stops before it.
     """
-    one_each = np.eye(len(courses))
-    rows = [(one_each[i], course.start, _PRIOR) for i, course in enumerate(courses)]  # factors, value, weight
+    known = [Equation(((i, 1.0),), course.start, _PRIOR) for i, course in enumerate(courses)]
     crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
     met = _met(tuple(tracks))
     for a in range(len(tracks)):
@@ -281,7 +280,7 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
                 target = np.array([courses[a].start, courses[b].start]) + along
                 at = crossing_points[int(np.argmin(np.abs(crossing_points - target).sum(axis=1)))] - along
                 weight = _CROSSED if crossing.driven else _MET if (b, a) in met else _BEYOND
-                rows += [(one_each[a], float(at[0]), weight), (one_each[b], float(at[1]), weight)]
+                known += [Equation(((i, 1.0),), float(station), weight) for i, station in zip((a, b), at, strict=True)]
             for first, second in ((a, b), (b, a)):
                 gap = _follows(tracks[first], tracks[second])
                 if gap is None:
@@ -289,12 +288,11 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
                 station, offset = courses[second].curve.project(courses[first].curve.at(np.array([courses[first].start]))[:, :2])
                 if abs(float(offset[0])) < _SAME:  # of `first`, its start lies so far along the course of `second`
                     shift = float(station[0]) - courses[first].start
-                    rows.append((one_each[first] - one_each[second], scale * gap - shift, _FOLLOWED))
+                    known.append(Equation(((first, 1.0), (second, -1.0)), scale * gap - shift, _FOLLOWED))
     for i, (course, track) in enumerate(zip(courses, tracks, strict=True)):
-        rows += [(one_each[i], start, _STOPPED) for start in _starts_to_stop(network, course, track, scale)]
-    factors, values, weights = (np.array(column) for column in zip(*rows, strict=True))
-    solution = np.linalg.lstsq(weights[:, None] * factors, weights * values, rcond=None)[0]
-    return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
+        known += [Equation(((i, 1.0),), start, _STOPPED) for start in _starts_to_stop(network, course, track, scale)]
+    starts = solve_starts(range(len(courses)), known)
+    return [replace(course, start=starts[i]) for i, course in enumerate(courses)]
 
 
 @lru_cache(maxsize=2)  # of one template many places are looked at

@@ -31,9 +31,11 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.fitting import fit_template, FittingConfig
-from scenario_gen.method.routing import make_planner, plan_routes, plan_with_retry, PlanningConfig, Query
-from scenario_gen.numerics import Floats
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.fitting import FittingConfig
+from scenario_gen.method.routing import make_planner, plan_with_retry, PlanningConfig, Query
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.ros.plumbing.stage_node import Inputs, REQUESTS, StageNode
 from scenario_gen.types import Road, tokens
 
@@ -85,8 +87,9 @@ class Planner(StageNode):
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
         _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
-        fit = fit_template(encounter, segmentation, road, config.fitting)
-        routes = plan_routes(road, fit, config.planning, config.seed)
+        stages = PipelineConfig(fitting=config.fitting, planning=config.planning)
+        planned = Chain(encounter, segmentation, road, stages, seed=config.seed).plan()
+        (_, fit), routes = planned.placed(), planned.routes
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         results = {

@@ -28,13 +28,14 @@ from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary, RequestSummary
 from scenario_gen.bags.recordings.sending import RequestSender, Send
 from scenario_gen.bags.recordings.template import decode_template
-from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter
 from scenario_gen.base.provenance import parameter_texts, versions
-from scenario_gen.method.evaluation import MEASURES
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
-from scenario_gen.method.sampling import Callbacks, sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.ros.plumbing.ros_parameters import values_of_call
 from scenario_gen.ros.plumbing.stage_node import REQUESTS
@@ -383,20 +384,14 @@ def answer_request(
             sender.scenario(scenario, requested, ego)
 
     callbacks = Callbacks(advance, cancelled, in_turn)
-    if config.moves:
-        from scenario_gen.method.attempt import Attempt  # these load all stages, and few requests need them
-        from scenario_gen.method.config import PipelineConfig
-        from scenario_gen.method.nearest import nearest_if_impossible
+    stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
+    chain = Chain(encounter, segmentation, road, stages, config, config.count, config.seed)
+    try:
+        outcome = chain.sample(chain.plan() if config.moves else replace(template, seed=config.seed), callbacks)
+    except RefusedError as error:
+        from scenario_gen.method.nearest import suggest_nearest  # only a refusal needs it
 
-        stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
-        attempt = Attempt(encounter, segmentation, road, stages, config, config.count, config.seed)
-        with nearest_if_impossible(attempt, cancelled):
-            outcome = attempt.run(callbacks)
-    else:
-        outcome = sample_scenarios(
-            replace(template, seed=config.seed), config.sampling, config.limits, config,
-            count=config.count, callbacks=callbacks, measures=MEASURES,
-        )  # fmt: skip
+        raise suggest_nearest(error, chain, cancelled) from None
     result = outcome.generated
     provenance = parameter_texts(config) | versions() | hashes
     stopped = cancelled() and len(result.scenarios) < result.requested

@@ -58,7 +58,7 @@ class Strays(IdmFollower):
 def bag(tmp_path_factory):
     """A bag of one request."""
     (encounter,) = read_log([LOG]).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
     case = generate(encounter, ROAD, config, count=2, seed=7)
     case = replace(case, provenance=provenance_of([LOG], 7, 2, [ROAD], config))
     return write_recording(tmp_path_factory.mktemp("search") / "bag", case)

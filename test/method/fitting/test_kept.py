@@ -4,18 +4,19 @@
 """A fit that loses the template's encounter is refused, unless it is asked for by name."""
 
 from dataclasses import replace
+import re
 
 import numpy as np
 import pytest
 from reaction_scenes import crossing, lane_encounter
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostConflictError
 from scenario_gen.method.fitting.kept import keeps_conflicts
 from scenario_gen.method.fitting.placement import Placement
-from scenario_gen.method.nearest import nearest_if_impossible
+from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.tracks import clean_tracks
@@ -77,12 +78,9 @@ def test_a_lost_leader_is_said_and_not_refused(place):
 
 
 def test_the_refusal_names_roads_that_keep_it():
-    attempt = Attempt(CROSSING, SEGMENTATION, OPEN, PipelineConfig())
-    with (
-        pytest.raises(LostConflictError, match=r"lost\. Nearest possible: road (t_intersection|four_way)"),
-        nearest_if_impossible(attempt),
-    ):
-        raise LostConflictError("lost")
+    answer = suggest_nearest(LostConflictError("lost"), Chain(CROSSING, SEGMENTATION, OPEN, PipelineConfig()))
+    assert isinstance(answer, LostConflictError)
+    assert re.match(r"lost\. Nearest possible: road (t_intersection|four_way)", str(answer))
 
 
 def test_only_what_is_known_can_be_allowed():

@@ -11,7 +11,7 @@ import pytest
 from reaction_scenes import answering, crossing, lane_encounter, wander
 
 from benchmarks._interaction_measures import following, yielding
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.sampling import kept_reactions, Plan, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.joint import advance, lateness, Mixing
@@ -35,7 +35,7 @@ def case(request):
     road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
 
     def made(config=CONFIG, count=40):
-        return Attempt(encounter, segmentation, road, config, count=count, seed=1).run()
+        return Chain(encounter, segmentation, road, config, count=count, seed=1).run()
 
     return encounter, made, made(), made(FREE)
 

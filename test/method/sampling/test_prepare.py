@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import uniform_changepoints
 from scenario_gen.method.routing.distance import distances_to_line
@@ -60,7 +60,7 @@ def rolls_out():
 def undisturbed(encounter, segmentation):
     """The drive without deviations on the own road, and what was adapted."""
     road = build_road("corridor", encounter, CONFIG.road)
-    planned = Attempt(encounter, segmentation, road, CONFIG).plan()
+    planned = Chain(encounter, segmentation, road, CONFIG).plan()
     done = prepare(Plan(encounter, segmentation, road, planned.routes, planned.fit.requested, find_waits(encounter)), NARROW)
     return done.model.draw(np.zeros((1, done.model.size)), Scale()).scenarios(0, [0], "map")[0], done.adaptations, planned
 

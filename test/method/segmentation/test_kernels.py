@@ -14,6 +14,7 @@ from scipy.stats import kstest, multivariate_normal, norm
 from scenario_gen.method.segmentation.hdp_hmm import chain, emission, observed, random
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.emission import BLOCK
+from scenario_gen.method.segmentation.hdp_hmm.model import States
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean, new_top, Place, Prior, Problem, unexplained
 from scenario_gen.method.segmentation.hdp_hmm.random import TAIL
 from scenario_gen.method.segmentation.hdp_hmm.start import kmeans
@@ -49,10 +50,10 @@ def test_likelihood_of_a_block():
     shape = np.column_stack([rng.normal(size=states), rng.uniform(size=states)])
     logs, row, work, out = np.empty((states, BLOCK)), np.empty(BLOCK), np.empty((2, BLOCK)), np.empty((n, states))
     squares = ((coef @ vt) ** 2).sum(axis=1) + shape[:, 1:]
-    block_log_likelihood(vt, 0, n, coef, shape, 0.5, 3.0, logs, row)
+    block_log_likelihood(vt, 0, n, States(coef, shape), 0.5, 3.0, logs, row)
     student = 0.5 * shape[:, :1] - 0.5 * (3.0 + 0.5 * d) * np.log1p(0.5 * squares / 3.0)
     np.testing.assert_allclose(logs[:, :n], student, rtol=1e-12)
-    block_log_likelihood(vt, 0, n, coef, shape, 0.5, 0.0, logs, row)
+    block_log_likelihood(vt, 0, n, States(coef, shape), 0.5, 0.0, logs, row)
     truth = 0.5 * (shape[:, :1] - 0.5 * squares)
     np.testing.assert_allclose(logs[:, :n], truth, rtol=1e-12)
     block_likelihood(logs, n, row, work, out)

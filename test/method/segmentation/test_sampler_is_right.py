@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from scenario_gen.method.segmentation.hdp_hmm.chain import run_chain
+from scenario_gen.method.segmentation.hdp_hmm.model import Data, Grid, Hyper, Out, Start
 
 HYPER = np.array([3.0, 1.0, 6.0, 0.5, 4.0, 2.0])
 STATES = 4
@@ -74,13 +75,16 @@ def draw_series(rng, labels, regressions, roots, mass, order):
 
 def gibbs(v, labels, top, mass, chosen, d, order, dof, moves, gaps, hidden, seed):
     """One sweep of the chain; returns labels, concentrations and regressions; `mass`, `v` and `chosen` are updated."""
-    hyper = np.concatenate([HYPER, [1.0, dof], np.zeros(d)])
     samples, trace, emissions = np.empty((1, len(v)), np.int64), np.empty((1, 5)), np.empty((STATES, d, v.shape[1]))
-    vt = np.ascontiguousarray(v.T)
     top = top.copy()
-    fixed = (np.array([len(v)]), *prior(d, order), EXTRAS, WORTHS, np.log(ODDS))
-    sizes = (1 + order * d, moves, seed, 0)
-    run_chain(v, vt, gaps, hidden, mass, *fixed, chosen, hyper, labels, top, *sizes, samples, trace, emissions)
+    run_chain(
+        Data(v, np.ascontiguousarray(v.T), gaps, hidden, mass, np.array([len(v)])),
+        Grid(*prior(d, order), EXTRAS, WORTHS, np.log(ODDS)),
+        Hyper(HYPER, 1.0, dof, np.zeros(d), moves),
+        Start(labels, top, chosen),
+        Out(samples, trace, emissions),
+        seed,
+    )
     whitening = emissions[:, :, 1 + order * d :]
     regressions = np.linalg.solve(whitening, -emissions[:, :, : 1 + order * d])
     return samples[0], top, regressions, np.linalg.inv(whitening)

@@ -25,7 +25,7 @@ from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
@@ -43,7 +43,7 @@ def real_run():
     (encounter,) = read_log([bundled("c")]).encounters
     config = PipelineConfig()
     road = build_road("straight", encounter, config.road)
-    return Attempt(encounter, segment(encounter, config.segmentation, 7), road, config, count=3, seed=7).run()
+    return Chain(encounter, segment(encounter, config.segmentation, 7), road, config, count=3, seed=7).run()
 
 
 def test_the_figures_survive_the_bag(tmp_path):

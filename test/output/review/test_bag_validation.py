@@ -21,7 +21,7 @@ from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.attempt import Attempt
+from scenario_gen.method.chain import Chain
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
@@ -40,7 +40,7 @@ def run():
     (encounter,) = read_log([bundled("c")]).encounters
     config = PipelineConfig(sampling=SamplingConfig(variety="narrow"))
     road = build_road("straight", encounter, config.road)
-    return Attempt(encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7).run()
+    return Chain(encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7).run()
 
 
 def rewritten(bag, target, change, without=()):
@@ -89,7 +89,7 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     (encounter,) = read_log([bundled("b")]).encounters
     config = PipelineConfig()
     road = build_road("t_intersection", encounter, config.road)
-    made = Attempt(encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7).run()
+    made = Chain(encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7).run()
     assert [edge.name("12") for edge in made.generated.reactions] == ["2 yields to 1"]
     bag = write_recording(tmp_path / "b", {"/here": made})
     (kept,) = validate_bag(bag)
@@ -240,7 +240,7 @@ def test_the_command_answers_with_its_exit_code(run, tmp_path):
 
 def test_an_ego_is_checked_with_its_witness(run, tmp_path):
     """The witness is a part of what is proven: one that hits another is found, one that is lost or altered is said."""
-    slot = Attempt(run.encounter, run.segmentation, run.road, PipelineConfig(), Request(ego="2"), count=3, seed=4).run()
+    slot = Chain(run.encounter, run.segmentation, run.road, PipelineConfig(), Request(ego="2"), count=3, seed=4).run()
     whole = validate_bag(write_recording(tmp_path / "whole", slot))[0]
     assert (whole.scenarios, whole.found, whole.left_out) == (3, {}, {})
 

@@ -33,7 +33,7 @@ def former(tmp_path_factory):
     """The bag of a run, rewritten as version 0.1 wrote it; the names of the parameters that were other ones."""
     folder = tmp_path_factory.mktemp("former")
     (encounter,) = read_log([LOG]).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
     result = generate(encounter, ROAD, config, count=3, seed=SEED)
     result = replace(result, provenance=provenance_of([LOG], SEED, 3, [ROAD], config))
     names = {name: former_name(name, entry) for name, (entry, _) in flatten(config).items()}

@@ -37,7 +37,7 @@ REQUESTS = {"plain": Request(), "ego": Request(ego="1"), "moved": Request(goals=
 def bag(tmp_path_factory):
     """One bag, a namespace for each request."""
     (encounter,) = read_log([LOG]).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False), sampling=SamplingConfig(variety="narrow"))
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10), sampling=SamplingConfig(variety="narrow"))
     runs = {}
     for name, request in REQUESTS.items():
         case = generate(encounter, ROAD, config, count=3, seed=SEED, request=request)
@@ -59,7 +59,7 @@ def mirrored_bag(tmp_path_factory):
         road.write_text(map_builders.lanelet2())
     log = bundled("a")
     (encounter,) = read_log([log]).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False), sampling=SamplingConfig(variety="narrow"))
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10), sampling=SamplingConfig(variety="narrow"))
     case = generate(encounter, str(road), config, count=2, seed=SEED)
     provenance = provenance_of([log], SEED, 2, [str(road)], config, Request())
     return write_recording(folder / "bag", {"/left": replace(case, provenance=provenance)}), log

@@ -16,13 +16,28 @@ from scenario_gen.method.segmentation.hdp_hmm.emission import (
     log_marginal,
     posterior_factor,
 )
+from scenario_gen.method.segmentation.hdp_hmm.model import (
+    DATA,
+    Data,
+    GRID,
+    Grid,
+    Hyper,
+    HYPERS,
+    Joint,
+    Out,
+    OUTPUT,
+    START,
+    Start,
+    States,
+    Statistics,
+)
 from scenario_gen.method.segmentation.hdp_hmm.observed import draw_hidden, draw_masses, log_masses, observed_log_likelihood
 from scenario_gen.method.segmentation.hdp_hmm.prior import sample_prior, set_prior
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
 from scenario_gen.method.segmentation.hdp_hmm.split_merge import split_or_merge
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions, log_transitions, sample_transitions
-from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.kernels import B2, F1, F2, I, I1, kernel, OUT1, OUT2, OUT3, OUTI1, OUTI2
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.kernels import I, kernel
 
 TRACE = ("log_joint", "occupied", "gamma", "alpha_kappa", "rho")
 LEAST_MESSAGE = 1e-30
@@ -62,32 +77,13 @@ def backward_step(row: Floats, columns: Floats, message: Floats, rescale: bool) 
 
 
 @kernel(inline=True)
-def backward_messages(
-    vt: Floats,
-    coef: Floats,
-    shape: Floats,
-    weight: float,
-    dof: float,
-    gaps: Ints,
-    hidden: Bools,
-    pi: Floats,
-    ends: Ints,
-    w: Floats,
-) -> None:
-    """Fill w (T, L) with likelihood times backward message at each sample (Fox et al., algorithm 3, step 1).
+def backward_messages(data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats) -> None:
+    """Fill w (T, L) with likelihood times backward message at each sample, each row up to a factor.
 
-    Args:
-        vt: (M, T) samples; several sequences stand one after the other.
-        coef: (L, D, M) emissions, see `draw_emission`.
-        shape: (L, 2) the rest of them, see `block_log_likelihood`.
-        weight: what a sample counts for.
-        dof: degrees of freedom of Student-t noise; 0: Gaussian.
-        gaps: (R,) samples with channels that were not observed, rising.
-        hidden: (R, D) which.
-        pi: (L + 1, L) transition rows; the last is the initial distribution.
-        ends: index one past the last sample of each sequence.
-        w: output, each row up to a factor.
+    Transition rows pi (L + 1, L), the last is the initial distribution (Fox et al., algorithm 3, step 1).
     """
+    vt, gaps, hidden, ends, (coef, shape) = data.vt, data.gaps, data.hidden, data.ends, emitted
+    weight, dof = hyper.weight, hyper.dof
     states = w.shape[1]
     block = np.empty((states, BLOCK))
     work = np.empty((2, BLOCK))
@@ -102,7 +98,7 @@ def backward_messages(
     stop = w.shape[0]
     while stop > 0:
         start = max(0, stop - BLOCK)
-        block_log_likelihood(vt, start, stop, coef, shape, weight, dof, block, best)
+        block_log_likelihood(vt, start, stop, emitted, weight, dof, block, best)
         while gap >= 0 and gaps[gap] >= start:
             observed_log_likelihood(vt[:, gaps[gap]], hidden[gap], coef, shape, weight, dof, block[:, gaps[gap] - start])
             gap -= 1
@@ -164,107 +160,80 @@ def update_outer(v: Floats, before: Ints, labels: Ints, mass: Floats, outer: Flo
                 outer[a] = 0.0
 
 
-@kernel(OUT2, OUT2, I1, B2, OUT1, I1, F2, F2, F2, F1, F1, F1, OUTI1, F1, I1, OUT1, I, I, I, I, OUTI2, OUT2, OUT3)
-def run_chain(
-    v: Floats,
-    vt: Floats,
-    gaps: Ints,
-    hidden: Bools,
-    mass: Floats,
-    ends: Ints,
-    mean: Floats,
-    precision: Floats,
-    within: Floats,
-    extras: Floats,
-    worths: Floats,
-    odds: Floats,
-    chosen: Ints,
-    hyper: Floats,
-    start: Ints,
-    top: Floats,
-    regressors: int,
-    moves: int,
-    seed: int,
-    burn: int,
-    samples: Ints,
-    trace: Floats,
-    emissions: Floats,
-) -> None:
-    """Run one chain from the labels `start`; every output row is one sweep.
+@kernel(inline=True)
+def draw_samples(state: State, data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats, labels: Ints) -> None:
+    """Draw labels (T,), masses and hidden channels, given transitions pi (L + 1, L) and emissions; w (T, L) is work space."""
+    backward_messages(data, emitted, hyper, pi, w)
+    sample_labels(state, w, pi, data.ends, labels)
+    if hyper.dof > 0.0:
+        draw_masses(state, data, labels, emitted, hyper)
+    draw_hidden(state, data, labels, emitted.coef)
 
-    Args:
-        v: (T, M) samples (z, y), M = P + D; what is hidden is drawn anew in every sweep.
-        vt: (M, T) the same, transposed.
-        gaps: (R,) samples with hidden channels, rising.
-        hidden: (R, D) which channels were not observed.
-        mass: (T,) see `accumulate`, to start from; updated. A sample of which nothing was observed has 0.
-        ends: index one past the last sample of each sequence.
-        mean: (D, P) prior mean M of the regressions.
-        precision: (P, P) their prior precision K is this times one of `worths`.
-        within: (D, D) prior mean of the states' covariances; S0 is (ν0 - D - 1) times it.
-        extras: (A,) what ν0 - D may be, all equally probable beforehand.
-        worths: (B,) what K may be in units of `precision`.
-        odds: (B,) logarithms of how probable each is beforehand.
-        chosen: (2,) which of them hold now; updated.
-        hyper: hyperpriors (see HYPER), then the weight of a sample, the noise's degrees of freedom (0: Gaussian), and the
-            blur of each of the D channels.
-        start: (T,) labels to start from, 0 .. L - 1.
-        top: (3 + L,) γ, α+κ, ρ and β to start from; updated.
-        regressors: P.
-        moves: split or merge moves that are tried in a sweep.
-        seed: any integer.
-        burn: sweeps that are run before the first row of `samples` is kept.
-        samples: (S, T) output, labels of the kept sweeps.
-        trace: (burn + S, 5) output, see TRACE.
-        emissions: (L, D, M) output, `coef` of the last sweep.
-    """
-    sweeps = trace.shape[0]
-    t_max, m = v.shape
-    states, d = emissions.shape[0], emissions.shape[1]
-    p = regressors
-    weight, dof, blur = hyper[6], hyper[7], hyper[8:]
+
+@kernel(inline=True)
+def fit_states(stats: Statistics, joint: Joint) -> None:
+    """Fill the factors and marginal likelihoods of all states from their other statistics."""
+    for k in range(len(stats.own)):
+        posterior_factor(stats.outer[k], stats.sums[k, 1], joint, stats.factors[k])
+        stats.own[k] = log_marginal(stats.factors[k], joint.weight * stats.sums[k, 0], joint)
+
+
+@kernel(inline=True)
+def draw_emissions(state: State, stats: Statistics, joint: Joint, emitted: States) -> None:
+    """Draw the emissions of all states from their posteriors."""
+    for k in range(len(stats.own)):
+        coef = emitted.coef[k]
+        emitted.shape[k, 0] = draw_emission(state, stats.factors[k], joint.weight * stats.sums[k, 0], joint, coef)
+        emitted.shape[k, 1] = blurred(coef, joint.blur)
+
+
+@kernel(inline=True)
+def write_trace(data: Data, hyper: Hyper, stats: Statistics, base: float, top: Floats, row: Floats) -> None:
+    """Fill row (5,), see TRACE; `base` is the log marginal likelihood of no samples."""
+    used = stats.n.sum(axis=0) > 0
+    row[0] = log_transitions(stats.n, top[1], top[2], top[3:]) + (stats.own[used] - base).sum()
+    row[0] += log_masses(data.mass, hyper.weight * len(hyper.blur), hyper.dof) if hyper.dof > 0.0 else 0.0
+    row[1], row[2:] = used.sum(), top[:3]
+
+
+@kernel(DATA, GRID, HYPERS, START, OUTPUT, I)
+def run_chain(data: Data, grid: Grid, hyper: Hyper, start: Start, out: Out, seed: int) -> None:
+    """Run one chain from `start`; every row of `out.trace` is one sweep, the last ones leave their labels, too."""
+    m, states, sweeps, burn = data.v.shape[1], len(out.emissions), len(out.trace), len(out.trace) - len(out.samples)
     state = np.empty(1, np.uint64)
     state[0] = np.uint64(seed)
-    labels, before = start.copy(), start.copy()
-    outer, factors = np.empty((states, m, m)), np.empty((states, m, m))
-    sums, own = np.empty((states, 2)), np.empty(states)
-    n = np.empty((states + 1, states), np.int64)
-    pi = np.empty((states + 1, states))
-    beta = top[3:]
-    shape = np.empty((states, 2))
-    w = np.empty((t_max, states))
+    labels, before = start.labels.copy(), start.labels.copy()
+    stats = Statistics(
+        np.empty((states, m, m)),
+        np.empty((states, 2)),
+        np.empty((states, m, m)),
+        np.empty(states),
+        np.empty((states + 1, states), np.int64),
+    )
+    emitted = States(out.emissions, np.empty((states, 2)))
+    pi, w = np.empty((states + 1, states)), np.empty((len(labels), states))
     g0, factor = np.empty((m, m)), np.empty((m, m))
-    base, nu = set_prior(mean, precision, within, extras[chosen[0]], worths[chosen[1]], g0, factor)
+    top, chosen = start.top, start.chosen
+    base, joint = set_prior(grid, grid.extras[chosen[0]], grid.worths[chosen[1]], hyper, g0, factor)
     for sweep in range(-1, sweeps):
         if sweep >= 0:
-            backward_messages(vt, emissions, shape, weight, dof, gaps, hidden, pi, ends, w)
-            sample_labels(state, w, pi, ends, labels)
-            if dof > 0.0:
-                draw_masses(state, v, labels, emissions, shape, weight, dof, gaps, hidden, mass)
-            draw_hidden(state, v, vt, labels, emissions, mass, gaps, hidden)
-        if dof > 0.0 or len(gaps) > 0 or sweep < 0 or sweep % REFRESH == REFRESH - 1:
-            accumulate(v, labels, mass, outer, sums)
+            draw_samples(state, data, emitted, hyper, pi, w, labels)
+        if hyper.dof > 0.0 or len(data.gaps) > 0 or sweep < 0 or sweep % REFRESH == REFRESH - 1:
+            accumulate(data.v, labels, data.mass, stats.outer, stats.sums)
         else:
-            update_outer(v, before, labels, mass, outer, sums)
+            update_outer(data.v, before, labels, data.mass, stats.outer, stats.sums)
         if sweep % PRIOR_EVERY == 0:
-            sample_prior(state, outer, sums, mean, precision, within, extras, worths, odds, weight, blur, chosen, g0, factor)
-            base, nu = set_prior(mean, precision, within, extras[chosen[0]], worths[chosen[1]], g0, factor)
-        for k in range(states):
-            posterior_factor(outer[k], sums[k, 1], g0, weight, blur, factors[k])
-            own[k] = log_marginal(factors[k], weight * sums[k, 0], p, nu)
-        count_transitions(labels, ends, n)
+            sample_prior(state, stats, grid, hyper, chosen, g0, factor)
+            base, joint = set_prior(grid, grid.extras[chosen[0]], grid.worths[chosen[1]], hyper, g0, factor)
+        fit_states(stats, joint)
+        count_transitions(labels, data.ends, stats.n)
         if sweep >= 0:
-            for _ in range(moves):
-                split_or_merge(state, v, mass, ends, g0, p, nu, weight, blur, top, beta, labels, n, outer, sums, factors, own)
+            for _ in range(hyper.moves):
+                split_or_merge(state, data, joint, top, labels, stats)
         before[:] = labels
-        sample_transitions(state, n, hyper, top, beta, pi)
-        for k in range(states):
-            shape[k, 0] = draw_emission(state, factors[k], weight * sums[k, 0], p, nu, emissions[k])
-            shape[k, 1] = blurred(emissions[k], blur)
+        sample_transitions(state, stats.n, hyper.levels, top, top[3:], pi)
+        draw_emissions(state, stats, joint, emitted)
         if sweep >= 0:
-            used = n.sum(axis=0) > 0
-            trace[sweep, 0] = log_transitions(n, top[1], top[2], beta) + (own[used] - base).sum()
-            trace[sweep, 0] += log_masses(mass, weight * d, dof) if dof > 0.0 else 0.0
-            trace[sweep, 1], trace[sweep, 2:] = used.sum(), top[:3]
+            write_trace(data, hyper, stats, base, top, out.trace[sweep])
         if sweep >= burn:
-            samples[sweep - burn] = labels
+            out.samples[sweep - burn] = labels

@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from scenario_gen.method.segmentation.hdp_hmm.model import Joint, States
 from scenario_gen.method.segmentation.hdp_hmm.random import gamma_draw, normal, State
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
@@ -75,35 +76,25 @@ def add_sample(v: Floats, mass: float, outer: Floats) -> None:
 
 
 @kernel(inline=True)
-def posterior_factor(outer: Floats, total: float, g0: Floats, weight: float, blur: Floats, out: Floats) -> None:
-    """Fill `out` (M, M) with the Cholesky factor of a state's G.
-
-    Args:
-        outer: (M, M) Σ mass v vᵀ of its samples; lower triangle.
-        total: Σ mass.
-        g0: (M, M) joint prior.
-        weight: what a sample counts for (1: all of it; less where neighbouring samples repeat each other).
-        blur: (D,) variance to which a sample's channels are known at all.
-        out: see above.
-    """
-    m = g0.shape[0]
-    d = len(blur)
+def posterior_factor(outer: Floats, total: float, joint: Joint, out: Floats) -> None:
+    """Fill `out` (M, M) with the Cholesky factor of a state's G from its Σ mass v vᵀ (M, M; lower triangle) and total mass."""
+    m, d = len(joint.g0), len(joint.blur)
     for i in range(m):
         for j in range(i + 1):
-            out[i, j] = g0[i, j] + weight * outer[i, j]
+            out[i, j] = joint.g0[i, j] + joint.weight * outer[i, j]
         if i >= m - d:
-            out[i, i] += weight * total * blur[i - (m - d)]
+            out[i, i] += joint.weight * total * joint.blur[i - (m - d)]
     cholesky(out)
 
 
 @kernel(inline=True)
-def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
-    """Part of log p(samples) that depends on them, from the Cholesky factor (M, M) of G; `nu` is the prior's ν0.
+def log_marginal(factor: Floats, n: float, joint: Joint) -> float:
+    """Part of log p(samples) that depends on them, from the Cholesky factor (M, M) of G.
 
     log p = c(factor, n) - c(prior factor, 0) with c = -nD/2 log π + log Γ_D(ν'/2) - ν'/2 log|S'| - D/2 log|K'|.
     """
-    m = factor.shape[0]
-    d = m - p
+    d, nu = len(joint.blur), joint.nu
+    p = len(factor) - d
     value: float = log_gammas(0.5 * (nu + n), d) - 0.5 * n * d * LOG_PI
     value -= d * log_diagonal(factor[:p, :p]) + (nu + n) * log_diagonal(factor[p:, p:])
     return value
@@ -141,14 +132,14 @@ def log_gammas(a: float, d: int) -> float:
 
 
 @kernel(inline=True)
-def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, coef: Floats) -> float:
-    """Draw (A, Σ) from the posterior; returns log|Σ|^(-1/2).
+def draw_emission(state: State, factor: Floats, n: float, joint: Joint, coef: Floats) -> float:
+    """Draw (A, Σ) from the posterior, of which `factor` (M, M) and the number n of samples are known; returns log|Σ|^(-1/2).
 
     `coef` (D, M) becomes the map of v to its whitened residual: W y - B z with WᵀW = Σ⁻¹ (W lower) and B = W A.
     Σ⁻¹ = Ly⁻ᵀ U Uᵀ Ly⁻¹ with U upper triangular (Bartlett), so W = Uᵀ Ly⁻¹; A = (Lyz + W⁻¹ E) Lz⁻¹, E standard normal.
     """
-    m = factor.shape[0]
-    d = m - p
+    d, nu = len(joint.blur), joint.nu
+    p = len(factor) - d
     for i in range(d):
         for j in range(i):
             coef[i, p + j] = normal(state)
@@ -163,7 +154,7 @@ def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, coe
 
 @kernel(inline=True)
 def block_log_likelihood(
-    vt: Floats, start: int, stop: int, coef: Floats, shape: Floats, weight: float, dof: float, out: Floats, row: Floats
+    vt: Floats, start: int, stop: int, emitted: States, weight: float, dof: float, out: Floats, row: Floats
 ) -> None:
     """Fill out (L, BLOCK) with log p(y_t | z_t, state) up to a constant.
 
@@ -171,13 +162,13 @@ def block_log_likelihood(
         vt: (M, T) samples.
         start: first sample.
         stop: one past the last, at most BLOCK further.
-        coef: (L, D, M) emissions, see `draw_emission`.
-        shape: (L, 2) log|Σ|^(-1/2) and tr(Σ⁻¹ blur).
+        emitted: emissions of the states.
         weight: what a sample counts for.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
         out: output.
         row: (BLOCK,) work space.
     """
+    coef, shape = emitted
     states, d, m = coef.shape
     n = stop - start
     for k in range(states):
@@ -252,10 +243,10 @@ def square(coef: Floats, v: Floats) -> float:
 
 
 @kernel(inline=True)
-def mean_emission(factor: Floats, n: float, p: int, nu: float, blur: Floats, coef: Floats, shape: Floats) -> None:
-    """Fill coef (D, M) and shape (2,), see `block_log_likelihood`, with the posterior's mean precision and regression."""
-    m = factor.shape[0]
-    d = m - p
+def mean_emission(factor: Floats, n: float, joint: Joint, coef: Floats, shape: Floats) -> None:
+    """Fill coef (D, M) and shape (2,), see `States`, with the posterior's mean precision and regression."""
+    d, nu = len(joint.blur), joint.nu
+    p = len(factor) - d
     root = math.sqrt(nu + n)
     for i in range(d):
         for j in range(d):
@@ -264,7 +255,7 @@ def mean_emission(factor: Floats, n: float, p: int, nu: float, blur: Floats, coe
             coef[i, q] = 0.0
         solve_row(factor, p, coef, i)
     shape[0] = log_diagonal(coef[:, p:])
-    shape[1] = blurred(coef, blur)
+    shape[1] = blurred(coef, joint.blur)
 
 
 @kernel(inline=True)

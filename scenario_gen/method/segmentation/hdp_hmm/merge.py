@@ -8,9 +8,10 @@ import math
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import accumulate, log_marginal, posterior_factor
+from scenario_gen.method.segmentation.hdp_hmm.model import JOINT, Joint
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions
-from scenario_gen.numerics import Floats, Ints
-from scenario_gen.numerics.kernels import F, F1, F2, I, I1, kernel, OUTI1
+from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics.kernels import F, F1, F2, I1, kernel, OUTI1
 
 
 @kernel(inline=True)
@@ -44,21 +45,18 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
 
 
 @kernel(inline=True)
-def joint_marginal(
-    outer: Floats, sums: Floats, i: int, j: int, g0: Floats, p: int, nu: float, weight: float, blur: Floats, factor: Floats
-) -> float:
+def joint_marginal(outer: Floats, sums: Floats, i: int, j: int, prior: Joint, factor: Floats) -> float:
     """Log marginal likelihood of states i and j as one, or of i alone if they are the same; outer (L, M, M), sums (L, 2)."""
-    m = g0.shape[0]
     count, total = sums[i, 0], sums[i, 1]
-    joint = outer[i].copy()
+    both = outer[i].copy()
     if i != j:
         count += sums[j, 0]
         total += sums[j, 1]
-        for a in range(m):
+        for a in range(len(both)):
             for b in range(a + 1):
-                joint[a, b] += outer[j, a, b]
-    posterior_factor(joint, total, g0, weight, blur, factor)
-    return log_marginal(factor, weight * count, p, nu)
+                both[a, b] += outer[j, a, b]
+    posterior_factor(both, total, prior, factor)
+    return log_marginal(factor, prior.weight * count, prior)
 
 
 @kernel(inline=True)
@@ -74,19 +72,8 @@ def best_merge(data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, mo
     return best_i, best_j
 
 
-@kernel(F2, F1, I1, F2, F, F1, I, F, F, OUTI1)
-def merge_states(
-    v: Floats,
-    mass: Floats,
-    ends: Ints,
-    g0: Floats,
-    nu: float,
-    hyper: Floats,
-    regressors: int,
-    stay: float,
-    move: float,
-    labels: Ints,
-) -> None:
+@kernel(F2, F1, I1, JOINT, F, F, OUTI1)
+def merge_states(v: Floats, mass: Floats, ends: Ints, prior: Joint, stay: float, move: float, labels: Ints) -> None:
     """Merge states greedily while the probability of the labels, emissions and transitions integrated out, grows.
 
     Gibbs sampling alone splits easily and merges with difficulty; this is run on the labels that a chain starts from.
@@ -95,37 +82,32 @@ def merge_states(
         v: (T, M) samples.
         mass: (T,) see `accumulate`.
         ends: index one past the last sample of each sequence.
-        g0: (M, M) joint prior of the emissions.
-        nu: prior degrees of freedom ν0.
-        hyper: as `run_chain` has it.
-        regressors: P.
+        prior: of the emissions.
         stay: prior weight of the own state in a transition row.
         move: prior weight of every other one.
         labels: (T,) updated; `labels.max() + 1` states.
     """
-    m, p = v.shape[1], regressors
-    weight, blur = hyper[6], hyper[8:]
-    states = 0
+    m, states = v.shape[1], 0
     for t in range(len(labels)):
         states = max(states, labels[t] + 1)
     outer, sums, factor = np.empty((states, m, m)), np.empty((states, 2)), np.empty((m, m))
     counts = np.zeros(states, np.int64)
     n = np.empty((states + 1, states), np.int64)
-    posterior_factor(np.zeros((m, m)), 0.0, g0, weight, blur, factor)
-    base = log_marginal(factor, 0, p, nu)
+    posterior_factor(np.zeros((m, m)), 0.0, prior, factor)
+    base = log_marginal(factor, 0.0, prior)
     own = np.zeros(states)
     data = np.full((states, states), np.nan)
     accumulate(v, labels, mass, outer, sums)
     for t in range(len(labels)):
         counts[labels[t]] += 1
     for k in range(states):
-        own[k] = joint_marginal(outer, sums, k, k, g0, p, nu, weight, blur, factor) - base
+        own[k] = joint_marginal(outer, sums, k, k, prior, factor) - base
     while True:
         count_transitions(labels, ends, n)
         for i in range(states):
             for j in range(i):
                 if counts[i] > 0 and counts[j] > 0 and np.isnan(data[i, j]):
-                    data[i, j] = joint_marginal(outer, sums, i, j, g0, p, nu, weight, blur, factor) - base
+                    data[i, j] = joint_marginal(outer, sums, i, j, prior, factor) - base
         i, j = best_merge(data, own, counts, n, stay, move)
         if i < 0:
             break

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import cholesky, square
+from scenario_gen.method.segmentation.hdp_hmm.model import Data, Hyper, States
 from scenario_gen.method.segmentation.hdp_hmm.random import log_gamma_draw, normal, State
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
@@ -99,20 +100,10 @@ def observed_log_likelihood(
 
 
 @kernel(inline=True)
-def draw_masses(
-    state: State,
-    v: Floats,
-    labels: Ints,
-    coef: Floats,
-    shape: Floats,
-    weight: float,
-    dof: float,
-    gaps: Ints,
-    hidden: Bools,
-    mass: Floats,
-) -> None:
-    """Draw mass (T,) given labels and emissions; those that are 0 stay so."""
-    d = coef.shape[1]
+def draw_masses(state: State, data: Data, labels: Ints, emitted: States, hyper: Hyper) -> None:
+    """Draw the samples' masses given labels (T,) and emissions; those that are 0 stay so."""
+    v, gaps, hidden, mass, (coef, shape) = data.v, data.gaps, data.hidden, data.mass, emitted
+    weight, dof, d = hyper.weight, hyper.dof, len(hyper.blur)
     factor, shift = np.empty((d, d)), np.empty(d)
     gap = 0
     for t in range(len(mass)):
@@ -131,8 +122,9 @@ def draw_masses(
 
 
 @kernel(inline=True)
-def draw_hidden(state: State, v: Floats, vt: Floats, labels: Ints, coef: Floats, mass: Floats, gaps: Ints, hidden: Bools) -> None:
-    """Draw the hidden channels of v (T, M) and of vt, its transpose, given the observed ones, labels and emissions."""
+def draw_hidden(state: State, data: Data, labels: Ints, coef: Floats) -> None:
+    """Draw the hidden channels of the samples given the observed ones, labels (T,) and emissions coef (L, D, M)."""
+    v, vt, mass, gaps, hidden = data.v, data.vt, data.mass, data.gaps, data.hidden
     d, m = coef.shape[1], coef.shape[2]
     p = m - d
     factor, shift = np.empty((d, d)), np.empty(d)

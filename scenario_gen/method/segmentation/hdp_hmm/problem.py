@@ -15,6 +15,7 @@ from scenario_gen.method.segmentation.hdp_hmm.chain import run_chain, TRACE
 from scenario_gen.method.segmentation.hdp_hmm.config import GAUSSIAN_DOF, SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.emission import accumulate, joint_prior, mean_emission, posterior_factor, square
 from scenario_gen.method.segmentation.hdp_hmm.merge import merge_states
+from scenario_gen.method.segmentation.hdp_hmm.model import Data, Grid, Hyper, Joint, Out, Start
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F1, F2, I, I1, kernel, OUT1, OUT2
 
@@ -48,12 +49,12 @@ def unexplained(
     for t in range(len(labels)):
         states = max(states, labels[t] + 1)
     outer, sums, factor = np.empty((states, m, m)), np.empty((states, 2)), np.empty((m, m))
-    coef, shape, blur = np.empty((states, d, m)), np.empty(2), np.zeros(d)
+    coef, shape, prior = np.empty((states, d, m)), np.empty(2), Joint(g0, 1.0, 1.0, np.zeros(d))
     accumulate(v, labels, mass, outer, sums)
     maps = np.empty((states, d, p))
     for k in range(states):
-        posterior_factor(outer[k], sums[k, 1], g0, 1.0, blur, factor)
-        mean_emission(factor, sums[k, 0], p, 1.0, blur, coef[k], shape)
+        posterior_factor(outer[k], sums[k, 1], prior, factor)
+        mean_emission(factor, sums[k, 0], prior, coef[k], shape)
         for i in range(d):
             for j in range(p - 1, -1, -1):
                 c = factor[p + i, j]
@@ -226,10 +227,6 @@ class Problem:
         result: Floats = scatter + np.eye(self.dimensions) * (1e-3 * np.trace(scatter) / self.dimensions + 1e-6)
         return result
 
-    def hyper(self, config: SamplerConfig) -> Floats:
-        """Hyperpriors as the kernels want them (8 + D numbers: see HYPER), (n,)."""
-        return np.concatenate([config.hyper, [self.weight, self.dof], self.blur])
-
     def run(
         self, config: SamplerConfig, prior: Prior, place: Place, top: Floats, burn: int, keep: int, seed: int
     ) -> tuple[Place, Prior, Ints, Floats]:
@@ -255,39 +252,22 @@ class Problem:
         chosen = np.array([np.abs(extras - prior.extra).argmin(), np.abs(self.worths - prior.worth).argmin()])
         v, mass = self.v.copy(), place.mass.copy()
         run_chain(
-            v,
-            np.ascontiguousarray(v.T),
-            self.gaps,
-            self.hidden,
-            mass,
-            self.ends,
-            self.mean,
-            self.precision,
-            prior.within,
-            extras,
-            self.worths,
-            self.odds,
-            chosen,
-            self.hyper(config),
-            place.labels,
-            top,
-            self.regressors,
-            config.moves,
+            Data(v, np.ascontiguousarray(v.T), self.gaps, self.hidden, mass, self.ends),
+            Grid(self.mean, self.precision, prior.within, extras, self.worths, self.odds),
+            Hyper(config.hyper, self.weight, self.dof, self.blur, config.moves),
+            Start(place.labels, top, chosen),
+            Out(samples, trace, emissions),
             seed,
-            burn,
-            samples,
-            trace,
-            emissions,
         )
         held = Prior(prior.within, float(extras[chosen[0]]), float(self.worths[chosen[1]]))
         return Place(samples[-1], mass), held, samples, trace
 
-    def merge(self, config: SamplerConfig, prior: Prior, place: Place) -> Place:
+    def merge(self, prior: Prior, place: Place) -> Place:
         """Merge states greedily under `prior`; returns where that leads, labels 0 .. K - 1 without gaps."""
         labels = compact(place.labels)
         g0 = joint_prior(self.mean, prior.worth * self.precision, prior.within * (prior.extra - 1.0))
-        nu = self.dimensions + prior.extra
-        merge_states(self.v, place.mass, self.ends, g0, nu, self.hyper(config), self.regressors, *MERGE_ROWS, labels)
+        joint = Joint(g0, self.dimensions + prior.extra, self.weight, self.blur)
+        merge_states(self.v, place.mass, self.ends, joint, *MERGE_ROWS, labels)
         return Place(compact(labels), place.mass)
 
 

@@ -9,7 +9,7 @@ of their own, a few rounds of fitting and labelling bring them to rest, and the 
 time, so that their probability is known. A merge draws such a pair, too, to know how probable the way back is.
 """
 
-import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from scenario_gen.method.segmentation.hdp_hmm.emission import (
     mean_emission,
     posterior_factor,
 )
+from scenario_gen.method.segmentation.hdp_hmm.model import Data, Joint, States, Statistics
 from scenario_gen.method.segmentation.hdp_hmm.random import log_beta_draw, State, uniform
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions, log_transitions
 from scenario_gen.numerics import Floats, Ints
@@ -32,9 +33,48 @@ MOST_STAY, LEAST_STAY = 0.99, 0.6
 MOST_LOG_RATIO, CERTAIN, LEAST_PRODUCT = 200.0, 1e150, 1e-150
 
 
+class Group(NamedTuple):
+    """The samples of both states of a move.
+
+    Attributes:
+        members: (n,) their numbers.
+        opens: (n,) 1 where a run of them begins.
+        outer: (M, M) their Σ mass v vᵀ.
+        sums: (2,) how many were observed, and Σ mass.
+    """
+
+    members: Ints
+    opens: Ints
+    outer: Floats
+    sums: Floats
+
+
+class Proposal(NamedTuple):
+    """A move.
+
+    Attributes:
+        pair: (2,) the states i and j.
+        group: their samples; of a merge none, for they all go to i.
+        side: (n,) 1 where a sample of the group goes to state j, else 0: to i.
+        n: (L + 1, L) transition counts after it.
+        outer: (2, M, M) statistics of both states after it.
+        sums: (2, 2) likewise.
+        gain: logarithm of how probable the choices of the way back are, over those of the way there, as far as known.
+    """
+
+    pair: Ints
+    group: Group
+    side: Ints
+    n: Ints
+    outer: Floats
+    sums: Floats
+    gain: float
+
+
 @kernel(inline=True)
-def members_of(labels: Ints, ends: Ints, i: int, j: int, index: Ints, opens: Ints) -> None:
-    """Fill the head of index (T,) with the samples of states i and j, that of opens (T,) with 1 where a run of them begins."""
+def group_of(labels: Ints, ends: Ints, i: int, j: int, stats: Statistics) -> Group:
+    """Return the samples of states i and j."""
+    index, opens = np.empty(len(labels), np.int64), np.empty(len(labels), np.int64)
     count = 0
     before = -2
     sequence = 0
@@ -47,73 +87,55 @@ def members_of(labels: Ints, ends: Ints, i: int, j: int, index: Ints, opens: Int
         if t + 1 == ends[sequence]:
             sequence += 1
             before = -2
+    return Group(index[:count], opens[:count], stats.outer[i] + stats.outer[j], stats.sums[i] + stats.sums[j])
 
 
 @kernel(inline=True)
-def fit_side(v: Floats, mass: Floats, index: Ints, side: Ints, which: int, outer: Floats, sums: Floats) -> None:
+def fit_side(data: Data, group: Group, side: Ints, which: int, outer: Floats, sums: Floats) -> None:
     """Fill outer (M, M) and sums (2,) with the statistics of the samples on side `which`."""
     outer[:] = 0.0
     sums[:] = 0.0
-    for r in range(len(index)):
-        t = index[r]
-        if side[r] == which and mass[t] > 0.0:
-            add_sample(v[t], mass[t], outer)
+    for r in range(len(side)):
+        t = group.members[r]
+        if side[r] == which and data.mass[t] > 0.0:
+            add_sample(data.v[t], data.mass[t], outer)
             sums[0] += 1.0
-            sums[1] += mass[t]
+            sums[1] += data.mass[t]
 
 
 @kernel(inline=True)
-def fit_sides(
-    v: Floats, mass: Floats, index: Ints, side: Ints, whole: Floats, total: Floats, outer: Floats, sums: Floats
-) -> None:
-    """Fill outer (2, M, M) and sums (2, 2) with both sides' statistics: the rarer's, and what it leaves of all.
-
-    Args:
-        v: (T, M) samples.
-        mass: (T,).
-        index: (n,) samples of both.
-        side: (n,) 0 or 1.
-        whole: (M, M) statistics of all n.
-        total: (2,) likewise.
-        outer: output.
-        sums: output.
-    """
+def fit_sides(data: Data, group: Group, side: Ints, outer: Floats, sums: Floats) -> None:
+    """Fill outer (2, M, M) and sums (2, 2) with the statistics of sides (n,): the rarer's, and what it leaves of all."""
     rare = 1 if 2 * side.sum() <= len(side) else 0
-    fit_side(v, mass, index, side, rare, outer[rare], sums[rare])
+    fit_side(data, group, side, rare, outer[rare], sums[rare])
     rest = 1 - rare
-    for i in range(len(whole)):
+    for i in range(len(group.outer)):
         for j in range(i + 1):
-            outer[rest, i, j] = whole[i, j] - outer[rare, i, j]
+            outer[rest, i, j] = group.outer[i, j] - outer[rare, i, j]
     for i in range(2):
-        sums[rest, i] = total[i] - sums[rare, i]
+        sums[rest, i] = group.sums[i] - sums[rare, i]
 
 
 @kernel(inline=True)
-def likelihood_ratios(
-    vt: Floats, mass: Floats, coef: Floats, shape: Floats, weight: float, anchors: Ints, work: Floats, ratio: Floats
-) -> None:
-    """Fill ratio (n,) with the likelihood of side 1 over that of side 0; at the anchors there is no doubt.
+def likelihood_ratios(vt: Floats, mass: Floats, emitted: States, weight: float, work: Floats, ratio: Floats) -> None:
+    """Fill ratio (n,) with the likelihood of side 1 over that of side 0.
 
     Args:
         vt: (M, n) samples.
         mass: (n,).
-        coef: (2, D, M) emissions.
-        shape: (2, 2), see `block_log_likelihood`.
+        emitted: of both sides.
         weight: what a sample counts for.
-        anchors: (2,).
         work: (3, BLOCK).
         ratio: output.
     """
-    alike = weight * (shape[1, 0] - shape[0, 0])
-    shape[:, 0] = 0.0
+    alike = weight * (emitted.shape[1, 0] - emitted.shape[0, 0])
+    emitted.shape[:, 0] = 0.0
     for start in range(0, len(mass), BLOCK):
         stop = min(start + BLOCK, len(mass))
-        block_log_likelihood(vt, start, stop, coef, shape, weight, 0.0, work[:2], work[2])
+        block_log_likelihood(vt, start, stop, emitted, weight, 0.0, work[:2], work[2])
         for r in range(start, stop):
             log_ratio = alike + mass[r] * (work[1, r - start] - work[0, r - start])
-            ratio[r] = np.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO)) if mass[r] > 0.0 else 1.0
-    ratio[anchors[0]] = 1.0 / CERTAIN
-    ratio[anchors[1]] = CERTAIN
+            ratio[r] = exact.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO)) if mass[r] > 0.0 else 1.0
 
 
 @kernel(inline=True)
@@ -163,63 +185,54 @@ def draw_sides(state: State, ratio: Floats, opens: Ints, stay: float, message: F
 
 
 @kernel(inline=True)
-def propose_sides(
-    state: State,
-    v: Floats,
-    mass: Floats,
-    index: Ints,
-    opens: Ints,
-    anchors: Ints,
-    whole: Floats,
-    total: Floats,
-    g0: Floats,
-    p: int,
-    nu: float,
-    weight: float,
-    blur: Floats,
-    stay: float,
-    side: Ints,
-    given: bool,
-) -> float:
-    """Draw sides (n,) for the samples `index` (n,), or take them as given; returns the log-probability of drawing them.
+def around_anchors(opens: Ints, anchors: tuple[int, int]) -> Ints:
+    """(n,) side 0 or 1 for the two anchors and the samples around them, -1 for others."""
+    side = np.full(len(opens), -1, np.int64)
+    for s in range(2):
+        r = anchors[s]
+        side[r] = s
+        for step in range(1, AROUND + 1):
+            if r - step < 0 or opens[r - step + 1] == 1 or side[r - step] == 1 - s:
+                break
+            side[r - step] = s
+        for step in range(1, AROUND + 1):
+            if r + step >= len(opens) or opens[r + step] == 1 or side[r + step] == 1 - s:
+                break
+            side[r + step] = s
+    return side
 
-    Everything but the last draw depends on the samples, their statistics `whole` (M, M) and `total` (2,), and the two anchors
-    only, so that it is the same there and back.
+
+@kernel(inline=True)
+def log_sides(
+    state: State, data: Data, joint: Joint, stay: float, group: Group, anchors: tuple[int, int], side: Ints, given: bool
+) -> float:
+    """Draw sides (n,) for the samples of a group, or take them as given; returns the log-probability of drawing them.
+
+    Everything but the last draw depends on the samples and the two anchors only, so that it is the same there and back.
     """
-    m, n = g0.shape[0], len(index)
-    d = m - p
+    (m, d), n = (len(joint.g0), len(joint.blur)), len(side)
     outer, sums, factor = np.empty((2, m, m)), np.empty((2, 2)), np.empty((m, m))
-    coef, shape = np.empty((2, d, m)), np.empty((2, 2))
+    emitted = States(np.empty((2, d, m)), np.empty((2, 2)))
     ratio, message, scratch = np.empty(n), np.empty(n), np.empty((3, BLOCK))
     members, masses = np.empty((m, n)), np.empty(n)
     for r in range(n):
-        masses[r] = mass[index[r]]
+        masses[r] = data.mass[group.members[r]]
         for i in range(m):
-            members[i, r] = v[index[r], i]
-    work = np.full(n, -1, np.int64)
-    for s in range(2):
-        r = anchors[s]
-        work[r] = s
-        for step in range(1, AROUND + 1):
-            if r - step < 0 or opens[r - step + 1] == 1 or work[r - step] == 1 - s:
-                break
-            work[r - step] = s
-        for step in range(1, AROUND + 1):
-            if r + step >= n or opens[r + step] == 1 or work[r + step] == 1 - s:
-                break
-            work[r + step] = s
+            members[i, r] = data.v[group.members[r], i]
+    work = around_anchors(group.opens, anchors)
     for turn in range(ROUNDS + 1):
         if turn > 0:
-            fit_sides(v, mass, index, work, whole, total, outer, sums)
+            fit_sides(data, group, work, outer, sums)
         for s in range(2):
             if turn == 0:
-                fit_side(v, mass, index, work, s, outer[s], sums[s])
-            posterior_factor(outer[s], sums[s, 1], g0, weight, blur, factor)
-            mean_emission(factor, weight * sums[s, 0], p, nu, blur, coef[s], shape[s])
-        likelihood_ratios(members, masses, coef, shape, weight, anchors, scratch, ratio)
+                fit_side(data, group, work, s, outer[s], sums[s])
+            posterior_factor(outer[s], sums[s, 1], joint, factor)
+            mean_emission(factor, joint.weight * sums[s, 0], joint, emitted.coef[s], emitted.shape[s])
+        likelihood_ratios(members, masses, emitted, joint.weight, scratch, ratio)
+        ratio[anchors[0]], ratio[anchors[1]] = 1.0 / CERTAIN, CERTAIN  # of these there is no doubt
         if turn < ROUNDS:
-            best_sides(ratio, opens, stay, message, work)
-    return draw_sides(state, ratio, opens, stay, message, side, given)
+            best_sides(ratio, group.opens, stay, message, work)
+    return draw_sides(state, ratio, group.opens, stay, message, side, given)
 
 
 @kernel(inline=True)
@@ -251,74 +264,6 @@ def chosen_state(counts: Ints, number: int, occupied: bool) -> int:
 
 
 @kernel(inline=True)
-def draw_pair(state: State, counts: Ints, splits: bool, pair: Ints) -> bool:
-    """Draw the states i and j of a move and the number of an anchor within each, into pair (4,); False if there are none.
-
-    A split takes a state i of two samples or more, both anchors, and an empty state j; a merge two states in use.
-    """
-    used = 0
-    for count in counts:
-        used += 1 if count > 0 else 0
-    empty = len(counts) - used
-    i = chosen_state(counts, int(uniform(state) * used), True)
-    if splits:
-        if empty == 0 or counts[i] < 2:
-            return False
-        j = chosen_state(counts, int(uniform(state) * empty), False)
-        first = int(uniform(state) * counts[i])
-        second = int(uniform(state) * (counts[i] - 1))
-        second += 1 if second >= first else 0
-    else:
-        if used < 2:
-            return False
-        rest = int(uniform(state) * (used - 1))
-        j = chosen_state(counts, rest, True)
-        if j >= i:
-            j = chosen_state(counts, rest + 1, True)
-        first, second = int(uniform(state) * counts[i]), int(uniform(state) * counts[j])
-    pair[0], pair[1], pair[2], pair[3] = i, j, first, second
-    return True
-
-
-@kernel(inline=True)
-def place_anchors(side: Ints, pair: Ints, splits: bool, anchors: Ints) -> None:
-    """Find the anchors (2,), which `pair` (4,) numbers within their states, among the samples of both, side (n,)."""
-    seen = np.zeros(2, np.int64)
-    for r in range(len(side)):
-        if side[r] == 0 and seen[0] == pair[2]:
-            anchors[0] = r
-        if (side[r] == 1 or splits) and seen[0 if splits else 1] == pair[3]:
-            anchors[1] = r
-        seen[side[r]] += 1
-
-
-@kernel(inline=True)
-def divided(labels: Ints, index: Ints, side: Ints, i: int, j: int) -> Ints:
-    """(T,) labels with the samples `index` (n,) in state i or j, by their side (n,)."""
-    after = labels.copy()
-    for r in range(len(index)):
-        after[index[r]] = j if side[r] == 1 else i
-    return after
-
-
-@kernel(inline=True)
-def united(labels: Ints, i: int, j: int) -> Ints:
-    """(T,) labels with state j made part of state i."""
-    after = labels.copy()
-    for t in range(len(labels)):
-        if labels[t] == j:
-            after[t] = i
-    return after
-
-
-@kernel(inline=True)
-def sides_of(labels: Ints, index: Ints, j: int, side: Ints) -> None:
-    """Fill side (n,) with 1 where sample `index` (n,) is in state j, else 0."""
-    for r in range(len(index)):
-        side[r] = 1 if labels[index[r]] == j else 0
-
-
-@kernel(inline=True)
 def log_pair(members: int, left: int, right: int, used: int, empty: int) -> float:
     """Logarithm of how often a merge draws a pair and its anchors, over how often the split that undoes it does.
 
@@ -333,106 +278,153 @@ def log_pair(members: int, left: int, right: int, used: int, empty: int) -> floa
 
 
 @kernel(inline=True)
-def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read from top to bottom
-    state: State,
-    v: Floats,
-    mass: Floats,
-    ends: Ints,
-    g0: Floats,
-    p: int,
-    nu: float,
-    weight: float,
-    blur: Floats,
-    top: Floats,
-    beta: Floats,
-    labels: Ints,
-    n: Ints,
-    outer: Floats,
-    sums: Floats,
-    factors: Floats,
-    own: Floats,
-) -> bool:
-    """Propose one move and accept or reject it; returns whether it was accepted.
+def draw_split(state: State, counts: Ints) -> tuple[int, int, int, int]:
+    """Draw a state of two samples or more, an empty one (-1 if there are none), and the numbers of two anchors in the first."""
+    used = (counts > 0).sum()
+    i = chosen_state(counts, int(uniform(state) * used), True)
+    if used == len(counts) or counts[i] < 2:
+        return i, -1, 0, 0
+    j = chosen_state(counts, int(uniform(state) * (len(counts) - used)), False)
+    first = int(uniform(state) * counts[i])
+    second = int(uniform(state) * (counts[i] - 1))
+    return i, j, first, second + 1 if second >= first else second
+
+
+@kernel(inline=True)
+def draw_merge(state: State, counts: Ints) -> tuple[int, int, int, int]:
+    """Draw two states in use, the second -1 if there are none, and the number of an anchor in each."""
+    used = (counts > 0).sum()
+    i = chosen_state(counts, int(uniform(state) * used), True)
+    if used < 2:
+        return i, -1, 0, 0
+    rest = int(uniform(state) * (used - 1))
+    j = chosen_state(counts, rest, True)
+    if j >= i:
+        j = chosen_state(counts, rest + 1, True)
+    first = int(uniform(state) * counts[i])
+    return i, j, first, int(uniform(state) * counts[j])
+
+
+@kernel(inline=True)
+def propose_split(
+    state: State, data: Data, joint: Joint, stay: float, labels: Ints, stats: Statistics, drawn: tuple[int, int, int, int]
+) -> Proposal:
+    """Divide state i into i and j, which was empty: see `draw_split`."""
+    i, j, first, second = drawn
+    counts, m = stats.n.sum(axis=0), len(joint.g0)
+    used, members = (counts > 0).sum(), counts[i]
+    group = group_of(labels, data.ends, i, j, stats)
+    side, n = np.zeros(members, np.int64), np.empty_like(stats.n)
+    gain = -log_sides(state, data, joint, stay, group, (first, second), side, False)
+    outer, sums = np.zeros((2, m, m)), np.zeros((2, 2))
+    fit_sides(data, group, side, outer, sums)
+    after = labels.copy()
+    relabel(after, group, side, i, j)
+    count_transitions(after, data.ends, n)
+    right = side.sum()
+    gain += log_pair(members, members - right, right, used, len(counts) - used)
+    return Proposal(np.array([i, j]), group, side, n, outer, sums, gain)
+
+
+@kernel(inline=True)
+def propose_merge(joint: Joint, stats: Statistics, drawn: tuple[int, int, int, int]) -> Proposal:
+    """Make state j part of state i: see `draw_merge`."""
+    i, j = drawn[0], drawn[1]
+    counts, m = stats.n.sum(axis=0), len(joint.g0)
+    used, members = (counts > 0).sum() - 1, counts[i] + counts[j]
+    n, outer, sums = stats.n.copy(), np.zeros((2, m, m)), np.zeros((2, 2))
+    outer[0], sums[0] = stats.outer[i] + stats.outer[j], stats.sums[i] + stats.sums[j]
+    n[i] += n[j]
+    n[j] = 0
+    n[:, i] += n[:, j]
+    n[:, j] = 0
+    gain = -log_pair(members, counts[i], counts[j], used, len(counts) - used)
+    none = np.empty(0, np.int64)
+    return Proposal(np.array([i, j]), Group(none, none, outer[0], sums[0]), none, n, outer, sums, gain)
+
+
+@kernel(inline=True)
+def log_undone(
+    state: State, data: Data, joint: Joint, stay: float, labels: Ints, stats: Statistics, drawn: tuple[int, int, int, int]
+) -> float:
+    """Log-probability of dividing what a merge makes one as it was divided before, by anchors numbered within both states."""
+    group, numbers = group_of(labels, data.ends, drawn[0], drawn[1], stats), (drawn[2], drawn[3])
+    side = np.empty(len(group.members), np.int64)
+    first, second = 0, 0
+    seen = np.zeros(2, np.int64)
+    for r in range(len(side)):
+        s = 1 if labels[group.members[r]] == drawn[1] else 0
+        side[r] = s
+        if seen[s] == numbers[s]:
+            if s == 0:
+                first = r
+            else:
+                second = r
+        seen[s] += 1
+    return log_sides(state, data, joint, stay, group, (first, second), side, True)
+
+
+@kernel(inline=True)
+def relabel(labels: Ints, group: Group, side: Ints, i: int, j: int) -> None:
+    """Give labels (T,) of state j to state i, then those of a group's side 1 to j; side (n,)."""
+    for t in range(len(labels)):
+        if labels[t] == j:
+            labels[t] = i
+    for r in range(len(side)):
+        if side[r] == 1:
+            labels[group.members[r]] = j
+
+
+@kernel(inline=True)
+def split_or_merge(state: State, data: Data, joint: Joint, top: Floats, labels: Ints, stats: Statistics) -> bool:
+    """Propose one move and accept or reject it (Metropolis-Hastings); returns whether it was accepted.
 
     Args:
         state: generator.
-        v: (T, M) samples.
-        mass: (T,) see `accumulate`.
-        ends: of the sequences.
-        g0: (M, M) joint prior.
-        p: regressors.
-        nu: prior degrees of freedom ν0.
-        weight: what a sample counts for.
-        blur: (D,).
-        top: (γ, α+κ, ρ).
-        beta: (L,) updated.
+        data: samples.
+        joint: prior.
+        top: (3 + L,) γ, α+κ, ρ and β; β is updated.
         labels: (T,) updated.
-        n: (L + 1, L) transition counts, updated.
-        outer: (L, M, M) statistics, updated.
-        sums: (L, 2) updated.
-        factors: (L, M, M) Cholesky factors of the posteriors, updated.
-        own: (L,) log marginal likelihood of each state's samples, updated.
+        stats: updated.
     """
     threshold = np.log(uniform(state))
     splits = uniform(state) < 0.5
-    counts = n.sum(axis=0)
-    pair = np.empty(4, np.int64)
-    if not draw_pair(state, counts, splits, pair):
-        return False
-    i, j = pair[0], pair[1]
-    m, members = len(g0), counts[i] + counts[j]
-    index, opens = np.empty(len(labels), np.int64), np.empty(len(labels), np.int64)
-    side, anchors, after = np.zeros(members, np.int64), np.empty(2, np.int64), labels
-    whole, total = outer[i] + outer[j], sums[i] + sums[j]
+    counts = stats.n.sum(axis=0)
     stay = min(max(top[2], LEAST_STAY), MOST_STAY)
-    two_outer, two_sums, two_factors, two_own = np.zeros((2, m, m)), np.zeros((2, 2)), np.empty((2, m, m)), np.zeros(2)
-    gain, n_after = 0.0, n.copy()
-    if splits:
-        members_of(labels, ends, i, j, index, opens)
-        place_anchors(side, pair, True, anchors)
-        gain -= propose_sides(
-            state, v, mass, index[:members], opens[:members], anchors, whole, total, g0, p, nu, weight, blur, stay, side, False
-        )
-        fit_sides(v, mass, index[:members], side, whole, total, two_outer, two_sums)
-        after = divided(labels, index[:members], side, i, j)
-        count_transitions(after, ends, n_after)
-    else:
-        two_outer[0], two_sums[0] = whole, total
-        n_after[i] += n_after[j]
-        n_after[j] = 0
-        n_after[:, i] += n_after[:, j]
-        n_after[:, j] = 0
-    for s in range(2):
-        posterior_factor(two_outer[s], two_sums[s, 1], g0, weight, blur, two_factors[s])
-        two_own[s] = log_marginal(two_factors[s], weight * two_sums[s, 0], p, nu)
-    gain += two_own[0] + two_own[1] - own[i] - own[j]
-    a, both = top[0] / n.shape[1], beta[i] + beta[j]
-    here, there = (0 if splits else predecessors(n, j)), (predecessors(n_after, j) if splits else 0)
-    share_i, share_j = log_beta_draw(state, a + predecessors(n_after, i), a + there)
-    gain += log_share(a, predecessors(n_after, i), there, share_i, share_j)
-    gain -= log_share(a, predecessors(n, i), here, np.log(beta[i] / both), np.log(beta[j] / both))
-    used, right = (counts > 0).sum(), side.sum() if splits else counts[j]
-    if splits:
-        gain += log_pair(members, members - right, right, used, len(counts) - used)
-    else:
-        gain -= log_pair(members, members - right, right, used - 1, len(counts) - used + 1)
-    gain -= log_transitions(n, top[1], top[2], beta)
-    keep_i, keep_j = beta[i], beta[j]
-    beta[i], beta[j] = max(both * np.exp(share_i), 1e-100), max(both * np.exp(share_j), 1e-100)
-    gain += log_transitions(n_after, top[1], top[2], beta)
-    if not splits and gain >= threshold:
-        members_of(labels, ends, i, j, index, opens)
-        sides_of(labels, index[:members], j, side)
-        place_anchors(side, pair, False, anchors)
-        gain += propose_sides(
-            state, v, mass, index[:members], opens[:members], anchors, whole, total, g0, p, nu, weight, blur, stay, side, True
-        )
-    if not gain >= threshold:
-        beta[i], beta[j] = keep_i, keep_j
+    drawn = draw_split(state, counts) if splits else draw_merge(state, counts)
+    if drawn[1] < 0:
         return False
-    labels[:] = after if splits else united(labels, i, j)
-    n[:] = n_after
+    move = propose_split(state, data, joint, stay, labels, stats, drawn) if splits else propose_merge(joint, stats, drawn)
+    i, j = drawn[0], drawn[1]
+    beta, factors, own, gain = top[3:], np.empty_like(move.outer), np.empty(2), move.gain
     for s in range(2):
-        outer[pair[s]], sums[pair[s]] = two_outer[s], two_sums[s]
-        factors[pair[s]], own[pair[s]] = two_factors[s], two_own[s]
+        posterior_factor(move.outer[s], move.sums[s, 1], joint, factors[s])
+        own[s] = log_marginal(factors[s], joint.weight * move.sums[s, 0], joint)
+    gain += own[0] + own[1] - stats.own[i] - stats.own[j]
+    after = beta.copy()
+    gain += draw_shares(state, top[0] / len(beta), stats.n, move, beta, after)
+    gain += log_transitions(move.n, top[1], top[2], after) - log_transitions(stats.n, top[1], top[2], beta)
+    if not splits and gain >= threshold:  # what costs most comes last
+        gain += log_undone(state, data, joint, stay, labels, stats, drawn)
+    if not gain >= threshold:
+        return False
+    relabel(labels, move.group, move.side, i, j)
+    stats.n[:], beta[:] = move.n, after
+    for s in range(2):
+        k = move.pair[s]
+        stats.outer[k], stats.sums[k] = move.outer[s], move.sums[s]
+        stats.factors[k], stats.own[k] = factors[s], own[s]
     return True
+
+
+@kernel(inline=True)
+def draw_shares(state: State, a: float, n: Ints, move: Proposal, beta: Floats, after: Floats) -> float:
+    """Draw how the pair shares its β after a move, into after (L,); returns the gain. `a` is γ / L, n the counts before."""
+    i, j = move.pair[0], move.pair[1]
+    both = beta[i] + beta[j]
+    here, there = (predecessors(n, j) if n[:, j].any() else 0), (predecessors(move.n, j) if move.n[:, j].any() else 0)
+    share_i, share_j = log_beta_draw(state, a + predecessors(move.n, i), a + there)
+    gain: float = log_share(a, predecessors(move.n, i), there, share_i, share_j)
+    gain -= log_share(a, predecessors(n, i), here, exact.log(beta[i] / both), exact.log(beta[j] / both))
+    after[i], after[j] = max(both * exact.exp(share_i), 1e-100), max(both * exact.exp(share_j), 1e-100)
+    return gain

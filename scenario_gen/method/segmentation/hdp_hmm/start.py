@@ -157,7 +157,7 @@ def _search(problem: Problem, config: SamplerConfig, clusters: int, rng: np.rand
     for stage, sweeps in enumerate(STAGES):
         top = new_top(max(clusters, place.labels.max() + 1))
         place, held, _, _ = problem.run(config, prior, place, top, sweeps - 1, 1, int(rng.integers(2**62)))
-        place = problem.merge(config, held, place)
+        place = problem.merge(held, place)
         prior = replace(held, within=problem.within(place))
         if stage == 0:
             chosen = problem
@@ -178,7 +178,7 @@ def other_start(start: Start, config: SamplerConfig, index: int, rng: np.random.
     problem, clusters = start.problem, start.states + MORE_STATES
     place = cluster(problem, clusters, WINDOWS[index % len(WINDOWS)], rng)
     place = problem.run(config, start.prior, place, new_top(clusters), STAGES[1] - 1, 1, int(rng.integers(2**62)))[0]
-    return problem.merge(config, start.prior, place)
+    return problem.merge(start.prior, place)
 
 
 def tails(problem: Problem, place: Place) -> float:

@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Fit, plan and sample: the one chain of the stages between the segmentation and the evaluation."""
+
+from dataclasses import dataclass
+
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.evaluation import MEASURES
+from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.routing import plan_routes
+from scenario_gen.method.sampling import Callbacks, sample_scenarios
+from scenario_gen.template import Wait
+from scenario_gen.types import Encounter, GenerationResult, Request, Road, Segmentation
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """What the stages after the segmentation take.
+
+    Attributes:
+        encounter: the template.
+        segmentation: its changepoints, found or given.
+        road: the target.
+        config: the parameters of every stage.
+        request: what is requested.
+        count: valid scenarios wanted.
+        seed: of all randomness.
+        waits: that scenarios keep; the template's if None.
+    """
+
+    encounter: Encounter
+    segmentation: Segmentation
+    road: Road
+    config: PipelineConfig
+    request: Request = Request()
+    count: int = 50
+    seed: int = 0
+    waits: tuple[Wait, ...] | None = None
+
+    def plan(self) -> GenerationResult:
+        """Fit and plan: the template on its road, with no scenarios yet.
+
+        Raises:
+            InputError, RefusedError: as the stages.
+        """
+        config = self.config
+        fit = fit_template(
+            self.encounter, self.segmentation, self.road, config.fitting,
+            request=self.request, max_speed=config.sampling.max_speed,
+        )  # fmt: skip
+        routes = plan_routes(self.road, fit, config.planning, self.seed)
+        return GenerationResult(self.encounter, self.segmentation, self.road, fit, routes, seed=self.seed)
+
+    def sample(self, planned: GenerationResult, callbacks: Callbacks = Callbacks()) -> GenerationResult:
+        """Sample what was planned; every candidate is checked.
+
+        Raises:
+            InputError, RefusedError: as `sample_scenarios`.
+        """
+        return sample_scenarios(
+            planned, self.config.sampling, self.config.limits, self.request,
+            count=self.count, waits=self.waits, callbacks=callbacks, measures=MEASURES,
+        )  # fmt: skip
+
+    def run(self, callbacks: Callbacks = Callbacks()) -> GenerationResult:
+        """Fit, plan and sample.
+
+        Raises:
+            InputError, RefusedError: as the stages.
+        """
+        return self.sample(self.plan(), callbacks)

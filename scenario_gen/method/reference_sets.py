@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The sets that a result is compared with, drawn by the same chain; `evaluation.compare` requests them."""
+
+from dataclasses import replace
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.evaluation import MEASURED, uniform_changepoints, without_changepoints
+from scenario_gen.types import GenerationResult, NARROW, Request, UNIFORM, WITHOUT
+
+
+def with_references(result: GenerationResult, config: PipelineConfig, request: Request = Request()) -> GenerationResult:
+    """Add what a result is measured against: sets without changepoints and with uniform ones.
+
+    They are drawn as the result is, with the same parameters and seed; beside preset `wide` there is a set of `narrow`, too.
+    A reference keeps no waits of the template: the ends of a wait would be two more changepoints. It has no target, choice or
+    order either, and a result that has one is not compared. A reference has only as many scenarios as are measured.
+
+    Raises:
+        InputError: road or fit of the result are not known.
+    """
+    road, _ = result.placed()
+    count = min(result.generated.requested, MEASURED)
+    plain = Chain(result.encounter, result.segmentation, road, config, request.plain, count, result.seed)
+    chains = {WITHOUT: replace(plain, segmentation=without_changepoints(result.segmentation), waits=())}
+    if result.segmentation.changepoints.size:
+        chains[UNIFORM] = replace(plain, segmentation=uniform_changepoints(result.segmentation), waits=())
+    if config.sampling.variety == "wide":
+        narrow = replace(config, sampling=replace(config.sampling, variety="narrow"))
+        chains[NARROW] = replace(plain, config=narrow)
+    references, refusals = {}, {}
+    for name, chain in chains.items():
+        try:
+            references[name] = (chain.sample(result) if name == NARROW else chain.run()).generated
+        except RefusedError as error:
+            refusals[name] = str(error)
+    requested = [name for name in ("target", "choose", "order") if getattr(request, name) != getattr(request.plain, name)]
+    apart = f"only the delivered set was drawn with {' and '.join(requested)} as asked" if requested else ""
+    return replace(result, references=references, refusals=refusals, apart=apart)
