@@ -16,6 +16,7 @@ from typing import Any
 from scenario_gen.bags.storage.autoware import DEFINITIONS
 from scenario_gen.base.errors import InputError
 
+MOST_TEXT = 64 * 1024  # characters of a definition
 KEPT = Path(__file__).resolve().parents[2] / "resources" / "definitions.json"
 
 
@@ -27,6 +28,25 @@ def type_store() -> Any:
     store = get_typestore(Stores.ROS2_JAZZY)
     for kind, text in DEFINITIONS.items():
         store.register(get_types_from_msg(text, kind))
+    return store
+
+
+@cache
+def ros1_types(kind: str, text: str) -> Any:
+    """Return a store that turns messages of ROS 1 into CDR, by the definition in their bag.
+
+    Raises:
+        InputError: the definition is too long.
+        Exception: rosbags' own, where it is damaged, or has other fields than ROS 2's of that name.
+    """
+    from rosbags.typesys import get_types_from_msg, get_typestore, Stores
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    if len(text) > MOST_TEXT:
+        raise InputError(f"its definition has {len(text)} characters; at most {MOST_TEXT} are read")
+    found = get_types_from_msg(text, kind)
+    found.pop("std_msgs/msg/Header", None)  # that of ROS 2 has no seq, which rosbags leaves out
+    store.register(found)
     return store
 
 

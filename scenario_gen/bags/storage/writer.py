@@ -150,8 +150,7 @@ class BagWriter:
         if self._broken or not self.held:
             return
         with self._writing():
-            self._writer._Writer__finalize_chunk()  # mcap has no public name for it
-            self._stream.flush()
+            self._writer.flush()
         self.held = False
 
     def close(self) -> None:
