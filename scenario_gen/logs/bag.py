@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.bags.storage.autoware import TRACKED
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.definitions import TRACKED
 from scenario_gen.bags.vehicles import decode_sample, decode_tracked, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST, VEHICLES
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig

@@ -79,7 +79,7 @@ class StoredBag:
         for topic in topics.values():
             if topic.encoding != "cdr" or not topic.type:
                 how = f"encoded as {shown(topic.encoding)!r}" if topic.type else "of no type"
-                raise InputError(f"{file}: topic {shown(topic.name)} is {how}; only CDR of a ROS type is read: choose other topics")
+                raise InputError(f"{file}: topic {shown(topic.name)} is {how}; only CDR of a ROS type is read: choose others")
         with _place(file):
             for stamp, number, data in storage.in_order(topics) if topics else ():
                 yield BagMessage(topics[number].name, topics[number].type, self._whole(data, file), stamp)
@@ -163,12 +163,12 @@ def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:
         InputError: it is damaged, or too large.
     """
     target = stack.enter_context(scratch(Path(tempfile.gettempdir()))) / file.stem
-    with file.open("rb") as packed, target.open("wb") as whole:
-        with guarded(f"{file}: cannot be decompressed", zstandard.ZstdError, remedy="copy it again"):
-            reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
-            while block := reader.read(COPIED):
-                allowance.unpack(len(block))
-                whole.write(block)
+    problem = guarded(f"{file}: cannot be decompressed", zstandard.ZstdError, remedy="copy it again")
+    with file.open("rb") as packed, target.open("wb") as whole, problem:
+        reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
+        while block := reader.read(COPIED):
+            allowance.unpack(len(block))
+            whole.write(block)
     return target
 
 

@@ -10,6 +10,7 @@ size that it announces and no more. Damage is a `DamagedError` with its place: a
 
 from collections import Counter
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 import heapq
 import io
@@ -193,12 +194,8 @@ class McapFile:
         self.counts = Counter(statistics.channel_message_counts)
         return bool(self.entries or not statistics.message_count) and set(self.counts) <= set(self.channels)
 
-    def scan(self, *, strict: bool = True) -> None:
-        """Read the whole file for topics and places.
-
-        Raises:
-            DamagedError: the file is damaged; not if `strict` is false: then that is noted among the gaps, and left out.
-        """
+    def scan(self) -> None:
+        """Read the whole file for topics and places; damage is noted among the gaps, and left out."""
         self.entries.clear()
         self.counts.clear()
         start = 0
@@ -207,19 +204,17 @@ class McapFile:
             try:
                 for offset, record in records(self.stream, self.most, magic=not start):
                     start = offset
-                    self._note(offset, record, strict=strict)
+                    self._note(offset, record)
                     start = self.stream.tell()
                     self.closed = isinstance(record, Footer)
                 return
             except DamagedError as error:
-                if strict:
-                    raise
                 after = self._next_chunk(start + 1)
                 self.gaps.append(Gap(start, after - start, error.problem))
                 start, self.closed = after, False
 
-    def _note(self, offset: int, record: Any, *, strict: bool) -> None:
-        """Take a record at the top level of the file."""
+    def _note(self, offset: int, record: Any) -> None:
+        """Take a record at the top level of the file, or note that it is lost."""
         try:
             if isinstance(record, Chunk):
                 self._lost = False
@@ -231,13 +226,10 @@ class McapFile:
                 self.counts[record.channel_id] += 1
             elif isinstance(record, MessageIndex) and self._lost:
                 self.gaps[-1] = replace(self.gaps[-1], messages=self.gaps[-1].messages + len(record.records))
-            elif not isinstance(record, ChunkIndex | Statistics):
+            else:
                 self._describe(record)
         except (DamagedError, InputError) as error:
-            if strict:
-                raise
-            problem = error.problem if isinstance(error, DamagedError) else str(error)
-            self.gaps.append(Gap(offset, self.stream.tell() - offset, problem))
+            self.gaps.append(Gap(offset, self.stream.tell() - offset, getattr(error, "problem", str(error))))
             self._lost = True
 
     def _describe(self, record: Any) -> None:
@@ -349,14 +341,14 @@ def open_mcap(file: BinaryIO, size: int, allowance: Allowance, wanted: str | Non
         raise DamagedError(len(MAGIC), "no header at the beginning of the file")
     if wanted is not None and header.profile != wanted:
         raise DamagedError(len(MAGIC), f"the profile is {header.profile[:40]!r}, not {wanted!r}")
-    end = size - FOOTER_BYTES - len(MAGIC)
-    found.stream.seek(max(end, len(MAGIC)))
-    try:
-        (_, footer), *more = records(found.stream, found.most)
-    except (DamagedError, ValueError):
-        footer, more = None, []
-    if not isinstance(footer, Footer) or more:
-        raise DamagedError(max(end, 0), "not the end of an MCAP file: its recorder was stopped, or it is cut off")
+    end, footer = max(size - FOOTER_BYTES - len(MAGIC), 0), None
+    found.stream.seek(end)
+    with suppress(DamagedError):
+        _, footer = next(records(found.stream, found.most), (0, None))
+    if not isinstance(footer, Footer):
+        raise DamagedError(end, "not the end of an MCAP file: its recorder was stopped, or it is cut off")
     if not found.read_summary(footer):
         found.scan()
+        if found.gaps:
+            raise DamagedError(found.gaps[0].offset, found.gaps[0].problem)
     return found

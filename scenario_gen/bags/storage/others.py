@@ -49,7 +49,9 @@ class RosbagsFile:
         found = []
         for connection in self._reader.connections:
             if not all(isinstance(text, str) for text in (connection.topic, connection.msgtype)):
-                raise InputError(f"{self._file}: damaged, it has a topic {shown(connection.topic)} of {shown(connection.msgtype)}")
+                raise InputError(
+                    f"{self._file}: damaged, it has a topic {shown(connection.topic)} of {shown(connection.msgtype)}"
+                )
             encoding = getattr(connection.ext, "serialization_format", "cdr")  # of ROS 1 it will be
             name, kind, quality = connection.topic, connection.msgtype, _quality(connection.ext)
             found.append(StoredTopic(connection.id, name, kind, quality, encoding, connection.msgcount))
@@ -176,4 +178,6 @@ def _check_chunk(stream: Any, start: int, length: int, allowance: Allowance) -> 
             size += len(block)
             allowance.unpack(len(block))
             if size > most:
-                raise InputError(f"{stream.name}: a chunk at byte {start} decompresses to more than bag.most_chunk_bytes ({most})")
+                raise InputError(
+                    f"{stream.name}: a chunk at byte {start} decompresses to more than bag.most_chunk_bytes ({most})"
+                )

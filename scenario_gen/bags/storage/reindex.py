@@ -96,7 +96,7 @@ def _salvaged(files: list[Path], config: BagConfig, stack: ExitStack) -> list["_
         first, again = (Allowance(config, str(files[0].parent), sum(sizes)) for _ in range(2))
         for path, size in zip(files, sizes, strict=True):
             whole = McapFile(stack.enter_context(path.open("rb")), size, first)
-            whole.scan(strict=False)
+            whole.scan()
             whole.allowance = again  # for the second reading, which writes
             found.append(_Saved(path, whole))
     except OSError as error:
@@ -132,7 +132,10 @@ class _Saved:
         except InputError as error:
             if schema is None or not schema.data or schema.encoding == PROTOBUF:
                 return str(error)
-            text = (schema.encoding, schema.data.decode(errors="replace"))  # a type that is not installed here, as the recorder described it
+            text = (
+                schema.encoding,
+                schema.data.decode(errors="replace"),
+            )  # a type that is not installed here, as the recorder described it
         qos, type_hash = (channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash"))
         bag.add_topic(channel.topic, kind, qos if profiles(qos) else "", type_hash, text)
         return ""

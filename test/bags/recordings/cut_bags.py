@@ -41,7 +41,7 @@ def salvaged(data: bytes, path: Path) -> list[tuple[int, bytes]]:
     config = BagConfig()
     with path.open("rb") as file:
         whole = McapFile(file, len(data), Allowance(config, str(path), len(data)))
-        whole.scan(strict=False)
+        whole.scan()
         whole.allowance = Allowance(config, str(path), len(data))
         known = {channel.id for channel in whole.channels.values() if channel.schema_id in whole.schemas}
         return [(stamp, message) for stamp, _, message in whole.in_order(known)]
