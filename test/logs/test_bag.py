@@ -298,7 +298,7 @@ def test_a_damaged_message_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("plugin", StoragePlugin, ids=lambda plugin: plugin.value)
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.1, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
 def test_truncated_bags(tmp_path, plugin, share):
     bag = write(tmp_path / "bag", streams(crossing()), plugin)
     (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
@@ -307,23 +307,6 @@ def test_truncated_bags(tmp_path, plugin, share):
     for path in (bag, file):
         with pytest.raises(InputError, match=file.name):
             read_log(path)
-
-
-def test_flipped_bits_never_end_in_a_traceback(tmp_path):
-    bag = write(tmp_path / "bag", streams(crossing(seconds=6.0)))
-    whole = (bag / "bag.mcap").read_bytes()
-    rng = np.random.Generator(np.random.PCG64(1))
-    refused = 0
-    for _ in range(60):
-        damaged = bytearray(whole)
-        for place in rng.integers(0, len(whole), 20):
-            damaged[place] ^= 1 << int(rng.integers(8))
-        (tmp_path / "flipped.mcap").write_bytes(bytes(damaged))
-        try:
-            read_log(tmp_path / "flipped.mcap")
-        except InputError as error:
-            refused += "flipped" in str(error)
-    assert refused > 30
 
 
 def test_missing_files_and_metadata(tmp_path):

@@ -47,7 +47,7 @@ def message_class(kind: str) -> Any:
     package, _, name = kind.partition("/msg/")
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError, ValueError):
+    except (ImportError, AttributeError, ValueError, TypeError):  # TypeError: a topic of no type
         raise InputError(f"message type {kind} is not installed; source the workspace that has {package or 'it'}") from None
 
 
