@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""rosbag2 bags, MCAP and SQLite: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
+"""Bags of rosbag2 and of ROS 1: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
 
 from collections import Counter
 from collections.abc import Sequence
