@@ -14,24 +14,13 @@ import zstandard
 
 from scenario_gen.bags.storage.config import Allowance, BagConfig
 from scenario_gen.bags.storage.files import files_of, METADATA
-from scenario_gen.bags.storage.mcap import DamagedError, decompressed, McapFile, open_mcap, StoredTopic
+from scenario_gen.bags.storage.mcap import BagTopic, DamagedError, decompressed, McapFile, open_mcap
 from scenario_gen.bags.storage.others import open_ros1, open_sqlite, RosbagsFile
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.folders import scratch
-from scenario_gen.types import Quality
 
 COPIED = 1 << 20  # bytes at a time
-
-
-@dataclass(frozen=True)
-class BagTopic:
-    """A topic of a bag: its full name, type ("" if it has none), what its first publisher offered, its number of messages."""
-
-    name: str
-    type: str
-    quality: Quality
-    count: int
 
 
 @dataclass(frozen=True)
@@ -60,8 +49,8 @@ class StoredBag:
         """
         found: dict[str, BagTopic] = {}
         for stored in (topic for file, storage in self.files for topic in _topics(file, storage).values()):
-            topic = found.get(stored.name) or BagTopic(stored.name, stored.type, stored.quality, 0)
-            found[stored.name] = replace(topic, count=topic.count + stored.count)
+            before = found.get(stored.name)
+            found[stored.name] = replace(before, count=before.count + stored.count) if before else stored
         return tuple(found[name] for name in sorted(found))
 
     def messages(self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True) -> Iterator[BagMessage]:
@@ -97,7 +86,7 @@ class StoredBag:
         return whole
 
 
-def _topics(file: Path, storage: McapFile | RosbagsFile) -> dict[int, StoredTopic]:
+def _topics(file: Path, storage: McapFile | RosbagsFile) -> dict[int, BagTopic]:
     """Return the topics of a file by the numbers that its messages bear."""
     with _place(file):
         return {topic.id: topic for topic in storage.list_topics()}

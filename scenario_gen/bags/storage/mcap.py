@@ -49,15 +49,18 @@ class DamagedError(ScenarioGenError):
 
 
 @dataclass(frozen=True)
-class StoredTopic:
-    """A topic in a file of any storage: its number there, name, type ("" if it has none), quality, encoding, message count."""
+class BagTopic:
+    """A topic of a bag: its full name, type ("" if it has none), what its first publisher offered, its number of messages.
 
-    id: int
+    In one file it has an `id`, too, and an `encoding`.
+    """
+
     name: str
     type: str
     quality: Quality
-    encoding: str
     count: int
+    id: int = 0
+    encoding: str = "cdr"
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ def records(stream: Exact, most: int, *, magic: bool = False) -> Iterator[tuple[
     Raises:
         DamagedError: one is damaged, or longer than `most` bytes.
     """
-    reader = StreamReader(stream, skip_magic=not magic, emit_chunks=True, record_size_limit=most + SLACK)  # type: ignore[arg-type]
+    reader = StreamReader(stream, skip_magic=not magic, emit_chunks=True, record_size_limit=most + SLACK)
     found, start = reader.records, stream.tell()
     while True:
         try:
@@ -270,7 +273,7 @@ class McapFile:
         except DamagedError as error:
             raise DamagedError(offset, f"in a chunk: {error.problem}") from error
 
-    def list_topics(self) -> list[StoredTopic]:
+    def list_topics(self) -> list[BagTopic]:
         """Return the channels, with their types and numbers of messages.
 
         Raises:
@@ -283,7 +286,7 @@ class McapFile:
             kind = self.schemas[channel.schema_id].name if channel.schema_id else ""
             quality = quality_of(channel.metadata.get("offered_qos_profiles", ""))
             count = self.counts[channel.id]
-            found.append(StoredTopic(channel.id, channel.topic, kind, quality, channel.message_encoding, count))
+            found.append(BagTopic(channel.topic, kind, quality, count, channel.id, channel.message_encoding))
         return found
 
     def in_order(self, wanted: Collection[int] | None) -> Iterator[Logged]:

@@ -39,7 +39,7 @@ class TopicInfo:
     @property
     def document(self) -> dict[str, Any]:
         """As in metadata.yaml."""
-        about = {"name": self.name, "type": self.type, "serialization_format": "cdr"}
+        about: dict[str, Any] = {"name": self.name, "type": self.type, "serialization_format": "cdr"}
         about |= {"offered_qos_profiles": profiles(self.qos), "type_description_hash": self.type_hash}
         return {"topic_metadata": about, "message_count": self.count}
 

@@ -19,7 +19,7 @@ from rosbags.interfaces import ConnectionExtRosbag1
 
 from scenario_gen.bags.storage.config import Allowance, FOUND_BYTES
 from scenario_gen.bags.storage.definitions import ros1_types
-from scenario_gen.bags.storage.mcap import LATEST, Logged, StoredTopic
+from scenario_gen.bags.storage.mcap import BagTopic, LATEST, Logged
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.types import Quality
@@ -40,7 +40,7 @@ class RosbagsFile:
         """Take an open reader of rosbags, and the file that messages name."""
         self._reader, self._file, self._allowance, self._remedy = reader, file, allowance, remedy
 
-    def list_topics(self) -> list[StoredTopic]:
+    def list_topics(self) -> list[BagTopic]:
         """Return the topics.
 
         Raises:
@@ -54,7 +54,7 @@ class RosbagsFile:
                 )
             encoding = getattr(connection.ext, "serialization_format", "cdr")  # of ROS 1 it will be
             name, kind, quality = connection.topic, connection.msgtype, _quality(connection.ext)
-            found.append(StoredTopic(connection.id, name, kind, quality, encoding, connection.msgcount))
+            found.append(BagTopic(name, kind, quality, connection.msgcount, connection.id, encoding))
         return found
 
     def in_order(self, wanted: Collection[int]) -> Iterator[Logged]:

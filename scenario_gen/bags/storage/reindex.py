@@ -5,7 +5,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 import heapq
 from pathlib import Path
@@ -14,11 +14,10 @@ from mcap.records import Channel
 
 from scenario_gen.bags.storage.config import Allowance, BagConfig
 from scenario_gen.bags.storage.definitions import definition
-from scenario_gen.bags.storage.files import METADATA
 from scenario_gen.bags.storage.mcap import DamagedError, Gap, Logged, McapFile
 from scenario_gen.bags.storage.metadata import profiles
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
-from scenario_gen.base.documents import read_yaml, shown
+from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind
 
@@ -69,106 +68,78 @@ def reindex(folder: Path, target: Path, config: BagConfig = BagConfig()) -> Rein
     Raises:
         InputError: there is no MCAP file in `folder`, none holds a whole message, or `target` cannot be written.
     """
-    files = [folder] if folder.is_file() else sorted(folder.glob("*.mcap"), key=lambda path: (len(path.name), path.name))
-    if not files:
+    paths = [folder] if folder.is_file() else sorted(folder.glob("*.mcap"), key=lambda path: (len(path.name), path.name))
+    if not paths:
         raise InputError(f"{folder}: no .mcap file here; name the folder of a recorded bag")
     with ExitStack() as stack:
-        found = _salvaged(files, config, stack)
+        files = _salvaged(paths, config, stack)
+        gaps = tuple((path.name, gap) for path, file in files for gap in file.gaps)
         with atomic_bag(target, REINDEXED, [folder]) as bag:
-            types = _types(found, folder)
-            for part in found:
-                part.announce(bag, types)
-            saved, undescribed = _write(bag, found)
-            gaps = tuple((part.path.name, gap) for part in found for gap in part.whole.gaps)
+            saved, lost = _write(bag, files)
             if not saved:
                 why = f": {gaps[0][1].problem} at byte {gaps[0][1].offset}" if gaps else ""
-                names = shown(", ".join(path.name for path in files))
+                names = shown(", ".join(path.name for path in paths))
                 raise InputError(f"{folder}: not one whole message is left in {names}{why}")
-    unclosed = tuple(part.path.name for part in found if not part.whole.closed)
-    return Reindexed(saved, gaps, tuple(sorted(undescribed.items())), unclosed)
+    return Reindexed(saved, gaps, tuple(sorted(lost.items())), tuple(path.name for path, file in files if not file.closed))
 
 
-def _salvaged(files: list[Path], config: BagConfig, stack: ExitStack) -> list["_Saved"]:
+def _salvaged(paths: list[Path], config: BagConfig, stack: ExitStack) -> list[tuple[Path, McapFile]]:
     """Return what is whole in each file."""
     found = []
     try:
-        sizes = [path.stat().st_size for path in files]
-        first, again = (Allowance(config, str(files[0].parent), sum(sizes)) for _ in range(2))
-        for path, size in zip(files, sizes, strict=True):
-            whole = McapFile(stack.enter_context(path.open("rb")), size, first)
-            whole.scan()
-            whole.allowance = again  # for the second reading, which writes
-            found.append(_Saved(path, whole))
+        sizes = [path.stat().st_size for path in paths]
+        first, again = (Allowance(config, str(paths[0].parent), sum(sizes)) for _ in range(2))
+        for path, size in zip(paths, sizes, strict=True):
+            file = McapFile(stack.enter_context(path.open("rb")), size, first)
+            file.scan()
+            file.allowance = again  # for the second reading, which writes
+            found.append((path, file))
     except OSError as error:
-        raise InputError(f"{error.filename or files[0]}: cannot be read ({error.strerror or error})") from error
+        raise InputError(f"{error.filename or paths[0]}: cannot be read ({error.strerror or error})") from error
     return found
 
 
-class _Saved:
-    """A file and what is whole in it."""
-
-    def __init__(self, path: Path, whole: McapFile) -> None:
-        self.path, self.whole = path, whole
-        self.topics: dict[int, tuple[str, str]] = {}  # by channel: the name, and why its messages cannot be written, or ""
-
-    def announce(self, bag: BagWriter, types: dict[str, str]) -> None:
-        """Announce the topics, whose types are given."""
-        for channel in self.whole.channels.values():
-            self.topics[channel.id] = (channel.topic, self._announced(bag, channel, types.get(channel.topic, "")))
-
-    def _announced(self, bag: BagWriter, channel: Channel, known: str) -> str:
-        """Announce a topic; return "", or why it cannot be."""
-        schema, name = self.whole.schemas.get(channel.schema_id), f"topic {shown(channel.topic)}"
-        kind = schema.name if schema is not None else known
-        if not kind:
-            return f"the type of {name} is not described in what is left"
-        if channel.message_encoding != "cdr":
-            return f"{name} is encoded as {shown(channel.message_encoding)!r}, not as 'cdr'"
-        if kind != known:
-            return f"{name} is of two types, {shown(known)} and {shown(kind)}"
-        text = None
-        try:
-            definition(kind)
-        except InputError as error:
-            if schema is None or not schema.data or schema.encoding == PROTOBUF:
-                return str(error)
-            text = (
-                schema.encoding,
-                schema.data.decode(errors="replace"),
-            )  # a type that is not installed here, as the recorder described it
-        qos, type_hash = (channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash"))
-        bag.add_topic(channel.topic, kind, qos if profiles(qos) else "", type_hash, text)
-        return ""
-
-    def messages(self) -> Iterator[tuple["_Saved", Logged]]:
-        """Yield its messages in order of their stamps."""
-        try:
-            for message in self.whole.in_order(None):
-                yield self, message
-        except DamagedError as error:  # it was whole just now
-            raise InputError(f"{self.path}: changed while it was read ({error})") from error
-
-
-def _types(found: list[_Saved], folder: Path) -> dict[str, str]:
-    """Return the type of each topic that metadata.yaml, if it is sound, or a file names: one may have lost what another has."""
-    types: dict[str, str] = {}
-    with suppress(InputError, KeyError, TypeError):
-        for topic in read_yaml(folder / METADATA)["rosbag2_bagfile_information"]["topics_with_message_count"]:
-            types[str(topic["topic_metadata"]["name"])] = str(topic["topic_metadata"]["type"])
-    for whole in (part.whole for part in found):
-        named = {c.topic: whole.schemas[c.schema_id].name for c in whole.channels.values() if c.schema_id in whole.schemas}
-        types |= named
-    return types
-
-
-def _write(bag: BagWriter, found: list[_Saved]) -> tuple[int, Counter[str]]:
+def _write(bag: BagWriter, files: list[tuple[Path, McapFile]]) -> tuple[int, Counter[str]]:
     """Write all messages; return how many were written, and how many could not be, by the reason."""
-    saved, undescribed = 0, Counter[str]()
-    for part, (stamp, channel, data) in heapq.merge(*(part.messages() for part in found), key=lambda entry: entry[1][0]):
-        topic, lost = part.topics.get(channel, ("", f"channel {channel} is not described in what is left of {part.path.name}"))
-        if lost:
-            undescribed[lost] += 1
+    saved, undescribed, types = 0, Counter[str](), dict[str, str]()
+    reasons = {
+        (path, key): _announced(bag, file, channel, types) for path, file in files for key, channel in file.channels.items()
+    }
+    for path, file, (stamp, number, data) in heapq.merge(*(_messages(*entry) for entry in files), key=lambda entry: entry[2][0]):
+        reason = reasons.get((path, number), f"channel {number} is not described in what is left of {path.name}")
+        if reason:
+            undescribed[reason] += 1
         else:
-            bag.write(topic, data, stamp)
+            bag.write(file.channels[number].topic, data, stamp)
             saved += 1
     return saved, undescribed
+
+
+def _messages(path: Path, file: McapFile) -> Iterator[tuple[Path, McapFile, Logged]]:
+    """Yield the messages of a file in order of their stamps."""
+    try:
+        for message in file.in_order(None):
+            yield path, file, message
+    except DamagedError as error:  # it was whole just now
+        raise InputError(f"{path}: changed while it was read ({error})") from error
+
+
+def _announced(bag: BagWriter, file: McapFile, channel: Channel, types: dict[str, str]) -> str:
+    """Announce a topic; return "", or why its messages cannot be written. `types` are those of the topics before."""
+    schema, name = file.schemas.get(channel.schema_id), f"topic {shown(channel.topic)}"
+    if schema is None:
+        return f"the type of {name} is not described in what is left"
+    if channel.message_encoding != "cdr":
+        return f"{name} is encoded as {shown(channel.message_encoding)!r}, not as 'cdr'"
+    if types.setdefault(channel.topic, schema.name) != schema.name:
+        return f"{name} is of two types, {shown(types[channel.topic])} and {shown(schema.name)}"
+    text = None
+    try:
+        definition(schema.name)
+    except InputError as error:
+        if not schema.data or schema.encoding == PROTOBUF:
+            return str(error)
+        text = (schema.encoding, schema.data.decode(errors="replace"))  # as the recorder described it
+    qos, type_hash = (channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash"))
+    bag.add_topic(channel.topic, schema.name, qos if profiles(qos) else "", type_hash, text)
+    return ""
