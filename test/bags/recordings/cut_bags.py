@@ -26,12 +26,12 @@ def small_bag(folder: Path, *, compress: bool) -> Path:
 
 def chunk_ends(whole: bytes) -> list[tuple[int, int]]:
     """Return where each chunk ends, and how many messages the file has up to there; by the mcap library."""
-    reader = StreamReader(BytesIO(whole), emit_chunks=True)
+    stream = BytesIO(whole)
     found, count = [], 0
-    for record in reader.records:
+    for record in StreamReader(stream, emit_chunks=True).records:
         if isinstance(record, Chunk):
             count += sum(isinstance(inner, Message) for inner in breakup_chunk(record))
-            found.append((reader._stream.count, count))
+            found.append((stream.tell(), count))
     return found
 
 
