@@ -9,7 +9,6 @@ Odometry: `child_frame_id` is `vehicle_<id>`, `pose.pose` the centre of the foot
 `twist.twist.linear.x` the speed along the heading, m/s. Covariances and all else are 0. QoS: reliable, transient_local, depth 1.
 `ego/witness` is one message per scenario, before the scenario: a trajectory of the ego on the scenario's clock, which proves the
 scenario valid. `ego_witness` of its `scenarios/info` is the SHA-256 of the message. QoS as that of `scenarios`.
-Bags of versions before 0.6 have `ego/track` instead: one for the whole request, the vehicle's template, which may hit others.
 """
 
 from collections.abc import Iterator

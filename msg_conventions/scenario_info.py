@@ -190,7 +190,7 @@ class RequestSummary:
         try:
             refused = {Cause(cause): _count(self.values, REFUSED + cause, what) for cause in causes}
         except ValueError as error:
-            raise InputError(f"{what} ({error})") from None
+            raise InputError(f"{what} ({error}); it is of another version: generate its scenarios anew") from None
         return ScenarioSet(
             requested=_count(self.values, "requested", what),
             scenarios=scenarios,

@@ -51,7 +51,6 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "vehicle_*/speed": (TWIST_TYPE, STREAM),
     "ego/start": (odometry.TYPE, LATCHED),
     "ego/goal": (odometry.TYPE, LATCHED),
-    "ego/track": (trajectory.TYPE, LATCHED),  # of bags of versions before 0.6
     ego.WITNESS: (trajectory.TYPE, MANY),
     "vehicle_*/odom": (odometry.TYPE, LIVE),
     "traffic/markers": (markers.ARRAY_TYPE, LIVE),

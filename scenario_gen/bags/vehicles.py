@@ -24,8 +24,7 @@ import numpy as np
 from msg_conventions import odometry, topics, tracks, trajectory
 from msg_conventions.streams import speed_of
 from msg_conventions.yaw import yaw
-from scenario_gen.bags.storage.autoware import TRACKED
-from scenario_gen.bags.storage.definitions import type_store
+from scenario_gen.bags.storage.definitions import TRACKED, type_store
 from scenario_gen.base.errors import guarded
 from scenario_gen.types import Encounter
 

@@ -25,7 +25,7 @@ class Generate:
     """The options of `generate`."""
 
     log: Annotated[
-        list[Path], typer.Argument(help="The recording: CSV, Parquet or SPMD files, or a rosbag2 bag (MCAP or SQLite).")
+        list[Path], typer.Argument(help="The recording: CSV, Parquet or SPMD files, or a bag (MCAP, SQLite or ROS 1).")
     ]
     road: Annotated[
         list[str],

@@ -257,7 +257,7 @@ def _of_files(archive: Path) -> Files:
     bags = {path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)}
     within = {path: not bags.isdisjoint(path.parents) for path in rest} if bags else dict.fromkeys(rest, False)
     tables = [path for path in rest if not within[path] and (is_table(path) or is_commonroad(path) or is_nocturne(path))]
-    loose = [path for path in rest if path.suffix in (".mcap", ".db3") and not within[path]]
+    loose = [path for path in rest if path.suffix in (".mcap", ".db3", ".bag") and not within[path]]
     one_log = not spmd and not bags and not loose and all(path.parent == archive and is_table(path) for path in tables)
     logs = [tables] if tables and one_log else [[path] for path in (*tables, *sorted(bags), *loose)]
     if not spmd and not logs:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""rosbag2 bags, MCAP and SQLite: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
+"""Bags of rosbag2 and of ROS 1: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.bags.storage.autoware import TRACKED
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.definitions import TRACKED
 from scenario_gen.bags.vehicles import decode_sample, decode_tracked, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST, VEHICLES
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig

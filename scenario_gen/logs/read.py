@@ -291,7 +291,7 @@ def time_near(a: Piece, b: Piece, config: LogConfig) -> tuple[float, float, floa
 
 
 def is_bag(path: Path) -> bool:
-    """Return whether it is a bag's folder or a bare .mcap or .db3 file."""
+    """Return whether it is a bag's folder or a bare .mcap, .db3 or .bag file."""
     return bool(files_of(path).files)
 
 
@@ -402,7 +402,7 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
     if known is None:
         raise InputError(
             f"{paths[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad scenarios, scenes of Nocturne and GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3. "
+            "CommonRoad scenarios, scenes of Nocturne and GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3, .bag. "
             "If its name misleads: --set log.format=table"
         )
     with reading(files[0]):

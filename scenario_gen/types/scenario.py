@@ -164,11 +164,6 @@ class Cause(StrEnum):
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the requested range; it was not checked
 
-    @classmethod
-    def _missing_(cls, value: object) -> "Cause | None":
-        """The cause by its name in recordings of versions up to 0.2."""
-        return {"time_law": cls.SPEED_PROFILE, "moving_wait": cls.STOP_NOT_KEPT}.get(str(value))
-
 
 def causes_in_words(refused: Mapping[Cause, int]) -> list[tuple[str, int]]:
     """Return causes of refusal with how many candidates each refused, the most frequent first."""

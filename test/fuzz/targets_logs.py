@@ -21,8 +21,7 @@ from msg_conventions.autoware import AutowareEncoder
 from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import TYPE as TRACKS
-from scenario_gen.bags.storage.autoware import TRACKED
-from scenario_gen.bags.storage.definitions import type_store
+from scenario_gen.bags.storage.definitions import TRACKED, type_store
 from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams

@@ -186,8 +186,7 @@ def tracked(folder):
     """Write a bag of autoware_perception_msgs/TrackedObjects."""
     from rosbags.rosbag2 import StoragePlugin, Writer
 
-    from scenario_gen.bags.storage.autoware import TRACKED
-    from scenario_gen.bags.storage.definitions import type_store
+    from scenario_gen.bags.storage.definitions import TRACKED, type_store
     from scenario_gen.bags.vehicles import KINDS
 
     types = type_store().types

@@ -6,13 +6,17 @@
 from dataclasses import dataclass
 
 from log_builders import crossing, geographic, save
+from mcap.writer import Writer as McapWriter
 import numpy as np
 import pytest
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from synthetic_cases import fix_message, nanoseconds_to_time, twist_message
 
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.bags.storage.definitions import type_store
+from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.definitions import definition, type_store
 from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
@@ -100,6 +104,82 @@ def test_fixes_and_speeds(tmp_path, plain, plugin):
         assert result.quality.rows == 484
     (bag / "metadata.yaml").unlink()
     assert len(read_log(bag).encounters) == 1
+
+
+@pytest.mark.parametrize("compression", [None, *Ros1Writer.CompressionFormat], ids=str)
+def test_a_bag_of_ros_1_is_read_like_one_of_ros_2(tmp_path, compression):
+    """Its headers have a number, its types other names, and one topic is of a type that nobody knows."""
+    types = get_typestore(Stores.ROS1_NOETIC)
+    types.register(get_types_from_msg("std_msgs/Header header\ntime at\nstring[] words", "my_msgs/msg/Odd"))
+    lines = [*streams(crossing()), *odometry(crossing())]
+    writer = Ros1Writer(tmp_path / "drive.bag")
+    if compression:
+        writer.set_compression(compression)
+    with writer:
+        known = {}
+        for line in lines:
+            if line.topic not in known:
+                known[line.topic] = writer.add_connection(line.topic, line.type, typestore=types)
+            writer.write(known[line.topic], line.stamp, STORES.cdr_to_ros1(line.data, line.type))
+        odd = writer.add_connection("/odd", "my_msgs/msg/Odd", typestore=types, latching=1)
+        time = types.types["builtin_interfaces/msg/Time"](sec=1, nanosec=2)
+        head = types.types["std_msgs/msg/Header"](seq=7, stamp=time, frame_id="map")
+        message = types.types["my_msgs/msg/Odd"](header=head, at=time, words=["a", "bc"])
+        writer.write(odd, 5, types.serialize_ros1(message, "my_msgs/msg/Odd"))
+    write(tmp_path / "drive", lines)
+    for kinds in (FIX, TWIST), (ODOMETRY,):
+        config = LogConfig(topics=",".join(dict.fromkeys(line.topic for line in lines if line.type in kinds)))
+        first, second = (read_log(tmp_path / name, config).encounters[0] for name in ("drive.bag", "drive"))
+        for name in ("position", "heading", "speed"):
+            assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
+    (latched,) = (topic for topic in bag_topics(tmp_path / "drive.bag") if topic.name == "/odd")
+    assert (latched.count, latched.quality.transient_local) == (1, True)
+    (found,) = read_messages(tmp_path / "drive.bag", lambda name: name == "/odd")
+    ros2 = get_typestore(Stores.ROS2_JAZZY)
+    ros2.register(get_types_from_msg("std_msgs/Header header\nbuiltin_interfaces/Time at\nstring[] words", "my_msgs/msg/Odd"))
+    assert ros2.deserialize_cdr(found.data, "my_msgs/msg/Odd").words == ["a", "bc"]
+
+
+@pytest.mark.parametrize("damage", ["cut", "not closed", "other fields", "bomb"])
+def test_a_bag_of_ros_1_that_cannot_be_read_is_named(tmp_path, damage):
+    types = get_typestore(Stores.ROS1_NOETIC)
+    if damage == "other fields":
+        types = get_typestore(Stores.EMPTY)
+        types.register(get_types_from_msg("float64 latitude", FIX))
+    path, writer = tmp_path / "drive.bag", Ros1Writer(tmp_path / "drive.bag")
+    writer.set_compression(Ros1Writer.CompressionFormat.BZ2)
+    with writer:
+        connection = writer.add_connection("/a/fix", FIX, typestore=types)
+        writer.write(connection, 5, bytes(100_000_000 if damage == "bomb" else 100))
+    whole = path.read_bytes()
+    if damage == "cut":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif damage == "not closed":
+        place = whole.index(b"index_pos=") + 10
+        path.write_bytes(whole[:place] + bytes(8) + whole[place + 8 :])
+    with pytest.raises(InputError, match=r"drive\.bag.*(rosbag reindex|choose other topics|most_chunk_bytes)"):
+        read_log(path)
+
+
+def test_a_channel_without_schema_or_of_another_kind_breaks_nothing(tmp_path):
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start(profile="ros2")
+        other = writer.register_schema("Status", "jsonschema", b"{}")
+        channels = [writer.register_channel("/bare", "json", 0), writer.register_channel("/status", "json", other)]
+        for line in odometry(crossing()):
+            if line.topic not in channels:
+                channels.append(line.topic)
+                schema = writer.register_schema(line.type, "ros2msg", definition(line.type)[0].encode())
+                channels.append(writer.register_channel(line.topic, "cdr", schema))
+            number = channels[channels.index(line.topic) + 1]
+            writer.add_message(number, log_time=line.stamp, data=line.data, publish_time=line.stamp)
+            for bare in channels[:2]:
+                writer.add_message(bare, log_time=line.stamp, data=b"{}", publish_time=line.stamp)
+        writer.finish()
+    assert len(read_log(tmp_path / "a.mcap").encounters) == 1
+    with pytest.raises(InputError, match=r"topic /bare is of no type"):
+        list(read_messages(tmp_path / "a.mcap", lambda name: name == "/bare"))
 
 
 def test_any_namespace_names_the_vehicle(tmp_path):
@@ -218,7 +298,7 @@ def test_a_damaged_message_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("plugin", StoragePlugin, ids=lambda plugin: plugin.value)
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.1, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
 def test_truncated_bags(tmp_path, plugin, share):
     bag = write(tmp_path / "bag", streams(crossing()), plugin)
     (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
@@ -227,23 +307,6 @@ def test_truncated_bags(tmp_path, plugin, share):
     for path in (bag, file):
         with pytest.raises(InputError, match=file.name):
             read_log(path)
-
-
-def test_flipped_bits_never_end_in_a_traceback(tmp_path):
-    bag = write(tmp_path / "bag", streams(crossing(seconds=6.0)))
-    whole = (bag / "bag.mcap").read_bytes()
-    rng = np.random.Generator(np.random.PCG64(1))
-    refused = 0
-    for _ in range(60):
-        damaged = bytearray(whole)
-        for place in rng.integers(0, len(whole), 20):
-            damaged[place] ^= 1 << int(rng.integers(8))
-        (tmp_path / "flipped.mcap").write_bytes(bytes(damaged))
-        try:
-            read_log(tmp_path / "flipped.mcap")
-        except InputError as error:
-            refused += "flipped" in str(error)
-    assert refused > 30
 
 
 def test_missing_files_and_metadata(tmp_path):

@@ -219,9 +219,9 @@ def test_reports():
     assert_same(entry.asked(), asked, "start", "end")
     assert summary.result(sent.scenarios) == sent
     assert summary.status.level is diagnostics.Level.WARN
-    former = {**summary.values, "refused.time_law": "1", "refused.moving_wait": "2"}  # as 0.2 wrote it
-    refused = replace(summary, status=replace(summary.status, values=former)).result().refused
-    assert refused[Cause.SPEED_PROFILE] == 1 and refused[Cause.STOP_NOT_KEPT] == 2
+    former = {**summary.values, "refused.time_law": "1"}  # as 0.2 wrote it
+    with pytest.raises(InputError, match=r"time_law.* version"):
+        replace(summary, status=replace(summary.status, values=former)).result()
     by_subject = {status.name.partition(": ")[2]: status.values for status in statuses}
     assert_same(fits.decode_fitted(fit.fitted[0].anchors, by_subject, fit.vehicles[0].id), fit.fitted[0], "moved", "stands")
     with pytest.raises(InputError, match="fit of nobody"):

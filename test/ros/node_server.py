@@ -28,6 +28,8 @@ from typing import NoReturn
 
 PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 
+STAND_INS = str(Path(__file__).resolve().parent / "stand_ins")
+
 
 class Forked:
     """A process of the server, with what the tests use of `subprocess.Popen`; `stdin` and `stdout` are pipes of texts.
@@ -200,6 +202,8 @@ def _become(module: str, arguments: list[str], folder: str, environment: dict[st
         os.chdir(folder)
         os.environ.clear()
         os.environ.update(environment)
+        if environment.get("WITHOUT_TF2") != "1":
+            sys.path.append(STAND_INS)  # after a genuine one
         if module == "start":
             sys.argv = arguments[:]
             start.start(arguments[0])

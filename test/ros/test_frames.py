@@ -3,9 +3,10 @@
 
 """What the player tells on /tf and /tf_static, heard by a client and a recorder, and read by other libraries than ours."""
 
+import signal
+
 from bag_examples import hand_made_run
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
+from node_server import start_nodes
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
@@ -15,9 +16,10 @@ from msg_conventions.scenarios import encode_scenario
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import decode
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.bags.storage.bag import bag_topics
+from scenario_gen.bags.storage.bag import bag_topics, read_messages
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
+OFFERED = "geometry_msgs/msg/TransformStamped"  # of the stand-in
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +41,21 @@ def test_bytes_are_those_of_rosbags_and_are_read_back():
     assert np.allclose([one[3] for one in found], poses, rtol=0.0, atol=1e-12)
 
 
-def test_a_type_that_is_not_installed_has_the_name_and_hash_of_the_real_one(client):
-    client.hear("/tf")
-    (offer,) = client.node.get_subscriptions_info_by_topic("/tf")
-    assert offer.topic_type == TYPE
-    assert str(offer.topic_type_hash) == STORE.hash_rihs01(TYPE)
+@pytest.mark.dds
+def test_without_tf2_msgs_the_rest_is_played_and_that_is_said(domain, client, bag):
+    client.hear("scenarios")
+    nodes = {"player": ("-p", f"bag:={bag}", "-p", "rate:=100.0"), "preview": (), "traffic": ()}
+    started = {
+        node: start_nodes("start", node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain), WITHOUT_TF2="1")
+        for node, words in nodes.items()
+    }
+    client.wait("scenarios", 5)
+    for node, process in started.items():
+        client.until(lambda node=node: (node, "/") in client.node.get_node_names_and_namespaces() or node == "player", node)
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=180.0)
+        assert process.returncode == 0 and output.count("no frames are published on /tf:") == 1, output
+        assert "tf2_msgs" in output and "Traceback" not in output
 
 
 @pytest.mark.dds
@@ -83,17 +95,16 @@ def test_a_motion_is_told_sample_by_sample(start, client, run, bag, tmp_path, to
         assert np.allclose(np.cos(turned - told.heading[i]), 1.0, rtol=0.0, atol=1e-12)
 
     assert {one.name: one.type for one in bag_topics(kept)} == {
-        "/tf": TYPE,
-        "/tf_static": TYPE,
+        **dict.fromkeys(("/tf", "/tf_static"), OFFERED),
         **dict.fromkeys(footprints, "geometry_msgs/msg/PolygonStamped"),
     }
     tree, drawn = {}, {}
-    with (kept / "kept_0.mcap").open("rb") as stream:
-        for _, channel, _, message in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
-            for one in getattr(message, "transforms", ()):
-                assert tree.setdefault(one.child_frame_id, one.header.frame_id) == one.header.frame_id
-            if hasattr(message, "polygon"):
-                drawn.setdefault(channel.topic, []).append(message)
+    for message in read_messages(kept):
+        if message.type == OFFERED:
+            for _, parent, child, _ in decode_frames(message.data):
+                assert tree.setdefault(child, parent) == parent
+        else:
+            drawn.setdefault(message.topic, []).append(STORE.deserialize_cdr(message.data, message.type))
     assert tree == {"local_enu": "map", "vehicle_1": told.frame_id, "vehicle_bus_2": told.frame_id}
     assert set(drawn) == set(footprints) and {one.header.frame_id for ones in drawn.values() for one in ones} <= set(tree)
 
@@ -138,6 +149,4 @@ def _counted(client, topic):
 
 
 def _logged(bag, number):
-    from scenario_gen.bags.storage.bag import read_messages
-
     return [message.stamp_ns for message in read_messages(bag, lambda name: name.endswith("scenarios"))][number]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from msg_conventions import odometry
 from msg_conventions.autoware import AutowareEncoder, EGO, OBJECTS, QUALITY, TRACKS
-from scenario_gen.bags.storage.autoware import PREDICTED, TRACKED
+from scenario_gen.bags.storage.definitions import PREDICTED, TRACKED
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.types import Scenario

@@ -21,14 +21,14 @@ from msg_conventions.ego import WITNESS
 from msg_conventions.hashes import decode_hashes, hash_of
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import encode_info, INFO, RequestSummary, ScenarioEntry
-from msg_conventions.scenarios import decode_scenario, messages_of
+from msg_conventions.scenarios import messages_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.recordings.scenarios import RecordedScenarios, SCENARIOS
 from scenario_gen.bags.recordings.template import anchor_index, decode_routes, lanes_beside, template_statuses
 from scenario_gen.bags.storage.bag import BagMessage, read_messages, within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, Scenario, ScenarioSet, Segmentation
+from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, ScenarioSet, Segmentation
 
 __all__ = [
     "INFO",
@@ -45,10 +45,10 @@ __all__ = [
 ]
 
 NO_ENTRY = f"{INFO} has no entry for them (lost with the end of a recording?)"
-TEMPLATE_TOPICS = r"tracks|changepoints|map|fit|road/entries|road/exits|road/lanes|vehicle_\w+/route|ego/(?:start|goal|track)"
+TEMPLATE_TOPICS = r"tracks|changepoints|map|fit|road/entries|road/exits|road/lanes|vehicle_\w+/route|ego/(?:start|goal)"
 TEMPLATE = re.compile(TEMPLATE_TOPICS, re.DOTALL)
 READ = re.compile(
-    rf"(?:(?P<namespace>.*?)/)?(?P<topic>{TEMPLATE_TOPICS}|posterior|fit/info|ego/witness|scenarios|scenarios/info|diagnostics)",
+    rf"(?:(?P<namespace>.*?)/)?(?P<topic>{TEMPLATE_TOPICS}|posterior|fit/info|ego/witness|ego/track|scenarios|scenarios/info|diagnostics)",
     re.DOTALL,
 )
 Statuses = Mapping[str, Mapping[str, str]]  # key-values of diagnostics, by subject
@@ -81,12 +81,14 @@ def read_recording(path: Path, config: BagConfig = BagConfig(), topics: Collecti
         topics: names without namespace; none: all topics of the conventions. With scenarios come their witnesses.
 
     Raises:
-        InputError: the bag is missing or damaged, or larger than `config` allows.
+        InputError: the bag is missing or damaged, larger than `config` allows, or of a version before 0.6.
     """
     wanted = {*topics, *((WITNESS,) if SCENARIOS in topics else ())}
 
     def known(name: str) -> re.Match[str] | None:
         match = READ.fullmatch(name)
+        if match and match["topic"] == "ego/track":
+            raise InputError(f"{path} is of a version before 0.6, by its topic {name}; generate its scenarios anew from the log")
         return match if match and (not topics or match["topic"] in wanted) else None
 
     found: dict[str, dict[str, list[BagMessage]]] = {}
@@ -213,12 +215,6 @@ class Namespace(RecordedScenarios):
         """The diagnostics about the newest template; the last value counts."""
         stamp = self.encounter.start_ns
         return template_statuses(self._shared, stamp, f"{self.name}/") | template_statuses(self.data("diagnostics"), stamp)
-
-    @cached_property
-    def ego_track(self) -> Scenario | None:
-        """The newest track of an ego, of a bag of a version before 0.6."""
-        tracks = self.data("ego/track")
-        return decode_scenario(tracks[-1], what=self.where("ego/track"), late=True)[1] if tracks else None
 
     @cached_property
     def road_name(self) -> str:

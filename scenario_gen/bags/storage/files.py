@@ -10,7 +10,7 @@ from typing import Any
 from scenario_gen.base.documents import read_yaml, shown
 from scenario_gen.base.errors import InputError
 
-SUFFIXES = (".mcap", ".db3")
+SUFFIXES = (".mcap", ".db3", ".bag")
 METADATA = "metadata.yaml"
 LOST = "scenario_gen.lost:"  # begins the keys of custom_data that name what is not in the bag, by topic
 
@@ -30,7 +30,7 @@ def files_of(path: Path) -> BagFiles:
         InputError: metadata.yaml is damaged, or lists a file that is not there.
     """
     if path.is_file():
-        return BagFiles((path,) if path.suffix.lower() in SUFFIXES else ())
+        return BagFiles((path,) if path.suffix in SUFFIXES else ())
     metadata = path / METADATA
     if not metadata.exists():
         return BagFiles(_in_folder(path))
@@ -48,7 +48,7 @@ def files_of(path: Path) -> BagFiles:
 
 def _in_folder(path: Path) -> tuple[Path, ...]:
     try:
-        found = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file()]
+        found = [file for file in path.iterdir() if file.suffix in SUFFIXES and file.is_file()]
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from error
     return tuple(sorted(found, key=lambda file: (len(file.name), file.name)))

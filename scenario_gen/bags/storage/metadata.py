@@ -14,13 +14,12 @@ from scenario_gen.base.documents import parse_yaml
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Quality
 
-VERSION = 9
 TIMES = ("deadline", "lifespan", "liveliness_lease_duration")
 NAMED = ("history", "reliability", "durability", "liveliness")
 FOREVER = {"sec": 9223372036, "nsec": 854775807}  # rmw's infinite duration
 
 
-class _PlainDumper(yaml.SafeDumper):  # type: ignore[misc]
+class _PlainDumper(yaml.CSafeDumper):  # type: ignore[misc]
     """No anchors: rosbag2's YAML reader does not want them."""
 
     def ignore_aliases(self, data: Any) -> bool:
@@ -37,25 +36,34 @@ class TopicInfo:
     type_hash: str
     count: int = 0
 
+    @property
+    def document(self) -> dict[str, Any]:
+        """As in metadata.yaml."""
+        about: dict[str, Any] = {"name": self.name, "type": self.type, "serialization_format": "cdr"}
+        about |= {"offered_qos_profiles": profiles(self.qos), "type_description_hash": self.type_hash}
+        return {"topic_metadata": about, "message_count": self.count}
+
 
 @dataclass
 class FileInfo:
-    """The metadata of one file: stamps in nanoseconds."""
+    """The metadata of one file, or of several: stamps in nanoseconds."""
 
     path: str
     start_ns: int = 2**63 - 1
     end_ns: int = 0
     count: int = 0
 
-    def add(self, stamp_ns: int) -> None:
-        """Count one message."""
-        self.start_ns, self.end_ns = min(self.start_ns, stamp_ns), max(self.end_ns, stamp_ns)
-        self.count += 1
+    def add(self, start_ns: int, end_ns: int, count: int = 1) -> None:
+        """Count messages between two stamps."""
+        self.start_ns, self.end_ns = min(self.start_ns, start_ns), max(self.end_ns, end_ns)
+        self.count += count
 
     @property
-    def span(self) -> tuple[int, int]:
-        """First stamp and duration in nanoseconds; zeros for an empty file."""
-        return (self.start_ns, self.end_ns - self.start_ns) if self.count else (0, 0)
+    def document(self) -> dict[str, Any]:
+        """First stamp, duration and count as in metadata.yaml; zeros where there is no message."""
+        start, duration = (self.start_ns, self.end_ns - self.start_ns) if self.count else (0, 0)
+        times = {"starting_time": {"nanoseconds_since_epoch": start}, "duration": {"nanoseconds": duration}}
+        return times | {"message_count": self.count}
 
 
 @dataclass
@@ -90,58 +98,20 @@ def qos_yaml(quality: Quality) -> str:
     return dump([profile]).rstrip("\n")
 
 
-@lru_cache(maxsize=256)
-def _topic_yaml(name: str, type_name: str, qos: str, type_hash: str) -> str:
-    """Return a topic's entry in metadata.yaml, up to the number of its messages."""
-    metadata = {
-        "name": name,
-        "type": type_name,
-        "serialization_format": "cdr",
-        "offered_qos_profiles": profiles(qos),
-        "type_description_hash": type_hash,
-    }
-    text = dump({"bag": {"topics": [{"topic_metadata": metadata, "message_count": 0}]}})  # indented as in the document
-    return text.split("\n", 2)[2].removesuffix("0\n")
-
-
 def metadata_yaml(info: BagInfo) -> str:
     """Return the text of metadata.yaml."""
     whole = FileInfo("")
     for file in info.files:
-        if file.count:
-            whole.start_ns, whole.end_ns = min(whole.start_ns, file.start_ns), max(whole.end_ns, file.end_ns)
-            whole.count += file.count
-    start, duration = whole.span
-    text = dump(
-        {
-            "rosbag2_bagfile_information": {
-                "version": VERSION,
-                "storage_identifier": "mcap",
-                "duration": {"nanoseconds": duration},
-                "starting_time": {"nanoseconds_since_epoch": start},
-                "message_count": whole.count,
-                "topics_with_message_count": [],
-                "compression_format": "",
-                "compression_mode": "",
-                "relative_file_paths": [file.path for file in info.files],
-                "files": [
-                    {
-                        "path": file.path,
-                        "starting_time": {"nanoseconds_since_epoch": file.span[0]},
-                        "duration": {"nanoseconds": file.span[1]},
-                        "message_count": file.count,
-                    }
-                    for file in info.files
-                ],
-                "custom_data": {f"{LOST}{topic}": words for topic, words in info.lost.items()} or None,
-                "ros_distro": "jazzy",
-            }
-        }
-    )
-    topics = "".join(f"{_topic_yaml(topic.name, topic.type, topic.qos, topic.type_hash)}{topic.count}\n" for topic in info.topics)
-    return text.replace(" []\n", "\n" + topics, 1) if topics else text
+        whole.add(file.start_ns, file.end_ns, file.count)
+    about = {"version": 9, "storage_identifier": "mcap", **whole.document}
+    about |= {"topics_with_message_count": [topic.document for topic in info.topics]}
+    about |= {"compression_format": "", "compression_mode": "", "relative_file_paths": [file.path for file in info.files]}
+    about |= {"files": [{"path": file.path} | file.document for file in info.files]}
+    about |= {"custom_data": {f"{LOST}{topic}": words for topic, words in info.lost.items()} or None, "ros_distro": "jazzy"}
+    return dump({"rosbag2_bagfile_information": about})
 
 
+@lru_cache(maxsize=256)
 def profiles(text: str) -> list[dict[str, Any]]:
     """Return the profiles, none if the text is damaged: a bag can be read without them."""
     try:
@@ -162,7 +132,6 @@ def _is_whole(profile: Any) -> bool:
     )
 
 
-@lru_cache(maxsize=256)
 def quality_of(text: str) -> Quality:
     """Return the quality that the first of the profiles offers: volatile, depth 10 where there is none."""
     for profile in profiles(text)[:1]:

@@ -9,23 +9,20 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 import heapq
 from pathlib import Path
-from typing import Any
 
-from mcap.records import Channel, Schema
+from mcap.records import Channel
 
 from scenario_gen.bags.storage.config import Allowance, BagConfig
 from scenario_gen.bags.storage.definitions import definition
-from scenario_gen.bags.storage.files import METADATA
-from scenario_gen.bags.storage.mcap import Logged, McapFile
+from scenario_gen.bags.storage.mcap import DamagedError, Gap, Logged, McapFile
 from scenario_gen.bags.storage.metadata import profiles
-from scenario_gen.bags.storage.records import DamagedError, PROTOBUF
-from scenario_gen.bags.storage.salvage import Gap, Salvage, salvage
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
-from scenario_gen.base.documents import read_yaml, shown
+from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind
 
 REINDEXED = Kind("reindexed bag")
+PROTOBUF = "protobuf"  # the encoding of schemas that are no texts
 MOST_LINES = 20  # of what was lost, on a terminal
 
 
@@ -71,117 +68,78 @@ def reindex(folder: Path, target: Path, config: BagConfig = BagConfig()) -> Rein
     Raises:
         InputError: there is no MCAP file in `folder`, none holds a whole message, or `target` cannot be written.
     """
-    files = [folder] if folder.is_file() else sorted(folder.glob("*.mcap"), key=lambda path: (len(path.name), path.name))
-    if not files:
+    paths = [folder] if folder.is_file() else sorted(folder.glob("*.mcap"), key=lambda path: (len(path.name), path.name))
+    if not paths:
         raise InputError(f"{folder}: no .mcap file here; name the folder of a recorded bag")
     with ExitStack() as stack:
-        found = _salvaged(files, config, stack)
+        files = _salvaged(paths, config, stack)
+        gaps = tuple((path.name, gap) for path, file in files for gap in file.gaps)
         with atomic_bag(target, REINDEXED, [folder]) as bag:
-            saved, undescribed = _write(bag, found, _types(found, folder))
+            saved, lost = _write(bag, files)
             if not saved:
-                gaps = [gap for _, part in found for gap in part.gaps]
-                why = f": {gaps[0].problem} at byte {gaps[0].offset}" if gaps else ""
-                raise InputError(
-                    f"{folder}: not one whole message is left in {shown(', '.join(path.name for path in files))}{why}"
-                )
-    return Reindexed(
-        saved,
-        tuple((path.name, gap) for path, part in found for gap in part.gaps),
-        tuple(sorted(undescribed.items())),
-        tuple(path.name for path, part in found if not part.closed),
-    )
+                why = f": {gaps[0][1].problem} at byte {gaps[0][1].offset}" if gaps else ""
+                names = shown(", ".join(path.name for path in paths))
+                raise InputError(f"{folder}: not one whole message is left in {names}{why}")
+    return Reindexed(saved, gaps, tuple(sorted(lost.items())), tuple(path.name for path, file in files if not file.closed))
 
 
-def _salvaged(files: list[Path], config: BagConfig, stack: ExitStack) -> list[tuple[Path, Salvage]]:
+def _salvaged(paths: list[Path], config: BagConfig, stack: ExitStack) -> list[tuple[Path, McapFile]]:
+    """Return what is whole in each file."""
     found = []
     try:
-        sizes = [path.stat().st_size for path in files]
-        first, again = (Allowance(config, str(files[0].parent), sum(sizes)) for _ in range(2))
-        for path, size in zip(files, sizes, strict=True):
-            part = salvage(stack.enter_context(path.open("rb")), size, first)
-            part.whole.allowance = again  # for the second reading, which writes
-            found.append((path, part))
+        sizes = [path.stat().st_size for path in paths]
+        first, again = (Allowance(config, str(paths[0].parent), sum(sizes)) for _ in range(2))
+        for path, size in zip(paths, sizes, strict=True):
+            file = McapFile(stack.enter_context(path.open("rb")), size, first)
+            file.scan()
+            file.allowance = again  # for the second reading, which writes
+            found.append((path, file))
     except OSError as error:
-        raise InputError(f"{error.filename or files[0]}: cannot be read ({error.strerror or error})") from error
+        raise InputError(f"{error.filename or paths[0]}: cannot be read ({error.strerror or error})") from error
     return found
 
 
-def _types(found: list[tuple[Path, Salvage]], folder: Path) -> dict[str, str]:
-    """Return the type of every topic that the files or metadata.yaml name: a file may have lost what another one has."""
-    types = _types_in_metadata(folder / METADATA)
-    for _, part in found:
-        for channel in part.whole.channels.values():
-            schema = part.whole.schemas.get(channel.schema_id)
-            if schema is not None:
-                types[channel.topic] = schema.name
-    return types
-
-
-def _types_in_metadata(path: Path) -> dict[str, str]:
-    """Return topics and types as far as metadata.yaml, which may be damaged too, names them."""
-    found: dict[str, str] = {}
-    try:
-        listed: Any = read_yaml(path)["rosbag2_bagfile_information"]["topics_with_message_count"]
-        for entry in listed:
-            about = entry["topic_metadata"]
-            if isinstance(about["name"], str) and isinstance(about["type"], str):
-                found[about["name"]] = about["type"]
-    except (InputError, KeyError, TypeError):
-        return found
-    return found
-
-
-def _write(bag: BagWriter, found: list[tuple[Path, Salvage]], types: dict[str, str]) -> tuple[int, Counter[str]]:
-    """Write the messages that were found; return how many, and how many could not be written, by the reason."""
-    topics = [_announce(bag, part.whole, types) for _, part in found]
-    saved, undescribed = 0, Counter[str]()
-    streams = [_logged(k, path, part.whole) for k, (path, part) in enumerate(found)]
-    for k, (stamp, channel, data) in heapq.merge(*streams, key=lambda entry: entry[1][0]):
-        topic, lost = topics[k].get(channel, ("", f"channel {channel} is not described in what is left of {found[k][0].name}"))
-        if lost:
-            undescribed[lost] += 1
+def _write(bag: BagWriter, files: list[tuple[Path, McapFile]]) -> tuple[int, Counter[str]]:
+    """Write all messages; return how many were written, and how many could not be, by the reason."""
+    saved, undescribed, types = 0, Counter[str](), dict[str, str]()
+    reasons = {
+        (path, key): _announced(bag, file, channel, types) for path, file in files for key, channel in file.channels.items()
+    }
+    for path, file, (stamp, number, data) in heapq.merge(*(_messages(*entry) for entry in files), key=lambda entry: entry[2][0]):
+        reason = reasons.get((path, number), f"channel {number} is not described in what is left of {path.name}")
+        if reason:
+            undescribed[reason] += 1
         else:
-            bag.write(topic, data, stamp)
+            bag.write(file.channels[number].topic, data, stamp)
             saved += 1
     return saved, undescribed
 
 
-def _logged(number: int, path: Path, whole: McapFile) -> Iterator[tuple[int, Logged]]:
+def _messages(path: Path, file: McapFile) -> Iterator[tuple[Path, McapFile, Logged]]:
+    """Yield the messages of a file in order of their stamps."""
     try:
-        for message in whole.in_order(None, strict=False):
-            yield number, message
-    except DamagedError as error:  # the salvage has found it whole
+        for message in file.in_order(None):
+            yield path, file, message
+    except DamagedError as error:  # it was whole just now
         raise InputError(f"{path}: changed while it was read ({error})") from error
 
 
-def _announce(bag: BagWriter, whole: McapFile, types: dict[str, str]) -> dict[int, tuple[str, str]]:
-    """Announce the topics of a file; return {channel: (topic, "" or why its messages cannot be written)}."""
-    announced: dict[int, tuple[str, str]] = {}
-    for channel in whole.channels.values():
-        schema = whole.schemas.get(channel.schema_id)
-        kind = schema.name if schema is not None else types.get(channel.topic, "")
-        name = f"topic {shown(channel.topic)}"
-        if not kind:
-            lost = f"the type of {name} is not described in what is left"
-        elif channel.message_encoding != "cdr":
-            lost = f"{name} is encoded as {shown(channel.message_encoding)!r}, not as 'cdr'"
-        elif kind != types[channel.topic]:
-            lost = f"{name} is of two types, {shown(types[channel.topic])} and {shown(kind)}"
-        else:
-            lost = _announced(bag, channel, kind, schema)
-        announced[channel.id] = (channel.topic, lost)
-    return announced
-
-
-def _announced(bag: BagWriter, channel: Channel, kind: str, schema: Schema | None) -> str:
-    """Announce a topic; return "", or why it cannot be."""
-    known = None
+def _announced(bag: BagWriter, file: McapFile, channel: Channel, types: dict[str, str]) -> str:
+    """Announce a topic; return "", or why its messages cannot be written. `types` are those of the topics before."""
+    schema, name = file.schemas.get(channel.schema_id), f"topic {shown(channel.topic)}"
+    if schema is None:
+        return f"the type of {name} is not described in what is left"
+    if channel.message_encoding != "cdr":
+        return f"{name} is encoded as {shown(channel.message_encoding)!r}, not as 'cdr'"
+    if types.setdefault(channel.topic, schema.name) != schema.name:
+        return f"{name} is of two types, {shown(types[channel.topic])} and {shown(schema.name)}"
+    text = None
     try:
-        definition(kind)
+        definition(schema.name)
     except InputError as error:
-        if schema is None or not schema.data or schema.encoding == PROTOBUF:
+        if not schema.data or schema.encoding == PROTOBUF:
             return str(error)
-        known = (schema.encoding, schema.data.decode())  # a type that is not installed here, as the recorder described it
+        text = (schema.encoding, schema.data.decode(errors="replace"))  # as the recorder described it
     qos, type_hash = (channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash"))
-    bag.add_topic(channel.topic, kind, qos if profiles(qos) else "", type_hash, known)
+    bag.add_topic(channel.topic, schema.name, qos if profiles(qos) else "", type_hash, text)
     return ""

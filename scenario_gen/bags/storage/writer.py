@@ -46,7 +46,6 @@ class BagWriter:
         self._split = split
         self._topics: dict[str, tuple[TopicInfo, tuple[str, str]]] = {}
         self._broken = False
-        self.held = False  # whether messages were written since the last `let_go`
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -126,10 +125,9 @@ class BagWriter:
             channel = self._channel(name)
             self._writer.add_message(channel, log_time=stamp_ns, data=data, publish_time=stamp_ns, sequence=topic.count)
             self._stream.flush()  # a full chunk, which the writer has just written
-        self._file.add(stamp_ns)
+        self._file.add(stamp_ns, stamp_ns)
         self._bytes += len(data)
         topic.count += 1
-        self.held = True
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -147,12 +145,9 @@ class BagWriter:
         Raises:
             OSError: the disk is full, or fails; nothing more can be written.
         """
-        if self._broken or not self.held:
-            return
-        with self._writing():
-            self._writer._Writer__finalize_chunk()  # mcap has no public name for it
-            self._stream.flush()
-        self.held = False
+        if not self._broken:
+            with self._writing():
+                self._writer.flush()
 
     def close(self) -> None:
         """Write indexes and metadata.yaml; where a write has failed, leave the files as they are, for `reindex`.

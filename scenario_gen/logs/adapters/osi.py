@@ -27,8 +27,7 @@ import betterosi
 import pandas as pd
 
 from scenario_gen.bags.storage.config import Allowance, BagConfig
-from scenario_gen.bags.storage.mcap import McapFile, open_mcap
-from scenario_gen.bags.storage.records import DamagedError
+from scenario_gen.bags.storage.mcap import DamagedError, McapFile, open_mcap
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.adapters import tracks

@@ -17,7 +17,7 @@ from scenario_gen.output.exchange.lanes import Lane, LaneMap, lanes_of
 from scenario_gen.output.exchange.road_lanes import lane_map_of
 from scenario_gen.types import Road, Scenario, split_off, tokens
 
-TOPICS = ("tracks", "map", "road/lanes", "fit/info", "ego/track", SCENARIOS, INFO)
+TOPICS = ("tracks", "map", "road/lanes", "fit/info", SCENARIOS, INFO)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +163,10 @@ def _with_ego(
     if slot:
         if requested not in ("", slot):
             raise InputError(f"{where} was made for ego {slot!r}; leave --ego out, or name that one")
-        track = scenario.witness or space.ego_track
+        track = scenario.witness
         if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
             raise InputError(f"{where} was made for ego {slot!r}, whose track is not on {space.where(WITNESS)}")
-        return replace(scenario, witness=None), track, scenario.witness is not None
+        return replace(scenario, witness=None), track, True
     if not requested:
         return scenario, None, False
     if requested not in ids:

@@ -88,11 +88,7 @@ def _result(
         notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {NO_ENTRY}")
     rows = [replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row for row in evaluation.rows]
     evaluation = replace(evaluation, rows=tuple(rows))
-    ego, track = None, namespace.ego_track
-    if track is not None and track.vehicles[0].id not in evaluation.vehicles:  # else of another request than these scenarios
-        scenarios = tuple(
-            scenario if scenario.witness else replace(scenario, witness=track) for scenario in scenarios
-        )  # to be drawn
+    ego = None
     witness = next((scenario.witness for scenario in scenarios if scenario.witness is not None), None)
     if witness is not None:
         first, last = (np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]]) for k in (0, -1))

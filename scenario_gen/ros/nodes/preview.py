@@ -22,7 +22,7 @@ from msg_conventions.scenarios import decode_scenario, digest
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.plumbing.stage_node import StageNode
-from scenario_gen.ros.plumbing.topics import create_publisher
+from scenario_gen.ros.plumbing.topics import create_frames_publisher
 from scenario_gen.template import find_conflicts
 from scenario_gen.types import Scenario, tokens
 
@@ -60,7 +60,7 @@ class Preview(StageNode):
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("preview", Config(), namespace)
-        self._tf = create_publisher(self, "/tf")
+        self._tf = create_frames_publisher(self, "/tf")
         self._messages: dict[str, bytes] = {}  # by SHA-256, oldest first
         self._newest: tuple[Scenario, ScenarioEntry] | None = None
         self._shown: Shown | None = None

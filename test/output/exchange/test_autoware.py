@@ -13,11 +13,11 @@ from small_scenarios import crossing, one_vehicle
 
 from msg_conventions.autoware import AutowareEncoder, encode_predicted_objects
 from scenario_gen.bags.recordings.autoware import autoware_messages, TYPES
-from scenario_gen.bags.storage.autoware import DEFINITIONS, PACKAGE, PREDICTED, TRACKED
-from scenario_gen.bags.storage.definitions import definition, type_store
+from scenario_gen.bags.storage.definitions import definition, PREDICTED, TRACKED, type_store
 
 OBJECTS, TRACKS = "/perception/object_recognition/objects", "/perception/object_recognition/tracking/objects"
 EGO = "/localization/kinematic_state"
+PACKAGE = "autoware_perception_msgs"
 START = 1_700_000_000_000_000_000
 
 
@@ -106,9 +106,14 @@ def test_hashes_are_those_that_rosidl_computes(tmp_path):
     if not (share / "geometry_msgs" / "msg" / "Pose.json").is_file():
         pytest.skip("the ROS wheels are not installed: a sourced Jazzy has its type descriptions elsewhere")
     (tmp_path / "msg").mkdir()
-    for kind, text in DEFINITIONS.items():
-        (tmp_path / f"{kind.removeprefix(PACKAGE + '/')}.msg").write_text(text)
-    files = [Path(f"{kind.removeprefix(PACKAGE + '/')}.msg") for kind in DEFINITIONS]
+    texts = {}
+    for kind in (PREDICTED, TRACKED):
+        for part in f"MSG: {kind}\n{definition(kind)[0]}".split(f"{'=' * 80}\n"):
+            name, _, text = part.partition("\n")
+            texts[Path("msg") / f"{name.rpartition('/')[2]}.msg"] = text if PACKAGE in name else ""
+    files = [file for file, text in texts.items() if text]
+    for file in files:
+        (tmp_path / file).write_text(texts[file])
     idl = [adapter.convert_msg_to_idl(tmp_path, PACKAGE, file, tmp_path / "msg") for file in files]
     arguments = {
         "package_name": PACKAGE,
