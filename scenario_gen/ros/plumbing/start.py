@@ -120,8 +120,7 @@ def _load(nodes: list[str]) -> None:
     from scenario_gen.ros.plumbing.process import kernels_ready
 
     stages = dict.fromkeys(stage for node in nodes for stage in getattr(node_class(node), "STAGES", ()))
-    count, seconds = kernels_ready(stages)
-    emit(event="loaded", kernels=count, seconds=seconds)
+    emit(event="loaded", kernels=kernels_ready(stages))
 
 
 def fork(specification: list[dict[str, Any]]) -> None:
