@@ -73,7 +73,7 @@ def parameters() -> None:
 
 @installation.command()
 def doctor() -> None:
-    """Check this environment: Python, packages, ROS, DDS, QoS of the visible topics, compiled kernels."""
+    """Check this environment: Python, packages, ROS 2. `ros2 doctor` checks the network and QoS."""
     from scenario_gen.ros.plumbing.doctor import ERROR, examine
 
     findings = []
