@@ -1,40 +1,50 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Run the whole suite for some jobs, as separate processes over DDS, into one bag; the demo's way."""
+"""Run the whole suite for some jobs, over DDS, into one bag: the recorder in one process, all other nodes in another."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
-import json
+import multiprocessing
+from multiprocessing.process import BaseProcess
 import os
 from pathlib import Path
-import select
 import shutil
-import subprocess
+import signal
 import sys
 import tempfile
 import time
 from typing import Any
 
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 import yaml
 
+from msg_conventions.diagnostics import decode_diagnostics, Level, Status
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.base.interrupts import ending
+from scenario_gen.base.interrupts import end_with_parent, ending, starting
 from scenario_gen.base.parameters import flatten
-from scenario_gen.base.ros_domain import free_domain, this_host_only
+from scenario_gen.base.ros_domain import own_domain
 from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.ros.plumbing.ros_parameters import config_of
+from scenario_gen.ros.plumbing.start import node_class, start
+from scenario_gen.ros.plumbing.topics import create_subscription
 
-NODES = ("recorder", "watcher", "gp_sampler", "planner", "segmenter", "road_server", "log_player")
+NODES = ("gp_sampler", "planner", "segmenter", "road_server", "log_player")
 # who must have spoken before the next one can: topic -> node
-CHAIN = {"tracks": "log_player", "map": "road_server", "changepoints": "segmenter", "fit": "planner", "scenarios": "gp_sampler"}
-SECTIONS = {
-    "log_player": ("log",),
-    "road_server": ("road",),
-    "segmenter": ("segmentation",),
-    "planner": ("fitting", "planning"),
-    "gp_sampler": ("fitting", "planning", "sampling", "limits"),
+CHAIN = {
+    "tracks": "log_player",
+    "map": "road_server",
+    "changepoints": "segmenter",
+    "fit": "planner",
+    "scenarios/info": "gp_sampler",
 }
+END_S = 30.0  # seconds that a process has to end by itself
+POLL_S = 0.2
+Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -48,47 +58,71 @@ class Job:
 
 
 @dataclass
-class _State:
-    """What is known of the jobs so far."""
+class Progress:
+    """What has been heard of the jobs so far."""
 
-    published_topics: dict[str, set[str]]
-    published: dict[str, int] = field(default_factory=dict)
-    recorded: dict[str, int] = field(default_factory=dict)
+    jobs: Sequence[Job]
+    tell: Tell
+    heard: set[str] = field(default_factory=set)  # topics, by their full names
+    published: dict[str, int] = field(default_factory=dict)  # scenarios, by namespace
+    recorded: dict[str, int] = field(default_factory=dict)  # messages in the bag, by topic
+    told: dict[str, str] = field(default_factory=dict)  # messages by status: /diagnostics has all again every second
 
     def complete(self) -> bool:
         """Say whether every job's scenarios have been published and recorded."""
         return all(
-            namespace in self.published
-            and self.recorded.get(f"{namespace}/scenarios", 0) >= self.published[namespace]
-            and self.recorded.get(f"{namespace}/scenarios/info", 0) > self.published[namespace]
-            for namespace in self.published_topics
+            (count := self.published.get(job.namespace)) is not None
+            and self.recorded.get(f"{job.namespace}/scenarios", 0) >= count
+            and self.recorded.get(f"{job.namespace}/scenarios/info", 0) > count
+            for job in self.jobs
         )
 
-    def waiting_for(self) -> str:
+    def late(self) -> str:
         """Return the first node of the chain that has not answered, and for which job."""
-        for namespace, topics in self.published_topics.items():
+        for job in self.jobs:
             for topic, node in CHAIN.items():
-                if topic not in topics:
-                    return f"{namespace}/{node}"
+                if f"{job.namespace}/{topic}" not in self.heard:
+                    return f"{job.namespace}/{node}"
         return "/recorder"
+
+    def take(self, topic: str, data: bytes) -> None:
+        """Take a message in.
+
+        Raises:
+            InputError, RefusedError: a node reports an error of that kind.
+        """
+        self.heard.add(topic)
+        if not topic.endswith(("/diagnostics", "/info")):
+            return
+        for status in decode_diagnostics(data)[1]:
+            if topic == "/diagnostics":
+                self._take_status(status)
+            elif "published" in status.values:
+                self.published[topic.removesuffix("/scenarios/info")] = int(status.values["published"])
+                self.tell(f"{topic.removesuffix('/scenarios/info')}: {status.message}")
+
+    def _take_status(self, status: Status) -> None:
+        if status.name == "/recorder: recorded":
+            self.recorded = {name: int(count) for name, count in status.values.items()}
+        elif status.level >= Level.ERROR:
+            error = InputError if status.values.get("error") == "InputError" else RefusedError
+            raise error(f"{status.name}: {status.message}")
+        elif "progress" in status.name and "request" in status.values and self.told.get(status.name) != status.message:
+            self.told[status.name] = status.message
+            self.tell(f"{status.name.partition(':')[0]}: {status.message}")
 
 
 def parameters(jobs: Sequence[Job], config: PipelineConfig, count: int, seed: int, bag: Path) -> dict[str, Any]:
-    """Return the parameter file of the suite."""
-    values = {name: value for name, (_, value) in flatten(config).items()}
-    common = {node: {n: v for n, v in values.items() if n.split(".")[0] in heads} for node, heads in SECTIONS.items()}
-    for node in ("segmenter", "planner", "gp_sampler"):
-        common[node]["seed"] = seed
-    common["gp_sampler"]["count"] = count
-    common["road_server"]["wait_for_tracks"] = True
+    """Return the parameter file of the suite: of every node what it declares of the pipeline's parameters."""
+    values = {name: value for name, (_, value) in flatten(config).items()} | {"count": count, "seed": seed}
+    common = {node: {name: values[name] for name in flatten(config_of(node_class(node))) if name in values} for node in NODES}
     result: dict[str, Any] = {"/recorder": {"bag": str(bag)}}
     for job in jobs:
-        own: dict[str, dict[str, Any]] = {
+        own = {
             "log_player": {"log_path": str(job.log.resolve()), "encounter": job.encounter},
-            "road_server": {"road_name": job.road},
+            "road_server": {"road_name": job.road, "wait_for_tracks": True},
         }
-        for node in SECTIONS:
-            result[f"{job.namespace}/{node}"] = common[node] | own.get(node, {})
+        result |= {f"{job.namespace}/{node}": common[node] | own.get(node, {}) for node in NODES}
     return {name: {"ros__parameters": body} for name, body in result.items()}
 
 
@@ -100,7 +134,7 @@ def run_suite(
     seed: int,
     bag: Path,
     timeout: float = 300.0,
-    progress: Callable[[str], None] | None = None,
+    progress: Tell = lambda _: None,
 ) -> Path:
     """Generate `count` scenarios for every job with the ROS nodes and record all their topics in the bag `bag`.
 
@@ -124,9 +158,14 @@ def run_suite(
         raise InputError(f"{bag} exists already; name another folder for the bag, or remove it")
     scratch = Path(tempfile.mkdtemp(prefix="scenario_gen_suite_"))
     try:
-        with free_domain() as domain, ending(partial(shutil.rmtree, scratch, ignore_errors=True)):
-            body = parameters(jobs, config, count, seed, scratch / bag.name)
-            _run(jobs, body, scratch, domain, timeout, progress or (lambda _: None))
+        with ending(partial(shutil.rmtree, scratch, ignore_errors=True)), own_domain():
+            file = scratch / "parameters.yaml"
+            file.write_text(yaml.safe_dump(parameters(jobs, config, count, seed, scratch / bag.name)), encoding="utf-8")
+            spaces = [word for job in jobs for word in ("--namespace", job.namespace)]
+            words = ["--ros-args", "--params-file", str(file)]
+            commands = (["recorder", *words], ["suite", "--nodes", ",".join(NODES), *spaces, *words])
+            with _watched(Progress(jobs, progress)) as (state, look), _processes(commands, scratch) as processes:
+                _follow(processes, state, look, scratch, timeout)
         bag.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(scratch / bag.name, bag)
     finally:
@@ -134,93 +173,83 @@ def run_suite(
     return bag
 
 
-def _run(
-    jobs: Sequence[Job], body: dict[str, Any], scratch: Path, domain: int, timeout: float, progress: Callable[[str], None]
-) -> None:
-    parameter_file = scratch / "parameters.yaml"
-    parameter_file.write_text(yaml.safe_dump(body), encoding="utf-8")
-    spaces = [word for job in jobs for word in ("--namespace", job.namespace)]
-    ros = ["--ros-args", "--params-file", str(parameter_file)]
-    arguments = {node: [*spaces, *ros] for node in NODES} | {"recorder": ros, "watcher": ["--namespace", "", *spaces]}
-    specification = [{"node": node, "arguments": arguments[node], "log": str(scratch / f"{node}.log")} for node in NODES]
-    (scratch / "suite.json").write_text(json.dumps(specification), encoding="utf-8")
-    environment = {
-        **os.environ,
-        **this_host_only(),
-        "ROS_DOMAIN_ID": str(domain),
-        "ROS_LOG_DIR": str(scratch / "log"),
-        "RCUTILS_COLORIZED_OUTPUT": "0",
-    }
-    suite = subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "fork", str(scratch / "suite.json")],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=(scratch / "suite.log").open("w"),
-        env=environment,
-    )
-    state = _State({job.namespace: set() for job in jobs})
-    with ending(partial(_end, suite)):
-        try:
-            _follow(suite, state, scratch, timeout, progress)
-        finally:
-            _end(suite)
-
-
-def _end(suite: "subprocess.Popen[bytes]") -> None:
-    if suite.stdin is not None:
-        suite.stdin.close()  # its end ends the suite, even where this process is killed
-    suite.terminate()  # while it loads it does not look there
+@contextmanager
+def _watched(state: Progress) -> Iterator[tuple[Progress, Callable[[], None]]]:
+    """Let a node of this process listen to the suite; the function given looks at what has arrived."""
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        suite.wait(30.0)
-    except subprocess.TimeoutExpired:
-        suite.kill()
-        suite.wait()
+        node = rclpy.create_node("watcher", enable_rosout=False, start_parameter_services=False)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        for topic in ("/diagnostics", *(f"{job.namespace}/{topic}" for job in state.jobs for topic in CHAIN)):
+            create_subscription(node, topic, partial(state.take, topic))
+        yield state, lambda: executor.spin_once(timeout_sec=POLL_S)
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+@contextmanager
+def _processes(commands: Sequence[list[str]], scratch: Path) -> Iterator[Mapping[str, BaseProcess]]:
+    """Run nodes as processes of their own, as their executables do; Ctrl-C ends those that are left at the end, in order."""
+    context = multiprocessing.get_context("spawn")
+    processes = {}
+    for name, *words in commands:
+        log = scratch / f"{name}.log"
+        processes[name] = context.Process(target=_become, args=([name, *words], str(log)))
+    with ending(partial(_end, list(processes.values()))):
+        try:
+            with starting():
+                for process in processes.values():
+                    process.start()
+            yield processes
+        finally:
+            _end(list(processes.values()))
+
+
+def _become(words: list[str], log: str) -> None:
+    """Turn a new process into an executable of nodes whose output is in a file."""
+    end_with_parent()
+    descriptor = os.open(log, os.O_WRONLY | os.O_CREAT, 0o644)
+    os.dup2(descriptor, 1)
+    os.dup2(descriptor, 2)
+    os.environ |= {"ROS_LOG_DIR": str(Path(log).with_suffix("")), "RCUTILS_COLORIZED_OUTPUT": "0"}
+    sys.argv = words
+    start(words[0])
+
+
+def _end(processes: Sequence[BaseProcess]) -> None:
+    for number in (signal.SIGINT, signal.SIGKILL):
+        alive = [process for process in processes if process.pid is not None and process.is_alive()]
+        for process in alive:
+            with suppress(ProcessLookupError):
+                os.kill(process.pid or 0, number)
+        for process in alive:
+            process.join(END_S)
 
 
 def _follow(
-    suite: "subprocess.Popen[bytes]", state: _State, scratch: Path, timeout: float, progress: Callable[[str], None]
+    processes: Mapping[str, BaseProcess], state: Progress, look: Callable[[], None], scratch: Path, timeout: float
 ) -> None:
-    """Read events until every job is done and recorded."""
-    assert suite.stdout is not None
+    """Wait until every job is done and recorded.
+
+    Raises:
+        InputError, RefusedError: it never will be.
+    """
     deadline = time.monotonic() + timeout
-    buffer = b""
     while not state.complete():
-        ready, _, _ = select.select([suite.stdout], [], [], max(0.0, deadline - time.monotonic()))
-        if not ready:
-            late = state.waiting_for()
-            raise RefusedError(f"{late} did not answer within {timeout:.0f} s{_tail(scratch, late)}")
-        data = os.read(suite.stdout.fileno(), 65536)
-        if not data:
-            raise RefusedError(f"the nodes ended before they were done{_tail(scratch, 'suite')}")
-        *lines, buffer = (buffer + data).split(b"\n")
-        for line in lines:
-            _take(json.loads(line), state, scratch, progress)
+        look()
+        for name, process in processes.items():
+            if not process.is_alive():
+                raise RefusedError(f"{name} ended with code {process.exitcode}{_tail(scratch, name)}")
+        if time.monotonic() > deadline:
+            late = state.late()
+            name = "recorder" if late == "/recorder" else "suite"
+            raise RefusedError(f"{late} did not answer within {timeout:.0f} s{_tail(scratch, name)}")
 
 
-def _take(event: dict[str, Any], state: _State, scratch: Path, progress: Callable[[str], None]) -> None:
-    """Take one event in."""
-    kind = event["event"]
-    if kind == "published":
-        state.published_topics[event["namespace"]].add(event["topic"])
-    elif kind == "done":
-        state.published_topics[event["namespace"]].add("scenarios")
-        state.published[event["namespace"]] = event["published"]
-        progress(f"{event['namespace']}: {event['text']}")
-    elif kind == "recorded":
-        state.recorded = event["counts"]
-    elif kind == "loaded":
-        progress(f"libraries and {event['kernels']} kernels loaded")
-    elif kind == "progress":
-        progress(f"{event['name'].partition(':')[0]}: {event['text']}")
-    elif kind == "exited":
-        raise RefusedError(f"{event['node']} ended with code {event['code']}{_tail(scratch, event['node'])}")
-    elif kind == "error":
-        error = InputError if event["kind"] == "InputError" else RefusedError
-        raise error(f"{event['name']}: {event['text']}")
-
-
-def _tail(scratch: Path, node: str) -> str:
-    """Return the last lines a node wrote, to put behind a message."""
-    path = scratch / f"{node.rpartition('/')[2]}.log"
+def _tail(scratch: Path, name: str) -> str:
+    """Return the last lines that a process wrote, to put behind a message."""
+    path = scratch / f"{name}.log"
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()[-5:] if path.is_file() else []
     return "; its last output: " + " | ".join(lines) if lines else ""

@@ -3,7 +3,7 @@
 
 """Processes of nodes, forked from one that has loaded the libraries and the kernels, which takes each seconds of CPU otherwise.
 
-`start_nodes` stands for `subprocess.Popen([sys.executable, "-m", "scenario_gen.ros.plumbing.start", …])`, or `…start", "fork"`.
+`start_nodes` stands for `subprocess.Popen([sys.executable, "-m", "scenario_gen.ros.plumbing.start", …])`.
 Tests of the start itself (signals while the libraries load, an empty cache, executables) start real executables instead.
 
 Nothing outlives the tests: whatever a process leaves behind ends with it, and all end with the server, which ends with the tests,
@@ -32,21 +32,24 @@ PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 class Forked:
     """A process of the server, with what the tests use of `subprocess.Popen`; `stdin` and `stdout` are pipes of texts.
 
-    What a single node writes to `stderr` comes with `stdout`.
+    What a node writes to `stderr` comes with `stdout`, or both in a file, `log`.
     """
 
-    def __init__(self, module: str, arguments: list[str], environment: dict[str, str]):
+    def __init__(self, arguments: list[str], environment: dict[str, str], log: Path | None):
         child_in, own_in = os.pipe()
         own_out, child_out = os.pipe()
+        if log is not None:
+            os.close(child_out)
+            child_out = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
         self._status, child_status = os.pipe()
-        request = json.dumps([module, arguments, str(Path.cwd()), environment]).encode()
+        request = json.dumps([arguments, str(Path.cwd()), environment]).encode()
         given = (child_in, child_out, child_status)
         server().sendall(len(request).to_bytes(8, "big"))
         socket.send_fds(server(), [request[:1]], given)
         server().sendall(request[1:])
         for descriptor in given:
             os.close(descriptor)
-        self.args = [module, *arguments]
+        self.args = arguments
         self.stdin, self.stdout = os.fdopen(own_in, "w"), os.fdopen(own_out)
         self.returncode: int | None = None
         self.pid = int.from_bytes(os.read(self._status, 8), "big")
@@ -93,9 +96,9 @@ class Forked:
         self.send_signal(signal.SIGKILL)
 
 
-def start_nodes(module: str, *arguments: str, **environment: str) -> Forked:
-    """Start `python -m scenario_gen.ros.nodes.<module>` with these arguments; `environment` is added to this process's."""
-    return Forked(module, list(arguments), os.environ | environment)
+def start_nodes(*arguments: str, log: Path | None = None, **environment: str) -> Forked:
+    """Start the executable that is named first; `environment` is added to this process's."""
+    return Forked(list(arguments), os.environ | environment, log)
 
 
 @cache
@@ -186,13 +189,13 @@ def _children() -> list[int]:
     return found
 
 
-def _become(module: str, arguments: list[str], folder: str, environment: dict[str, str], stdin: int, stdout: int) -> NoReturn:
+def _become(arguments: list[str], folder: str, environment: dict[str, str], stdin: int, stdout: int) -> NoReturn:
     """Turn this process into what `python -m` would have made of it."""
     from scenario_gen.ros.plumbing import start
 
     code = 1
     try:
-        for descriptor, own in ((stdin, 0), (stdout, 1), *([(stdout, 2)] if module == "start" else [])):
+        for descriptor, own in ((stdin, 0), (stdout, 1), (stdout, 2)):
             os.dup2(descriptor, own)
         os.close(stdin)
         os.close(stdout)
@@ -200,11 +203,8 @@ def _become(module: str, arguments: list[str], folder: str, environment: dict[st
         os.chdir(folder)
         os.environ.clear()
         os.environ.update(environment)
-        if module == "start":
-            sys.argv = arguments[:]
-            start.start(arguments[0])
-        else:
-            start.fork(json.loads(Path(arguments[0]).read_text()))
+        sys.argv = arguments[:]
+        start.start(arguments[0])
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)

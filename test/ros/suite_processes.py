@@ -5,9 +5,9 @@
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-import json
 import os
 from pathlib import Path
+import signal
 import sys
 import threading
 import time
@@ -30,23 +30,23 @@ class Processes:
     ):
         self.folder = folder
         spaces = {node: [w for name in (namespaces or {}).get(node, ()) for w in ("--namespace", name)] for node in nodes}
-        specification = [
-            {"node": node, "arguments": [*spaces[node], "--ros-args", *arguments], "log": str(folder / f"{node}.log")}
-            for node, arguments in nodes.items()
-        ]
-        (folder / "suite.json").write_text(json.dumps(specification))
         environment = {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)}
-        self.process = start_nodes("forked", str(folder / "suite.json"), **environment)
-        assert json.loads(self.process.stdout.readline())["event"] == "loaded"
-        started = [json.loads(self.process.stdout.readline()) for _ in nodes]
-        self.pids = {event["node"]: event["pid"] for event in started}
+        self.processes = {
+            node: start_nodes(node, *spaces[node], "--ros-args", *arguments, log=folder / f"{node}.log", **environment)
+            for node, arguments in nodes.items()
+        }
+        self.pids = {node: process.pid for node, process in self.processes.items()}
 
     def end(self) -> dict[str, int]:
         """End all nodes as Ctrl-C does; return their exit codes."""
-        self.process.stdin.close()
-        events = [json.loads(line) for line in self.process.stdout]
-        self.process.wait(180.0)
-        return {event["node"]: event["code"] for event in events if event["event"] == "exited"}
+        for process in self.processes.values():
+            process.send_signal(signal.SIGINT)
+        return {node: process.wait(180.0) for node, process in self.processes.items()}
+
+    def kill(self) -> None:
+        """Kill those that still run."""
+        for process in self.processes.values():
+            process.kill()
 
     def log(self, node: str) -> str:
         return (self.folder / f"{node}.log").read_text()
@@ -137,5 +137,4 @@ def whole_chain(folder: Path, domain: int, nodes: Iterable[str], *, count: int) 
     arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
     made = Processes(folder, domain, arguments)
     yield made
-    if made.process.poll() is None:
-        made.process.kill()
+    made.kill()

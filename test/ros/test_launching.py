@@ -196,7 +196,7 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
     wanted = [node for node in nodes if node.executable in ("suite", "gp_sampler", "road_server")]
     some = ["--nodes", "gp_sampler,road_server"] if composed == "true" else []
     where = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)}
-    processes = [start_nodes("start", node.executable, *some, *words(node), **where) for node in wanted]
+    processes = [start_nodes(node.executable, *some, *words(node), **where) for node in wanted]
     try:
 
         def values(node: str, *names: str) -> list[object]:
@@ -237,9 +237,7 @@ def test_a_drive_is_launched_with_its_parameters(domain, client, tmp_path):
     assert set(values) <= set(flatten(Config()))
     file = tmp_path / "values.yaml"
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values | {"ego": 2}}}))  # launch_ros guesses a number
-    process = start_nodes(
-        "start", "traffic", "--ros-args", "-r", "__ns:=/a", "--params-file", str(file), ROS_DOMAIN_ID=str(domain)
-    )
+    process = start_nodes("traffic", "--ros-args", "-r", "__ns:=/a", "--params-file", str(file), ROS_DOMAIN_ID=str(domain))
     try:
         request = GetParameters.Request(names=["ego", "drive.policy", "lock_step"])
         ego, policy, lock_step = client.call(GetParameters, "/a/traffic/get_parameters", request).values

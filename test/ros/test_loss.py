@@ -129,7 +129,7 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
 
 
 def _recorder(domain: int, bag: Path) -> Forked:
-    return start_nodes("start", "recorder", "--ros-args", "-p", f"bag:={bag}", ROS_DOMAIN_ID=str(domain))
+    return start_nodes("recorder", "--ros-args", "-p", f"bag:={bag}", ROS_DOMAIN_ID=str(domain))
 
 
 def _scenario(k: int) -> Scenario:

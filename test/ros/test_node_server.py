@@ -12,7 +12,7 @@ import pytest
 
 PROGRAM = """
 import node_server
-process = node_server.start_nodes("start", "traffic", ROS_DOMAIN_ID="{domain}")
+process = node_server.start_nodes("traffic", ROS_DOMAIN_ID="{domain}")
 print(process.pid, flush=True)
 process.wait()
 """

@@ -17,7 +17,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.worker import Worker
 from scenario_gen.cli.default_yaml import default_yaml
-from scenario_gen.cli.suite import Job, parameters, SECTIONS
+from scenario_gen.cli.suite import Job, parameters
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.ros.nodes.road_server import road_of_url
 from scenario_gen.ros.plumbing.ros_parameters import descriptor, with_values
@@ -153,7 +153,7 @@ def test_urls_of_load_map():
 def test_the_suite_hands_every_stage_parameter_to_a_node(tmp_path):
     body = parameters([Job("/x", tmp_path / "log", "straight", 3)], PipelineConfig(), 5, 7, tmp_path / "bag")
     given = {name for node in body.values() for name in node["ros__parameters"]}
-    stages = {head for heads in SECTIONS.values() for head in heads}
+    stages = {"log", "road", "segmentation", "fitting", "planning", "sampling", "limits"}
     assert {name for name in flatten(PipelineConfig()) if name.split(".")[0] in stages} <= given
     assert body["/x/gp_sampler"]["ros__parameters"]["count"] == 5
     assert body["/x/log_player"]["ros__parameters"]["encounter"] == 3

@@ -36,8 +36,7 @@ def suite(tmp_path_factory, domain):
     arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
     made = Processes(folder, domain, arguments)
     yield made
-    if made.process.poll() is None:
-        made.process.kill()
+    made.kill()
 
 
 def ask(client, **values):

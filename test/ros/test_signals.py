@@ -29,7 +29,7 @@ def _started(node: str, domain: int, *arguments: str) -> "subprocess.Popen[str]"
 
 
 def _forked(node: str, domain: int, *arguments: str) -> Forked:
-    return start_nodes("start", node, "--ros-args", *arguments, ROS_DOMAIN_ID=str(domain))
+    return start_nodes(node, "--ros-args", *arguments, ROS_DOMAIN_ID=str(domain))
 
 
 ENDS = {"once": (signal.SIGINT,), "twice": (signal.SIGINT, signal.SIGINT), "terminated": (signal.SIGTERM,)}

@@ -18,11 +18,10 @@ import traceback
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, of_template, Status
+from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
 from scenario_gen.base.errors import printable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
-from scenario_gen.ros.plumbing.start import emit
-from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, others_on, own_topics, publish
+from scenario_gen.ros.plumbing.topics import create_publisher, others_on, own_topics, publish
 
 PERIOD = 1.0  # seconds of real time between two regular messages; what waits is published after half of it at most
 HOLD = 3.0  # seconds for which a finding is shown at least
@@ -31,7 +30,6 @@ ALSO = 50  # findings of one name that a message holds beside the newest
 MOST = 100  # statuses of a node
 LONGEST = 2_000  # characters of a message
 LARGEST = 65_536  # characters of the values of one status
-MILESTONES = ("tracks", "map", "changepoints", "fit")  # topics whose first message the watcher reports
 
 
 @dataclass(frozen=True)
@@ -225,41 +223,3 @@ def bounded(status: Status) -> Status:
         values["left_out"] = f"{missing} values, which would make the message too long"
     message = status.message if len(status.message) <= LONGEST else f"{status.message[:LONGEST]} …"
     return Status(status.name[:LONGEST], status.level, printable(message), values)
-
-
-class Watcher(Node):  # type: ignore[misc]
-    """Writes what the nodes of a suite publish and report to standard output, as events for the suite's runner.
-
-    It watches the topics of one namespace; without a namespace, /diagnostics, which all namespaces share.
-    """
-
-    def __init__(self, namespace: str | None = None) -> None:
-        super().__init__("watcher", namespace=namespace, enable_rosout=False, start_parameter_services=False)
-        self._reported: dict[str, str] = {}  # by name: /diagnostics has all again every second
-        if namespace is None:
-            create_subscription(self, "/diagnostics", self._diagnostics)
-            return
-        for topic in MILESTONES:
-            create_subscription(self, topic, lambda _, topic=topic: emit(event="published", namespace=namespace, topic=topic))
-        create_subscription(self, "scenarios/info", self._account)
-
-    def autostart(self) -> None:
-        """Nothing to start."""
-
-    def _account(self, data: bytes) -> None:
-        for status in decode_diagnostics(data)[1]:
-            if "published" in status.values:
-                published, requested = int(status.values["published"]), int(status.values["requested"])
-                emit(event="done", namespace=self.get_namespace(), published=published, requested=requested, text=status.message)
-
-    def _diagnostics(self, data: bytes) -> None:
-        for status in decode_diagnostics(data)[1]:
-            if self._reported.get(status.name) == status.message and "recorded" not in status.name:
-                continue
-            self._reported[status.name] = status.message
-            if "recorded" in status.name:
-                emit(event="recorded", counts={topic: int(count) for topic, count in status.values.items()})
-            elif status.level >= Level.ERROR:
-                emit(event="error", name=status.name, text=status.message, kind=status.values.get("error", ""))
-            elif "progress" in status.name and "request" in status.values:
-                emit(event="progress", name=status.name, text=status.message)

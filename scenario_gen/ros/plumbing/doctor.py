@@ -49,9 +49,9 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
         yield Finding(WARNING, "ROS 2", advice)
         return
     yield packages("interfaces", INTERFACES, "install ros-jazzy-common-interfaces, or source a Jazzy installation")
-    action = importlib.util.find_spec("scenario_gen_interfaces.action")  # a checkout has a folder of the package's name
+    action = importlib.util.find_spec("scenario_gen_interfaces")
     missing = "scenario_gen_interfaces is not built: gp_sampler has the service generate, and no action generate_scenarios"
-    yield Finding(OK, "action", "scenario_gen_interfaces is here" if action else missing)
+    yield Finding(OK, "action", "scenario_gen_interfaces is here" if action and action.origin else missing)
     run = subprocess.run([sys.executable, "-c", NODE], capture_output=True, text=True, check=False, env=dict(environment))
     if run.returncode:
         why = next((line for line in reversed(run.stderr.splitlines()) if line.strip()), "it does not say why")
