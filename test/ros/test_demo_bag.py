@@ -14,9 +14,9 @@ from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.cli.suite import Job, run_suite
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.ros.plumbing.suite import Job, run_suite
 
 pytestmark = [pytest.mark.dds, pytest.mark.slow]
 JOBS = (

@@ -17,12 +17,12 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.worker import Worker
 from scenario_gen.cli.default_yaml import default_yaml
-from scenario_gen.cli.suite import Job, parameters
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.ros.nodes.road_server import road_of_url
 from scenario_gen.ros.plumbing.ros_parameters import descriptor, with_values
 from scenario_gen.ros.plumbing.stage_node import Inputs
 from scenario_gen.ros.plumbing.start import node_class
+from scenario_gen.ros.plumbing.suite import Job, parameters
 
 STAGE_NODES = ("segmenter", "planner", "gp_sampler", "log_player", "road_server", "evaluator")
 ROOT = Path(__file__).resolve().parents[2]

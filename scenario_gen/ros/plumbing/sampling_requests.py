@@ -29,13 +29,13 @@ from msg_conventions.scenario_info import request_summary, RequestSummary
 from scenario_gen.bags.recordings.sending import RequestSender, Send
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.base.parameters import parameter
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Callbacks, sample_scenarios, SamplingConfig
 from scenario_gen.method.validity import Limits
+from scenario_gen.ros.plumbing.node_parameters import SamplerParameters
 from scenario_gen.ros.plumbing.ros_parameters import values_of_call
 from scenario_gen.ros.plumbing.stage_node import REQUESTS
 from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Request, Scenario
@@ -48,26 +48,13 @@ Answer = tuple[GenerationResult, RequestSummary]  # the result of a request, who
 
 
 @dataclass(frozen=True)
-class Config(Request):
+class Config(Request, SamplerParameters):
     """The sampler's parameters; `fitting` and `planning` are used for requests with start or end states."""
 
-    count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
-    seed: int = parameter(0, "seed of the samples, and of the planner where states are asked for", low=0)
-    generate_on_input: bool = parameter(True, "generate whenever the inputs are complete or change; false: on ~/generate only")
-    patience: float = parameter(
-        60.0,
-        "wait so long for subscribers of scenarios that acknowledge none, then go on and warn; 0: for ever",
-        unit="s",
-        low=0.0,
-    )
-    pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     sampling: SamplingConfig = field(default_factory=SamplingConfig)
     limits: Limits = field(default_factory=Limits)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
 
 
 class Code(IntEnum):

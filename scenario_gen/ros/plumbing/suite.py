@@ -28,7 +28,7 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.interrupts import end_with_parent, ending, starting
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.ros_domain import own_domain
-from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.method.config import PipelineConfig
 from scenario_gen.ros.plumbing.ros_parameters import config_of
 from scenario_gen.ros.plumbing.start import node_class, start
 from scenario_gen.ros.plumbing.topics import create_subscription
