@@ -8,7 +8,6 @@ from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
 from pathlib import Path
 from typing import Any, TypeVar
-import warnings
 
 from scenario_gen.base.documents import parse_yaml, read_yaml, shown, WHOLE
 from scenario_gen.base.errors import did_you_mean, InputError
@@ -27,7 +26,6 @@ def parameter(
     high: float | None = None,
     choices: tuple[str, ...] = (),
     group: str = "",
-    was: str = "",
 ) -> Any:
     """Declare one parameter of a frozen configuration dataclass; bounds are inclusive.
 
@@ -39,9 +37,8 @@ def parameter(
         high: largest value, None for no bound.
         choices: the texts allowed, none for any.
         group: of entry points, whose names are allowed beside `choices` (see `base.registry`).
-        was: its name in the version before this one, which is still accepted, with a warning.
     """
-    meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "group": group, "was": was}
+    meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "group": group}
     return field(default=default, metadata=meta)
 
 
@@ -96,20 +93,6 @@ def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]
     return flat
 
 
-def former_name(name: str, entry: "Field[Any]") -> str:
-    """Return the dotted name in the version before this one of the parameter `name`; the same name if it has not changed."""
-    return name.removesuffix(entry.name) + (entry.metadata["was"] or entry.name)
-
-
-def current_name(config: Any, name: str) -> str:
-    """Return the dotted name of the parameter that is called `name`, or was so one version ago, which is warned of."""
-    for known, (entry, _) in flatten(config).items():
-        if name != known and name == former_name(known, entry):
-            warnings.warn(f"parameter {name} is called {known} now; the old name goes with the next version", FutureWarning, 3)
-            return known
-    return name
-
-
 def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     """Return a copy of `config` with the dotted names in `values` set.
 
@@ -120,7 +103,7 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     nested: dict[str, dict[str, Any]] = {}
     known = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
     for name, value in values.items():
-        head, _, rest = current_name(config, name).partition(".")
+        head, _, rest = name.partition(".")
         if head not in known or bool(rest) != is_dataclass(getattr(config, head)):
             raise InputError(
                 f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them"
@@ -145,7 +128,7 @@ def assigned(config: Config, assignment: str) -> Config:
     name, equals, text = assignment.partition("=")
     if not equals:
         raise InputError(f"--set {shown(assignment)}: write it as name=value")
-    known, name = flatten(config), current_name(config, name)
+    known = flatten(config)
     if name not in known:
         raise InputError(f"unknown parameter {shown(name)}; `scenario-gen parameters` lists them{did_you_mean(name, known)}")
     is_text = isinstance(known[name][0].default, str)  # stays text: vehicle "007" is no number

@@ -12,7 +12,7 @@ import yaml
 
 import scenario_gen
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import flatten, former_name, updated
+from scenario_gen.base.parameters import flatten, updated
 
 Config = TypeVar("Config")
 
@@ -42,7 +42,7 @@ def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what:
     """
     values: dict[str, Any] = {}
     for name, (entry, _) in flatten(config).items():
-        text = texts.get(prefix + name, texts.get(prefix + former_name(name, entry)))
+        text = texts.get(prefix + name)
         if text is None:
             raise InputError(f"{what}: parameter {prefix}{name} is not there, so it cannot be made again")
         kind = type(entry.default)

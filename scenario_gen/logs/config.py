@@ -57,17 +57,15 @@ class LogConfig(Parameters):
     proximity: float = parameter(
         100.0, "vehicles closer than this can form an encounter (the range of DSRC in the paper)", unit="m", low=1.0, high=2000.0
     )
-    min_duration: float = parameter(5.0, "shortest encounter", unit="s", low=0.5, high=600.0, was="shortest")
+    min_duration: float = parameter(5.0, "shortest encounter", unit="s", low=0.5, high=600.0)
     max_duration: float = parameter(
-        60.0, "longest encounter; longer ones are cut into equal parts", unit="s", low=2.0, high=3600.0, was="longest"
+        60.0, "longest encounter; longer ones are cut into equal parts", unit="s", low=2.0, high=3600.0
     )
     travel: float = parameter(5.0, "least distance that one vehicle of an encounter drives", unit="m", low=0.0, high=1000.0)
     standstill: float = parameter(
         10.0, "an encounter ends when all vehicles stand still for longer than this", unit="s", low=1.0, high=600.0
     )
-    max_vehicles: int = parameter(
-        12, "largest number of vehicles in an encounter cut from a longer log", low=2, high=64, was="most_vehicles"
-    )
+    max_vehicles: int = parameter(12, "largest number of vehicles in an encounter cut from a longer log", low=2, high=64)
     min_presence: float = parameter(
         3.0, "shortest presence of a vehicle that arrives late or leaves early", unit="s", low=0.5, high=600.0
     )

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import assigned, flatten, parameter, Parameters, updated
-from scenario_gen.base.provenance import read_parameters
+from scenario_gen.base.parameters import flatten, parameter, Parameters, updated
 
 
 @dataclass(frozen=True)
@@ -62,21 +61,3 @@ def test_a_bad_value_is_named(name, value, said):
 def test_a_bad_value_is_refused_at_construction():
     with pytest.raises(InputError, match="gain"):
         Inner(gain=-1.0)
-
-
-@dataclass(frozen=True)
-class Renamed:
-    length: float = parameter(1.0, "how long", unit="m", low=0.0, was="longness")
-
-
-@dataclass(frozen=True)
-class OuterRenamed:
-    inner: Renamed = field(default_factory=Renamed)
-
-
-def test_a_former_name_is_taken_with_a_warning():
-    with pytest.warns(FutureWarning, match=r"inner\.longness is called inner\.length now"):
-        assert updated(OuterRenamed(), {"inner.longness": 2.0}).inner.length == 2.0
-    with pytest.warns(FutureWarning, match=r"inner\.longness"):
-        assert assigned(OuterRenamed(), "inner.longness=3").inner.length == 3.0
-    assert read_parameters(OuterRenamed(), {"x.inner.longness": "4.0"}, "x.", "a bag").inner.length == 4.0

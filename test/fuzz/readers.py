@@ -72,5 +72,5 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
 
 def parsing_modules() -> set[str]:
     """Return the modules outside of the nodes that call what parses, by their paths in their packages."""
-    files = [(path, package) for package in PACKAGES for path in package.rglob("*.py") if "ros" not in path.parts]
+    files = [(path, package) for package in PACKAGES for path in package.rglob("*.py") if package / "ros" not in path.parents]
     return {str(path.relative_to(package)) for path, package in files if PARSING.search(path.read_text(encoding="utf-8"))}

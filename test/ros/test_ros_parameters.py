@@ -3,21 +3,17 @@
 
 """ROS parameters as the tools of ROS give them: numbers for texts, whole numbers for real ones, what they dumped."""
 
-from dataclasses import dataclass, field
-
 from hypothesis import given, strategies
 from node_server import start_nodes
 import pytest
-import rclpy
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
 from suite_processes import Client, RESOURCES
 import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
-from scenario_gen.logs import LogConfig
 from scenario_gen.ros.nodes.gp_sampler import Config
-from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters, meant, values_of_call, with_values
+from scenario_gen.ros.plumbing.ros_parameters import meant, with_values
 
 DECLARED = {name: entry for name, (entry, _) in flatten(Config()).items()}
 RESERVED = "start_type_description_service"  # read-only, of every rclpy node
@@ -42,25 +38,6 @@ def test_a_real_number_is_taken_as_any_tool_writes_it(number):
 def test_what_can_only_be_a_mistake_is_refused(name, value):
     with pytest.raises(InputError, match=name.rpartition(".")[2]):
         with_values(Config(), [Parameter(name, value=value)])
-
-
-@dataclass(frozen=True)
-class Stages:
-    log: LogConfig = field(default_factory=LogConfig)
-
-
-def test_former_names_are_taken(domain):
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=domain)
-    node = rclpy.create_node("a", context=context, parameter_overrides=[Parameter("log.longest", value=30.0)])
-    try:
-        assert ConfigParameters(node, Stages()).config.log.max_duration == 30.0
-        assert node.get_parameter("log.max_duration").value == 30.0 and not node.has_parameter("log.longest")
-        with pytest.warns(FutureWarning, match=r"log\.shortest is called log\.min_duration now"):
-            assert values_of_call(Stages(), [Parameter("log.shortest", value=7.0).to_parameter_msg()]).log.min_duration == 7.0
-    finally:
-        node.destroy_node()
-        rclpy.shutdown(context=context)
 
 
 def dumped(client: Client, node: str) -> dict[str, object]:

@@ -34,7 +34,7 @@ class OnlineConfig(Parameters):
     look_back: float = parameter(6.0, "age beyond which no changepoint is looked for any more", unit="s", low=1.0, high=60.0)
     every: int = parameter(2, "samples between two looks", low=1, high=100)
     significance_level: float = parameter(
-        1e-6, "probability with which noise alone looks like a changepoint", low=1e-12, high=0.5, was="chance_alone"
+        1e-6, "probability with which noise alone looks like a changepoint", low=1e-12, high=0.5
     )
     min_segment: float = parameter(0.5, "least distance between changepoints", unit="s", low=0.2, high=10.0)
 

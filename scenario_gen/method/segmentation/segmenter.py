@@ -41,11 +41,8 @@ class SegmentationConfig(Parameters):
         "probability with which noise alone makes a changepoint look as useful as is asked of one",
         low=1e-12,
         high=0.5,
-        was="chance_alone",
     )
-    min_probability: float = parameter(
-        0.05, "posterior probability above which a changepoint may be added", low=0.0, high=1.0, was="least_chance"
-    )
+    min_probability: float = parameter(0.05, "posterior probability above which a changepoint may be added", low=0.0, high=1.0)
     speed_window: float = parameter(1.0, "window of the longitudinal acceleration", unit="s", low=0.3, high=5.0)
     turn_window: float = parameter(2.0, "window of the lateral acceleration", unit="s", low=0.4, high=10.0)
     speed_noise: float = parameter(

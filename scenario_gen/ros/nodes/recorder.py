@@ -151,6 +151,7 @@ class Recorder(Node):  # type: ignore[misc]
     def close(self) -> None:
         """Close the bag; what else has to be done at the end may fail."""
         self.stop()
+        self.diagnostics.publish()
 
     def _look_around(self) -> None:
         """Subscribe to topics that have come up since."""

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import current_name, flatten, former_name, updated
+from scenario_gen.base.parameters import flatten, updated
 
 Config = TypeVar("Config")
 INT64 = 2**63 - 1
@@ -74,8 +74,7 @@ def values_of_call(config: Config, messages: Sequence[Any]) -> Config:
     Raises:
         InputError: one is unknown, has the wrong type or is out of range.
     """
-    given = [Parameter.from_parameter_msg(message) for message in messages]
-    parameters = [Parameter(current_name(config, p.name), value=p.value) for p in given]
+    parameters = [Parameter.from_parameter_msg(message) for message in messages]
     if unknown := sorted({p.name for p in parameters} - set(flatten(config))):
         raise InputError(f"unknown parameter {', '.join(unknown)}")
     return with_values(config, parameters)
@@ -95,7 +94,7 @@ class ConfigParameters:
         self._declared = {name: entry for name, (entry, _) in flatten(config).items()}
         for name, (entry, value) in flatten(config).items():
             try:
-                node.declare_parameter(name, self._by_former_name(name, entry, value), descriptor(entry))
+                node.declare_parameter(name, value, descriptor(entry))
             except Exception as error:
                 raise InputError(f"{node.get_fully_qualified_name()}: parameter {name}: {error}") from error
         given = [node.get_parameter(name) for name in self._declared]
@@ -108,17 +107,6 @@ class ConfigParameters:
         # a parameter file keyed to another node would be ignored in silence
         values = ", ".join(f"{name}={value!r}" for name, (_, value) in flatten(self.config).items())
         node.get_logger().info(f"effective parameters: {values}")
-
-    def _by_former_name(self, name: str, entry: "Field[Any]", value: Any) -> Any:
-        """Return the value given under the name that a parameter had one version ago, else `value`."""
-        former = former_name(name, entry)
-        if former == name:
-            return value
-        given = self._node.declare_parameter(former, value, descriptor(entry)).value
-        self._node.undeclare_parameter(former)
-        if given != value:
-            self._node.get_logger().warning(f"parameter {former} is called {name} now; the old name goes with the next version")
-        return meant(entry, given)
 
     def _keep(self, parameters: list[Parameter]) -> list[Parameter]:
         """Return what is to be set: values of the declared types, and nothing that is read-only and in effect already."""
