@@ -127,7 +127,7 @@ def test_maps_are_served_and_bad_ones_refused(suite, client):
     (grid, *_) = client.wait("/map")
     answer = client.call(GetMap, "/road_server/get_map", GetMap.Request())
     assert (answer.map.info.width, answer.map.info.height) == decode_map(grid)[1].drivable.shape[::-1]
-    for url in ("file:///no/such/map.yaml", "nonsense", "package://no_such_package/map.yaml"):
+    for url in ("file:///no/such/map.yaml", "package://no_such_package/map.yaml", "nonsense"):
         answer = client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=url))
         assert answer.result in (LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST, LoadMap.Response.RESULT_INVALID_MAP_METADATA)
     client.until(

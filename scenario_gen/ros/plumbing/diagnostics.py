@@ -55,6 +55,7 @@ class NodeDiagnostics:
         self._lock = threading.RLock()
         self._state: Status | None = None  # of nodes that have any
         self._changed = False
+        self._fresh: set[str] = set()  # findings that no message has held yet, by name
         self._ticks = 0
         self._twins: dict[str, list[str]] = {}  # nodes that publish the same topics, by topic
         self._publisher = create_publisher(node, "/diagnostics")
@@ -130,6 +131,7 @@ class NodeDiagnostics:
         with self._lock:
             statuses = [*([self._state] if self._state else []), *(entry.status for entry in self._entries.values())]
             self._changed = False
+            self._fresh.clear()
         publish(self._node, self._publisher, encode_diagnostics(statuses, self._node.get_clock().now().nanoseconds))
 
     def _status(self, subject: str, level: Level, message: str, values: Mapping[str, str]) -> Status:
@@ -139,15 +141,18 @@ class NodeDiagnostics:
         """Take a status in."""
         if not self._enabled:
             return
-        status, old, times = bounded(status), self._entries.get(status.name), 1
+        old, times = self._entries.get(status.name), 1
         if status.level is Level.OK:
-            self._changed |= old is None or old.status != status
+            self._changed |= old is None or old.status != bounded(status)
         else:
             self._changed = True
             if old is not None and old.bad:
                 times = old.times + 1
                 status = replace(status, values={**status.values, "times": str(times)})
-        self._entries[status.name] = _Entry(status, monotonic(), times)
+                if status.name in self._fresh and status.message not in old.status.message:
+                    status = replace(status, message=f"{status.message}; {old.status.message}")
+            self._fresh.add(status.name)
+        self._entries[status.name] = _Entry(bounded(status), monotonic(), times)
         while len(self._entries) > MOST:  # at first what is well
             first = next(iter(self._entries))
             self._entries.pop(next((name for name, entry in self._entries.items() if not entry.bad), first))
