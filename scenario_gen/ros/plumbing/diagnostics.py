@@ -149,8 +149,9 @@ class NodeDiagnostics:
             if old is not None and old.bad:
                 times = old.times + 1
                 status = replace(status, values={**status.values, "times": str(times)})
-                if status.name in self._fresh and status.message not in old.status.message:
-                    status = replace(status, message=f"{status.message}; {old.status.message}")
+                if status.name in self._fresh:
+                    known = status.message in old.status.message
+                    status = replace(status, message=old.status.message if known else f"{status.message}; {old.status.message}")
             self._fresh.add(status.name)
         self._entries[status.name] = _Entry(bounded(status), monotonic(), times)
         while len(self._entries) > MOST:  # at first what is well
