@@ -115,18 +115,6 @@ def test_of_two_players_the_later_tells_no_frames(start, client, bag):
     assert first.returncode == 0 and "another publisher" not in output, output
 
 
-@pytest.mark.dds
-def test_a_motion_that_is_not_there_is_refused_if_it_was_asked_for(start, bag):
-    asked = {
-        "has no motion on fit/none": {"frames": "fit/none"},
-        "has 5 messages, counted from 0": {"frames": "scenarios", "scenario": 5},
-    }
-    started = {said: start("player", bag=bag, paused=True, **words) for said, words in asked.items()}
-    for said, process in started.items():
-        output, _ = process.communicate(timeout=180.0)
-        assert process.returncode == 2 and said in output and "Traceback" not in output, output
-
-
 def _counted(client, topic):
     from msg_conventions.diagnostics import decode_diagnostics
 

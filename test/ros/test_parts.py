@@ -167,16 +167,6 @@ def test_default_yaml_holds_the_defaults():
     assert text == default_yaml(), "run: python -m scenario_gen.cli.default_yaml > config/default.yaml"
 
 
-def test_nodes_are_thin():
-    def lines(path):
-        return len(path.read_text().partition('"""')[2].splitlines())  # below the licence
-
-    for path in (ROOT / "scenario_gen" / "ros" / "nodes").glob("*.py"):
-        assert lines(path) <= 330, path
-    for name in STAGE_NODES:
-        assert lines(ROOT / "scenario_gen" / "ros" / "nodes" / f"{name}.py") <= 200, name
-
-
 def test_the_kernels_of_a_node_are_those_of_packages_that_are_there():
     for name in STAGE_NODES:
         for stage in node_class(name).STAGES:

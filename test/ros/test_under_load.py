@@ -156,43 +156,5 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
     assert _generate(client, count=1).result().result.successful
 
 
-def test_empty_maps_nan_tracks_and_wrong_types_are_said_and_survived(suite, client):
-    """The last test of the module, for it plays havoc with the inputs; then the road comes again, and all is well."""
-    import struct
-
-    from nav_msgs.srv import GetPlan, LoadMap
-    from std_msgs.msg import String
-
-    from msg_conventions.cdr import CdrWriter
-
-    client.hear("/diagnostics", "/tracks", "/map")
-    tracks = client.wait("/tracks")[0]
-    empty = CdrWriter().header(0, "map").stamp(0).pack("f", 0.2).pack("I", 0, 0).pack("d", *[0.0] * 6, 1.0).pack("I", 0).finish()
-    heard = len(client.wait("/map"))
-    client.say("/map", empty)
-    client.wait("/map", heard + 1)
-    client.until(lambda: _refused(client, GetPlan, "map"), "the empty map to be refused")
-    client.say("/tracks", _with_nan(tracks, struct))
-    for node in ("/segmenter", "/road_server"):
-        client.until(lambda node=node: any(s.name.startswith(node) and "not finite" in s.message for s in _said(client)), node)
-    client.node.create_publisher(String, "/changepoints", 1).publish(String(data="of a wrong type"))
-    client.say("/tracks", tracks)
-    answer = client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url="straight"))
-    assert answer.result == LoadMap.Response.RESULT_SUCCESS
-    client.until(lambda: _generate(client, count=1).result().result.successful, "the sampler to be served again")
-
-
 def _said(client):
     return [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
-
-
-def _refused(client, kind, reason: str) -> bool:
-    """Ask for a plan; say whether it was empty, and why."""
-    plan = client.call(kind, "/planner/get_plan", kind.Request()).plan
-    said = [s.message for s in _said(client) if s.name.startswith("/planner: get_plan")]
-    return not plan.poses and any(reason in words for words in said)
-
-
-def _with_nan(tracks: bytes, struct) -> bytes:
-    """The same tracks with one coordinate that is no number: the last acceleration, before the last point's time."""
-    return tracks[:-16] + struct.pack("<d", float("nan")) + tracks[-8:]
