@@ -105,9 +105,7 @@ def test_of_two_players_the_later_tells_no_frames(start, client, bag):
     first = start("player", bag=bag, loop=True, rate=5.0)
     client.wait("/tf", 30)
     second = start("player", "-r", "__ns:=/other", bag=bag, loop=True)
-    assert second.stdout is not None
-    while "another publisher of /tf publishes vehicle_1, vehicle_bus_2" not in (line := second.stdout.readline()):
-        assert line, "it ended"
+    client.until(lambda: "another publisher of /tf publishes vehicle_1, vehicle_bus_2" in second.output(), "the later one's word")
     count = len(client.heard["/tf"])
     client.wait("/tf", count + 50)  # the first goes on
     first.terminate()

@@ -255,9 +255,7 @@ def test_the_player_ends_when_all_is_played_and_heard(start, client):
 def test_the_player_stays_if_it_is_told_to(start, client):
     bag = RESOURCES / "synthetic_c"
     process = start("player", bag=bag, rate=1000.0, stay=True)
-    assert process.stdout is not None
-    while "played" not in (line := process.stdout.readline()):
-        assert line, "it ended"
+    client.until(lambda: "played" in process.output(), "its end")
     client.until(lambda: ("player", "/") in client.node.get_node_names_and_namespaces(), "the player in the graph")
     assert process.poll() is None
     ended(process)
