@@ -121,6 +121,34 @@ class Client:
         self.until(future.done, f"an answer of {name}", timeout)
         return future.result()
 
+    def statuses(self, topic: str = "/diagnostics"):
+        """All statuses that were heard so far."""
+        from msg_conventions.diagnostics import decode_diagnostics
+
+        return [status for data in list(self.heard[topic]) for status in decode_diagnostics(data)[1]]
+
+    def counted(self, topic: str, node: str = "/recorder") -> int:
+        """How many messages of a topic a recorder says are in its bag."""
+        if not self.heard["/diagnostics"]:
+            self.hear("/diagnostics")
+            self.wait("/diagnostics")
+        return max((int(s.values.get(topic, 0)) for s in self.statuses() if s.name == f"{node}: recorded"), default=0)
+
+    def generate_later(self, **values):
+        """Ask the sampler for scenarios; return the future."""
+        from rcl_interfaces.srv import SetParametersAtomically
+        from rclpy.parameter import Parameter
+
+        parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+        request = SetParametersAtomically.Request(parameters=parameters)
+        return self.call_later(SetParametersAtomically, "/gp_sampler/generate", request)
+
+    def generate(self, **values):
+        """Ask the sampler for scenarios; return its answer."""
+        future = self.generate_later(**values)
+        self.until(future.done, "an answer of the sampler", 600.0)
+        return future.result().result
+
     def close(self) -> None:
         self.executor.shutdown(timeout_sec=2.0)
         self.thread.join(2.0)

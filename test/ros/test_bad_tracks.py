@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from suite_processes import Processes, RESOURCES
 
-from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.diagnostics import Level
 from msg_conventions.fits import decode_fit
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.logs import read_log
@@ -84,10 +84,8 @@ def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tm
 
 def _levels(client) -> dict[str, Level]:
     """What each node said last of its tracks."""
-    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
-    return {s.name[1:].removesuffix(": tracks"): s.level for s in statuses if s.name.endswith(": tracks")}
+    return {s.name[1:].removesuffix(": tracks"): s.level for s in client.statuses() if s.name.endswith(": tracks")}
 
 
 def _named(client, node: str, words: str) -> bool:
-    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
-    return any(s.level is Level.ERROR and s.name == f"/{node}: tracks" and words in s.message for s in statuses)
+    return any(s.level is Level.ERROR and s.name == f"/{node}: tracks" and words in s.message for s in client.statuses())

@@ -64,7 +64,7 @@ def test_a_motion_is_told_sample_by_sample(start, client, run, bag, tmp_path, to
     output, _ = player.communicate(timeout=180.0)
     assert player.returncode == 0 and "Traceback" not in output, output
     client.wait("/tf", 61)
-    client.until(lambda: _counted(client, "/tf") == 61, "61 messages in the bag")
+    client.until(lambda: client.counted("/tf") == 61, "61 messages in the bag")
     recorder.terminate()
     assert recorder.wait(180.0) == 0
 
@@ -111,16 +111,6 @@ def test_of_two_players_the_later_tells_no_frames(start, client, bag):
     first.terminate()
     output, _ = first.communicate(timeout=180.0)
     assert first.returncode == 0 and "another publisher" not in output, output
-
-
-def _counted(client, topic):
-    from msg_conventions.diagnostics import decode_diagnostics
-
-    if "/diagnostics" not in client.heard:
-        client.heard["/diagnostics"] = []
-        client.hear("/diagnostics")
-    said = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
-    return max((int(one.values[topic]) for one in said if topic in one.values), default=0)
 
 
 def _logged(bag, number):

@@ -5,11 +5,11 @@
 
 import numpy as np
 import pytest
-from suite_processes import Client, Processes, RESOURCES
+from suite_processes import Processes, RESOURCES
 
 from msg_conventions import trajectory
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.diagnostics import Level
 from msg_conventions.streams import encode_fix, encode_speed
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.logs import read_log
@@ -95,14 +95,10 @@ def test_streams_with_all_that_can_be_wrong_do_not_end_it(suite, client):
     misfit.publish(String(data="no fix"))
     client.say("/vehicle_4/fix", b"\x00\x01\x00\x00" + bytes(8))  # the last message of the longest queue
     for words in ("/vehicle_4/fix: the message ends at byte 8", "/vehicle_8/fix is a std_msgs"):
-        client.until(lambda words=words: any(s.level is Level.ERROR and words in s.message for s in said(client)), words)
+        client.until(lambda words=words: any(s.level is Level.ERROR and words in s.message for s in client.statuses()), words)
     heard = len(client.heard["/tracks"])
     assert "streams" in client.call(Trigger, "/segmenter/segment", Trigger.Request()).message
     template = decode_tracks(client.wait("/tracks", heard + 1)[-1])
     assert [vehicle.id for vehicle in template.vehicles] == ["3", "4"]
     assert abs(template.start_ns - start) < 10**9
     assert template.duration > 10.0
-
-
-def said(client: Client):
-    return [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]

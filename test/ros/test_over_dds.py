@@ -46,8 +46,7 @@ def test_the_origin_of_the_tracks_frame_is_said(suite, client):
     client.hear("/diagnostics")
 
     def origins():
-        said = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
-        return {status.values["origin"] for status in said if status.name == "/log_player: encounter"}
+        return {status.values["origin"] for status in client.statuses() if status.name == "/log_player: encounter"}
 
     client.until(origins, "the log player's word on its encounter")
     (encounter,) = read_log(LOG).encounters
@@ -86,10 +85,7 @@ def test_maps_are_served_and_bad_ones_refused(suite, client):
     for url in ("file:///no/such/map.yaml", "package://no_such_package/map.yaml", "nonsense"):
         answer = client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=url))
         assert answer.result in (LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST, LoadMap.Response.RESULT_INVALID_MAP_METADATA)
-    client.until(
-        lambda: any("nonsense" in s.message for data in client.heard["/diagnostics"] for s in decode_diagnostics(data)[1]),
-        "the reason on /diagnostics",
-    )
+    client.until(lambda: any("nonsense" in s.message for s in client.statuses()), "the reason on /diagnostics")
 
 
 def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
@@ -126,11 +122,7 @@ def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
             bad.start.pose.position.x = value
         assert not client.call(GetPlan, "/planner/get_plan", bad).plan.poses
         client.until(
-            lambda reason=reason: any(
-                s.name.startswith("/planner") and reason in s.message
-                for data in client.heard["/diagnostics"]
-                for s in decode_diagnostics(data)[1]
-            ),
+            lambda reason=reason: any(s.name.startswith("/planner") and reason in s.message for s in client.statuses()),
             f"{reason} on /diagnostics",
         )
         told = client.call(Trigger, "/planner/explain", Trigger.Request())

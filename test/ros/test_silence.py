@@ -10,7 +10,7 @@ import time
 import pytest
 from suite_processes import Client, RESOURCES
 
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
+from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.worker import MOST_WAITING, Worker
@@ -81,7 +81,7 @@ def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch
         worker.join(120.0)
         assert not worker.is_alive()
         spun(node, lambda: _said(client).endswith("unconfigured" if cleaned else "inactive"))
-        names = {s.name for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]}
+        names = {s.name for s in client.statuses()}
         assert names == {"/segmenter: state"}, "of its work a node says nothing when it is not active"
         assert not any(client.heard[topic] for topic in OUTPUTS)
         if cleaned:
@@ -115,8 +115,7 @@ def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
 
 
 def _said(client: Client) -> str:
-    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
-    return "\n".join(s.message for s in statuses)
+    return "\n".join(s.message for s in client.statuses())
 
 
 def test_of_too_many_jobs_the_newest_is_answered_at_once():
