@@ -19,10 +19,11 @@ def test_a_node_says_that_kernels_are_compiled_and_ends_when_asked(tmp_path):
     environment = os.environ | {"PYTHONUNBUFFERED": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
     node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
     try:
-        line = node.stderr.readline()
-        assert line.startswith("kernels: ") and line.endswith("s; once per machine\n"), line
+        assert any(
+            line.startswith("kernels: ") and line.endswith("s; once per machine\n") for line in iter(node.stderr.readline, "")
+        )
         node.send_signal(signal.SIGINT)
-        assert node.wait(timeout=60.0) == 130
+        assert node.wait(timeout=60.0) == 0
     finally:
         node.kill()
         node.stderr.close()

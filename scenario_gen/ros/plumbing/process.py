@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The life of a process of nodes: kernels loaded, nodes created, started and spun, ended by a signal or when all are done.
+"""The life of a process of nodes: created, started when their kernels are there, spun, ended by a signal or when all are done.
 
 Signals are received by a thread of their own (`scenario_gen/base/interrupts.py`), and rclpy's handlers are not installed: nothing
 is raised in the midst of a callback, and the context is valid until the nodes have ended.
 
-The kernels of all nodes are loaded, or compiled once per machine, before the first node exists: who finds a node in the graph can
-use it.
+The kernels of all nodes are loaded, or compiled once per machine, before the first one is spun: what it is asked meanwhile, to
+configure say, it answers then.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 import faulthandler
 import gc
@@ -29,7 +30,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from scenario_gen.base.errors import print_error, ScenarioGenError
-from scenario_gen.base.interrupts import end_orderly, ending, hear
+from scenario_gen.base.interrupts import end_orderly, hear
 from scenario_gen.numerics.compiling import end_workers, make_ready, Progress, words
 from scenario_gen.ros.plumbing.ros_parameters import help_of, USAGE
 
@@ -59,12 +60,10 @@ def run_nodes(makers: Sequence[Maker], arguments: Sequence[str] | None = None) -
 
 
 def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str | None]) -> int:
-    """Load the kernels, create, spin and destroy the nodes; return the exit code."""
+    """Create, spin and destroy the nodes; return the exit code."""
     nodes: list[Any] = []
     code = 0
     try:
-        with ending(end_workers):
-            kernels_ready(dict.fromkeys(stage for make in makers for stage in getattr(make, "STAGES", ())), _print_progress())
         rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
         executor = SingleThreadedExecutor()
         for namespace in spaces:
@@ -80,6 +79,7 @@ def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str
         traceback.print_exc()
         code = 1
     end_orderly(lambda: None)  # a Ctrl-C does not disturb the clean end
+    end_workers()
     for node in nodes:
         getattr(node, "cancel", list)()  # all at once, so that no node waits for the end of another
     for step in ("close", "destroy_node"):
@@ -140,7 +140,7 @@ def _print_progress() -> Progress:
 
 
 def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any]) -> int:
-    """Start the nodes and spin them; return the exit code."""
+    """Start the nodes, once their kernels are there, and spin them; return the exit code."""
     requested = threading.Event()
 
     def end() -> None:
@@ -150,8 +150,13 @@ def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any]) -> int:
         executor.create_task(lambda: None)  # so that it looks up
 
     end_orderly(end)
+    stages = dict.fromkeys(stage for node in nodes for stage in getattr(node, "STAGES", ()))
+    loading = ThreadPoolExecutor(1).submit(kernels_ready, stages, _print_progress())
+    while not requested.is_set() and not loading.done():
+        requested.wait(0.02)
     for node in nodes:
         if not requested.is_set():
+            loading.result()
             node.autostart()
     while not requested.is_set() and rclpy.ok() and not all(getattr(node, "done", False) for node in nodes):
         try:
