@@ -9,7 +9,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-import json
 import os
 from pathlib import Path
 import signal
@@ -27,47 +26,41 @@ def environment(domain: int) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Suite:
-    """Running nodes: the process that has forked them, and their own ids."""
+    """Running nodes."""
 
-    process: "subprocess.Popen[str]"
-    pids: tuple[int, ...]
+    processes: tuple["subprocess.Popen[bytes]", ...]
+
+    @property
+    def pids(self) -> tuple[int, ...]:
+        """Their processes' ids."""
+        return tuple(process.pid for process in self.processes)
 
     def signalled(self, *signals: signal.Signals) -> float:
         """Send signals to every node, 50 ms apart; return the seconds until the last one has gone."""
-        assert self.process.stdout is not None
         started = time.perf_counter()
         for number in signals:
-            for pid in self.pids:
-                os.kill(pid, number)
+            for process in self.processes:
+                process.send_signal(number)
             time.sleep(0.05)
-        for _ in self.pids:
-            self.process.stdout.readline()  # exited
+        for process in self.processes:
+            process.wait(30.0)
         return time.perf_counter() - started
 
     def end(self) -> None:
-        """End the nodes as the demo does."""
-        if self.process.stdin is not None and not self.process.stdin.closed:
-            self.process.stdin.close()
-        self.process.wait(30.0)
+        """End the nodes that still run."""
+        self.signalled(signal.SIGINT)
 
 
 @contextmanager
 def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> Iterator[Suite]:
-    """Run nodes, each with its ROS arguments, as the demo does; they are ended at the end."""
-    specification = [
-        {"node": node, "arguments": ["--ros-args", *own], "log": str(folder / f"{node}.log")} for node, own in arguments.items()
-    ]
-    (folder / "suite.json").write_text(json.dumps(specification), encoding="utf-8")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "fork", str(folder / "suite.json")],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env=environment(domain) | {"ROS_LOG_DIR": str(folder)},
-    )
-    assert process.stdout is not None
-    process.stdout.readline()  # loaded
-    suite = Suite(process, tuple(json.loads(process.stdout.readline())["pid"] for _ in arguments))
+    """Run nodes, each a process with its ROS arguments and a log in the folder; they are ended at the end."""
+    processes = []
+    for node, own in arguments.items():
+        command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", node, "--ros-args", *own]
+        with (folder / f"{node}.log").open("wb") as log:
+            variables = environment(domain) | {"ROS_LOG_DIR": str(folder)}
+            processes.append(subprocess.Popen(command, stdout=log, stderr=log, env=variables))
+    suite = Suite(tuple(processes))
     try:
         yield suite
     finally:

@@ -8,56 +8,31 @@ from pathlib import Path
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
-from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from scenario_gen.cli.launching import declared, DriveArguments, read_drive, refuse_misspelt
+from scenario_gen.cli.launching import DRIVE, meanings, read
 
 SHARE = Path(get_package_share_directory("scenario_gen"))
-IN_DRIVE = ("policy", "step")  # parameters of the drive, named drive.…
-OF_NODE = ("bag", "ego", "index", "policy", "rate", "lock_step", "step", "results")
 
 
-def drive(context, given):
-    """Return the processes; whatever is wrong with an argument is said before there is one."""
-    arguments = read_drive(
-        {name: LaunchConfiguration(name).perform(context) for name in declared(DriveArguments) if name in given}
+def start(launch):
+    """Return the processes."""
+    own, display = launch.own, ["-d", str(SHARE / "config" / "suite.rviz")]
+    traffic = Node(
+        package="scenario_gen",
+        executable="traffic",
+        name="traffic",
+        namespace=own.namespace,
+        parameters=launch.parameter_files(),
+        ros_arguments=["--log-level", own.log_level],
+        output="screen",
+        respawn=own.respawn,
     )
-    values = {f"drive.{name}" if name in IN_DRIVE else name: getattr(arguments, name) for name in OF_NODE if name in given}
-    files = [arguments.params] if arguments.params else []
-    started = [
-        Node(
-            package="scenario_gen",
-            executable="traffic",
-            name="traffic",
-            namespace=arguments.namespace,
-            parameters=[*files, values],
-            output="screen",
-        )
-    ]
-    if arguments.rviz:
-        started.append(
-            Node(
-                package="rviz2",
-                executable="rviz2",
-                arguments=["-d", str(SHARE / "config" / "suite.rviz")],
-                parameters=[{"use_sim_time": True}],
-            )
-        )
-    return started
+    rviz = Node(package="rviz2", executable="rviz2", arguments=display, parameters=[{"use_sim_time": True}])
+    return [traffic, rviz] if own.rviz else [traffic]
 
 
 def generate_launch_description():
-    given = set()
-
-    def begin(context):
-        given.update(getattr(context, "launch_configurations", context))  # what the command line says, before any default
-        refuse_misspelt(given, DriveArguments)
-
-    arguments = [
-        DeclareLaunchArgument(name, default_value=default, description=text)
-        for name, (default, text) in declared(DriveArguments).items()
-    ]
-    return LaunchDescription(
-        [OpaqueFunction(function=begin), *arguments, OpaqueFunction(function=lambda context: drive(context, given))]
-    )
+    arguments = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in meanings(DRIVE).items()]
+    begin = OpaqueFunction(function=lambda context: start(read(DRIVE, context.launch_configurations)))
+    return LaunchDescription([*arguments, begin])

@@ -86,12 +86,9 @@ LATE = {
     "pandas": "slow to load",
     "protobuf": "extra osi",
     "pyarrow": "extra parquet",
-    "pyproj": "slow to load",
-    "rclpy": "extra ros",
     "rich": "extra cli",
     "rosbags": "extra bags",
     "sklearn": "tests alone install it",
-    "std_msgs": "extra ros",
     "yaml": "slow to load",
 }
 LATE_OURS = {
@@ -101,8 +98,7 @@ LATE_OURS = {
     "logs/read.py": "adapters need extras",
     "logs/tables.py": "needs pyarrow",
     "method/routing/search/ompl/planners.py": "needs ompl",
-    "ros/plumbing/doctor.py": "works without what it looks for",
-    "ros/plumbing/sampling_requests.py": "only a refusal needs it",
+    "ros/plumbing/sampling_requests.py": "loads all stages, and few requests need them",
     "ros/plumbing/start.py": "loads rclpy",
     "types/generation.py": "its methods call public functions, which are loaded when they are first used",
     "types/scenario.py": "likewise",

@@ -67,6 +67,27 @@ def free_domain() -> Iterator[int]:
     raise RefusedError(f"no free ROS domain among {DOMAINS.start} to {DOMAINS.stop - 1}; end other ROS processes")
 
 
+@contextmanager
+def own_domain() -> Iterator[int]:
+    """Put this process and its children in a domain of their own, on this host.
+
+    Raises:
+        RefusedError: none is free, or may be locked.
+    """
+    with free_domain() as domain:
+        own = {**this_host_only(), "ROS_DOMAIN_ID": str(domain)}
+        before = {name: os.environ.get(name) for name in own}
+        os.environ.update(own)
+        try:
+            yield domain
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
+
+
 def this_host_only(environment: Mapping[str, str] = os.environ) -> dict[str, str]:
     """Return the variables that let a process meet others on this host only, whatever its domain.
 

@@ -15,6 +15,7 @@ from scenario_gen.base.errors import did_you_mean, InputError, of_system, presen
 from scenario_gen.cli import bags, corpus, generation, output, testing
 
 app = typer.Typer(
+    cls=output.Program,
     help="Turn recorded encounters of vehicles into new, valid ones on other roads.",
     no_args_is_help=True,
     add_completion=False,
@@ -42,12 +43,13 @@ def options(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
-    quiet: output.QuietOption = False,
-    as_json: output.JsonOption = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Of any command: print errors only.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Of any command: print one JSON object to standard output, messages to standard error.")
+    ] = False,
 ) -> None:
     """Turn recorded encounters of vehicles into new, valid ones on other roads."""
-    del version
-    output.start(quiet=quiet, as_json=as_json)
+    del version, quiet, as_json  # which `output.Program` takes
 
 
 @installation.command()
@@ -73,7 +75,7 @@ def parameters() -> None:
 
 @installation.command()
 def doctor() -> None:
-    """Check this environment: Python, packages, ROS, DDS, QoS of the visible topics, compiled kernels."""
+    """Check this environment: Python, packages, ROS 2. `ros2 doctor` checks the network and QoS."""
     from scenario_gen.ros.plumbing.doctor import ERROR, examine
 
     findings = []

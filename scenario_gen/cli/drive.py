@@ -7,8 +7,8 @@ The node `traffic` runs in this process, and steps when the planner has answered
 one command. The planner is started as a command, in a ROS domain in which nobody else is.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 import os
 import shlex
 import signal
@@ -17,7 +17,7 @@ import tempfile
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.interrupts import ending
-from scenario_gen.base.ros_domain import free_domain, this_host_only
+from scenario_gen.base.ros_domain import own_domain
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.trials import Outcome, Trial
 from scenario_gen.ros.nodes.traffic_of_trials import drive_trials
@@ -44,7 +44,7 @@ def drive_over_dds(
     words = shlex.split(command)
     if not words:
         raise InputError("--planner is empty; with --ros, give the command that starts the planner's node")
-    with free_domain() as domain, _environment(domain), tempfile.TemporaryFile() as output:
+    with own_domain(), tempfile.TemporaryFile() as output:
         try:
             process = subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT, start_new_session=True)
         except OSError as error:
@@ -72,19 +72,3 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
             os.killpg(process.pid, number)
         with suppress(subprocess.TimeoutExpired):
             process.wait(PATIENCE)
-
-
-@contextmanager
-def _environment(domain: int) -> Iterator[None]:
-    """Set what puts this process and its children in a ROS domain on this host."""
-    own = {**this_host_only(), "ROS_DOMAIN_ID": str(domain)}
-    before = {name: os.environ.get(name) for name in own}
-    os.environ.update(own)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

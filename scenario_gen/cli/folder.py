@@ -90,56 +90,66 @@ def generate_folder(
         InputError: a log cannot be read, an encounter is unknown, or `out` may not be replaced.
         RefusedError: nothing could be generated.
     """
-    logs, roads, config, count, seed = requested.logs, requested.roads, requested.config, requested.count, requested.seed
-    with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *requested.also_read]) as folder:
-        readings, read = [], list[int]()
-        with progress() as advance:
-            for k, (group, _) in enumerate(requested.jobs):
-                advance("logs read", k, len(requested.jobs))
-                try:
-                    readings.append(read_log(group, config.log))
-                except NoEncounterError as error:
-                    if len(requested.jobs) == 1:
-                        raise
-                    tell(f"no encounter: {error}")  # a result; the other logs may have some
-                    continue
-                read.append(k)
-        for line in notes_of(readings):
-            tell(line)
+    with replaced_folder(out, GENERATED, [*requested.logs, *map(Path, requested.roads), *requested.also_read]) as folder:
+        readings = read_logs(requested, progress, tell)
         pairs = [
             (encounter, road)
-            for log, k in zip(readings, read, strict=True)
+            for log, roads in readings
             for encounter in chosen(log.encounters, requested.encounters)
-            for road in requested.jobs[k][1]
+            for road in roads
         ]
         with progress() as advance:
             cases, refusals = generate_all(
                 pairs,
-                config,
-                count=count,
-                seed=seed,
+                requested.config,
+                count=requested.count,
+                seed=requested.seed,
                 request=requested.request,
                 advance=advance,
                 for_testing=requested.for_testing,
             )
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
-        for line in faults_of(cases):
+        unlooking = unlooking_said(cases) if requested.request.ego else []
+        for line in (*faults_of(cases), *unlooking):
             tell(line)
-        unlooking = [] if not requested.request.ego else unlooking_said(cases)
-        for sentence in unlooking:
-            tell(sentence)
         if record is not None:
             record(folder / BAG, cases)
+        quality = [line for log, _ in readings for line in log.quality.lines()]
         write_results(
             folder,
             cases,
-            seed=seed,
-            title=requested.title or ", ".join(path.stem for path in logs),
-            quality=[*(line for log in readings for line in log.quality.lines()), *refusals, *unlooking],
-            provenance=provenance_of(logs, seed, count, roads, config, requested.request),
+            seed=requested.seed,
+            title=requested.title or ", ".join(path.stem for path in requested.logs),
+            quality=[*quality, *refusals, *unlooking],
+            provenance=provenance_of(
+                requested.logs, requested.seed, requested.count, requested.roads, requested.config, requested.request
+            ),
         )
     return cases, refusals
+
+
+def read_logs(
+    requested: FolderRequest, progress: Callable[[], AbstractContextManager[Advance]], tell: Callable[[str], None]
+) -> list[tuple[LogResult, Sequence[str]]]:
+    """Return each log with the roads for its encounters; of several logs, those without an encounter are told and left out.
+
+    Raises:
+        InputError: a log cannot be read, or is the only one and has no encounter.
+    """
+    readings = []
+    with progress() as advance:
+        for k, (group, roads) in enumerate(requested.jobs):
+            advance("logs read", k, len(requested.jobs))
+            try:
+                readings.append((read_log(group, requested.config.log), roads))
+            except NoEncounterError as error:
+                if len(requested.jobs) == 1:
+                    raise
+                tell(f"no encounter: {error}")  # a result; the other logs may have some
+    for line in notes_of([log for log, _ in readings]):
+        tell(line)
+    return readings
 
 
 def faults_of(cases: Sequence[GenerationResult]) -> list[str]:

@@ -3,32 +3,24 @@
 
 """What commands print: messages, tables, progress, and with --json one object of results."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, fields, is_dataclass
 import functools
-import inspect
 import json
 import math
 import os
 from pathlib import Path
 import sys
-from typing import Annotated, Any, get_type_hints
+from typing import Any
 import webbrowser
 
 import typer
+from typer.core import TyperGroup
 
 from scenario_gen.base.errors import InputError, presentable, printable, ScenarioGenError
 from scenario_gen.base.stores import renamed
 from scenario_gen.cli import places
-
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.", rich_help_panel="Output")]
-JsonOption = Annotated[
-    bool,
-    typer.Option(
-        "--json", help="Print one JSON object to standard output; messages go to standard error.", rich_help_panel="Output"
-    ),
-]
 
 
 @dataclass
@@ -41,30 +33,42 @@ class Output:
 
 
 _current = Output()
+FLAGS = ("--quiet", "-q", "--json")
 
 
-@contextmanager
-def printing(command: str, *, quiet: bool, as_json: bool) -> Iterator[None]:
-    """Set how a command prints; with `as_json`, print its results as the last line of standard output, also after an error."""
-    global _current  # noqa: PLW0603 - the command line runs one command in a process
-    before, _current = _current, Output(quiet, as_json, {"command": command, "exit_code": 0})
-    own = _current
-    try:
-        yield
-    except typer.Exit as end:
-        own.results["exit_code"] = end.exit_code
-        raise
-    except (ScenarioGenError, OSError) as error:
-        own.results |= {"exit_code": getattr(error, "exit_code", 2), "error": presentable(str(error))}
-        raise
-    finally:
-        _current = before
-        if as_json:
-            print_object(own.results)
+class Program(TyperGroup):
+    """The program: takes --quiet and --json before and behind a command's name, and prints what --json asks for."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take the flags of all commands, wherever they stand before a `--`."""
+        end = args.index("--") if "--" in args else len(args)
+        flags = [word for word in args[:end] if word in FLAGS]
+        return super().parse_args(ctx, [*flags, *(word for word in args[:end] if word not in FLAGS), *args[end:]])
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; with --json, print its results as the last line of standard output, also after an error."""
+        global _current  # noqa: PLW0603 - the command line runs one command in a process
+        _current = Output(ctx.params["quiet"], ctx.params["as_json"])
+        ended: dict[str, Any] = {"exit_code": 0}
+        try:
+            return super().invoke(ctx)
+        except typer.Exit as end:
+            ended["exit_code"] = end.exit_code
+            raise
+        except (ScenarioGenError, OSError) as error:
+            ended |= {"exit_code": getattr(error, "exit_code", 2), "error": presentable(str(error))}
+            raise
+        except Exception:  # a wrong option, which the caller reports
+            _current.as_json = False
+            raise
+        finally:
+            if _current.as_json:
+                print_object({"command": ctx.invoked_subcommand} | _current.results | ended)
+            _current = Output()
 
 
 class Commands(typer.Typer):
-    """Commands that stand together in `--help`; each takes --quiet and --json, and URLs of a store where it takes paths."""
+    """Commands that stand together in `--help`; each takes URLs of a store where it takes paths."""
 
     def __init__(self, panel: str) -> None:
         super().__init__()
@@ -83,37 +87,17 @@ class Commands(typer.Typer):
         """
 
         def of(function: Callable[..., None]) -> Callable[..., None]:
-            own = name or function.__name__
+            paths = places.paths_of(function, urls)
 
             @functools.wraps(function)
-            def run(*, quiet: bool, as_json: bool, **values: Any) -> None:
-                how = printing(own, quiet=quiet or _current.quiet, as_json=as_json or _current.as_json)
-                with how, places.as_files(values, paths) as own_values:
-                    function(**own_values)
+            def run(**values: Any) -> None:
+                with places.as_files(values, paths) as local:
+                    function(**local)
 
-            signature = getattr(function, "__signature__", None) or inspect.signature(function)
-            hints = get_type_hints(function, include_extras=True) | {"quiet": QuietOption, "as_json": JsonOption}
-            parameters = [
-                entry.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[entry.name])
-                for entry in signature.parameters.values()
-            ]
-            paths = places.paths_of(parameters, urls)
-            parameters += [
-                inspect.Parameter(flag, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=hints[flag])
-                for flag in ("quiet", "as_json")
-            ]
-            run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-            run.__annotations__ = hints
-            super(Commands, self).command(own, rich_help_panel=panel or self.panel, **options)(run)
+            super(Commands, self).command(name, rich_help_panel=panel or self.panel, **options)(run)
             return function
 
         return of
-
-
-def start(*, quiet: bool, as_json: bool) -> None:
-    """Set how the commands of this process print, from the options before the command's name."""
-    global _current  # noqa: PLW0603
-    _current = Output(quiet, as_json)
 
 
 def give(**results: Any) -> None:

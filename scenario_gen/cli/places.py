@@ -3,11 +3,10 @@
 
 """URLs as arguments of commands: what a command reads is copied to files first, what it writes goes to the store at its end."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack
-import inspect
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_type_hints
 
 import typer
 
@@ -18,14 +17,13 @@ from scenario_gen.base.stores import fetched, naming_objects, place, Remote, tem
 READ = ("log", "parameter_file", "against")  # options that name an input; those of all other options are written
 
 
-def paths_of(parameters: Sequence[inspect.Parameter], own: Sequence[str]) -> dict[str, bool]:
+def paths_of(command: Callable[..., None], own: Sequence[str]) -> dict[str, bool]:
     """Return {name: whether it is written} of the parameters that are paths, without the command's `own`, whose URLs it takes."""
     found = {}
-    for entry in parameters:
-        kind, info = get_args(entry.annotation)[:2]
-        if entry.name not in own and (kind is Path or Path in get_args(kind)):
-            is_option = isinstance(info, typer.models.OptionInfo) and entry.name not in READ
-            found[entry.name] = is_option or entry.name == "out"
+    for name, annotation in get_type_hints(command, include_extras=True).items():
+        kind, info = (*get_args(annotation), None, None)[:2]
+        if name not in own and (kind is Path or Path in get_args(kind)):
+            found[name] = name == "out" or (type(info) is type(typer.Option()) and name not in READ)
     return found
 
 

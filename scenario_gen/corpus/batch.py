@@ -99,10 +99,10 @@ class Batch:
 
     def lines(self) -> list[str]:
         """Return the summary for people."""
-        messages = [f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (template and road)"]
-        messages += [f"{count} cases without any: {cause}" for cause, count in Counter(self.failures).most_common()]
-        messages += [f"{count} candidates refused: {cause}" for cause, count in Counter(self.refused).most_common()]
-        return messages + self.failed
+        lines = [f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (template and road)"]
+        lines += [f"{count} cases without any: {cause}" for cause, count in Counter(self.failures).most_common()]
+        lines += [f"{count} candidates refused: {cause}" for cause, count in Counter(self.refused).most_common()]
+        return lines + self.failed
 
 
 def run_batch(

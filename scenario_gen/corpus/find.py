@@ -70,12 +70,12 @@ def coverage_lines(hits: Hits, batch: Place) -> list[str]:
     kinds = sorted({kind for kind, *_ in hits.coverage})
     roads = sorted({table.parent.name.partition("=")[2] for table in (batch / "cases").rglob("*.parquet")})
     cells = {(kind, road, pet): count for kind, road, pet, count in hits.coverage}
-    messages = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
+    lines = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
     for kind in kinds:
         for road in roads:
             counts = ", ".join(f"{pet}: {cells[kind, road, pet]}" for pet in classes if (kind, road, pet) in cells)
-            messages.append(f"  {kind} on {road}: {f'PET {counts}' if counts else 'no scenario'}")
-    return messages
+            lines.append(f"  {kind} on {road}: {f'PET {counts}' if counts else 'no scenario'}")
+    return lines
 
 
 def bag_of(batch: Place, row: Mapping[str, Any]) -> Place:

@@ -83,17 +83,17 @@ class Built:
 
     def lines(self) -> list[str]:
         """Return the summary for people."""
-        messages = [
+        lines = [
             f"{self.primitives} primitives, fitted to {self.fitted} pairs; {self.segments} segments in all {self.assigned} pairs",
             f"convergence: split R̂ at most {self.r_hat:.3f}; two seeds agree to {self.seeds:.2f} (adjusted Rand)",
             f"pairs assigned agree with the fit to {self.agreement:.2f} (adjusted Rand)",
             "primitives by pairs fitted: " + ", ".join(f"{found} of {count}" for count, found in self.growth),
         ]
         if self.r_hat > USUAL_R_HAT:
-            messages.append("R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps")
+            lines.append("R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps")
         if 0 < self.limit <= self.primitives:
-            messages.append(f"all {self.limit} states are in use: raise sampler.states")
-        return [*messages, *self.failed]
+            lines.append(f"all {self.limit} states are in use: raise sampler.states")
+        return [*lines, *self.failed]
 
 
 def pair_encounters(encounter: Encounter, interaction: float) -> Iterator[Encounter]:

@@ -53,7 +53,6 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "output/exchange/osi.py": "a map, which the reader of maps has read",
     "output/exchange/export.py": "copies a map, which the reader of maps has read",
     "cli/launching.py": "parameter files, through `documents`",
-    "cli/suite.py": "what its own processes write",
     "corpus/batch.py": "its own notes in its own folder, through `documents`",
     "corpus/mine.py": "its own intermediate tables, which are written whole or not at all",
     "corpus/tasks.py": "its own note in its own folder, through `documents`",
@@ -71,5 +70,5 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
 
 def parsing_modules() -> set[str]:
     """Return the modules outside of the nodes that call what parses, by their paths in their packages."""
-    files = [(path, package) for package in PACKAGES for path in package.rglob("*.py") if "ros" not in path.parts]
+    files = [(path, package) for package in PACKAGES for path in package.rglob("*.py") if package / "ros" not in path.parents]
     return {str(path.relative_to(package)) for path, package in files if PARSING.search(path.read_text(encoding="utf-8"))}

@@ -32,7 +32,7 @@ def start(domain):
 
     def run(node: str, *more: str, **parameters: object) -> Forked:
         words = [*more, *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}"))]
-        process = start_nodes("start", node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain))
+        process = start_nodes(node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain))
         started.append(process)
         return process
 

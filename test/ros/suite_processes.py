@@ -5,9 +5,9 @@
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-import json
 import os
 from pathlib import Path
+import signal
 import sys
 import threading
 import time
@@ -30,23 +30,23 @@ class Processes:
     ):
         self.folder = folder
         spaces = {node: [w for name in (namespaces or {}).get(node, ()) for w in ("--namespace", name)] for node in nodes}
-        specification = [
-            {"node": node, "arguments": [*spaces[node], "--ros-args", *arguments], "log": str(folder / f"{node}.log")}
-            for node, arguments in nodes.items()
-        ]
-        (folder / "suite.json").write_text(json.dumps(specification))
         environment = {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)}
-        self.process = start_nodes("forked", str(folder / "suite.json"), **environment)
-        assert json.loads(self.process.stdout.readline())["event"] == "loaded"
-        started = [json.loads(self.process.stdout.readline()) for _ in nodes]
-        self.pids = {event["node"]: event["pid"] for event in started}
+        self.processes = {
+            node: start_nodes(node, *spaces[node], "--ros-args", *arguments, log=folder / f"{node}.log", **environment)
+            for node, arguments in nodes.items()
+        }
+        self.pids = {node: process.pid for node, process in self.processes.items()}
 
     def end(self) -> dict[str, int]:
         """End all nodes as Ctrl-C does; return their exit codes."""
-        self.process.stdin.close()
-        events = [json.loads(line) for line in self.process.stdout]
-        self.process.wait(180.0)
-        return {event["node"]: event["code"] for event in events if event["event"] == "exited"}
+        for process in self.processes.values():
+            process.send_signal(signal.SIGINT)
+        return {node: process.wait(180.0) for node, process in self.processes.items()}
+
+    def kill(self) -> None:
+        """Kill those that still run."""
+        for process in self.processes.values():
+            process.kill()
 
     def log(self, node: str) -> str:
         return (self.folder / f"{node}.log").read_text()
@@ -121,6 +121,34 @@ class Client:
         self.until(future.done, f"an answer of {name}", timeout)
         return future.result()
 
+    def statuses(self, topic: str = "/diagnostics"):
+        """All statuses that were heard so far."""
+        from msg_conventions.diagnostics import decode_diagnostics
+
+        return [status for data in list(self.heard[topic]) for status in decode_diagnostics(data)[1]]
+
+    def counted(self, topic: str, node: str = "/recorder") -> int:
+        """How many messages of a topic a recorder says are in its bag."""
+        if not self.heard["/diagnostics"]:
+            self.hear("/diagnostics")
+            self.wait("/diagnostics")
+        return max((int(s.values.get(topic, 0)) for s in self.statuses() if s.name == f"{node}: recorded"), default=0)
+
+    def generate_later(self, **values):
+        """Ask the sampler for scenarios; return the future."""
+        from rcl_interfaces.srv import SetParametersAtomically
+        from rclpy.parameter import Parameter
+
+        parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+        request = SetParametersAtomically.Request(parameters=parameters)
+        return self.call_later(SetParametersAtomically, "/gp_sampler/generate", request)
+
+    def generate(self, **values):
+        """Ask the sampler for scenarios; return its answer."""
+        future = self.generate_later(**values)
+        self.until(future.done, "an answer of the sampler", 600.0)
+        return future.result().result
+
     def close(self) -> None:
         self.executor.shutdown(timeout_sec=2.0)
         self.thread.join(2.0)
@@ -137,5 +165,4 @@ def whole_chain(folder: Path, domain: int, nodes: Iterable[str], *, count: int) 
     arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
     made = Processes(folder, domain, arguments)
     yield made
-    if made.process.poll() is None:
-        made.process.kill()
+    made.kill()

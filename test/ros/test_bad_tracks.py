@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from suite_processes import Processes, RESOURCES
 
-from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.diagnostics import Level
 from msg_conventions.fits import decode_fit
-from msg_conventions.streams import encode_fix, encode_speed
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.logs import read_log
 from scenario_gen.types.encounter import Encounter
@@ -85,45 +84,8 @@ def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tm
 
 def _levels(client) -> dict[str, Level]:
     """What each node said last of its tracks."""
-    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
-    return {s.name[1:].removesuffix(": tracks"): s.level for s in statuses if s.name.endswith(": tracks")}
+    return {s.name[1:].removesuffix(": tracks"): s.level for s in client.statuses() if s.name.endswith(": tracks")}
 
 
 def _named(client, node: str, words: str) -> bool:
-    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
-    return any(s.level is Level.ERROR and s.name == f"/{node}: tracks" and words in s.message for s in statuses)
-
-
-def test_streams_of_vehicles_far_apart_are_named_and_the_next_good_ones_become_tracks(tmp_path, domain, client):
-    """A vehicle that is 10 km off, then one that is off the globe; then a drive side by side."""
-    client.hear("/diagnostics", "/tracks")
-    topics = [f"/vehicle_{name}/{kind}" for name in ("1", "2") for kind in ("fix", "speed")]
-    for topic in topics:
-        client.announce(topic)
-    made = Processes(tmp_path, domain, {"segmenter": ["-p", "live.silence:=1.0"]})
-    try:
-        client.until(lambda: all(client.node.count_subscribers(topic) for topic in topics), "the segmenter's subscriptions")
-        client.heard.clear()
-        for start, north, words in ((1, 0.09, "no two vehicles are within"), (2, 90.0, "only vehicle 1 has usable positions")):
-            _drive(client, start * 10**18, north)
-            client.until(lambda words=words: any(words in text for text in _errors(client)), words)
-        assert not client.heard["/tracks"]
-        _drive(client, 3 * 10**18 // 2, 4e-5)
-        client.wait("/tracks")
-        assert _peak(made.pids["segmenter"]) < GIBIBYTE
-    finally:
-        assert made.end() == {"segmenter": 0}
-
-
-def _drive(client, start_ns: int, north: float) -> None:
-    """Ten seconds of two vehicles, the second one so many degrees north of the first."""
-    for k in range(100):
-        stamp = start_ns + k * 100_000_000
-        for name, offset in (("1", 0.0), ("2", north)):
-            client.say(f"/vehicle_{name}/fix", encode_fix(42.0 + offset, -83.0 + 1e-5 * k, stamp, "a"))
-            client.say(f"/vehicle_{name}/speed", encode_speed(8.3, stamp, "a"))
-
-
-def _errors(client) -> list[str]:
-    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
-    return [s.message for s in statuses if s.level is Level.ERROR]
+    return any(s.level is Level.ERROR and s.name == f"/{node}: tracks" and words in s.message for s in client.statuses())

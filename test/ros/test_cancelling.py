@@ -8,7 +8,6 @@ import threading
 import pytest
 
 from scenario_gen.base.cancelling import cancellable, CancelledError, stop_if_cancelled
-from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.base.worker import Worker
 from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template
@@ -35,25 +34,6 @@ def test_every_stage_of_a_node_can_be_cancelled(request):
         with cancellable(lambda: True), pytest.raises(CancelledError):
             work()
     stop_if_cancelled()  # outside, nothing is
-
-
-def test_a_newer_job_ends_the_running_one_of_its_name_and_nobody_is_told():
-    failures, done, started = [], [], threading.Event()
-    worker = Worker(lambda name, error: failures.append((name, error)))
-
-    def endless(_):
-        started.set()
-        while True:
-            stop_if_cancelled()
-
-    worker.submit("tracks", endless)
-    assert started.wait(60.0)
-    finished = threading.Event()
-    worker.submit("tracks", lambda cancelled: (done.append(cancelled()), finished.set()))
-    assert finished.wait(60.0)
-    worker.close(60.0)
-    assert done == [False] and failures == []
-    assert issubclass(CancelledError, ScenarioGenError)
 
 
 def test_two_threads_run_jobs_of_two_names_at_a_time_and_never_two_of_one():

@@ -5,7 +5,6 @@
 
 import threading
 
-from node_server import Forked
 import pytest
 from suite_processes import Processes, RESOURCES
 
@@ -15,9 +14,9 @@ from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.cli.suite import Job, run_suite
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.ros.plumbing.suite import Job, run_suite
 
 pytestmark = [pytest.mark.dds, pytest.mark.slow]
 JOBS = (
@@ -74,8 +73,7 @@ def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
         assert made.end() == dict.fromkeys(nodes, 0)
 
 
-def test_a_job_that_cannot_be_done_names_the_stage_and_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenario_gen.cli.suite.subprocess.Popen", lambda command, env, **_: Forked("forked", command[4:], env))
+def test_a_job_that_cannot_be_done_names_the_stage_and_leaves_nothing(tmp_path):
     with pytest.raises(RefusedError, match="/x/planner: plan: the template does not fit"):
         run_suite([Job("/x", RESOURCES / "synthetic_b", "straight")], PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag")
     with pytest.raises(InputError, match="/x/log_player"):

@@ -3,19 +3,16 @@
 
 """Vehicles that stream, a segmenter that hears them, and /clock: changepoints while they drive, scenarios when they have."""
 
-import time
-
 import numpy as np
 import pytest
-from suite_processes import Client, Processes, RESOURCES
+from suite_processes import Processes, RESOURCES
 
 from msg_conventions import trajectory
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.diagnostics import Level
 from msg_conventions.streams import encode_fix, encode_speed
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.logs import read_log
-from scenario_gen.logs.geodesy import latitude_longitude
 
 pytestmark = pytest.mark.dds
 LOG = RESOURCES / "synthetic_c"
@@ -65,35 +62,6 @@ def test_changepoints_come_while_the_vehicles_drive_and_scenarios_afterwards(sui
     assert len(set(client.wait("/changepoints", 2))) == 1
 
 
-def test_a_changepoint_does_not_wait_for_what_follows(suite, client):
-    """Twelve seconds of sixteen are said, and no more: the changepoint at four seconds comes, and then what they amount to."""
-    (encounter,) = read_log(LOG).encounters
-    places = latitude_longitude(encounter)
-    start, order = 10**18, []
-
-    def note(data: bytes) -> None:
-        message = trajectory.decode(data, "order")
-        if 0 <= message.stamp_ns - start < 10**9:
-            order.append(message)
-
-    client.also("/changepoints/live", note)
-    client.also("/tracks", note)
-    topics = [f"/vehicle_{name}/{kind}" for name in ("5", "6") for kind in ("fix", "speed")]
-    for topic in topics:
-        client.announce(topic)
-    client.until(lambda: all(client.node.count_subscribers(topic) for topic in topics), "the segmenter's subscriptions")
-    for k in range(120):
-        time.sleep(0.01)  # ten times the real speed, so that no topic runs far ahead of the others
-        stamp = start + k * encounter.dt_ns
-        for i, name in enumerate(("5", "6")):
-            client.say(f"/vehicle_{name}/fix", encode_fix(*places[i, k], stamp, "a"))
-            client.say(f"/vehicle_{name}/speed", encode_speed(encounter.speed[i, k], stamp, "a"))
-    client.until(lambda: any(len(message.time_ns) >= 110 for message in order), "the tracks of what was said")
-    first, tracks = order[0], order[-1]
-    assert [vehicle.id for vehicle in first.vehicles] == [vehicle.id for vehicle in tracks.vehicles] == ["5", "6"]
-    assert len(first.time_ns) == 1 and abs(first.time_ns[0] * 1e-9 - 4.0) < 0.6
-
-
 def test_streams_with_all_that_can_be_wrong_do_not_end_it(suite, client):
     """Disorder, repetition, NaN, no fix, damaged bytes, wrong types, stamps of another time: then an encounter after all."""
     from std_msgs.msg import String
@@ -127,14 +95,10 @@ def test_streams_with_all_that_can_be_wrong_do_not_end_it(suite, client):
     misfit.publish(String(data="no fix"))
     client.say("/vehicle_4/fix", b"\x00\x01\x00\x00" + bytes(8))  # the last message of the longest queue
     for words in ("/vehicle_4/fix: the message ends at byte 8", "/vehicle_8/fix is a std_msgs"):
-        client.until(lambda words=words: any(s.level is Level.ERROR and words in s.message for s in said(client)), words)
+        client.until(lambda words=words: any(s.level is Level.ERROR and words in s.message for s in client.statuses()), words)
     heard = len(client.heard["/tracks"])
     assert "streams" in client.call(Trigger, "/segmenter/segment", Trigger.Request()).message
     template = decode_tracks(client.wait("/tracks", heard + 1)[-1])
     assert [vehicle.id for vehicle in template.vehicles] == ["3", "4"]
     assert abs(template.start_ns - start) < 10**9
     assert template.duration > 10.0
-
-
-def said(client: Client):
-    return [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]

@@ -39,24 +39,6 @@ rclpy.spin(node)
 """
 
 
-def _statuses(client: Client) -> list[Status]:
-    return [status for data in list(client.heard["/diagnostics"]) for status in decode_diagnostics(data)[1]]
-
-
-def _recorded(client: Client, topic: str) -> int:
-    counts = [int(s.values.get(topic, 0)) for s in _statuses(client) if s.name == "/recorder: recorded"]
-    return max(counts, default=0)
-
-
-def _generate(client: Client, **values):
-    from rcl_interfaces.srv import SetParametersAtomically
-    from rclpy.parameter import Parameter
-
-    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
-    request = SetParametersAtomically.Request(parameters=parameters)
-    return client.call(SetParametersAtomically, "/gp_sampler/generate", request, timeout=600.0).result
-
-
 def test_a_large_request_arrives_whole(tmp_path, domain, client):
     bag = tmp_path / "bag"
     nodes = {
@@ -70,12 +52,12 @@ def test_a_large_request_arrives_whole(tmp_path, domain, client):
     client.hear("/diagnostics")
     suite = Processes(tmp_path, domain, nodes)
     try:
-        client.until(lambda: _generate(client, count=1).successful, "the sampler's inputs")
-        answer = _generate(client, count=MANY, seed=3)
+        client.until(lambda: client.generate(count=1).successful, "the sampler's inputs")
+        answer = client.generate(count=MANY, seed=3)
         assert answer.successful and f"{MANY} of {MANY} scenarios" in answer.reason, answer.reason
-        assert not [s.message for s in _statuses(client) if "pace of" in s.name], "nobody hangs"
-        client.until(lambda: _recorded(client, "/scenarios/info") >= MANY + 2, "the recorder to have all", 600.0)
-        assert not [s.message for s in _statuses(client) if s.name == "/recorder: losses" and "lost" in s.message]
+        assert not [s.message for s in client.statuses() if "pace of" in s.name], "nobody hangs"
+        client.until(lambda: client.counted("/scenarios/info") >= MANY + 2, "the recorder to have all", 600.0)
+        assert not [s.message for s in client.statuses() if s.name == "/recorder: losses" and "lost" in s.message]
     finally:
         assert suite.end() == dict.fromkeys(nodes, 0)
     (scenarios,) = [topic for topic in bag_topics(bag) if topic.name == "/scenarios"]
@@ -129,7 +111,7 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
 
 
 def _recorder(domain: int, bag: Path) -> Forked:
-    return start_nodes("start", "recorder", "--ros-args", "-p", f"bag:={bag}", ROS_DOMAIN_ID=str(domain))
+    return start_nodes("recorder", "--ros-args", "-p", f"bag:={bag}", ROS_DOMAIN_ID=str(domain))
 
 
 def _scenario(k: int) -> Scenario:
@@ -164,7 +146,7 @@ def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
             client.say("/scenarios/info", encode_info(entry, 0))
 
         publish(0)
-        client.until(lambda: _recorded(client, "/scenarios") == 1, "the first scenario in the bag")
+        client.until(lambda: client.counted("/scenarios") == 1, "the first scenario in the bag")
         recorder.send_signal(signal.SIGSTOP)
         for k in range(1, count):
             publish(k)
@@ -175,7 +157,7 @@ def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
         client.say("/scenarios/info", encode_diagnostics([Status("/x: request", Level.OK, "", closing)], 0))
 
         def told() -> str:
-            losses = [s.values for s in _statuses(client) if s.name == "/recorder: losses" and s.level is Level.WARN]
+            losses = [s.values for s in client.statuses() if s.name == "/recorder: losses" and s.level is Level.WARN]
             words = [values.get("/scenarios", "") for values in losses]
             return next((said for said in words if "lost" in said and "are missing" in said), "")
 
@@ -204,12 +186,12 @@ def test_a_killed_recorder_keeps_what_came_before_its_last_seconds(domain, tmp_p
     client.hear("/diagnostics")
     recorder = _recorder(domain, bag)
     try:
-        client.until(lambda: any(s.name == "/recorder: recorded" for s in _statuses(client)), "the recorder")
+        client.until(lambda: any(s.name == "/recorder: recorded" for s in client.statuses()), "the recorder")
         client.announce("/report")
         client.until(lambda: client.node.count_subscribers("/report") == 1, "a subscriber")
         data = encode_diagnostics([Status("/evaluator: row", Level.OK, "")], 0)
         client.say("/report", data)
-        client.until(lambda: _recorded(client, "/report") == 1, "the message in the bag")
+        client.until(lambda: client.counted("/report") == 1, "the message in the bag")
         client.until(lambda: _saved(bag, tmp_path, data), "the message on the disk")
         recorder.kill()
         recorder.wait()

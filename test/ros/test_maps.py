@@ -8,7 +8,7 @@ import json
 from lengths import LONG
 from nav_msgs.srv import LoadMap
 import pytest
-from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from suite_processes import Client, whole_chain
 
@@ -71,15 +71,14 @@ def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(sui
     assert client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=str(tmp_path / "tiny.yaml"))).result == 0
 
     def refused() -> bool:
-        statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
-        return any(s.name == "/planner: plan" and s.level is Level.ERROR for s in statuses)
+        return any(s.name == "/planner: plan" and s.level is Level.ERROR for s in client.statuses())
 
     client.until(refused, "the planner's refusal")
     before = len(client.heard["/scenarios/info"])
     reasons = []
 
     def is_told() -> bool:
-        answer = client.call(SetParametersAtomically, "/gp_sampler/generate", SetParametersAtomically.Request()).result
+        answer = client.generate()
         reasons.append(answer.reason)
         return not answer.successful and "fit/info of this map" in answer.reason
 

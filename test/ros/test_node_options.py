@@ -71,18 +71,6 @@ def test_simulated_time_stamps_what_a_node_says(start, client):
         time.sleep(0.2)
 
 
-def test_a_node_that_was_killed_and_starts_again_is_one_node_with_the_same_output(start, client):
-    client.hear("/map")
-    first = start("road_server", road_name="straight")
-    client.wait("/map")
-    first.kill()
-    first.wait(30.0)
-    client.heard["/map"].clear()
-    start("road_server", road_name="straight")  # as respawn does
-    client.wait("/map")
-    client.until(lambda: client.node.count_publishers("/map") == 1, "the killed one to be gone")
-
-
 def test_the_table_of_options_names_tests_that_are_there():
     text = (ROOT / "docs" / "interfaces.md").read_text()
     table = re.findall(r"^\| .* \| `(test_\w+\.py)` \|$", text, re.MULTILINE)

@@ -62,7 +62,7 @@ def test_any_type_is_recorded_as_it_was_sent(start, client, tmp_path):
             sent[topic].append(serialize_message(message))
             out.publish(sent[topic][-1])  # these bytes: what fills CDR's gaps may differ from one serialisation to the next
     whole = sum(len(data) for messages in sent.values() for data in messages)
-    client.until(lambda: counted(client, "/area") == 50 and counted(client, "/imu") == 50, f"{whole} bytes in the bag")
+    client.until(lambda: client.counted("/area") == 50 and client.counted("/imu") == 50, f"{whole} bytes in the bag")
     ended(recorder)
     assert {topic.name: topic.type for topic in bag_topics(bag)} == {
         "/imu": "sensor_msgs/msg/Imu",
@@ -79,17 +79,6 @@ def test_any_type_is_recorded_as_it_was_sent(start, client, tmp_path):
     assert all(c.metadata["topic_type_hash"].startswith("RIHS01_") for c in summary.channels.values())
 
 
-def counted(client: Client, topic: str, node: str = "/recorder") -> int:
-    """How many messages of a topic a recorder says are in its bag."""
-    from msg_conventions.diagnostics import decode_diagnostics
-
-    if "/diagnostics" not in client.heard:
-        client.heard["/diagnostics"] = []
-        client.hear("/diagnostics")
-    said = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
-    return max((int(s.values[topic]) for s in said if s.name == f"{node}: recorded" and topic in s.values), default=0)
-
-
 def test_a_killed_recorder_loses_its_last_chunk_only(start, client, tmp_path):
     """`kill -9` in the midst of it; `scenario-gen reindex` makes a bag of it that other readers open."""
     from sensor_msgs.msg import CompressedImage
@@ -104,7 +93,7 @@ def test_a_killed_recorder_loses_its_last_chunk_only(start, client, tmp_path):
         message = CompressedImage(format=str(sent), data=data)
         picture.publish(message)
         sent += 1
-        client.until(lambda due=sent - 40: counted(client, "/picture") >= due, "the recorder to keep up")
+        client.until(lambda due=sent - 40: client.counted("/picture") >= due, "the recorder to keep up")
     written = size(bag)
     recorder.send_signal(signal.SIGKILL)
     assert recorder.wait(180.0) == -signal.SIGKILL
@@ -148,7 +137,7 @@ def test_a_full_disk_ends_the_recording_and_says_so(start, client, tmp_path):
 
         for k in range(120):  # 6 MB
             picture.publish(CompressedImage(format=str(k), data=bytes(50_000)))
-            client.until(lambda due=k - 40: errors() or counted(client, "/picture") >= due, "the recorder to keep up")
+            client.until(lambda due=k - 40: errors() or client.counted("/picture") >= due, "the recorder to keep up")
         client.until(errors, "an error of the recorder")
         assert "No space left on device" in errors()[0] and "bag_0.mcap" in errors()[0]
         assert recorder.poll() is None
@@ -174,7 +163,7 @@ def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(start, client, da
     client.until(lambda: client.node.count_subscribers("/topic") > 0, "a subscriber of /topic")
     client.until(lambda: client.node.count_publishers("/topic") > 0, "a publisher of /topic")
     assert client.call(Trigger, "/player/resume", Trigger.Request()).success
-    client.until(lambda: counted(client, "/topic") == 10, "ten messages in the bag")
+    client.until(lambda: client.counted("/topic") == 10, "ten messages in the bag")
     ended(recorder)
     ended(player)
     played = [m.data for m in read_messages(source, lambda name: name == "/topic")]
@@ -226,7 +215,7 @@ def test_a_recorder_keeps_to_its_namespace(start, client, tmp_path):
     wanted = {"/": set(heard), "/a": set(heard) - {"/b/ego/start", "/ab/ego/start"}}
     for space, topics in wanted.items():
         node = f"{space.rstrip('/')}/recorder"
-        client.until(lambda n=node, t=topics: all(counted(client, one, n) == 1 for one in t), f"{len(topics)} messages of {node}")
+        client.until(lambda n=node, t=topics: all(client.counted(one, n) == 1 for one in t), f"{len(topics)} messages of {node}")
     for process in recorders.values():
         ended(process)
     bags = {"/": tmp_path / "root", "/a": tmp_path / "own"}
@@ -255,9 +244,7 @@ def test_the_player_ends_when_all_is_played_and_heard(start, client):
 def test_the_player_stays_if_it_is_told_to(start, client):
     bag = RESOURCES / "synthetic_c"
     process = start("player", bag=bag, rate=1000.0, stay=True)
-    assert process.stdout is not None
-    while "played" not in (line := process.stdout.readline()):
-        assert line, "it ended"
+    client.until(lambda: "played" in process.output(), "its end")
     client.until(lambda: ("player", "/") in client.node.get_node_names_and_namespaces(), "the player in the graph")
     assert process.poll() is None
     ended(process)

@@ -8,7 +8,6 @@ import re
 import pytest
 from suite_processes import Processes, RESOURCES
 
-from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.ego import decode_state, ego_messages
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.base.errors import InputError
@@ -36,20 +35,7 @@ def suite(tmp_path_factory, domain):
     arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
     made = Processes(folder, domain, arguments)
     yield made
-    if made.process.poll() is None:
-        made.process.kill()
-
-
-def ask(client, **values):
-    """Call ~/generate with these parameters; its result."""
-    from rcl_interfaces.srv import SetParametersAtomically
-    from rclpy.parameter import Parameter
-
-    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
-    request = SetParametersAtomically.Request(parameters=parameters)
-    future = client.call_later(SetParametersAtomically, "/gp_sampler/generate", request)
-    client.until(future.done, "an answer")
-    return future.result().result
+    made.kill()
 
 
 def in_process(count, **asked):
@@ -64,8 +50,7 @@ def published(client, result):
     request = re.match(r"request (\d+)", result.reason)[1]
 
     def accounts():
-        every = [s for data in client.heard["/scenarios/info"] for s in decode_diagnostics(data)[1]]
-        return [s.values for s in every if s.values["request"] == request]
+        return [s.values for s in client.statuses("/scenarios/info") if s.values["request"] == request]
 
     client.until(lambda: any("published" in values for values in accounts()), "the account")
     own = [values for values in accounts() if "sha256" in values]
@@ -76,7 +61,7 @@ def published(client, result):
 def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
     client.hear("/scenarios", "/scenarios/info", "/ego/start", "/ego/goal", "/ego/witness")
     client.wait("/scenarios/info", 3, timeout=120.0)
-    result = ask(client, ego="1", count=3)
+    result = client.generate(ego="1", count=3)
     assert result.successful, result.reason
     encounter, made = in_process(3, ego="1")
     digests, accounts = published(client, result)
@@ -94,11 +79,11 @@ def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
 def test_the_same_bytes_as_in_process_with_states(suite, client):
     client.hear("/scenarios", "/scenarios/info")
     client.wait("/scenarios/info", 3, timeout=120.0)
-    result = ask(client, count=3, **MOVED)
+    result = client.generate(count=3, **MOVED)
     assert result.successful, result.reason
     encounter, made = in_process(3, **MOVED)
     assert published(client, result)[0] == [digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios]
-    plain = ask(client, count=2)
+    plain = client.generate(count=2)
     assert published(client, plain)[0] == [digest(encode_scenario(s, encounter.start_ns)) for s in in_process(2)[1].scenarios], (
         "states are valid for their call only"
     )
@@ -107,21 +92,21 @@ def test_the_same_bytes_as_in_process_with_states(suite, client):
 def test_what_is_impossible_is_refused_and_the_nearest_is_possible(suite, client):
     client.hear("/scenarios", "/scenarios/info")
     client.wait("/scenarios/info", 3, timeout=120.0)
-    result = ask(client, count=2, goals="1: 19 18.07 3.1413 11")
+    result = client.generate(count=2, goals="1: 19 18.07 3.1413 11")
     assert not result.successful
     assert "off the road" in result.reason
     nearest = re.search(r"goals:='([^']*)'", result.reason.partition("Nearest possible: ")[2])[1]
-    taken = ask(client, count=2, goals=nearest)
+    taken = client.generate(count=2, goals=nearest)
     assert taken.successful and "2 of 2" in taken.reason
     for values, said in (({"ego": "9"}, "there are: 1, 2"), ({"starts": "1: a"}, "starts"), ({"goals": "7: 0 0 0"}, "'7'")):
-        refused = ask(client, **values)
+        refused = client.generate(**values)
         assert not refused.successful and said in refused.reason
 
 
 def test_all_of_it_is_in_the_bag(suite, client):
     client.hear("/scenarios", "/scenarios/info")
     client.wait("/scenarios/info", 3, timeout=120.0)
-    results = [ask(client, ego="2", count=2), ask(client, count=2, **MOVED)]
+    results = [client.generate(ego="2", count=2), client.generate(count=2, **MOVED)]
     digests = [published(client, result)[0] for result in results]
     suite.end()
     bag = suite.folder / "bag"

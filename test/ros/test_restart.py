@@ -23,9 +23,6 @@ NODES = {
 
 
 def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, client):
-    from rcl_interfaces.srv import SetParametersAtomically
-    from rclpy.parameter import Parameter
-
     def processes(name, nodes):
         (tmp_path / name).mkdir()
         return Processes(tmp_path / name, domain, {node: NODES[node] for node in nodes})
@@ -42,9 +39,7 @@ def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, clie
         for topic in ("/changepoints", "/fit", "/vehicle_1/route"):  # the latched inputs came again
             assert len(set(client.wait(topic, 2))) == 1, topic
         # the sampler, which lives, heard the same inputs again and made nothing of them: this is its second request
-        values = [Parameter(name, value=value).to_parameter_msg() for name, value in (("count", 1), ("seed", 9))]
-        request = SetParametersAtomically.Request(parameters=values)
-        result = client.call(SetParametersAtomically, "/gp_sampler/generate", request).result
+        result = client.generate(count=1, seed=9)
         assert result.successful and result.reason.startswith("request 2: 1 of 1"), result.reason
         other = client.wait("/scenarios", 4)[3]
 

@@ -72,9 +72,9 @@ def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
     }
     words = [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
     where = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)}
-    process = start_nodes("start", "suite", "--namespace", "/a", "--ros-args", *words, **where)
+    process = start_nodes("suite", "--namespace", "/a", "--ros-args", *words, **where)
     bag = ("-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "paused:=true")
-    player = start_nodes("start", "player", "--ros-args", "-r", "__ns:=/a", *bag, **where)
+    player = start_nodes("player", "--ros-args", "-r", "__ns:=/a", *bag, **where)
     try:
         for name in ("gp_sampler", "log_player", "road_server", "segmenter", "planner", "evaluator", "recorder", "player"):
             node = f"/a/{name}"

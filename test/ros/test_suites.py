@@ -45,7 +45,7 @@ def suites(tmp_path_factory, domains):
         }
         words = [word for key, value in values.items() for word in ("-p", f"{key}:={value}")]
         where = {"ROS_DOMAIN_ID": str(domains[domain]), "ROS_LOG_DIR": str(folder)}
-        running[name] = start_nodes("start", "suite", "--namespace", namespace, "--ros-args", *words, **where)
+        running[name] = start_nodes("suite", "--namespace", namespace, "--ros-args", *words, **where)
     yield running
     for process in running.values():
         process.kill()

@@ -127,10 +127,9 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     found = set()
 
     def all_said():
-        for data in client.heard["/diagnostics"]:
-            for status in decode_diagnostics(data)[1]:
-                if status.level is Level.WARN:
-                    found.update(text for text in (*wrong, "s old") if text in status.message)
+        for status in client.statuses():
+            if status.level is Level.WARN:
+                found.update(text for text in (*wrong, "s old") if text in status.message)
         return len(found) >= 3
 
     client.until(all_said, "faults on /diagnostics")

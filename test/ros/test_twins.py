@@ -6,7 +6,7 @@
 from bag_examples import hand_made_run
 import pytest
 
-from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.diagnostics import Level
 from scenario_gen.bags.recordings.write import result_messages
 
 pytestmark = pytest.mark.dds
@@ -15,11 +15,10 @@ pytestmark = pytest.mark.dds
 def twins_of(client):
     """The newest status about twins, by node."""
     found = {}
-    for data in client.heard["/diagnostics"]:
-        for status in decode_diagnostics(data)[1]:
-            node, _, subject = status.name.partition(": ")
-            if subject == "twins":
-                found[node] = status
+    for status in client.statuses():
+        node, _, subject = status.name.partition(": ")
+        if subject == "twins":
+            found[node] = status
     return found
 
 
@@ -51,10 +50,9 @@ def test_the_recorder_blames_two_publishers_and_not_the_disk(start, client, tmp_
         client.say(topic, data)
 
     def blamed():
-        statuses = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
         return [
             status.message
-            for status in statuses
+            for status in client.statuses()
             if status.name == "/recorder: losses" and "/one and /test_client and /two publish" in status.message
         ]
 

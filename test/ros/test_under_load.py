@@ -51,22 +51,9 @@ def suite(tmp_path_factory, domain):
     made.end()
 
 
-def _generate(client, wait=True, **values):
-    """Ask for scenarios; return the future, with its result if `wait`."""
-    from rcl_interfaces.srv import SetParametersAtomically
-    from rclpy.parameter import Parameter
-
-    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
-    request = SetParametersAtomically.Request(parameters=parameters)
-    future = client.call_later(SetParametersAtomically, "/gp_sampler/generate", request)
-    if wait:
-        client.until(future.done, "an answer of the sampler")
-    return future
-
-
 @pytest.mark.slow
 def test_callers_from_many_processes_get_their_own_answers(suite, domain, client):
-    client.until(lambda: _generate(client, count=1).result().result.successful, "the sampler's inputs")
+    client.until(lambda: client.generate(count=1).successful, "the sampler's inputs")
     client.hear("/scenarios", "/scenarios/info")
     client.wait("/scenarios/info", 2)
     client.heard.clear()
@@ -125,16 +112,16 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
     from std_srvs.srv import Trigger
 
     client.hear("/diagnostics")
-    client.until(lambda: _generate(client, count=1).result().result.successful, "the sampler's inputs")
-    running, *others = [_generate(client, wait=False, count=20_000) for _ in range(GpSampler.THREADS)]
-    waiting = _generate(client, wait=False, count=2, seed=3)
+    client.until(lambda: client.generate(count=1).successful, "the sampler's inputs")
+    running, *others = [client.generate_later(count=20_000) for _ in range(GpSampler.THREADS)]
+    waiting = client.generate_later(count=2, seed=3)
     name = "/gp_sampler: progress"
-    client.until(lambda: any(s.name == name and s.values.get("requested") == "20000" for s in _said(client)), "progress")
+    client.until(lambda: any(s.name == name and s.values.get("requested") == "20000" for s in client.statuses()), "progress")
     assert client.call(ListParameters, "/gp_sampler/list_parameters", ListParameters.Request()).result.names
     assert client.call(GetMap, "/road_server/get_map", GetMap.Request()).map.data
     client.call(GetPlan, "/planner/get_plan", GetPlan.Request())
     assert not running.done(), "the others were to be served while it ran"
-    third = _generate(client, wait=False, count=20_000, request="third")
+    third = client.generate_later(count=20_000, request="third")
     one = SetParametersAtomically.Request(parameters=[Parameter("request", value="third").to_parameter_msg()])
     client.until(lambda: client.call(SetParametersAtomically, "/gp_sampler/cancel_request", one).result.successful, "its end")
     client.until(third.done, "the answer of one that waited, though others did not end")
@@ -153,46 +140,4 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
         assert not future.result().result.successful
         assert "cancelled" in future.result().result.reason
     assert not client.call(Trigger, "/gp_sampler/cancel", Trigger.Request()).success
-    assert _generate(client, count=1).result().result.successful
-
-
-def test_empty_maps_nan_tracks_and_wrong_types_are_said_and_survived(suite, client):
-    """The last test of the module, for it plays havoc with the inputs; then the road comes again, and all is well."""
-    import struct
-
-    from nav_msgs.srv import GetPlan, LoadMap
-    from std_msgs.msg import String
-
-    from msg_conventions.cdr import CdrWriter
-
-    client.hear("/diagnostics", "/tracks", "/map")
-    tracks = client.wait("/tracks")[0]
-    empty = CdrWriter().header(0, "map").stamp(0).pack("f", 0.2).pack("I", 0, 0).pack("d", *[0.0] * 6, 1.0).pack("I", 0).finish()
-    heard = len(client.wait("/map"))
-    client.say("/map", empty)
-    client.wait("/map", heard + 1)
-    client.until(lambda: _refused(client, GetPlan, "map"), "the empty map to be refused")
-    client.say("/tracks", _with_nan(tracks, struct))
-    for node in ("/segmenter", "/road_server"):
-        client.until(lambda node=node: any(s.name.startswith(node) and "not finite" in s.message for s in _said(client)), node)
-    client.node.create_publisher(String, "/changepoints", 1).publish(String(data="of a wrong type"))
-    client.say("/tracks", tracks)
-    answer = client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url="straight"))
-    assert answer.result == LoadMap.Response.RESULT_SUCCESS
-    client.until(lambda: _generate(client, count=1).result().result.successful, "the sampler to be served again")
-
-
-def _said(client):
-    return [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
-
-
-def _refused(client, kind, reason: str) -> bool:
-    """Ask for a plan; say whether it was empty, and why."""
-    plan = client.call(kind, "/planner/get_plan", kind.Request()).plan
-    said = [s.message for s in _said(client) if s.name.startswith("/planner: get_plan")]
-    return not plan.poses and any(reason in words for words in said)
-
-
-def _with_nan(tracks: bytes, struct) -> bytes:
-    """The same tracks with one coordinate that is no number: the last acceleration, before the last point's time."""
-    return tracks[:-16] + struct.pack("<d", float("nan")) + tracks[-8:]
+    assert client.generate(count=1).successful

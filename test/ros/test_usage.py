@@ -26,13 +26,6 @@ def test_the_player_lists_its_parameters():
         assert f"  {name} := " in done.stdout
 
 
-@pytest.mark.dds
-def test_help_may_be_read_in_part():
-    command = f"{sys.executable} -m scenario_gen.ros.plumbing.start suite --help | head -n 3"
-    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=120.0, check=False)
-    assert done.stderr == "" and "suite: all nodes in one process" in done.stdout
-
-
 @pytest.mark.parametrize("name", NODES)
 def test_every_node_lists_all_of_its_parameters(name):
     module = importlib.import_module(f"scenario_gen.ros.nodes.{name}")

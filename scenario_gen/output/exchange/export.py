@@ -127,13 +127,13 @@ def export_bag(
             for exported in case.scenarios:
                 progress(next(done), total)
                 try:
-                    message = to.write(folder, case, exported, export)
+                    written = to.write(folder, case, exported, export)
                 except RefusedError as error:
                     notes.append(f"{about}: left out: {error}")
                     continue
-                notes += [f"{about}, scenario {exported.index}: {sentence}" for sentence in message.notes]
-                entries.append(_entry(case, exported, message.names, to, export))
-                contents.append((message.names[0], message.content))
+                notes += [f"{about}, scenario {exported.index}: {sentence}" for sentence in written.notes]
+                entries.append(_entry(case, exported, written.names, to, export))
+                contents.append((written.names[0], written.content))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
         for name, data in to.closing(contents).items():

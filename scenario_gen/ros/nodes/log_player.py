@@ -21,8 +21,8 @@ from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import latitude_longitude, LogConfig, read_log
+from scenario_gen.ros.plumbing.node_parameters import LogPlayerParameters
 from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.types import Encounter, tokens
 
@@ -30,14 +30,9 @@ HEAD_START = 1.0  # seconds in which listeners find the streams, which are not l
 
 
 @dataclass(frozen=True)
-class Config(Parameters):
+class Config(LogPlayerParameters):
     """The log player's parameters."""
 
-    log_path: str = parameter("", "log to read: a file, a bag or a folder of files")
-    encounter: int = parameter(0, "which encounter of the log, from 0", low=0)
-    stream: bool = parameter(False, "play the encounter as fixes and speeds of each vehicle, and not as tracks")
-    rate: float = parameter(1.0, "how many times as fast as it was recorded the stream is", low=0.01, high=1000.0)
-    wait_matching_subscriptions: int = parameter(0, "do not begin to stream before each stream has so many listeners", low=0)
     log: LogConfig = field(default_factory=LogConfig)
 
 

@@ -250,6 +250,7 @@ class Player(Node):  # type: ignore[misc]
         self.executor.create_task(self._finish)  # to wake the executor alone would not make it look
 
     def _finish(self) -> None:
+        self.diagnostics.publish()  # how it went
         self.done = True
 
     def _play_once(self, config: Config) -> None:

@@ -29,8 +29,8 @@ from scenario_gen.bags.recordings.losses import Losses, remedy
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError, of_system
-from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
+from scenario_gen.ros.plumbing.node_parameters import RecorderParameters
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.topics import adapted_quality, message_class, qos
 
@@ -50,17 +50,8 @@ def default_topics(namespace: str) -> str:
 
 
 @dataclass(frozen=True)
-class Config(Parameters):
+class Config(RecorderParameters):
     """The recorder's parameters."""
-
-    bag: str = parameter("", "folder of the bag to begin at once; empty waits for ~/start and names it by the time")
-    topics: str = parameter(
-        "",
-        "regular expression of the full names of the topics to record; empty: those of the node's namespace, /clock and /tf",
-    )
-    compress: bool = parameter(True, "compress chunks with zstd")
-    split_bytes: int = parameter(0, "begin a new file after so many bytes of messages; 0 never", unit="B", low=0)
-    split_seconds: float = parameter(0.0, "begin a new file after so long; 0 never", unit="s", low=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -160,6 +151,7 @@ class Recorder(Node):  # type: ignore[misc]
     def close(self) -> None:
         """Close the bag; what else has to be done at the end may fail."""
         self.stop()
+        self.diagnostics.publish()
 
     def _look_around(self) -> None:
         """Subscribe to topics that have come up since."""

@@ -27,19 +27,15 @@ from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.roads import build_road, FAULTY, RoadConfig
+from scenario_gen.ros.plumbing.node_parameters import RoadServerParameters
 from scenario_gen.ros.plumbing.stage_node import REQUESTS, StageNode
 
 
 @dataclass(frozen=True)
-class Config(Parameters):
+class Config(RoadServerParameters):
     """The road server's parameters."""
 
-    road_name: str = parameter(
-        "t_intersection", "straight, curve, t_intersection, four_way, merge, roundabout, corridor, or a map_server YAML file"
-    )
-    wait_for_tracks: bool = parameter(False, "publish nothing until tracks say what the road is sized to")
     road: RoadConfig = field(default_factory=RoadConfig)
 
 

@@ -38,7 +38,6 @@ from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.driving import (
     ArrivingTrials,
-    Config,
     decode_command,
     EgoCommand,
     encode_verdict,
@@ -47,6 +46,7 @@ from scenario_gen.ros.plumbing.driving import (
     surroundings,
     task_messages,
 )
+from scenario_gen.ros.plumbing.node_parameters import TrafficParameters as Config
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.topics import create_frames_publisher, create_publisher, create_subscription, publish
 from scenario_gen.types import tokens

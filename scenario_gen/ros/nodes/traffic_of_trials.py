@@ -15,10 +15,8 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import State
 from scenario_gen.closed_loop.trials import Outcome, Trial
 from scenario_gen.ros.nodes.traffic import Traffic
-from scenario_gen.ros.plumbing.driving import (
-    Config,
-    INPUTS,
-)
+from scenario_gen.ros.plumbing.driving import INPUTS
+from scenario_gen.ros.plumbing.node_parameters import TrafficParameters
 
 START = 60.0  # seconds that a planner's node may take until it publishes commands
 SETTLE = 1.0  # seconds from its first publisher until it has found the topics that it listens to
@@ -31,7 +29,7 @@ class TrafficOfTrials(Traffic):
     """Drives trials one after the other for `scenario-gen drive --ros`; each step waits for the planner's reply."""
 
     def __init__(self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress) -> None:
-        super().__init__(config=Config(lock_step=True, follow_on=False, drive=config))
+        super().__init__(config=TrafficParameters(lock_step=True, follow_on=False, drive=config))
         self._trials, self._progress = list(trials), progress
         self._sent: State | None = None  # the state that was published last, when [s], and how many times
         self._sent_at, self._times_sent = 0.0, 0

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a node reports of itself on /diagnostics: its statuses by name, all of them every second, and at once when one changes.
+"""What a node reports of itself on /diagnostics: its statuses by name, all of them every second, and soon when one changes.
 
 That is how diagnostic_updater does it, so that diagnostic_aggregator takes no status for stale, and who comes late has all of
 them within a second. Nothing is latched: an error of an hour ago would reach a late aggregator as news.
@@ -18,20 +18,17 @@ import traceback
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, of_template, Status
+from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
 from scenario_gen.base.errors import printable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
-from scenario_gen.ros.plumbing.start import emit
-from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, others_on, own_topics, publish
+from scenario_gen.ros.plumbing.topics import create_publisher, others_on, own_topics, publish
 
-PERIOD = 1.0  # seconds of real time between two regular messages; what waits is published after half of it at most
-HOLD = 3.0  # seconds for which a finding is shown at least
-AT_ONCE = 20  # messages a second beside the regular ones; what changes more often waits
-ALSO = 50  # findings of one name that a message holds beside the newest
+TICK_S = 0.25  # seconds of real time after which what has changed is published
+TICKS = 4  # after so many all is published, changed or not
+HOLD_S = 3.0  # seconds for which a finding is shown at least
 MOST = 100  # statuses of a node
 LONGEST = 2_000  # characters of a message
 LARGEST = 65_536  # characters of the values of one status
-MILESTONES = ("tracks", "map", "changepoints", "fit")  # topics whose first message the watcher reports
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,7 @@ class _Entry:
 
 
 class NodeDiagnostics:
-    """The statuses of one node."""
+    """The statuses of one node, from any thread; its executor publishes them."""
 
     def __init__(self, node: Node, update: Callable[[], None] = lambda: None, *, enabled: bool = True) -> None:
         """Report from now on; `update` is called each second, to bring what goes on up to date, `enabled` see `enable`."""
@@ -57,27 +54,24 @@ class NodeDiagnostics:
         self._entries: dict[str, _Entry] = {}
         self._lock = threading.RLock()
         self._state: Status | None = None  # of nodes that have any
-        self._news: dict[str, list[str]] = {}  # findings since the last message, by name
-        self._waiting = False  # something is to be published before the next regular message
-        self._left, self._refilled = AT_ONCE, monotonic()
-        self._regular = self._updating = False  # whether this tick's message is a regular one; whether `update` is running
+        self._changed = False
+        self._fresh: set[str] = set()  # findings that no message has held yet, by name
+        self._ticks = 0
         self._twins: dict[str, list[str]] = {}  # nodes that publish the same topics, by topic
         self._publisher = create_publisher(node, "/diagnostics")
-        node.create_timer(0.5 * PERIOD, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.create_timer(TICK_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def enable(self, enabled: bool) -> None:
         """Take in what the node's work reports, or forget what it reported and take in no more, but the node's state."""
         with self._lock:
             self._enabled = enabled
             self._entries.clear()
-            self._news.clear()
 
     def state(self, message: str, **values: str) -> None:
         """Report in which state the node is; values that only tell how far something is wait for the next second."""
         with self._lock:
             old, self._state = self._state, self._status("state", Level.OK, message, values)
-            if old is None or old.message != message:
-                self._publish_soon()
+            self._changed |= old is None or old.message != message
 
     def report(self, *statuses: Status, stamp_ns: int = 0) -> None:
         """Keep statuses, and forget those of an earlier report about the same: names that begin with the same word.
@@ -90,9 +84,8 @@ class NodeDiagnostics:
             names, families = {status.name for status in statuses}, {family(status.name) for status in statuses}
             for name in [name for name in self._entries if family(name) in families and name not in names]:
                 self._entries.pop(name)
-            changed = [self._keep(of_template(status, stamp_ns) if stamp_ns else status) for status in statuses]
-            if any(changed):
-                self._publish_soon()
+            for status in statuses:
+                self._keep(of_template(status, stamp_ns) if stamp_ns else status)
 
     def status(
         self, level: Level, message: str, subject: str, values: Mapping[str, str], stamp_ns: int = 0, *, log: bool = True
@@ -105,8 +98,7 @@ class NodeDiagnostics:
         with self._lock:
             stop_if_abandoned()
             status = self._status(subject, level, message, values)
-            if self._keep(of_template(status, stamp_ns) if stamp_ns else status):
-                self._publish_soon()
+            self._keep(of_template(status, stamp_ns) if stamp_ns else status)
         if not log:
             return
         if level is Level.OK:  # a call of its own for each severity: rclpy refuses to change it between calls from one line
@@ -134,54 +126,52 @@ class NodeDiagnostics:
             if (entry := self._entries.get(subject)) is not None and entry.bad:
                 self._entries[subject] = replace(entry, over=True)
 
+    def publish(self) -> None:
+        """Publish all that is known now."""
+        with self._lock:
+            statuses = [*([self._state] if self._state else []), *(entry.status for entry in self._entries.values())]
+            self._changed = False
+            self._fresh.clear()
+        publish(self._node, self._publisher, encode_diagnostics(statuses, self._node.get_clock().now().nanoseconds))
+
     def _status(self, subject: str, level: Level, message: str, values: Mapping[str, str]) -> Status:
         return Status(f"{self._node.get_fully_qualified_name()}: {subject}", level, message, values)
 
-    def _keep(self, status: Status) -> bool:
-        """Take a status in; return whether it is news."""
+    def _keep(self, status: Status) -> None:
+        """Take a status in."""
         if not self._enabled:
-            return False
-        status, old = bounded(status), self._entries.get(status.name)
-        news, times = True, 1
+            return
+        old, times = self._entries.get(status.name), 1
         if status.level is Level.OK:
-            news = old is None or old.status != status
+            self._changed |= old is None or old.status != bounded(status)
         else:
+            self._changed = True
             if old is not None and old.bad:
                 times = old.times + 1
                 status = replace(status, values={**status.values, "times": str(times)})
-            found = self._news.setdefault(status.name, [])
-            found.append(status.message)
-            del found[: -ALSO - 1]
-        self._entries[status.name] = _Entry(status, monotonic(), times)
+                if status.name in self._fresh:
+                    known = status.message in old.status.message
+                    status = replace(status, message=old.status.message if known else f"{status.message}; {old.status.message}")
+            self._fresh.add(status.name)
+        self._entries[status.name] = _Entry(bounded(status), monotonic(), times)
         while len(self._entries) > MOST:  # at first what is well
             first = next(iter(self._entries))
             self._entries.pop(next((name for name, entry in self._entries.items() if not entry.bad), first))
-        return news
-
-    def _publish_soon(self) -> None:
-        """Publish now, or with the next tick if that were too often."""
-        if monotonic() - self._refilled >= PERIOD:
-            self._left, self._refilled = AT_ONCE, monotonic()
-        self._waiting = True
-        if self._left > 0 and not self._updating:
-            self._left -= 1
-            self._publish()
 
     def _tick(self) -> None:
-        """Every second bring all up to date, end what is over and was shown long enough, and publish; between, what waits."""
-        self._regular = not self._regular
-        if self._regular:
-            self._updating = True
+        """Every second bring all up to date, end what is over and was shown long enough, and publish; between, what changed."""
+        self._ticks += 1
+        if self._ticks % TICKS == 0:
             self._update()
             self._look_for_twins()
-        with self._lock:
-            now, self._updating = monotonic(), False
-            for name, entry in self._entries.items():
-                if entry.over and now - entry.since >= HOLD:
-                    values = {key: value for key, value in entry.status.values.items() if key != "error"}
-                    self._entries[name] = _Entry(Status(name, Level.OK, f"over: {entry.status.message}", values), now)
-            if self._regular or self._waiting:
-                self._publish()
+            with self._lock:
+                for name, entry in self._entries.items():
+                    if entry.over and monotonic() - entry.since >= HOLD_S:
+                        values = {key: value for key, value in entry.status.values.items() if key != "error"}
+                        status = Status(name, Level.OK, f"over: {entry.status.message}", values)
+                        self._entries[name] = _Entry(status, monotonic())
+        if self._changed or self._ticks % TICKS == 0:
+            self.publish()
 
     def _look_for_twins(self) -> None:
         """Warn of other nodes that publish the node's own topics: who listens hears both and cannot tell them apart."""
@@ -195,16 +185,6 @@ class NodeDiagnostics:
         said = "; ".join(f"{topic} is published by {' and '.join(who)}, too" for topic, who in found.items())
         remedy = "who listens hears both: end one of the nodes, or give it another namespace"
         self.status(Level.WARN, f"{said}; {remedy}", "twins", {topic: " ".join(who) for topic, who in found.items()})
-
-    def _publish(self) -> None:
-        """Publish all; findings of one name that no message has held yet stand beside the newest."""
-        statuses = [self._state] if self._state else []
-        for name, entry in self._entries.items():
-            also = {f"also.{k}": message for k, message in enumerate(self._news.get(name, [])[: -1 if entry.bad else None])}
-            statuses.append(bounded(replace(entry.status, values={**entry.status.values, **also})) if also else entry.status)
-        self._news.clear()
-        self._waiting = False
-        publish(self._node, self._publisher, encode_diagnostics(statuses, self._node.get_clock().now().nanoseconds))
 
 
 def family(name: str) -> str:
@@ -225,41 +205,3 @@ def bounded(status: Status) -> Status:
         values["left_out"] = f"{missing} values, which would make the message too long"
     message = status.message if len(status.message) <= LONGEST else f"{status.message[:LONGEST]} …"
     return Status(status.name[:LONGEST], status.level, printable(message), values)
-
-
-class Watcher(Node):  # type: ignore[misc]
-    """Writes what the nodes of a suite publish and report to standard output, as events for the suite's runner.
-
-    It watches the topics of one namespace; without a namespace, /diagnostics, which all namespaces share.
-    """
-
-    def __init__(self, namespace: str | None = None) -> None:
-        super().__init__("watcher", namespace=namespace, enable_rosout=False, start_parameter_services=False)
-        self._reported: dict[str, str] = {}  # by name: /diagnostics has all again every second
-        if namespace is None:
-            create_subscription(self, "/diagnostics", self._diagnostics)
-            return
-        for topic in MILESTONES:
-            create_subscription(self, topic, lambda _, topic=topic: emit(event="published", namespace=namespace, topic=topic))
-        create_subscription(self, "scenarios/info", self._account)
-
-    def autostart(self) -> None:
-        """Nothing to start."""
-
-    def _account(self, data: bytes) -> None:
-        for status in decode_diagnostics(data)[1]:
-            if "published" in status.values:
-                published, requested = int(status.values["published"]), int(status.values["requested"])
-                emit(event="done", namespace=self.get_namespace(), published=published, requested=requested, text=status.message)
-
-    def _diagnostics(self, data: bytes) -> None:
-        for status in decode_diagnostics(data)[1]:
-            if self._reported.get(status.name) == status.message and "recorded" not in status.name:
-                continue
-            self._reported[status.name] = status.message
-            if "recorded" in status.name:
-                emit(event="recorded", counts={topic: int(count) for topic, count in status.values.items()})
-            elif status.level >= Level.ERROR:
-                emit(event="error", name=status.name, text=status.message, kind=status.values.get("error", ""))
-            elif "progress" in status.name and "request" in status.values:
-                emit(event="progress", name=status.name, text=status.message)

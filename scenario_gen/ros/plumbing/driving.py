@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Between traffic and a planner under test: parameters, commands to the ego, arriving trials, messages of a drive."""
+"""Between traffic and a planner under test: commands to the ego, arriving trials, messages of a drive."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import json
 
 import numpy as np
 
 from msg_conventions import driving
-from msg_conventions.autoware import EGO, encode_kinematic_state, encode_predicted_objects, HORIZON_NS, OBJECTS, STEP_NS
+from msg_conventions.autoware import encode_kinematic_state, encode_predicted_objects, HORIZON_NS, OBJECTS, STEP_NS
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.ego import encode_state
 from msg_conventions.frames import encode_frames
@@ -22,8 +22,6 @@ from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.arriving import ArrivingScenarios
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
@@ -31,27 +29,6 @@ from scenario_gen.closed_loop.tracking import of_twist, Track
 from scenario_gen.closed_loop.trials import Outcome, Trial, trial_of
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Road
-
-
-@dataclass(frozen=True)
-class Config(Parameters):
-    """The node's parameters; those of a drive are called drive.step, drive.policy and so on."""
-
-    bag: str = parameter("", "bag with scenarios; empty: they come live from `scenarios`, its `info` and `map`")
-    ego: str = parameter("", "id of the vehicle in whose place the ego drives; empty: the scenario's own ego slot, or its first")
-    index: int = parameter(0, "number of the first scenario, from 0, in the order of the bag", low=0)
-    rate: float = parameter(1.0, "how many times as fast as real time", low=0.01, high=1000.0)
-    lock_step: bool = parameter(False, "go one step for each call of ~/step, and not by a clock")
-    wait_for_ego: bool = parameter(True, "begin a drive with the ego's first command; else it brakes until one comes")
-    silence: float = parameter(0.5, "a command older than this is no command, and the ego brakes", unit="s", low=0.01)
-    patience: float = parameter(5.0, "in lock-step, wait so long for a command, in real time", unit="s", low=0.01)
-    follow_on: bool = parameter(True, "go on with the next scenario when one is over; else it waits for ~/next")
-    autoware: bool = parameter(
-        False, f"publish {OBJECTS} and {EGO}, too, as Autoware's planners take them; needs autoware_perception_msgs"
-    )
-    results: str = parameter("", "folder for drives.json and junit.xml, written anew after each drive; empty: none")
-    drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
-
 
 INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "ego/odom")
 WAYS = ("ego/trajectory", "ego/path")  # their times say for when they are; they may be old

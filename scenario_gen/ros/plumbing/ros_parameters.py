@@ -142,13 +142,18 @@ class ConfigParameters:
         self.config = with_values(self.config, parameters)
 
 
+def config_of(node: Any) -> Any:
+    """Return the default configuration of a node's class: the `Config` of its module."""
+    return sys.modules[node.__module__].Config()
+
+
 def help_of(name: str, nodes: Sequence[Any]) -> str:
     """Return the usage of an executable, and every parameter of its nodes: default value, unit, meaning, choices."""
     lines = [USAGE.format(name=name)]
     for node in nodes:
         module = sys.modules[node.__module__]
         lines += ["", f"{(module.__doc__ or '').strip()}", "", f"Parameters of {node.__name__}:"]
-        for parameter, (entry, value) in flatten(module.Config()).items():
+        for parameter, (entry, value) in flatten(config_of(node)).items():
             meta = entry.metadata
             choices = f"; one of {', '.join(meta['choices'])}" if meta["choices"] else ""
             written = f"'{value}'" if isinstance(value, str) else json.dumps(value)

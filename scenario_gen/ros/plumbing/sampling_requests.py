@@ -28,8 +28,7 @@ from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary, RequestSummary
 from scenario_gen.bags.recordings.sending import RequestSender, Send
 from scenario_gen.bags.recordings.template import decode_template
-from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
-from scenario_gen.base.parameters import parameter
+from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
@@ -37,38 +36,26 @@ from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
+from scenario_gen.ros.plumbing.node_parameters import SamplerParameters
 from scenario_gen.ros.plumbing.ros_parameters import values_of_call
 from scenario_gen.ros.plumbing.stage_node import REQUESTS
 from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Request, Scenario
 
 SHOWN = 20  # waiting requests that are named
-SILENCE = 10.0  # seconds after which a line on the terminal says how far a request is, though it is hardly farther
+LOG_S = 5.0  # seconds between two lines on the terminal that say how far a request is
 LOOK = 0.1  # seconds between two looks whether those that wait can be served
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 Answer = tuple[GenerationResult, RequestSummary]  # the result of a request, whose scenarios are published by then
 
 
 @dataclass(frozen=True)
-class Config(Request):
+class Config(Request, SamplerParameters):
     """The sampler's parameters; `fitting` and `planning` are used for requests with start or end states."""
 
-    count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
-    seed: int = parameter(0, "seed of the samples, and of the planner where states are asked for", low=0)
-    generate_on_input: bool = parameter(True, "generate whenever the inputs are complete or change; false: on ~/generate only")
-    patience: float = parameter(
-        60.0,
-        "wait so long for subscribers of scenarios that acknowledge none, then go on and warn; 0: for ever",
-        unit="s",
-        low=0.0,
-    )
-    pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     sampling: SamplingConfig = field(default_factory=SamplingConfig)
     limits: Limits = field(default_factory=Limits)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
 
 
 class Code(IntEnum):
@@ -105,7 +92,7 @@ class OpenRequest:
     accepted: int = 0
     candidates: int = 0
     stamp_ns: int = 0
-    logged: tuple[int, float] = field(default=(0, 0.0))  # tenths and time of the last line on the terminal
+    logged: float = 0.0  # when the last line was written on the terminal
 
     def progress(self, accepted: int, candidates: int, stamp_ns: int) -> None:
         """Set the progress."""
@@ -160,7 +147,7 @@ class OpenRequests:
     def begin(self, request: OpenRequest) -> None:
         """Start the clock of a request whose job begins."""
         request.began = monotonic()
-        request.logged = (0, request.began)
+        request.logged = request.began
         self.report()
 
     def end(self, request: OpenRequest, level: Level, message: str, **more: str) -> None:
@@ -192,7 +179,7 @@ class OpenRequests:
         return bool(self._node.cancel(request.job))
 
     def report(self) -> None:
-        """Report on /diagnostics how far the request at work is, and on the terminal, if it is a good deal farther."""
+        """Report on /diagnostics how far the request at work is, and now and then on the terminal."""
         with self._lock:
             running = next((request for request in self._open.values() if request.began is not None), None)
             waiting = [request for request in self._open.values() if request.began is None]
@@ -203,11 +190,8 @@ class OpenRequests:
         values |= {f"waiting.{request.name}": f"{request.n_requested} scenarios" for request in waiting[:SHOWN]}
         found = f"{running.accepted} of {running.n_requested} scenarios from {running.candidates} candidates"
         message = f"request {running.name}: {found}, {running.seconds():.0f} s"
-        tenths, now = 10 * running.accepted // max(running.n_requested, 1), monotonic()
-        farther = now - running.logged[1] >= 1.0 and running.logged[0] < tenths < 10
-        log = farther or now - running.logged[1] >= SILENCE
-        if log:
-            running.logged = (tenths, now)
+        if log := monotonic() - running.logged >= LOG_S:
+            running.logged = monotonic()
         self._node.diagnostics.status(Level.OK, message, "progress", values, running.stamp_ns, log=log)
 
     async def _generate(
@@ -344,43 +328,49 @@ def _named(parameters: Sequence[Any]) -> tuple[list[Any], str]:
     return [parameter for parameter in parameters if parameter.name != "request"], str(names[0]) if names else ""
 
 
-def answer_request(
-    messages: Mapping[str, bytes],
-    config: Config,
-    request: str,
-    node: str,
-    progress: Callable[[int, int, int], None],
-    cancelled: Callable[[], bool],
-    send: Send,
-    turn: AbstractContextManager[object],
-) -> Answer:
+@dataclass(frozen=True)
+class Channel:
+    """Where the answer to a request goes.
+
+    Attributes:
+        request: what is told how far it is.
+        node: the node's full name.
+        cancelled: whether to stop early; what was published by then stays, and the summary says so.
+        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
+        turn: held while a scenario's messages, or those of the end, are sent, so that requests at the same time do not mix them.
+    """
+
+    request: OpenRequest
+    node: str
+    cancelled: Callable[[], bool]
+    send: Send
+    turn: AbstractContextManager[object]
+
+
+def answer_request(messages: Mapping[str, bytes], config: Config, channel: Channel) -> Answer:
     """Sample, check and publish; fit and plan anew if start or end states are requested.
 
     Args:
         messages: of the template, by topic.
         config: the values of this request.
-        request: its id.
-        node: the node's full name.
-        progress: called with the scenarios and candidates so far, and the template's stamp [ns].
-        cancelled: whether to stop early; what was published by then stays, and the summary says so.
-        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
-        turn: held while a scenario's messages, or those of the end, are sent, so that requests at the same time do not mix them.
+        channel: where they go.
 
     Raises:
         InputError: a message is damaged, or a vehicle that is named does not exist.
         RefusedError: the request is impossible; the message says why, and which similar request is possible.
     """
+    request, node, cancelled = channel.request.name, channel.node, channel.cancelled
     template = decode_template(messages)
     encounter, segmentation, (road, _) = template.encounter, template.segmentation, template.placed()
 
     def advance(done: int, _total: int, candidates: int) -> None:
-        progress(done, candidates, encounter.start_ns)
+        channel.request.progress(done, candidates, encounter.start_ns)
 
     hashes = template_hashes(messages)
-    sender = RequestSender(RequestMessages(encounter, request, node, hashes), road.frame_id, send)
+    sender = RequestSender(RequestMessages(encounter, request, node, hashes), road.frame_id, channel.send)
 
     def in_turn(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
-        with turn:
+        with channel.turn:
             sender.scenario(scenario, requested, ego)
 
     callbacks = Callbacks(advance, cancelled, in_turn)
@@ -396,6 +386,6 @@ def answer_request(
     provenance = parameter_texts(config) | versions() | hashes
     stopped = cancelled() and len(result.scenarios) < result.requested
     summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=outcome.reacting)
-    with turn:
+    with channel.turn:
         sender.close(result, summary)
     return outcome, summary

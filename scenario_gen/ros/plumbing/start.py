@@ -4,29 +4,18 @@
 """The executables: each a node, and `suite`: all nodes in one process with one executor, `ros2 run scenario_gen suite`.
 
 Each listens to signals before anything else is loaded, so that Ctrl-C while the libraries load ends it at once.
-
-`python -m scenario_gen.ros.plumbing.start fork SPECIFICATION.json` runs several nodes as separate processes, forked from one
-that has loaded the libraries and the kernels once; the file holds a list of {"node", "arguments", "log"}. Events are written to
-standard output as JSON lines. Ctrl-C, SIGTERM, or the end of standard input ends all nodes.
+`python -m scenario_gen.ros.plumbing.start NODE` does the same.
 """
 
 from functools import partial
 import gc
 import importlib
-import json
-import os
-from pathlib import Path
-import select
-import signal
 import sys
-import traceback
 from typing import Any
 
 from scenario_gen.base.interrupts import hear
 
-PATIENCE = 20.0  # seconds that a node has to end by itself; far more than it needs, for machines that are busy
 NODES = ("recorder", "evaluator", "preview", "gp_sampler", "planner", "segmenter", "road_server", "log_player", "player")
-WATCHER = "watcher"  # reports to the runner of a suite; no executable
 SUITE = """\
 suite: all nodes in one process with one executor, for small machines: `ros2 run scenario_gen suite`.
 
@@ -38,8 +27,7 @@ stands in a parameter file, or, where there is no namespace, behind its name: `-
 
 def node_class(name: str) -> Any:
     """Return the class of a node: GpSampler of `gp_sampler`."""
-    module = "plumbing.diagnostics" if name == WATCHER else f"nodes.{name}"
-    return getattr(importlib.import_module(f"scenario_gen.ros.{module}"), name.title().replace("_", ""))
+    return getattr(importlib.import_module(f"scenario_gen.ros.nodes.{name}"), name.title().replace("_", ""))
 
 
 def chosen(arguments: list[str]) -> tuple[list[str], list[str]]:
@@ -83,86 +71,5 @@ traffic = partial(start, "traffic")
 suite = partial(start, "suite")
 
 
-# --- several nodes, each a process ----------------------------------------------------------------------------
-
-
-def emit(**event: object) -> None:
-    """Write one event; a line is short enough to arrive unbroken from any process."""
-    os.write(sys.__stdout__.fileno() if sys.__stdout__ else 1, (json.dumps(event) + "\n").encode())
-
-
-def _become(node: str, arguments: list[str], log: str) -> None:
-    """Turn the forked process into a node; never returns."""
-    code = 1
-    try:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda number, _: os._exit(128 + number))  # until the node sets its own
-        os.setpgid(0, 0)  # the terminal's Ctrl-C reaches the suite, which ends its nodes in order
-        descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-        os.dup2(descriptor, 2)
-        if node != WATCHER:
-            os.dup2(descriptor, 1)
-        null = os.open(os.devnull, os.O_RDONLY)
-        os.dup2(null, 0)
-        sys.argv = [node, *arguments]
-        start(node)
-    except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else 1
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        sys.stderr.flush()
-        os._exit(code)
-
-
-def _load(nodes: list[str]) -> None:
-    """Import the nodes and compile, or load, the kernels of their stages: what every fork will share."""
-    from scenario_gen.ros.plumbing.process import kernels_ready
-
-    stages = dict.fromkeys(stage for node in nodes for stage in getattr(node_class(node), "STAGES", ()))
-    count, seconds = kernels_ready(stages)
-    emit(event="loaded", kernels=count, seconds=seconds)
-
-
-def fork(specification: list[dict[str, Any]]) -> None:
-    """Fork the nodes, report those that end, and end them all after a signal or the end of standard input."""
-    signals = (signal.SIGINT, signal.SIGTERM)
-    for number in signals:
-        signal.signal(number, lambda number, _: os._exit(128 + number))  # there is nobody to be ended yet
-    _load([entry["node"] for entry in specification])
-    requested: list[bool] = []
-    for number in signals:
-        signal.signal(number, lambda *_: requested.append(True))
-    children: dict[int, str] = {}
-    for entry in specification:
-        pid = os.fork()
-        if pid == 0:
-            _become(entry["node"], entry["arguments"], entry["log"])
-        children[pid] = entry["node"]
-        emit(event="started", node=entry["node"], pid=pid)
-    while not requested and children:
-        readable, _, _ = select.select([0], [], [], 0.1)
-        if readable and not os.read(0, 1):
-            break
-        _reap(children)
-    for number in (signal.SIGINT, signal.SIGKILL):
-        for pid in children:
-            os.kill(pid, number)
-        for _ in range(int(PATIENCE / 0.05)):
-            if children:
-                select.select([], [], [], 0.05)
-                _reap(children)
-
-
-def _reap(children: dict[int, str]) -> None:
-    for pid in list(children):
-        done, status = os.waitpid(pid, os.WNOHANG)
-        if done:
-            emit(event="exited", node=children.pop(pid), code=os.waitstatus_to_exitcode(status))
-
-
 if __name__ == "__main__":
-    if sys.argv[1] == "fork":
-        fork(json.loads(Path(sys.argv[2]).read_text(encoding="utf-8")))
-    else:
-        start(sys.argv.pop(1))
+    start(sys.argv.pop(1))

@@ -19,7 +19,6 @@ from typing import Any
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -112,9 +111,9 @@ def publish(node: Node, publisher: Any, data: bytes) -> None:
     try:
         if publisher is not None and node.context.ok():
             publisher.publish(data)
-    except rclpy_implementation.InvalidHandle:
+    except InvalidHandle:
         return  # the publisher was destroyed meanwhile
-    except rclpy_implementation.RCLError:
+    except RuntimeError:  # of rcl
         if node.context.ok():
             raise
 
