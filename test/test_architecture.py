@@ -29,7 +29,8 @@ STAGES = (
     "sampling",
     "evaluation",
     "config",
-    "attempt",
+    "chain",
+    "reference_sets",
     "suitable_roads",
     "nearest",
 )
@@ -41,7 +42,7 @@ CONCEPTS = {
     ),
     "gap of two motions in space and time": ("logs/gap.py", r"def \w*space_time_gap\("),
     "growing of groups": ("logs/growing.py", r"class Growth\b|def \w*grow_groups?\("),
-    "least squares of a placement": ("method/fitting/", r"def \w*(?:least_squares|joint_similarity)\("),
+    "least squares of a placement": ("template/starts.py", r"def \w*(?:least_squares|joint_similarity)\("),
     "RRT*-Connect": ("method/routing/search/pose_tree.py", r"def _?cheapest_parent\("),
     "fit, plan, sample": ("method/chain.py", r"(?s)\A(?=.*\bfit_template\()(?=.*\bplan_routes\()"),
     "latitude and longitude": ("logs/geodesy.py", r"(?:import|from) pyproj|6_?378_?137|6_?371_?0"),
@@ -49,59 +50,18 @@ CONCEPTS = {
     "object stores": ("base/stores/", r"(?:import|from) fsspec"),
     "files of bags": ("bags/storage/", r"(?:import|from) (?:rosbags|mcap)\b"),
 }
-# The same of the stages, folders or modules of scenario_gen/method: what one makes, `pipeline` hands to the next.
-STAGES = {
-    "segmentation": set(),
-    "fitting": set(),
-    "routing": set(),
-    "validity": set(),
-    "sampling": {"validity"},
-    "evaluation": set(),
-    "config": {"segmentation", "fitting", "routing", "validity", "sampling", "evaluation"},
-    "chain": {"config", "fitting", "routing", "sampling", "evaluation"},
-    "reference_sets": {"config", "chain", "evaluation"},
-    "suitable_roads": {"config", "segmentation", "fitting"},
-    "nearest": {"config", "chain", "segmentation", "fitting", "sampling", "suitable_roads"},
-}
-# Rooms and stages that others enter by their packages alone; behind the door stand what an extra brings, and what is slow.
-DOORS = {"types", "template", "roads", "logs", *(f"method.{stage}" for stage in STAGES)}
-BESIDE_THE_DOOR = {
-    "logs.tables": "needs pandas",
-    "method.validity.collision": "kernels, named by what they prove",
-    "method.validity.containment": "kernels, named by what they prove",
-}
-# What may be imported inside a function, and why: libraries, and modules of ours that load such.
-LATE = {
-    "arviz": "tests alone install it",
-    "betterosi": "extra osi",
-    "ast": "read when the first public name is used",
-    "dask": "extra corpus",
-    "distributed": "extra corpus",
-    "duckdb": "extra corpus",
-    "fsspec": "extra stores",
-    "concurrent": "slow to load",
-    "jsonschema": "slow to load",
-    "matplotlib": "extra plot",
-    "multiprocessing": "slow to load",
-    "pandas": "slow to load",
-    "protobuf": "extra osi",
-    "pyarrow": "extra parquet",
-    "rich": "extra cli",
-    "rosbags": "extra bags",
-    "sklearn": "tests alone install it",
-    "yaml": "slow to load",
-}
-LATE_OURS = {
-    "__main__.py": "a command loads what it needs",
-    "cli/": "a command loads what it needs",
-    "logs/adapters/tracks.py": "needs pyarrow",
-    "logs/read.py": "adapters need extras",
-    "logs/tables.py": "needs pyarrow",
-    "method/routing/search/ompl/planners.py": "needs ompl",
-    "ros/plumbing/sampling_requests.py": "loads all stages, and few requests need them",
-    "ros/plumbing/start.py": "loads rclpy",
-    "types/generation.py": "its methods call public functions, which are loaded when they are first used",
-    "types/scenario.py": "likewise",
+SECOND_HOMES = {  # that are there still; it may only shrink
+    "rectangles: corners, overlap, distance": {
+        "closed_loop/advance.py",
+        "closed_loop/picture.py",
+        "logs/quality.py",
+        "method/evaluation/geometry.py",
+        "method/validity/checker.py",
+        "method/validity/collision.py",
+        "template/separation.py",
+    },
+    "RRT*-Connect": {"method/routing/search/tree_kernels.py"},
+    "files of bags": {"output/exchange/osi.py"},
 }
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
 

@@ -13,16 +13,7 @@ OURS = {"scenario_gen", "msg_conventions"}
 INNER_MODULES = ("numba.core.", "numba.np.", "numba.cpython.", "llvmlite.", "rclpy.impl.")
 PUBLIC = {"_asdict", "_exit", "_fields", "_make", "_replace"}  # documented in spite of their names
 FORGED = {"Structure", "Union", "CFUNCTYPE"}  # of ctypes: a layout that is copied from somebody's header
-KNOWN = {  # files that do it still; it may only shrink
-    "scenario_gen/bags/storage/type_support.py",
-    "scenario_gen/bags/storage/writer.py",
-    "scenario_gen/numerics/exact/elementwise.py",
-    "scenario_gen/numerics/exact/functions.py",
-    "scenario_gen/numerics/kernel_cache.py",
-    "scenario_gen/numerics/kernels.py",
-    "scenario_gen/ros/plumbing/process.py",
-    "scenario_gen/ros/plumbing/topics.py",
-}
+KNOWN: set[str] = set()  # files that do it still; it may only shrink
 
 
 def is_private(name: str) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, WORLD, World
 from scenario_gen.closed_loop.driver import ACCELERATION, CLOCK, EGO_CLOCK, HELD, MANNER, Manner, RATE, WAITED
 from scenario_gen.closed_loop.others import react
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.kernels import B, B1, F, F1, F2, I, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, exact, Floats, frozen
+from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT3
 from scenario_gen.template import conflict_of, lag_behind
 from scenario_gen.types import Scenario, tokens, yielders_of

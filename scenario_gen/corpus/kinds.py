@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUTB1
 
 KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")

@@ -23,7 +23,7 @@ from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR, quoted, 
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import FASTEST, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
 from scenario_gen.logs import APART, METRES_PER_SECOND_APART, shortest
-from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel
 
 BIN = 500_000  # µs

@@ -12,7 +12,7 @@ import numpy as np
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.kinds import kind_of, Motion, unwrapped
 from scenario_gen.logs import APART, metres_per_degree, shortest, space_time_gap, ticks, windows
-from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
+from scenario_gen.numerics import Bools, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
 FASTEST = 35.0  # m/s: what a vehicle drives in a bin widens the cells

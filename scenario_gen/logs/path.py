@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy import linalg
+from scipy.interpolate import BSpline
 from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.numerics import Floats, Ints, wrap_angle

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy import sparse
 from scipy.ndimage import median_filter
 
 from scenario_gen.base.errors import InputError

@@ -17,7 +17,7 @@ from scenario_gen.method.fitting import LostConflictError
 from scenario_gen.method.sampling import Cancelled, TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, suitable_roads, with_suitable_roads
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import draw_route, footprint_fits, nearest_pose_with_room, road_and_template
 from scenario_gen.template import footprint_gap

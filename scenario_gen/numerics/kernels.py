@@ -59,48 +59,8 @@ def sources() -> tuple[Path, ...]:
 def folder() -> Path:
     """Return the folder of compiled kernels: in `NUMBA_CACHE_DIR`, the user's cache, or a temporary folder of this process.
 
-    def take(array: Any) -> Any:
-        if array.dtype != dtype or array.ndim != ndim or not (array.flags.c_contiguous and array.flags.writeable):
-            raise TypeError(f"{name}: an output must be a writable, contiguous array of {ndim} dimensions of {dtype}")
-        return array
-
-    return take
-
-
-def named(fields: type, *declared: Any) -> types.NamedTuple:
-    """Return the type of an argument that is a NamedTuple, from the types of its fields."""
-    return types.NamedTuple(declared, fields)
-
-
-def _tuple(name: str, declared: types.NamedTuple) -> Callable[[Any], Any]:
-    """Return what makes a NamedTuple the declared one; the same one again, of which all was right, is not looked at anew."""
-    takes = [_argument(f"{name}: {field}", each) for field, each in zip(declared.fields, declared.types, strict=True)]
-    right = None
-
-    def take(values: Any) -> Any:
-        nonlocal right
-        if values is right:
-            return values
-        taken = declared.instance_class(*[take(value) for take, value in zip(takes, values, strict=True)])
-        if all(one is other for one, other in zip(taken, values, strict=True)):
-            right = None if any(getattr(each, "mutable", False) for each in declared.types) else values  # outputs are large
-        return taken
-
-    return take
-
-
-def _argument(name: str, declared: Any) -> Callable[[Any], Any]:
-    if isinstance(declared, types.NamedTuple):
-        return _tuple(name, declared)
-    if isinstance(declared, types.Array):
-        return _output(name, declared) if declared.mutable else _input(name, declared)
-    return operator.index if declared == I else bool if declared == B else float
-
-
-class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A function with one compiled form, to Python and to the kernels that call it.
-
-    numba's own dispatcher compiles another form for every mixture of read-only and writable arrays that it is given.
+    Its name is a hash of all sources of kernels, as numba tells them apart (path, time, size), and of the versions of Python and
+    numba: a kernel is compiled anew when another file that it calls has changed.
     """
     stamps = [(str(file), file.stat().st_mtime_ns, file.stat().st_size) for file in sources()]
     name = "kernels-" + sha256(repr((stamps, numba.__version__, platform.python_version())).encode()).hexdigest()[:16]
@@ -126,8 +86,8 @@ def is_lasting() -> bool:
     return _temporary.cache_info().currsize == 0
 
 
-def record(of: type[Any], *fields: Any) -> Any:
-    """Return the type of a NamedTuple whose fields have these types, as an argument of a kernel."""
+def named(of: type[Any], *fields: Any) -> Any:
+    """Return the type of an argument that is a NamedTuple, from the types of its fields."""
     return types.BaseTuple.from_types(fields, of)
 
 
@@ -143,14 +103,8 @@ def _compiler(function: Callable[..., Any], **options: Any) -> Any:
 
 def _reader(declared: Any) -> Callable[[Any], Any]:
     """What makes an argument the declared one: inputs contiguous and of their type; outputs stay (a copy would be lost)."""
-    if isinstance(declared, types.BaseTuple):  # numba converts no arrays inside of one: all fields are inputs, read-only
-        readers = [_reader(kind) for kind in declared.types]
-
-        def read_record(value: Any) -> Any:
-            fields = [read(each) for read, each in zip(readers, value, strict=True)]
-            return type(value)(*(sealed(each.view()) if isinstance(each, np.ndarray) else each for each in fields))
-
-        return read_record
+    if isinstance(declared, types.BaseTuple):
+        return _record_reader(declared)
     if not isinstance(declared, types.Array) or declared.mutable:
         return _same
     dtype = np.dtype(str(declared.dtype))
@@ -158,6 +112,27 @@ def _reader(declared: Any) -> Callable[[Any], Any]:
     def read(value: Any) -> Any:
         array = np.ascontiguousarray(value)
         return array if array.dtype == dtype else array.astype(dtype, casting="safe")
+
+    return read
+
+
+def _record_reader(declared: Any) -> Callable[[Any], Any]:
+    """The same for a NamedTuple. numba converts nothing inside of one: inputs are read-only, numbers have their type.
+
+    The same one as the last time is not looked at anew.
+    """
+    seen: list[Any] = [None, None]
+
+    def convert(kind: Any, value: Any) -> Any:
+        if isinstance(kind, types.Array):
+            array = _reader(kind)(value)
+            return array if kind.mutable or not array.flags.writeable else sealed(array.view())
+        return _reader(kind)(value) if isinstance(kind, types.BaseTuple) else {F: float, I: int, B: bool}.get(kind, _same)(value)
+
+    def read(value: Any) -> Any:
+        if seen[0] is not value:
+            seen[:] = value, type(value)(*(convert(kind, each) for kind, each in zip(declared.types, value, strict=True)))
+        return seen[1]
 
     return read
 

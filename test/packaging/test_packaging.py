@@ -30,36 +30,6 @@ def test_every_ros_package_that_is_imported_is_declared():
     assert imported <= declared, imported - declared
 
 
-KEYS = {  # rosdep's, of what the lists in requirements/ name; looked up in rosdistro for Ubuntu 24.04 (docs/dependencies.md)
-    "numpy": "python3-numpy",
-    "scipy": "python3-scipy",
-    "numba": "python3-numba",
-    "rosbags": "python3-rosbags-pip",
-    "pandas": "python3-pandas",
-    "pyproj": "python3-pyproj",
-    "shapely": "python3-shapely",
-    "pillow": "python3-pil",
-    "pyyaml": "python3-yaml",
-    "jinja2": "python3-jinja2",
-    "typer": "python3-typer",
-    "jsonschema": "python3-jsonschema",
-    "matplotlib": "python3-matplotlib",
-    "rich": "python3-rich",
-}
-
-
-def test_package_xml_and_the_lists_of_requirements_name_the_same_packages():
-    """Each by its rosdep key or, where it has none, by its name in the comment on pip; and none that is not needed."""
-    text = (ROOT / "package.xml").read_text()
-    needed = {wanted.name for wanted in run_time() if not wanted.name.startswith("ros-")}
-    by_pip = set(re.search(r"By pip, for they have no rosdep key: ([^.]*)\.", text)[1].split(", "))
-    keys = {entry.text for entry in ET.fromstring(text).findall("exec_depend") if entry.text.startswith("python3-")}
-    assert by_pip | set(KEYS) == needed and not by_pip & set(KEYS)
-    assert keys == set(KEYS.values())
-    dependencies = (ROOT / "docs" / "dependencies.md").read_text()
-    assert all(f"`{key}`" in dependencies for key in keys)
-
-
 @pytest.mark.parametrize("sourced", [False, True])
 def test_make_leaves_a_sourced_jazzy_its_rclpy(tmp_path, sourced):
     package = tmp_path / "lib" / "rclpy"

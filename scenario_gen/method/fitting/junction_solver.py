@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.method.fitting.relations import equations, Relation
-from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template import Equation, solve_starts, Track
 

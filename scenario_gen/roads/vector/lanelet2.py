@@ -19,7 +19,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite
 from scenario_gen.logs import local_frame, middle_of
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_long, refuse_too_many_lanes, speed_of
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
 from scenario_gen.types import RuleKind

@@ -35,7 +35,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import make_planner, plan_with_retry, PlanningConfig, Query
-from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.ros.plumbing.stage_node import Inputs, REQUESTS, StageNode
 from scenario_gen.types import Road, tokens
 

@@ -28,7 +28,7 @@ from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary, RequestSummary
 from scenario_gen.bags.recordings.sending import RequestSender, Send
 from scenario_gen.bags.recordings.template import decode_template
-from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig

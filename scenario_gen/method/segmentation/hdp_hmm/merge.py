@@ -10,7 +10,7 @@ import numpy as np
 from scenario_gen.method.segmentation.hdp_hmm.emission import accumulate, log_marginal, posterior_factor
 from scenario_gen.method.segmentation.hdp_hmm.model import JOINT, Joint
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, F2, I1, kernel, OUTI1
 
 

@@ -9,6 +9,7 @@ of their own, a few rounds of fitting and labelling bring them to rest, and the 
 time, so that their probability is known. A merge draws such a pair, too, to know how probable the way back is.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -135,7 +136,7 @@ def likelihood_ratios(vt: Floats, mass: Floats, emitted: States, weight: float, 
         block_log_likelihood(vt, start, stop, emitted, weight, 0.0, work[:2], work[2])
         for r in range(start, stop):
             log_ratio = alike + mass[r] * (work[1, r - start] - work[0, r - start])
-            ratio[r] = exact.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO)) if mass[r] > 0.0 else 1.0
+            ratio[r] = np.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO)) if mass[r] > 0.0 else 1.0
 
 
 @kernel(inline=True)
@@ -179,7 +180,7 @@ def draw_sides(state: State, ratio: Floats, opens: Ints, stay: float, message: F
             side[r] = 1 if uniform(state) * (1.0 + odds) < odds else 0
         product *= (odds if side[r] == 1 else 1.0) / (1.0 + odds)
         if product < LEAST_PRODUCT:
-            value += np.log(product)
+            value += math.log(product)
             product = 1.0
     return value + math.log(product)
 
@@ -425,6 +426,6 @@ def draw_shares(state: State, a: float, n: Ints, move: Proposal, beta: Floats, a
     here, there = (predecessors(n, j) if n[:, j].any() else 0), (predecessors(move.n, j) if move.n[:, j].any() else 0)
     share_i, share_j = log_beta_draw(state, a + predecessors(move.n, i), a + there)
     gain: float = log_share(a, predecessors(move.n, i), there, share_i, share_j)
-    gain -= log_share(a, predecessors(n, i), here, exact.log(beta[i] / both), exact.log(beta[j] / both))
-    after[i], after[j] = max(both * exact.exp(share_i), 1e-100), max(both * exact.exp(share_j), 1e-100)
+    gain -= log_share(a, predecessors(n, i), here, np.log(beta[i] / both), np.log(beta[j] / both))
+    after[i], after[j] = max(both * np.exp(share_i), 1e-100), max(both * np.exp(share_j), 1e-100)
     return gain
