@@ -14,8 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from scenario_gen.base.errors import printable
-from scenario_gen.base.folders import write_text
-from scenario_gen.base.folders.marker import Kind
+from scenario_gen.base.folders import Kind, write_text
 from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig

@@ -26,9 +26,8 @@ from uuid import uuid4
 
 from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import describe, InputError, needs, ScenarioGenError
-from scenario_gen.base.folders import naming, scratch, sync, write_text
-from scenario_gen.base.folders.claim import alone
-from scenario_gen.base.folders.scratch import sweep_tree
+from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_text
+from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
 from scenario_gen.base.interrupts import ending, starting
 from scenario_gen.base.stores import create, fetched, Place, Remote, upload
 from scenario_gen.base.stores import temporary as scratch_folder
@@ -63,13 +62,10 @@ def arriving(target: Place) -> Iterator[Path]:
             upload(place / target.name, target)
         return
     target.parent.mkdir(parents=True, exist_ok=True)
-    with scratch(target.parent, swept=True) as place:  # by `sweep_tree`: to list a folder for each of its files is quadratic
+    with scratch(target.parent) as place:
         temporary = place / target.name  # for a bag's files are called as its folder is
         yield temporary
-        if temporary.is_dir():
-            for path in sorted(temporary.rglob("*"), reverse=True):
-                sync(path)
-        sync(temporary)
+        sync_tree(temporary)
         with naming(target):
             if target.is_dir():  # of a task that was killed before its last file
                 shutil.rmtree(target)
@@ -108,8 +104,7 @@ def held(out: Place) -> Iterator[None]:
     if isinstance(out, Remote):
         yield
         return
-    out.mkdir(parents=True, exist_ok=True)
-    with alone(out), ending(partial(sweep_tree, out)):
+    with claimed(out / f"{PREFIX}run", out), ending(partial(sweep_tree, out)):
         sweep_tree(out)
         yield
         sweep_tree(out)

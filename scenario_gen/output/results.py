@@ -13,15 +13,14 @@ from scenario_gen.bags.recordings.read import INFO, read_recording
 from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
-from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, sha256_of, write_text
 from scenario_gen.base.provenance import what_makes_it_again
-from scenario_gen.method.evaluation import read_evaluations
 from scenario_gen.output.report.page import ReportInput, write_report
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types import as_markdown, GenerationResult, Request
 
 BAG, REPORT, FIGURES, TABLE = "bag", "report.html", "evaluation.json", "evaluation.md"
+GENERATED, EVALUATED = Kind("generated"), Kind("evaluated")
 
 
 def write_results(
@@ -90,33 +89,6 @@ def as_table(cases: Sequence[GenerationResult]) -> str:
 def _reactions(case: GenerationResult) -> str:
     sentences = [f"- {as_markdown(line)}" for line in case.reacting["sentences"]]
     return "\n".join(["Who reacts to whom in the template:", "", *sentences]) if sentences else ""
-
-
-def _is_generated(folder: Path) -> bool:
-    """Say whether a folder without a marker is what `write_results` left there: these names, and its figures."""
-    if {path.name for path in folder.iterdir()} != {BAG, REPORT, FIGURES} or not (folder / BAG).is_dir():
-        return False
-    names = {path.name for path in (folder / BAG).iterdir()}
-    files = {f"{BAG}_{k}.mcap" for k in range(len(names) - 1)}
-    return names == {"metadata.yaml", *files} and _has_figures(folder, {"provenance", "cases"})
-
-
-def _is_evaluated(folder: Path) -> bool:
-    """Say the same of `write_evaluation`."""
-    return {path.name for path in folder.iterdir()} == {TABLE, REPORT, FIGURES} and _has_figures(folder, {"cases"})
-
-
-def _has_figures(folder: Path, keys: set[str]) -> bool:
-    try:
-        document = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
-        read_evaluations(folder)
-    except (OSError, ValueError, InputError):
-        return False
-    return set(document) == keys and {"scenario_gen", "seed"} <= set(document.get("provenance", ("scenario_gen", "seed")))
-
-
-GENERATED = Kind("generated", _is_generated)
-EVALUATED = Kind("evaluated", _is_evaluated)
 
 
 def namespaces(count: int) -> list[str]:

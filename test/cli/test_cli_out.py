@@ -17,7 +17,7 @@ from rich.table import Table
 
 from scenario_gen.base.errors import presentable
 from scenario_gen.base.folders import MARKER
-from scenario_gen.base.folders.claim import PREFIX
+from scenario_gen.base.folders.scratch import PREFIX
 from scenario_gen.base.terminal import Terminal
 from scenario_gen.cli import commands as cli
 from scenario_gen.logs.synthetic import bundled

@@ -5,17 +5,16 @@
 
 from dataclasses import replace
 import json
-import os
 import pickle
 
 from archives import read_planted
 from hypothesis import given, strategies
+from killed import killed_in
 import numpy as np
 import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import sha256_of
-from scenario_gen.base.folders.claim import claim
 from scenario_gen.corpus import grouping
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
@@ -95,21 +94,14 @@ def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
     assert (seen[0][0] == seen[1][0]).all() and seen[0][1] == seen[1][1]
 
 
-def killed_while_writing(folder):
-    """What a process leaves that is killed: its scratch folder, whose lock the kernel has let go of."""
-    left = claim(folder / "scratch")
-    (left.new / "torn.parquet").write_text("torn")
-    os.close(left.lock)
-
-
 def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     """As after a kill: of each stage a file is gone, and a torn one lies there."""
     out, _ = corpus
     before = {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")}
     for stage in ("messages", "hours", "found", "encounters"):
         sorted((out / stage).glob("*[0-9].parquet"))[0].unlink()
-        killed_while_writing(out / stage)
-    killed_while_writing(out)
+        killed_in(out / stage)
+    killed_in(out)
     mine([archive], out)
     assert {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")} == before
     assert not list(out.rglob(".scenario_gen-*"))

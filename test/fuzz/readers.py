@@ -57,12 +57,10 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "corpus/mine.py": "its own intermediate tables, which are written whole or not at all",
     "corpus/tasks.py": "its own note in its own folder, through `documents`",
     "corpus/meetings.py": "its own intermediate tables, likewise",
-    "base/folders/claim.py": "what is none is no claim: test/base/folders",
-    "base/folders/marker.py": "what is none is no marker: test/base/folders",
+    "base/folders/replace.py": "what is none is no marker: test/base/folders",
     "corpus/grouping.py": "tables of meetings that the run before it has just written",
     "numerics/kernels.py": "source files of the package, to see which have kernels",
     "output/report/html.py": "assets of the package",
-    "output/results.py": "whether a folder is an earlier result: anything else is none",
     "closed_loop/search/problem.py": "its own journal; what is none is refused: test/closed_loop/search",
     "bags/storage/definitions.py": "definitions of messages that ROS 2 has installed",
 }

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Random SIGKILLs of the commands that write results, each onto an earlier result: that or the new one is whole afterwards.
+"""Random SIGKILLs of the commands that write results, each onto an earlier result.
 
 One half of the kills comes at any time of a run, the other shortly after the first file of the new result is there. After each,
-what the next run does first is done, so that leftovers are known to go; every tenth time a whole run follows, as users start it.
+what the next command does first is done: the earlier result or the new one is whole then, and nothing else is left. Every tenth
+time a whole run follows, as users start it.
 `mine` with its store and its cluster is killed by `python -m benchmarks kills`.
 """
 
@@ -26,13 +27,11 @@ import time
 from figures import Figure
 
 from scenario_gen.__main__ import command as main
-from scenario_gen.base.folders import replaced_folder
-from scenario_gen.base.folders.claim import PREFIX
+from scenario_gen.base.folders.scratch import PREFIX, sweep_beside
 from scenario_gen.logs.synthetic import bundled
 
 COUNT = 100
 COMMANDS = ("generate", "evaluate", "regenerate")
-KINDS = {"generate": "generated", "evaluate": "evaluated", "regenerate": "regenerated bag"}
 
 
 @dataclass
@@ -82,20 +81,8 @@ class Target:
         return digest(out or self.out)
 
     def settle(self) -> None:
-        """Do what the next run does first."""
-        from scenario_gen.output.results import EVALUATED, GENERATED
-        from scenario_gen.output.review.regenerate import REGENERATED
-
-        kind = next(kind for kind in (GENERATED, EVALUATED, REGENERATED) if kind.name == KINDS[self.command])
-        try:
-            with replaced_folder(self.out, kind):
-                raise _EnoughError
-        except _EnoughError:
-            pass
-
-
-class _EnoughError(Exception):
-    """Nothing is to be written."""
+        """Do what the next command that names the folder does first."""
+        sweep_beside([str(self.out)])
 
 
 def digest(folder: Path) -> str:
@@ -176,13 +163,13 @@ def kills(command: str, state: Path, count: int, seed: int = 1) -> Counter[str]:
         when = kill_once(target, 1 - earlier, duration, chance)
         seen["kills" if when != "ended" else "ended before the kill"] += 1
         seen[f"while {when}"] += when != "ended"
+        seen["left something"] += names(target.folder) != ["out"]
+        target.settle()  # a kill between the two renames leaves the earlier result beside its place
         found = known.get(digest(target.out))
         seen["whole"] += found is not None and when != "ended"
         seen["new in place"] += found == 1 - earlier and when != "ended"
         if found is None:
             raise RuntimeError(f"{target.out} is neither the earlier result nor the new one; look at it there")
-        seen["left something"] += names(target.folder) != ["out"]
-        target.settle()
         if seen["kills"] % 10 == 0:
             target.finish(1 - found)
         seen["not cleaned"] += names(target.folder) != ["out"] or digest(target.out) not in known

@@ -3,9 +3,8 @@
 
 """Folders of results: complete or not at all, replacing nothing but an earlier result of the same kind."""
 
-from scenario_gen.base.folders.disk import naming, sync, write_text
-from scenario_gen.base.folders.marker import Kind, MARKER, sha256_of
-from scenario_gen.base.folders.replace import replaced_folder
+from scenario_gen.base.folders.disk import naming, sync, sync_tree, write_text
+from scenario_gen.base.folders.replace import Kind, MARKER, replaced_folder, sha256_of
 from scenario_gen.base.folders.scratch import scratch
 
-__all__ = ["MARKER", "Kind", "naming", "replaced_folder", "scratch", "sha256_of", "sync", "write_text"]
+__all__ = ["MARKER", "Kind", "naming", "replaced_folder", "scratch", "sha256_of", "sync", "sync_tree", "write_text"]

@@ -1,19 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The file system: errors that name the file, data flushed to the disk, two folders exchanged at once."""
+"""Files written so that an error names them and a crash of the machine does not lose them."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-import ctypes
-import errno
+from contextlib import contextmanager
 import os
 from pathlib import Path
-import shutil
-
-AT_FDCWD, RENAME_EXCHANGE = -100, 2
-# errors of a kernel or a file system that knows no exchange
-UNKNOWN = {errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EPERM}
 
 
 @contextmanager
@@ -33,7 +26,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def sync(path: Path) -> None:
-    """Flush a file's content, or a folder's list of names, to the disk."""
+    """Flush a file's content, or a folder's list of names, to the disk; an OSError names it."""
     with naming(path):
         descriptor = os.open(path, os.O_RDONLY)
         try:
@@ -42,46 +35,8 @@ def sync(path: Path) -> None:
             os.close(descriptor)
 
 
-def sync_tree(folder: Path) -> None:
-    """`sync` all that is in a folder, then the folder."""
-    for path in sorted(folder.rglob("*"), reverse=True):  # what is in a folder comes before it
-        sync(path)
-    sync(folder)
-
-
-def exchange(one: Path, other: Path) -> bool:
-    """Let two folders swap their names in one step; return False where the system cannot.
-
-    Raises:
-        OSError: it can, but not here.
-    """
-    try:
-        call = ctypes.CDLL(None, use_errno=True).renameat2
-    except (AttributeError, OSError):
-        return False
-    if call(AT_FDCWD, os.fsencode(one), AT_FDCWD, os.fsencode(other), RENAME_EXCHANGE) == 0:
-        return True
-    number = ctypes.get_errno()
-    if number in UNKNOWN:
-        return False
-    raise OSError(number, os.strerror(number), str(other))
-
-
-def is_gone(path: Path) -> bool:
-    """Return whether there certainly is nothing of that name."""
-    try:
-        path.lstat()
-    except FileNotFoundError:
-        return True
-    except OSError:
-        return False
-    return False
-
-
-def discard(path: Path) -> None:
-    """Remove a file or a folder as far as that is possible."""
-    with suppress(OSError):
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink()
+def sync_tree(path: Path) -> None:
+    """`sync` a file, or a folder after all that is in it."""
+    for inside in path.rglob("*") if path.is_dir() else ():
+        sync(inside)
+    sync(path)

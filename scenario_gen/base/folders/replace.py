@@ -1,22 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Results take their places: written beside it, checked, and exchanged with an earlier result."""
+"""Results take their places whole: written beside it, then renamed; in the place of an earlier result of the same kind only.
+
+An earlier result is known by its marker, a file that holds its kind and the SHA-256 of every other file.
+"""
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, ExitStack, suppress
-import errno
+from contextlib import contextmanager, suppress
+import hashlib
+import json
 import os
 from pathlib import Path
-import stat
+from typing import NewType
 
-from scenario_gen.base.errors import InputError, of_system
-from scenario_gen.base.folders.claim import alone, Claim, claim, GUARD, PREFIX, settle
-from scenario_gen.base.folders.disk import exchange, is_gone, sync
-from scenario_gen.base.folders.marker import finish, Kind, objection
-from scenario_gen.base.interrupts import ending, uninterrupted
+from scenario_gen.base.errors import describe, InputError, of_system
+from scenario_gen.base.folders.disk import sync, sync_tree, write_text
+from scenario_gen.base.folders.scratch import claimed, OLD, PREFIX
+from scenario_gen.base.interrupts import uninterrupted
 
-FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}  # no right to write, or a file system that is read-only
+MARKER, FORMAT = ".scenario_gen.json", 1
+UNTOUCHED = "; what was there is untouched; make room, or name another folder that you may write to"
+Kind = NewType("Kind", str)
+"""A kind of result, as markers name it."""
 
 
 @contextmanager
@@ -24,7 +30,7 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
     """Yield an empty folder to write a result to, and move it to `target` at the end, flushed to the disk.
 
     Until then `target` stays as it is, also if the body raises, or the process is killed. It may be an empty folder or an
-    unchanged earlier result of the same kind. Leftovers of killed runs beside it are removed.
+    unchanged earlier result of the same kind. What a killed run left there is removed.
 
     Args:
         target: place of the result; folders above are created.
@@ -39,36 +45,25 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
     """
     try:
         place = _place(target, inputs)
-        missing = [folder for folder in place.parents if not folder.exists()]
     except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a null character
-        raise _failed(target, error) from error
-    claims: list[Claim] = []
-
-    def clean_up() -> None:
-        while claims:
-            claims.pop().release()
-        for folder in missing:
-            with suppress(OSError):  # it is not empty: the result is there
-                folder.rmdir()
-
-    with ending(clean_up):
-        try:
-            with uninterrupted(), _system_errors(target, place.parent):
-                place.parent.mkdir(parents=True, exist_ok=True)
-                with alone(place.parent):
-                    settle(place)
-                    _check(target, place, kind)
-                    own = claim(place)
-                    claims.append(own)
-            with _system_errors(target, own.new):
-                yield own.new
-            with uninterrupted(), _system_errors(target, place.parent):
-                finish(own.new, kind)
-                _check(target, place, kind)
-                _put(target, own, kind)
-        finally:
+        raise InputError(f"{target} cannot be written: {describe(error)}; name another folder") from error
+    own = place.with_name(f"{PREFIX}{place.name}")
+    try:
+        with claimed(own, target) as above:
+            _check(target, place, kind)
+            new = above / place.name
+            new.mkdir()
+            yield new
             with uninterrupted():
-                clean_up()
+                _finish(new, kind)
+                _check(target, place, kind)
+                _put(target, place, new, kind)
+    except OSError as error:
+        named = place if error.filename is None else Path(os.fsdecode(error.filename))
+        if not any(one.is_relative_to(other) for one, other in ((named, place), (named, own), (own, named))):
+            raise  # of what the body reads
+        waits = f"; the earlier result is in {own / OLD}, the next command puts it back"
+        raise of_system(error, target, waits if os.path.lexists(own / OLD) else UNTOUCHED) from error
 
 
 def _place(target: Path, inputs: Iterable[Path]) -> Path:
@@ -77,101 +72,78 @@ def _place(target: Path, inputs: Iterable[Path]) -> Path:
     Raises:
         InputError: no result may be there, or one of the inputs lies there.
     """
-    if target.is_symlink():
-        raise InputError(f"{target} is a link; name the folder that it leads to, or another one")
     place = target.resolve()
-    if place.parent == place:
-        raise InputError(f"{target} is the root of the file system; name a folder in it")
-    above = next((folder for folder in place.parents if folder.exists()), place)
-    if not above.is_dir():
-        raise InputError(f"{target} cannot be a folder, because {above} is a file; name another folder")
-    if not place.exists():
-        return place
-    if not place.is_dir():
-        raise InputError(f"{target} is a file; name a folder")
-    if _above(place, Path.cwd()):
-        raise InputError(f"{target} is the folder that you are in, or above it, and not an earlier result; name another one")
-    if os.path.ismount(place):
-        raise InputError(f"{target} is a mount point, which cannot be replaced; name a folder in it")
-    if not place.stat().st_mode & stat.S_IWUSR:  # also for root, who may write everywhere
-        raise InputError(f"{target} is read-only; name another folder")
-    for path in (path for given in inputs for path in _all_of(given)):
-        if _above(place, path):
-            raise InputError(f"{target} holds {path}, which is read, and would be replaced; name another folder")
+    there = next(folder for folder in (place, *place.parents) if folder.exists())
+    why = ""
+    if target.is_symlink():
+        why = "is a link; name the folder that it leads to"
+    elif not there.is_dir():
+        why = f"cannot be a folder, because {there} is a file"
+    elif Path.cwd().is_relative_to(place):
+        why = "is the folder that you are in, or above it"
+    elif os.path.ismount(place):
+        why = "is a mount point, which cannot be replaced; name a folder in it"
+    elif read := next((path for path in inputs if path.resolve().is_relative_to(place)), None):
+        why = f"holds {read}, which is read, and would be replaced"
+    if why:
+        raise InputError(f"{target} {why}; name another folder")
     return place
 
 
-def _all_of(given: Path) -> list[Path]:
-    """Return an input and all files in it; none where it cannot be read: its reader reports that."""
-    with suppress(OSError, ValueError):
-        return [given, *(given.rglob("*") if given.is_dir() else ())]
-    return []
-
-
-def _above(place: Path, path: Path) -> bool:
-    """Return whether a path is a folder or lies in it, by its name or by the targets of its links."""
-    with suppress(OSError, RuntimeError, ValueError):
-        return any(candidate.is_relative_to(place) for candidate in (path.resolve(), path.parent.resolve() / path.name))
-    return False
-
-
-def _check(target: Path, place: Path, kind: Kind) -> None:
-    """Raise InputError if the content of `place` may not be replaced."""
-    if not is_gone(place) and (reason := objection(place, kind)):
-        raise InputError(f"{target} is not replaced: {reason}; move that away, or name another folder")
-
-
-def _put(target: Path, own: Claim, kind: Kind) -> None:
-    """Move the new result to its place, or leave everything as it was.
+def _put(target: Path, place: Path, new: Path, kind: Kind) -> None:
+    """Move the new result to its place; where that fails `claimed` puts the earlier one back.
 
     Raises:
-        InputError: something came into the earlier result at the last moment, or that could not be put back.
+        InputError: something came into the earlier result at the last moment.
         OSError: the file system refuses.
     """
-    place, new, old = own.place, own.new, own.old
-    with ExitStack() as undo:
-        if not place.exists() or not any(place.iterdir()):
-            new.rename(place)
-            undo.callback(place.rename, new)
-        elif exchange(new, place):
-            undo.callback(exchange, new, place)
-            _check(target, new, kind)
-        else:
-            old.parent.mkdir()
-            place.rename(old)
-            undo.callback(_put_back, target, own)
-            _check(target, old, kind)
-            new.rename(place)
-            undo.callback(place.rename, new)
+    if place.exists():
+        old = new.parents[1] / OLD
+        place.rename(old)
+        _check(target, old, kind)
+    new.rename(place)
+    with suppress(OSError):  # of a file system without such a call; all data are on the disk
         sync(place.parent)
-        undo.pop_all()
 
 
-def _put_back(target: Path, own: Claim) -> None:
-    try:
-        own.old.rename(own.place)
-    except OSError as error:
-        raise of_system(error, target, f"; the earlier result is in {own.old}, the next run puts it back") from error
+def _finish(folder: Path, kind: Kind) -> None:
+    """Write the marker of a new result, and flush all its files to the disk."""
+    document = {"kind": kind, "format": FORMAT, "files": _digests(folder)}
+    write_text(folder / MARKER, json.dumps(document, indent=2) + "\n")
+    sync_tree(folder)
 
 
-@contextmanager
-def _system_errors(target: Path, folder: Path) -> Iterator[None]:
-    """Turn the system's errors about files in `folder` into ours."""
-    try:
-        yield
-    except OSError as error:
-        if error.filename is None or Path(os.fsdecode(error.filename)).is_relative_to(folder):
-            raise _failed(target, error) from error
-        raise
+def _digests(folder: Path) -> dict[str, str]:
+    """Return {relative name: SHA-256} of all files at any depth, in order; "" of what is no regular file, as a link."""
+    found: dict[str, str] = {}
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and not path.is_symlink():
+            found |= {f"{path.name}/{name}": digest for name, digest in _digests(path).items()}
+        else:
+            found[path.name] = "" if path.is_symlink() or not path.is_file() else sha256_of(path)
+    return found
 
 
-def _failed(target: Path, error: Exception) -> InputError:
-    """Return an error of the system as one of ours; a file being written is named as if it were in the target already."""
-    forbidden = isinstance(error, OSError) and error.errno in FORBIDDEN
-    remedy = "it cannot be written to: name another folder" if forbidden else "make room, or name another folder"
-    advice = f"; what was there is untouched; {remedy}"
-    if not isinstance(error, OSError):
-        return InputError(f"{target}: {error}{advice}")
-    path = target if error.filename is None else Path(os.fsdecode(error.filename))
-    own = next((k for k, part in enumerate(path.parts) if part.startswith((PREFIX, GUARD))), None)
-    return of_system(error, path if own is None else target.joinpath(*path.parts[own + 3 :]), advice)
+def _check(target: Path, there: Path, kind: Kind) -> None:
+    """Raise InputError if `there` holds files that are not of an earlier result; some of its own may be missing."""
+    present = _digests(there) if there.exists() else {}
+    files: dict[str, str] = {}
+    if MARKER in present:
+        with suppress(ValueError, KeyError, TypeError, RecursionError):
+            marker = json.loads((there / MARKER).read_text(encoding="utf-8"))
+            if (marker["kind"], marker["format"]) == (kind, FORMAT):
+                files = {**marker["files"], MARKER: present[MARKER]}
+    foreign = next((name for name, digest in present.items() if files.get(name) != digest), "")
+    if foreign:
+        why = f"{foreign} in it is new or changed" if files else f"it holds {foreign} and is not an earlier result ({kind})"
+        raise InputError(f"{target} is not replaced: {why}; move that away, or name another folder")
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file, or of a folder's files in order of their names."""
+    digest = hashlib.sha256()
+    for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+        if file.is_file() and (file == path or file.name != MARKER):  # which is about the files, and not in every bag
+            with file.open("rb") as stream:
+                hashlib.file_digest(stream, lambda: digest)
+    return digest.hexdigest()

@@ -3,75 +3,122 @@
 
 """Folders of intermediate files: removed with the command, also by Ctrl-C; the next command removes those of killed ones.
 
-A scratch folder is a claim (`claim.py`) on a result that never takes its place, so its lock shows whether its process lives.
+.scenario_gen-NAME/lock   held while the process lives; says which one it is
+                  /new    what is being written
+                  /old    the earlier result NAME while the new one takes its place (`replace.py`)
+
+A folder of results has this beside it, so that the new result takes its place by a rename.
 """
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 import os
 from pathlib import Path
+from secrets import token_hex
+import shutil
+import socket
 import tempfile
 
+from filelock import FileLock, Timeout
+
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.folders.claim import alone, Claim, claim, GUARD, PREFIX, settle
+from scenario_gen.base.folders.disk import write_text
 from scenario_gen.base.interrupts import ending, uninterrupted
 
-NAME = "scratch"
+PREFIX, LOCK, NEW, OLD = ".scenario_gen-", "lock", "new", "old"
 DEPTHS = ("*/", "*/*/")  # at which a corpus and a batch write below their own folder
+PATIENCE_S = 1.0  # for a process that is about to release a folder
 
 
 @contextmanager
-def scratch(parent: Path, *, swept: bool = False) -> Iterator[Path]:
-    """Yield an empty folder in `parent`, which only this user may enter, and remove it at the end.
+def claimed(own: Path, what: Path, patience_s: float = PATIENCE_S) -> Iterator[Path]:
+    """Hold the folder of intermediate files `own`, created with those above it, and removed at the end as far as it is empty.
 
     Args:
-        parent: the folder.
-        swept: whether others remove what killed processes left there; else `parent` is listed, whatever it holds.
+        own: its name begins with `PREFIX`; what a killed process left in it is removed.
+        what: is being written, in messages.
+        patience_s: seconds to wait for another process.
+
+    Yields:
+        An empty folder in it, which only this user may enter.
 
     Raises:
+        InputError: another process holds it, or it contains files of others.
         OSError: there is no room, or no right to write.
     """
-    claims: list[Claim] = []
+    lock = FileLock(own / LOCK, thread_local=False)
+    missing = [folder for folder in own.parents if not folder.exists()]
 
     def clean_up() -> None:
-        while claims:
-            claims.pop().release()
+        with suppress(OSError):
+            if lock.is_locked and _emptied(own):
+                (own / LOCK).unlink()
+            for folder in (own, *missing):
+                folder.rmdir()  # fails where there is something: the result
+        lock.release()
 
     with ending(clean_up):
         try:
             with uninterrupted():
-                if not swept:
-                    sweep(parent)
-                claims.append(_claimed(parent / NAME))
-                own = claims[0]
-                own.folder.chmod(0o700)
-            yield own.new
+                _acquire(lock, own, what, patience_s)
+                if not _emptied(own):
+                    raise InputError(f"{own / OLD} is an earlier result, in whose place {what} now is; move one of them away")
+                (own / NEW).mkdir()
+            yield own / NEW
         finally:
             with uninterrupted():
                 clean_up()
 
 
-def _claimed(place: Path) -> Claim:
-    """Return a claim; a second one if another process removed the first between its creation and its lock."""
-    with suppress(FileNotFoundError, BlockingIOError):
-        return claim(place)
-    return claim(place)
+def _acquire(lock: FileLock, own: Path, what: Path, patience_s: float) -> None:
+    while not lock.is_locked:
+        own.mkdir(0o700, parents=True, exist_ok=True)
+        if (names := {path.name for path in own.iterdir()}) and not {LOCK} <= names <= {LOCK, NEW, OLD}:
+            raise InputError(f"{own} is needed for intermediate files, but holds other ones; move it away")
+        try:
+            with suppress(FileNotFoundError):  # another process has just removed the folder
+                lock.acquire(timeout=patience_s, poll_interval=0.02)
+        except Timeout as error:
+            with suppress(OSError):
+                who = (own / LOCK).read_text(encoding="utf-8")
+                raise InputError(f"{what} is being written by {who}; wait for it, or name another folder") from error
+    write_text(own / LOCK, f"process {os.getpid()} on {socket.gethostname()}")
+
+
+def _emptied(own: Path) -> bool:
+    """Remove what is in a folder of ours, or put it back if it is an earlier result without a successor.
+
+    Returns:
+        Whether nothing is left; an earlier result stays if others have put something in its place.
+    """
+    old, place = own / OLD, own.with_name(own.name.removeprefix(PREFIX))
+    if old.exists() and not place.exists():
+        old.rename(place)
+    elif old.exists() and (own / NEW / place.name).exists():
+        return False
+    for path in (own / NEW, old):
+        if path.exists():
+            shutil.rmtree(path)
+    return True
+
+
+def scratch(parent: Path) -> AbstractContextManager[Path]:
+    """Give an empty folder in `parent`, which only this user may enter, and remove it at the end, as `claimed` does."""
+    own = parent / f"{PREFIX}{token_hex(8)}"
+    return claimed(own, own)
 
 
 def sweep(folder: Path) -> None:
-    """Remove the leftovers of killed processes in a folder, unless they cannot be removed or another process holds them."""
-    with suppress(OSError, InputError):
-        with os.scandir(folder) as listing:
-            left = any(entry.name.startswith(PREFIX) or entry.name == GUARD for entry in listing)
-        if left:
-            with alone(folder, patience=0.0):
-                settle(folder / GUARD)
+    """Remove what killed processes left in a folder, unless it cannot be removed or another process holds it."""
+    for own in folder.glob(f"{PREFIX}*"):
+        with suppress(OSError, InputError), claimed(own, own, patience_s=0.0):
+            pass
 
 
 def sweep_tree(folder: Path) -> None:
-    """`sweep` a folder and those in it; to be called `alone`."""
-    for above in sorted({path.parent for path in folder.rglob(f"{PREFIX}*")}):
-        settle(above / GUARD)
+    """`sweep` a folder and those in it."""
+    for above in {path.parent for path in folder.rglob(f"{PREFIX}*")}:
+        sweep(above)
 
 
 def sweep_beside(words: Iterable[str]) -> None:

@@ -17,8 +17,7 @@ from scipy import special
 from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.folders import replaced_folder, sha256_of, write_text
-from scenario_gen.base.folders.marker import Kind
+from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
 from scenario_gen.base.parameters import assigned, flatten
 from scenario_gen.base.provenance import versions
 from scenario_gen.closed_loop.config import ClosedLoopConfig

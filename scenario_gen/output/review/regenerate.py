@@ -10,7 +10,7 @@ from pathlib import Path
 from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, RequestSummary, ScenarioEntry
 from scenario_gen.bags.recordings.template import decode_template, missing_topics
 from scenario_gen.bags.recordings.write import add_message, same_tracks, scenario_bytes
-from scenario_gen.bags.storage.bag import bag_topics, BagMessage, within
+from scenario_gen.bags.storage.bag import BagMessage, within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
@@ -28,6 +28,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.template import mirrored
 from scenario_gen.types import Encounter, GenerationResult, Request, Scenario, Segmentation
 
+REGENERATED = Kind("regenerated bag")
 TEMPLATE = ("tracks", "changepoints", "map", "fit")
 
 
@@ -174,34 +175,6 @@ def write_regenerated(regenerated: Regenerated, folder: Path, inputs: Sequence[P
         for message in regenerated.messages:
             add_message(bag, message.topic, message.data, message.stamp_ns)
     return folder
-
-
-def _is_regenerated(folder: Path) -> bool:
-    """Say whether a bag without a marker was written by `write_regenerated`.
-
-    Nothing is there but one file; every topic is one of the template's with one message, but for `scenarios/info`, whose entry
-    and summary were logged at the same instant: those of a recording never are.
-    """
-    if {path.name for path in folder.iterdir()} != {"metadata.yaml", f"{folder.name}_0.mcap"}:
-        return False
-    try:
-        (namespace,) = read_recording(folder).namespaces.values()
-        (opening, _), (closing, (summary,)) = namespace.infos
-    except (InputError, ValueError):
-        return False
-    topics = {topic: len(messages) for topic, messages in namespace.messages.items() if topic != INFO}
-    known = not topics.keys() & {"posterior", "fit/info", "diagnostics"} and len(bag_topics(folder)) == len(topics) + 1
-    whole = {"scenarios", *TEMPLATE} <= set(topics) and set(topics.values()) == {1}
-    return (
-        known
-        and whole
-        and isinstance(summary, RequestSummary)
-        and summary.published == 1
-        and opening.stamp_ns == closing.stamp_ns
-    )
-
-
-REGENERATED = Kind("regenerated bag", _is_regenerated)
 
 
 @dataclass(frozen=True, eq=False)

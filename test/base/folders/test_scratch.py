@@ -9,11 +9,11 @@ import os
 import signal
 import subprocess
 
+from killed import killed_in
 import pytest
 
 from scenario_gen.base.folders import scratch
-from scenario_gen.base.folders.claim import alone, claim, GUARD, PREFIX
-from scenario_gen.base.folders.scratch import sweep, sweep_beside
+from scenario_gen.base.folders.scratch import PREFIX, sweep, sweep_beside
 from scenario_gen.base.interrupts import leave, starting
 
 
@@ -21,68 +21,36 @@ def left(folder):
     return sorted(path for path in folder.rglob(f"{PREFIX}*"))
 
 
-def killed_in(folder):
-    """What a process leaves that is killed: its folder, whose lock the kernel has let go of."""
-    folder.mkdir(parents=True, exist_ok=True)
-    dead = claim(folder / "scratch")
-    (dead.new / "spilled").write_text("much")
-    os.close(dead.lock)
-
-
 @pytest.mark.parametrize("error", [None, KeyError("a fault")])
-def test_a_scratch_folder_goes_at_the_end(tmp_path, error):
+def test_a_scratch_folder_goes_at_the_end_and_what_the_dead_left_is_swept(tmp_path, error):
     with suppress(KeyError), scratch(tmp_path) as place:
+        killed_in(tmp_path)
         (place / "deep").mkdir()
         (place / "deep" / "file").write_text("x")
-        assert place.parent.parent.stat().st_mode & 0o777 == 0o700
+        assert place.parent.stat().st_mode & 0o777 == 0o700 and len(left(tmp_path)) == 2
+        sweep(tmp_path)
+        assert left(tmp_path) == [place.parent]
         if error:
             raise error
     assert not list(tmp_path.iterdir())
 
 
-def test_of_the_dead_all_goes_and_of_the_living_nothing(tmp_path):
-    with scratch(tmp_path) as place:
-        killed_in(tmp_path)
-        assert len(left(tmp_path)) == 2
-        sweep(tmp_path)
-        assert left(tmp_path) == [place.parent.parent]
-        killed_in(tmp_path)
-        with scratch(tmp_path):
-            assert len(left(tmp_path)) == 2, "the next one sweeps before it begins"
-
-
-def test_who_looks_through_a_folder_is_not_waited_for(tmp_path):
-    killed_in(tmp_path)
-    with alone(tmp_path):
-        sweep(tmp_path)
-        assert len(left(tmp_path)) == 1
-    sweep(tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize(("number", "stays"), [(signal.SIGINT, False), (signal.SIGKILL, True)])
-def test_the_lock_of_a_folder_goes_with_who_holds_it(tmp_path, number, stays):
-    """By Ctrl-C at once, after SIGKILL with the next command; one that is held, or has a content, stays."""
+def test_a_folder_goes_with_who_holds_it(tmp_path, number, stays):
+    """By Ctrl-C at once, after SIGKILL with the next command."""
     pid = os.fork()
     if not pid:
         try:
             signal.signal(signal.SIGINT, leave)
             os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-            with alone(tmp_path):
+            with scratch(tmp_path):
                 os.kill(os.getpid(), number)
         finally:
             os._exit(1)
     assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == (-number if stays else 128 + number)
-    lock = tmp_path / GUARD
-    assert lock.exists() == stays
+    assert bool(left(tmp_path)) == stays
     sweep(tmp_path)
-    assert not lock.exists()
-    with alone(tmp_path):
-        sweep(tmp_path)
-        assert lock.exists()
-    lock.write_text("somebody's own")
-    sweep(tmp_path)
-    assert lock.exists()
+    assert not left(tmp_path)
 
 
 def test_what_is_started_hears_no_ctrl_c():
@@ -101,7 +69,7 @@ def test_what_is_started_hears_no_ctrl_c():
         signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.parametrize("words", [["{}"], ["--out", "{}"], ["--out={}"], ["x", "{}/bag"], ["\0", "{}/"]])
+@pytest.mark.parametrize("words", [["{}"], ["--out={}"], ["x", "{}/bag"], ["\0", "{}/"]])
 def test_a_command_sweeps_where_its_words_point(tmp_path, words):
     places = [tmp_path / "batch", tmp_path / "batch" / "cases", tmp_path / "batch" / "bags" / "road=a"]
     deep = not any("bag" in word for word in words)
