@@ -81,7 +81,7 @@ licences: $(TEST)
 	$(BIN)/python test/packaging/licences.py
 
 install: $(READY)
-	$(BIN)/python -m scenario_gen.numerics.compiling
+	$(BIN)/python -m scenario_gen.numerics
 
 # The core first: with it the kernels of the stages are compiled, once for this user, while pip installs the rest.
 STAGES := numerics template roads method
@@ -89,7 +89,7 @@ $(RUN): requirements/core.lock requirements/run.lock requirements/ros.lock setup
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
 	$(LOCKED) -r requirements/core.lock
-	$(BIN)/python -m scenario_gen.numerics.compiling $(STAGES) & kernels=$$!; \
+	$(BIN)/python -m scenario_gen.numerics $(STAGES) & kernels=$$!; \
 	$(LOCKED) -r requirements/run.lock $(if $(SOURCED),,-r requirements/ros.lock) && $(PIP) --no-build-isolation --editable .; \
 	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(RUN)
@@ -99,7 +99,7 @@ $(READY): $(RUN) requirements/extras.lock
 	@touch $(READY)
 
 $(TEST): $(READY) requirements/test.lock requirements/ros-test.lock
-	$(BIN)/python -m scenario_gen.numerics.compiling & kernels=$$!; \
+	$(BIN)/python -m scenario_gen.numerics & kernels=$$!; \
 	$(LOCKED) -r requirements/test.lock $(if $(SOURCED),,-r requirements/ros-test.lock); \
 	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(TEST)

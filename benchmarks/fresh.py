@@ -49,7 +49,7 @@ def run() -> list[Row]:
         parts["test: packages and the other kernels"] = make(".venv/.test")
         installed.append(_installed(clone, "after make test"))
         parts["test: ruff, mypy, pytest"] = make("test", PYTEST_ADDOPTS=f"--junitxml={results}")
-        alone = sized(("-m", "scenario_gen.numerics.compiling"), quick=("--version",))
+        alone = sized(("-m", "scenario_gen.numerics"), quick=("--version",))
         python = str(clone / ".venv" / "bin" / "python") if not DRY else sys.executable
         apart = {"all kernels, by themselves": step(python, *alone, NUMBA_CACHE_DIR=str(place / "kernels"))}
         totals = {f"make {name}": _sum(parts, name) for name in ("demo", "test")}

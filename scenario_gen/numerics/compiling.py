@@ -1,30 +1,38 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Kernels that are not in the cache are compiled once: by several processes, under a lock, and the user is told.
+"""Kernels that are not in the cache are compiled once: by several processes, under a lock, and the user is told."""
 
-`python -m scenario_gen.numerics.compiling` compiles all of the project, or those of the packages that are named.
-"""
-
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-import importlib
 import logging
 import os
-import shutil
+from pathlib import Path
 import subprocess
 import sys
-from time import monotonic, time
+from time import monotonic
+from typing import Protocol
 
 from filelock import FileLock, Timeout
 
-from scenario_gen.numerics.kernels import folder, import_all, is_lasting, Kernel, registered
+from scenario_gen.numerics.kernel_cache import folder, is_lasting
 
 WORKERS = max(1, min(4, os.cpu_count() or 1))
 POLL_S = 0.5
-UNUSED_S = 60.0 * 86400.0  # after which kernels of another version are removed
 ONLY = "--only"
 Progress = Callable[[int, int, float], None]  # kernels that are there, kernels that are needed, seconds
+
+
+class Compilable(Protocol):
+    """A kernel: what tells it from all others, the file that says that it is in the cache, and how long it takes, about."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def mark(self) -> Path: ...  # noqa: D102
+    @property
+    def size(self) -> int: ...  # noqa: D102
+
 
 _workers: list["subprocess.Popen[bytes]"] = []
 
@@ -43,15 +51,16 @@ def _log(done: int, needed: int, seconds: float) -> None:
         logging.getLogger("scenario_gen").warning("%s; this takes a minute or two", words(done, needed, seconds))
 
 
-def make_ready(report: Progress = _log) -> int:
-    """Compile what is not in the cache of the kernels of all modules that have been imported; return their number.
+def make_ready(needed: Sequence[Compilable], report: Progress = _log) -> int:
+    """Compile what is not in the cache of the kernels that are needed; return their number.
 
     Of several processes one has them compiled; the others wait.
 
     Args:
+        needed: the kernels, of modules that have been imported.
         report: called now and then while something is not there.
     """
-    needed, started = registered(), monotonic()
+    started = monotonic()
 
     def show(absent: int) -> None:
         report(len(needed) - absent, len(needed), monotonic() - started)
@@ -64,16 +73,16 @@ def make_ready(report: Progress = _log) -> int:
     return len(needed)
 
 
-def _missing(kernels: list[Kernel]) -> list[Kernel]:
+def _missing(kernels: Sequence[Compilable]) -> list[Compilable]:
     """Those that are not in the cache."""
     return [each for each in kernels if not each.mark.exists()]
 
 
-def _compile(absent: list[Kernel], show: Callable[[], None]) -> None:
+def _compile(absent: Sequence[Compilable], show: Callable[[], None]) -> None:
     """Have kernels compiled by processes, each its share of them."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder().parent)}
     names = [each.name for each in sorted(absent, key=lambda each: each.size, reverse=True)]
-    command = [sys.executable, "-m", "scenario_gen.numerics.compiling", ONLY]
+    command = [sys.executable, "-m", "scenario_gen.numerics", ONLY]
     try:
         for k in range(min(WORKERS, len(names))):  # in a session of its own: not the terminal's Ctrl-C
             share = names[k::WORKERS]
@@ -93,40 +102,3 @@ def end_workers() -> None:
         worker = _workers.pop()
         worker.kill()
         worker.wait()
-
-
-def _work(names: list[str]) -> None:
-    """Compile these kernels, as long as somebody waits for them."""
-    parent = os.getppid()
-    for name in names:
-        if os.getppid() == parent:
-            module, _, function = name.partition(":")
-            getattr(importlib.import_module(module), function).compile()
-
-
-def main() -> None:
-    """Compile the kernels of the packages that are named, or all; remove those of versions that were not used for long."""
-    if ONLY in sys.argv:
-        _work(sys.argv[2:])
-        return
-    started = monotonic()
-    import_all(sys.argv[1:])
-    end, last = "\r" if sys.stdout.isatty() else "\n", ""
-
-    def show(done: int, needed: int, seconds: float) -> None:
-        nonlocal last
-        text = words(done, needed, seconds)
-        if sys.stdout.isatty() or text[:16] != last[:16]:
-            print(text, end=end, flush=True)
-        last = text
-
-    count = make_ready(show)
-    folder().touch()
-    for old in folder().parent.glob("kernels-*"):
-        if time() - old.stat().st_mtime > UNUSED_S:
-            shutil.rmtree(old, ignore_errors=True)
-    print(f"{count} kernels ready after {monotonic() - started:.1f} s", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -3,19 +3,14 @@
 
 """Compiled kernels: `numba.njit` with declared types, compiled at the first call and kept by numba's own cache.
 
-Inputs are `F1`, `I2`, …, which the kernel only reads; outputs are `OUT1`, `OUTI2`, …. Where numba's cache lies is said by
-`folder`; `scenario_gen/numerics/compiling.py` compiles several kernels at once.
+Inputs are `F1`, `I2`, …, which the kernel only reads; outputs are `OUT1`, `OUTI2`, …. `kernel_cache.py` says where
+numba's cache lies; `compiling.py` compiles several kernels at once.
 """
 
 from collections.abc import Callable, Sequence
-from functools import cache, update_wrapper
-from hashlib import sha256
+from functools import update_wrapper
 import importlib
-import os
 from pathlib import Path
-import platform
-import re
-import tempfile
 from typing import Any, cast, TypeVar
 
 import numba
@@ -24,6 +19,8 @@ from numba.extending import typeof_impl
 import numpy as np
 
 from scenario_gen.numerics.arrays import sealed
+from scenario_gen.numerics.compiling import make_ready
+from scenario_gen.numerics.kernel_cache import folder, PACKAGE, sources
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -44,46 +41,7 @@ OUTI1, OUTI2 = (_array(I, n, readonly=False) for n in (1, 2))
 OUTB1, OUTB2 = (_array(B, n, readonly=False) for n in (1, 2))
 
 OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-PACKAGE = Path(__file__).parents[1]
-_DECORATED = re.compile(rb"^@kernel\(", re.MULTILINE)
 _kernels: list["Kernel"] = []
-
-
-@cache
-def sources() -> tuple[Path, ...]:
-    """Return the files of the package that hold kernels."""
-    return tuple(file for file in sorted(PACKAGE.rglob("*.py")) if _DECORATED.search(file.read_bytes()))
-
-
-@cache
-def folder() -> Path:
-    """Return the folder of compiled kernels: in `NUMBA_CACHE_DIR`, the user's cache, or a temporary folder of this process.
-
-    Its name is a hash of all sources of kernels, as numba tells them apart (path, time, size), and of the versions of Python and
-    numba: a kernel is compiled anew when another file that it calls has changed.
-    """
-    stamps = [(str(file), file.stat().st_mtime_ns, file.stat().st_size) for file in sources()]
-    name = "kernels-" + sha256(repr((stamps, numba.__version__, platform.python_version())).encode()).hexdigest()[:16]
-    user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "scenario_gen"
-    try:
-        place = Path(numba.config.CACHE_DIR or user.expanduser()) / name
-        place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=place).close()
-    except (OSError, RuntimeError):  # the latter: the user has no home
-        place = Path(_temporary().name) / name
-        place.mkdir(mode=0o700)
-    return place
-
-
-@cache
-def _temporary() -> tempfile.TemporaryDirectory[str]:
-    """A folder that goes with this process."""
-    return tempfile.TemporaryDirectory(prefix="scenario_gen-kernels-")
-
-
-def is_lasting() -> bool:
-    """Say whether other processes will find the kernels that this one compiles."""
-    return _temporary.cache_info().currsize == 0
 
 
 def named(of: type[Any], *fields: Any) -> Any:
@@ -177,9 +135,7 @@ class Kernel:
         """Call the compiled form."""
         if not self.dispatcher.signatures:
             if not self.mark.exists():
-                from scenario_gen.numerics.compiling import make_ready
-
-                make_ready()
+                make_ready(registered())
             self.compile()
         return self.dispatcher(*[read(value) for read, value in zip(self._readers, values, strict=True)])
 

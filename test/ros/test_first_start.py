@@ -35,8 +35,8 @@ def test_several_processes_compile_once_and_without_a_folder_each_does(tmp_path)
         "from scenario_gen.numerics.kernels import F, kernel\n@kernel(F)\ndef twice(x):\n    return x + x\n"
     )
     run = (
-        "import kernel_of_a_test as module\nfrom scenario_gen.numerics import compiling\nsaid = []\n"
-        "compiling.make_ready(lambda *words: said.append(compiling.words(*words)))\nprint(module.twice(2.0), said[-1:])"
+        "import kernel_of_a_test as module\nfrom scenario_gen.numerics import compiling, kernels\nsaid = []\n"
+        "compiling.make_ready(kernels.registered(), lambda *words: said.append(compiling.words(*words)))\nprint(module.twice(2.0), said[-1:])"
     )
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     several = [

@@ -32,6 +32,7 @@ from rclpy.utilities import remove_ros_args
 from scenario_gen.base.errors import print_error, ScenarioGenError
 from scenario_gen.base.interrupts import end_orderly, hear
 from scenario_gen.numerics.compiling import end_workers, make_ready, Progress, words
+from scenario_gen.numerics.kernels import registered
 from scenario_gen.ros.plumbing.ros_parameters import help_of, USAGE
 
 REPORT_S = 5.0  # seconds between two reports of how many kernels are there
@@ -123,7 +124,7 @@ def kernels_ready(stages: Iterable[str], progress: Progress = lambda *_: None) -
         package = importlib.import_module(f"scenario_gen.{stage}")
         for module in pkgutil.iter_modules(getattr(package, "__path__", ())):
             importlib.import_module(f"scenario_gen.{stage}.{module.name}")
-    return make_ready(progress) if stages else 0
+    return make_ready(registered(), progress) if stages else 0
 
 
 def _print_progress() -> Progress:
