@@ -4,10 +4,8 @@
 """Mistakes of users: each gets one line that says what is wrong and what to do, exit code 2, and nothing is lost."""
 
 import resource
-import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -127,10 +125,6 @@ def limited():
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
 
-def waits_for_ctrl_c():
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
 def command(folder, *words):
     return {"args": [sys.executable, "-m", "scenario_gen", *words], "cwd": folder, "text": True, "stderr": subprocess.PIPE}
 
@@ -143,16 +137,4 @@ def test_a_disk_that_is_full_is_one_line_and_loses_nothing(folder):
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
     assert line.startswith("error: made") and "File too large; what was there is untouched; make room" in line
-    assert files(folder) == before
-
-
-def test_ctrl_c_is_one_line_and_loses_nothing(folder):
-    before, entries = files(folder), len(list(folder.iterdir()))
-    words = (*GENERATE[:-1], "100000", "--out", "made")
-    process = subprocess.Popen(**command(folder, *words), preexec_fn=waits_for_ctrl_c)  # noqa: PLW1509
-    while process.poll() is None and len(list(folder.iterdir())) == entries:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate()
-    assert process.returncode == 128 + signal.SIGINT and said.strip() == "stopped by SIGINT"
     assert files(folder) == before
