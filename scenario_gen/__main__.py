@@ -15,6 +15,7 @@ from scenario_gen.base.interrupts import leave, SIGNALS
 
 def command() -> None:
     """Run the command line in a process that goes on."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: matrices are small here, and threads only wait
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as for nohup, or a job in the background
             signal.signal(number, leave)

@@ -165,14 +165,14 @@ def regenerate(
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
-    """Generate one scenario of a bag again and check that it has the same SHA-256."""
+    """Generate one scenario of a bag again and check that it is the same: its bytes, or its places within 1 cm."""
     from scenario_gen.output.review.regenerate import regenerate_scenario, write_regenerated
 
     remind(bag)
     config = configured(parameter_file, assignments).bag
     result = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log, config=config)
-    give(index=index, bytes=len(result.data), sha256=result.sha256)
-    say(f"scenario {index}: the same {len(result.data)} bytes, sha256 {result.sha256}")
+    give(index=index, bytes=len(result.data), sha256=result.sha256, apart_m=result.apart)
+    say(f"scenario {index}: {result.comparison}, {len(result.data)} bytes, sha256 {result.sha256}")
     if out is not None:
         written = write_regenerated(result, out, [bag, *([log] if log else ())])
         give(bag=written)

@@ -20,7 +20,7 @@ def test_a_node_says_that_kernels_are_compiled_and_ends_when_asked(tmp_path):
     node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
     try:
         assert any(
-            line.startswith("kernels: ") and line.endswith("s; once per machine\n") for line in iter(node.stderr.readline, "")
+            line.startswith("kernels: ") and line.endswith("s; once for this installation\n") for line in iter(node.stderr.readline, "")
         )
         node.send_signal(signal.SIGINT)
         assert node.wait(timeout=60.0) == 0
@@ -36,7 +36,8 @@ def test_several_processes_compile_once_and_without_a_folder_each_does(tmp_path)
     )
     run = (
         "import kernel_of_a_test as module\nfrom scenario_gen.numerics import compiling, kernels\nsaid = []\n"
-        "compiling.make_ready(kernels.registered(), lambda *words: said.append(compiling.words(*words)))\nprint(module.twice(2.0), said[-1:])"
+        "compiling.make_ready(kernels.registered(), lambda *words: said.append(compiling.words(*words)))\n"
+        "print(module.twice(2.0), said[-1:])"
     )
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     several = [
@@ -44,10 +45,10 @@ def test_several_processes_compile_once_and_without_a_folder_each_does(tmp_path)
     ]
     said = [process.communicate(timeout=300.0)[0] for process in several]
     assert all(text.startswith("4.0 [") for text in said), said
-    assert any("once per machine" in text for text in said)
+    assert any("once for this installation" in text for text in said)
     assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 1
     warm = subprocess.run([sys.executable, "-c", run], capture_output=True, text=True, env=environment, check=True)
     assert warm.stdout == "4.0 []\n"
     nowhere = environment | {"NUMBA_CACHE_DIR": "/proc/nowhere"}
     alone = subprocess.run([sys.executable, "-c", run], capture_output=True, text=True, env=nowhere, check=True)
-    assert "at every start: no folder to keep them" in alone.stdout, alone.stdout
+    assert "at every start" in alone.stdout, alone.stdout

@@ -181,6 +181,12 @@ class Namespace(RecordedScenarios):
                 found[topic] = (of_stamp or own)[-1]
         return found
 
+    def published(self, entry: ScenarioEntry) -> tuple[bytes, bytes]:
+        """Return the bytes of a scenario and of its witness, empty if there is none."""
+        pairs = zip(self.messages.get(SCENARIOS, ()), self.hashes, strict=True)
+        data = next((message.data for message, sha256 in pairs if sha256 == entry.sha256), b"")
+        return data, self.witnesses[entry.witness].data if entry.witness else b""
+
     def messages_of(self, info: BagMessage, entry: ScenarioEntry, summary: RequestSummary) -> tuple[BagMessage, ...]:
         """Return the messages for a bag of one scenario: its template, the scenario, its entry, and a summary of it alone.
 

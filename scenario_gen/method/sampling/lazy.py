@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenarios of a large set: kept by their indices, and drawn again, bit for bit, whenever they are looked at."""
+"""Scenarios of a large set: kept by their indices, and drawn again, to rounding, whenever they are looked at."""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby

@@ -110,7 +110,7 @@ def regenerate(
     check: Check | None = None,
     measures: Measures | None = None,
 ) -> Scenario | None:
-    """The scenario with this seed and index again, bit for bit, without the others; arguments as in `draw_scenarios`.
+    """The scenario with this seed and index again, to rounding, without the others; arguments as in `draw_scenarios`.
 
     One of a proposal needs `check` and `measures`, by which that is found again.
 

@@ -77,7 +77,7 @@ class Sampler:
         return self.model.draw(self.numbers(level, number), self._scale(level)), list(range(first, first + BLOCK))
 
     def scenario(self, index: int) -> Scenario | None:
-        """The candidate with this index, bit for bit as in a whole set; None if it has no speed profile."""
+        """The candidate with this index, to rounding as in a whole set; None if it has no speed profile."""
         level, candidate = place_of(index)
         number, row = divmod(candidate, BLOCK)
         batch = self.model.draw(self.numbers(level, number)[row : row + 1], self._scale(level))
@@ -96,7 +96,7 @@ class Sampler:
         return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(self.seed, [0], self.frame_id)[0]
 
     def redraw(self, index: Sequence[int]) -> list[Scenario]:
-        """The scenarios of indices that are of one block, bit for bit as in a whole set."""
+        """The scenarios of indices that are of one block, to rounding as in a whole set."""
         level, candidate = place_of(index[0])
         batch, own = self.block(level, candidate // BLOCK)
         drawn = batch.scenarios(self.seed, own, self.frame_id)

@@ -37,7 +37,7 @@ def segment_series(
     Args:
         x: (T, D), any units, NaN where nothing was measured; see `standardised`.
         config: model and sampler.
-        seed: same seed, same answer, bit for bit.
+        seed: same seed, same answer.
         ends: where several sequences stand one after the other, the index one past the last sample of each.
         blur: (D,) measurement error of each channel, a standard deviation in x's units (None: 0).
 

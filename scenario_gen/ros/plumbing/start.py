@@ -10,6 +10,7 @@ Each listens to signals before anything else is loaded, so that Ctrl-C while the
 from functools import partial
 import gc
 import importlib
+import os
 import sys
 from typing import Any
 
@@ -46,6 +47,7 @@ def chosen(arguments: list[str]) -> tuple[list[str], list[str]]:
 def start(name: str) -> None:
     """Load the node `name`, or the suite, and run it."""
     hear()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: matrices are small here, and threads only wait
     names, arguments = chosen(sys.argv) if name == "suite" else ([name], sys.argv)
     gc.disable()  # what the libraries make while they load stays: to look for garbage in it takes a sixth of the time
     from scenario_gen.ros.plumbing.process import asks_for_help, run_nodes, show
