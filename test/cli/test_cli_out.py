@@ -78,23 +78,6 @@ def again(kind, bag):
     }[kind]
 
 
-@pytest.mark.parametrize("kind", ["generated", "evaluated", "regenerated"])
-def test_results_of_versions_without_markers_are_known_strictly(run, made, tmp_path, kind):
-    out = tmp_path / kind
-    shutil.copytree(made / kind, out)
-    (out / MARKER).unlink()
-    (out / "notes.txt").write_text("mine")
-    code, said = run(*again(kind, made / "generated" / "bag"), "--out", out)
-    assert code == 2 and "is not an earlier result" in said and (out / "notes.txt").read_text() == "mine"
-    (out / "notes.txt").unlink()
-    before = files(out)
-    code, said = run(*again(kind, made / "generated" / "bag"), "--out", out)
-    assert code == 0, said
-    after = files(out)
-    assert set(after) == {*before, Path(MARKER)} and after != before
-    assert [path.name for path in tmp_path.iterdir()] == [kind]
-
-
 def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
     """The two that once were lost: a recording, for a scenario of its own, and notes beside a page called report.html."""
     bag = tmp_path / "generated_bag"

@@ -10,10 +10,10 @@ from pathlib import Path
 import threading
 
 import boto3
-from object_store import new_bucket, reached, serving
+from object_store import new_bucket, reached, read, serving
 import pytest
 
-from scenario_gen.base.stores import below, place, read, upload
+from scenario_gen.base.stores import below, place, upload
 from scenario_gen.logs.synthetic import bundled
 
 pytestmark = pytest.mark.xdist_group("places")

@@ -57,3 +57,9 @@ def new_bucket(name: str) -> str:
 
     boto3.client("s3").create_bucket(Bucket=name)
     return f"s3://{name}"
+
+
+def read(found):
+    """The content of an object."""
+    system, path = found.there()
+    return system.cat_file(path)
