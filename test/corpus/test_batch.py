@@ -138,7 +138,7 @@ def test_a_find_that_is_ended_leaves_nothing(batch, number):
     words = [sys.executable, "-m", "scenario_gen", "find", str(out)]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with subprocess.Popen([*words, FOREVER], preexec_fn=interruptible, **quiet) as run:  # noqa: PLW1509 - one thread
-        while run.poll() is None and not list(out.glob(".scenario_gen-*/new")):
+        while run.poll() is None and not list(out.glob(".scenario_gen*")):
             time.sleep(0.01)
         assert run.poll() is None, "it ended before it could be stopped"
         run.send_signal(number)
