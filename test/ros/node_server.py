@@ -84,5 +84,7 @@ def _become(arguments: list[str], folder: str, environment: dict[str, str], log:
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
+    if "WITHOUT_TF2" in environment:
+        sys.path[:] = [path for path in sys.path if path != STAND_INS]
     sys.argv = arguments[:]
     start.start(arguments[0])
