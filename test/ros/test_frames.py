@@ -46,8 +46,7 @@ def test_without_tf2_msgs_the_rest_is_played_and_that_is_said(domain, client, ba
     client.hear("scenarios")
     nodes = {"player": ("-p", f"bag:={bag}", "-p", "rate:=100.0"), "preview": (), "traffic": ()}
     started = {
-        node: start_nodes(node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain), WITHOUT_TF2="1")
-        for node, words in nodes.items()
+        node: start_nodes(node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain), WITHOUT_TF2="1") for node, words in nodes.items()
     }
     client.wait("scenarios", 5)
     for node, process in started.items():

@@ -310,7 +310,7 @@ def test_works_in_a_pipeline_and_under_cross_validation(fitted):
     assert np.isfinite(cross_val_score(model, x, cv=2)).all()
 
 
-ALLOWED = {"numpy", "scipy", "numba", "llvmlite", "scenario_gen"}
+ALLOWED = {"filelock", "numpy", "scipy", "numba", "llvmlite", "scenario_gen"}
 TAKEN_ALONG = {"cffi", "charset_normalizer", "coverage", "pycparser", "yaml"}  # by numba and numpy.f2py, where they are installed
 
 
