@@ -16,7 +16,6 @@ import pytest
 from rich.table import Table
 
 from scenario_gen.base.errors import presentable
-from scenario_gen.base.folders import MARKER
 from scenario_gen.base.folders.scratch import PREFIX
 from scenario_gen.base.terminal import Terminal
 from scenario_gen.cli import commands as cli
@@ -66,16 +65,6 @@ def made(tmp_path_factory):
 
 def files(folder):
     return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
-def again(kind, bag):
-    """The command that writes another result of that kind."""
-    quick = ("--set", "evaluation.resamples=10")
-    return {
-        "generated": (*GENERATE, "--seed", 1),
-        "evaluated": ("evaluate", bag, *quick),
-        "regenerated": ("regenerate", bag, 1),
-    }[kind]
 
 
 def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
