@@ -34,6 +34,7 @@ PATIENCE = 240.0  # s after which a run counts as one that hangs
 PAUSE = 0.3  # s, at most, from the object at which a kill comes
 RUNS = 6  # of one sequence, at most
 LEFT = ".scenario_gen"  # with which names of intermediate files begin
+STAGES = ("found", "encounters")  # whose tables are compared
 Tables = dict[str, bytes]
 
 
@@ -60,7 +61,7 @@ def run(part: str = "all") -> list[Row]:
         archive = write_archive(folder / "archive", 5, **ARCHIVE)
         words = [sys.executable, "-m", "scenario_gen", "mine", str(archive), "--out", str(folder / "whole"), *SETTINGS]
         subprocess.run(words, check=True, capture_output=True)
-        whole = {path.name: path.read_bytes() for path in _tables_in(folder / "whole")}
+        whole = {f"{path.parent.name}/{path.name}": path.read_bytes() for path in _tables_in(folder / "whole")}
         processes = Processes(folder)
         try:
             processes.start()
@@ -90,7 +91,7 @@ def _rows(victim: str, seen: Seen) -> list[Row]:
 
 
 def _tables_in(out: Path) -> list[Path]:
-    return [out / "found.parquet", *sorted((out / "encounters").glob("*.parquet"))]
+    return sorted(path for stage in STAGES for path in (out / stage).glob("*.parquet"))
 
 
 def _killed(victim: str, processes: Processes, whole: Tables) -> Seen:
@@ -182,8 +183,8 @@ def _judge(processes: Processes, out: str, log: Path, whole: Tables, names: set[
     """Compare what is there with an undisturbed run, and count what is left."""
     store: Any = processes.store()
     there = _listed(processes, out)
-    wanted = [name for name in there if name == "found.parquet" or name.startswith("encounters/")]
-    tables = {Path(name).name: store.get_object(Bucket=BUCKET, Key=f"{out}/{name}")["Body"].read() for name in wanted}
+    wanted = [name for name in there if name.startswith(tuple(f"{stage}/" for stage in STAGES))]
+    tables = {name: store.get_object(Bucket=BUCKET, Key=f"{out}/{name}")["Body"].read() for name in wanted}
     same = tables == whole
     seen.same += same
     extra = set(there) - names

@@ -13,7 +13,7 @@ A file that is there is done, so a run that was killed goes on where it was.
 
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, chain
 import json
@@ -60,6 +60,7 @@ ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
         "notes": {"type": "array", "items": {"type": "string"}},
     },
 }
+LOOSE_BAGS = (".mcap", ".db3", ".bag")  # endings of files that are bags without a folder
 HEAD = 16_384  # bytes of an object by which its format is recognised
 MOST_DRAWN = 120  # encounters on the page
 MOST_SHOWN = 20  # failures and files that are named; the corpus holds all
@@ -249,21 +250,31 @@ def _of_files(archive: Path) -> Files:
         raise InputError(f"{archive} does not exist")
     if archive.is_file() or is_bag(archive):
         return ([archive], [], []) if is_spmd(archive) else ([], [[archive]], [])
-    files = sorted(Path(folder, name) for folder, _, names in os.walk(archive) for name in names if not name.startswith("."))
-    spmd: list[Path] = []
-    rest: list[Path] = []
-    for path in files:
-        (spmd if is_spmd(path) else rest).append(path)
+    spmd, rest = _parted(_visible_files(archive), is_spmd)
     bags = {path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)}
-    within = {path: not bags.isdisjoint(path.parents) for path in rest} if bags else dict.fromkeys(rest, False)
-    tables = [path for path in rest if not within[path] and (is_table(path) or is_commonroad(path) or is_nocturne(path))]
-    loose = [path for path in rest if path.suffix in (".mcap", ".db3", ".bag") and not within[path]]
-    one_log = not spmd and not bags and not loose and all(path.parent == archive and is_table(path) for path in tables)
-    logs = [tables] if tables and one_log else [[path] for path in (*tables, *sorted(bags), *loose)]
+    if bags:
+        rest = [path for path in rest if bags.isdisjoint(path.parents)]
+    tables, rest = _parted(rest, lambda path: is_table(path) or is_commonroad(path) or is_nocturne(path))
+    loose, others = _parted(rest, lambda path: path.suffix in LOOSE_BAGS)
+    if tables and not (spmd or bags or loose) and all(path.parent == archive and is_table(path) for path in tables):
+        logs = [tables]  # one log in several tables
+    else:
+        logs = [[path] for path in (*tables, *sorted(bags), *loose)]
     if not spmd and not logs:
         raise InputError(f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario")
-    known = {*spmd, *tables, *loose}
-    return spmd, logs, [path for path in rest if path not in known and not within[path]]
+    return spmd, logs, others
+
+
+def _visible_files(folder: Path) -> list[Path]:
+    return sorted(Path(above, name) for above, _, names in os.walk(folder) for name in names if not name.startswith("."))
+
+
+def _parted(paths: Iterable[Path], chosen: Callable[[Path], bool]) -> tuple[list[Path], list[Path]]:
+    """Return the paths that are chosen, and the others."""
+    parts: tuple[list[Path], list[Path]] = ([], [])
+    for path in paths:
+        parts[not chosen(path)].append(path)
+    return parts
 
 
 def resolved(paths: Iterable[Place]) -> Iterator[str]:

@@ -7,9 +7,10 @@ A task writes to a temporary name, syncs and renames, so a file that is there is
 distribution, nothing else: it holds no state that a killed run would lose.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import count, islice
 import json
@@ -41,9 +42,7 @@ WORKERS = {  # their environment: one thread each; Dask's own has them return ev
 }
 
 
-COMMON = ("config", "request")  # fields of tasks that are alike in all of them
-WAVE = 4  # bundles for each worker that the scheduler holds at a time
-BUNDLE = 8  # tasks in a bundle, at most
+WAVE = 4  # tasks for each worker that the scheduler holds at a time
 
 
 @contextmanager
@@ -205,78 +204,35 @@ class Spread:
             yield from self._distributed(function, tasks)
 
     def _distributed(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
-        """Yield as `_outcomes` does; workers run bundles of tasks.
+        """Yield as `_outcomes` does; the scheduler holds a few tasks for each worker at a time.
 
-        Tasks of a bundle whose workers died are run one at a time at the end, so that only the task that ends them fails.
+        Tasks whose workers died are run again one at a time at the end, so that only the one that ends them fails.
         """
         from distributed import as_completed
 
-        client, common, submitted = self._client, _common(tasks), dict[tuple[str, int], Sequence[Task]]()
-        plugin = f"scenario_gen-{uuid4().hex}"
-        client.register_plugin(_plugin(common), name=plugin)  # of later workers, too
+        group, numbers, waiting = uuid4().hex, count(), iter(tasks)  # one group of keys, which Dask queues
+        held: dict[tuple[str, int], Task] = {}
 
-        def submit(bundles: Sequence[Sequence[Any]]) -> list[Any]:
-            if not bundles:
-                return []
-            keys = [(plugin, number) for _, number in zip(bundles, numbers, strict=False)]  # one group, which Dask queues
-            submitted.update(zip(keys, bundles, strict=True))
-            less = [[replace(task, **dict.fromkeys(common)) for task in own] if common else own for own in bundles]
-            futures: list[Any] = client.map(partial(_completed, function, plugin), less, key=keys)
-            return futures
+        def submitted(chosen: Iterable[Task]) -> list[Any]:
+            own = {(group, next(numbers)): task for task in chosen}
+            held.update(own)
+            return list(self._client.map(partial(_guarded, function), list(own.values()), key=list(own))) if own else []
 
-        each = max(len(client.nthreads()), self._workers)
-        start, numbers = iter(tasks), count()
-        waiting = (list(islice(start, size)) for size in bundle_sizes(len(tasks), each))
-        running, suspects = as_completed(submit(list(islice(waiting, WAVE * each)))), list[Task]()
-        for done, future in enumerate(running, start=1):
-            own = submitted.pop(future.key)
-            outcomes = _outcomes_of(future, len(own))
-            if outcomes is None:
-                suspects += own
+        suspects: list[Task] = []
+        alone = False
+        running = as_completed(submitted(islice(waiting, WAVE * max(len(self._client.nthreads()), self._workers))))
+        for future in running:
+            task = held.pop(future.key)
+            if future.status != "error":
+                yield future.result()
+            elif alone:
+                yield f"{getattr(task, 'name', 'a task')}: {future.exception()}"
             else:
-                yield from outcomes
-            if done % each == 0:  # together: the scheduler spends less on a bundle
-                running.update(submit(list(islice(waiting, each))))
-        for task in suspects:
-            (future,) = as_completed(submit([[task]]))
-            yield from _outcomes_of(future, 1) or [f"{getattr(task, 'name', 'a task')}: {future.exception()}"]
-
-
-def bundle_sizes(tasks: int, workers: int) -> list[int]:
-    """Return how many consecutive tasks each bundle has, by guided self-scheduling (Polychronopoulos & Kuck 1987).
-
-    A bundle takes a share of what remains, so the last ones are single tasks, and no worker works long after the others.
-
-    Args:
-        tasks: their number.
-        workers: their number.
-    """
-    sizes = []
-    while tasks:
-        sizes.append(max(min((tasks - 1) // workers, BUNDLE), 1))
-        tasks -= sizes[-1]
-    return sizes
-
-
-class FailedTasksError(Exception):
-    """Tasks of a bundle failed; the arguments are why, for each task, "" for one that did not fail.
-
-    As an exception it reaches the client with the news that the bundle has ended; a result would have to be fetched.
-    """
-
-
-def _outcomes_of(future: Any, count: int) -> Sequence[str] | None:
-    """Return why each of the `count` tasks of a bundle failed, "" if it did not; None if the workers that ran it died.
-
-    Raises:
-        ConnectionError: the scheduler was lost.
-    """
-    if future.status == "finished":
-        return [""] * count
-    if future.status == "cancelled":
-        raise ConnectionError("the connection has ended")
-    error = future.exception()
-    return error.args if isinstance(error, FailedTasksError) else None
+                suspects.append(task)
+            running.update(submitted(islice(waiting, 1)))
+            if suspects and not held:
+                alone = True
+                running.update(submitted([suspects.pop()]))
 
 
 @contextmanager
@@ -288,38 +244,9 @@ def _connected(scheduler: str) -> Iterator[None]:
     """
     try:
         yield
-    except (OSError, TimeoutError) as error:
+    except (OSError, TimeoutError, CancelledError) as error:
         lost = f"{scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
         raise InputError(f"{lost}; the same command goes on where it stopped") from error
-
-
-def _common(tasks: Sequence[Any]) -> dict[str, Any]:
-    """Return the fields that are one object in all tasks (the configuration): they are sent to each worker once."""
-    shared = {name: getattr(tasks[0], name) for name in COMMON if hasattr(tasks[0], name)}
-    return {name: value for name, value in shared.items() if all(getattr(task, name) is value for task in tasks)}
-
-
-def _plugin(common: Mapping[str, Any]) -> Any:
-    """Return what gives every worker, also one that is started later, what tasks have in common."""
-    from distributed import WorkerPlugin
-
-    plugin = WorkerPlugin()
-    plugin.common = common
-    return plugin
-
-
-def _completed(function: Callable[[Any], Any], plugin: str, tasks: Sequence[Any]) -> None:
-    """Run the tasks of a bundle, on a worker, with what they have in common with the others.
-
-    Raises:
-        FailedTasksError: some failed.
-    """
-    from distributed import get_worker
-
-    common = get_worker().plugins[plugin].common
-    outcomes = [_guarded(function, replace(task, **common) if common else task) for task in tasks]
-    if any(outcomes):
-        raise FailedTasksError(*outcomes)
 
 
 @contextmanager
@@ -369,8 +296,7 @@ def _cluster(workers: int, place: Path) -> Iterator[Any]:
 
     settings = {
         "temporary-directory": str(place),
-        "distributed.scheduler.allowed-failures": 10,
-        "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further bundle
+        "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further task
         "distributed.worker.daemon": True,
         "distributed.worker.profile.enabled": False,
         "distributed.admin.tick.interval": "500ms",

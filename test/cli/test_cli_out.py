@@ -67,16 +67,6 @@ def files(folder):
     return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def again(kind, bag):
-    """The command that writes another result of that kind."""
-    quick = ("--set", "evaluation.resamples=10")
-    return {
-        "generated": (*GENERATE, "--seed", 1),
-        "evaluated": ("evaluate", bag, *quick),
-        "regenerated": ("regenerate", bag, 1),
-    }[kind]
-
-
 def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
     """The two that once were lost: a recording, for a scenario of its own, and notes beside a page called report.html."""
     bag = tmp_path / "generated_bag"

@@ -19,19 +19,6 @@ def refuse(name):
 
 
 @dataclass(frozen=True)
-class Shared:
-    """A task with something that all tasks have in common."""
-
-    name: str
-    config: object
-
-
-def need_config(task):
-    if task.config is None:
-        raise InputError(f"{task.name} lacks its configuration")
-
-
-@dataclass(frozen=True)
 class Counted:
     """A task with a file of its name."""
 

@@ -1,37 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tasks: each is run once, in bundles of which the scheduler holds few; only the task that ends its workers fails."""
+"""Tasks: each is run once; only the task that ends its workers fails."""
 
-from contextlib import ExitStack
-import pickle
-
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
-from refusing import Counted, end_worker, need_config, refuse, Shared, write_once
+from refusing import Counted, end_worker, refuse, write_once
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.tasks import BUNDLE, bundle_sizes, Spread, spread, WAVE, Workers
+from scenario_gen.corpus.tasks import spread, Workers
 
 ALONE = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
 
 
-@given(st.integers(0, 5000), st.integers(1, 300))
-def test_sizes_of_bundles(tasks, workers):
-    sizes = bundle_sizes(tasks, workers)
-    assert sum(sizes) == tasks and all(1 <= size <= BUNDLE for size in sizes)
-    assert sizes == sorted(sizes, reverse=True) and set(sizes[-workers:]) <= {1}
-    assert all(workers * size <= max(tasks - sum(sizes[:k]), workers) for k, size in enumerate(sizes))
-
-
-def test_few_tasks_are_single_and_many_are_not():
-    assert bundle_sizes(10, 8) == [1] * 10
-    assert len(bundle_sizes(100_000, 1000)) < 21_000 and bundle_sizes(0, 3) == []
-
-
-def test_every_task_of_a_bundle_is_run_once(tmp_path):
+def test_every_task_is_run_once(tmp_path):
     told = []
     with spread(Workers(2, "", lambda *how: told.append(how))) as go:
         tasks = [Counted(str(k), tmp_path) for k in range(60)]
@@ -42,7 +23,7 @@ def test_every_task_of_a_bundle_is_run_once(tmp_path):
 
 
 def test_only_the_task_that_ends_its_workers_fails(tmp_path):
-    """Neither the others of its bundle, nor those that wait at the same worker."""
+    """Not those that wait at the same worker."""
     from dask import config
     from distributed import LocalCluster
 
@@ -88,27 +69,3 @@ def test_a_cluster_that_runs_is_used():
 
     with LocalCluster(**ALONE) as cluster, spread(Workers(1, cluster.scheduler_address)) as go:
         assert go(refuse, ["a", "b"]) == ["b: b is none"]
-
-
-def test_tasks_are_submitted_in_waves_without_what_they_share():
-    """The scheduler holds a few tasks for each worker, and the configuration goes to each worker once."""
-    from distributed import Client, LocalCluster
-
-    with (
-        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster,
-        Client(cluster) as client,
-    ):
-        sizes, held = [], []
-        submit = client.map
-
-        def watched(run, tasks, **options):
-            sizes.extend(len(pickle.dumps((run, task))) for bundle in tasks for task in bundle)
-            held.append(len(client.futures) + len(tasks))
-            return submit(run, tasks, **options)
-
-        client.map = watched
-        go = Spread(Workers(1, cluster.scheduler_address), ExitStack())
-        go._client = client
-        config = CorpusConfig()
-        assert go(need_config, [Shared(str(k), config) for k in range(40)]) == []
-        assert len(sizes) == 40 and max(sizes) <= 500 and max(held) <= 2 * WAVE

@@ -104,6 +104,8 @@ def _emptied(own: Path) -> bool:
 
 def scratch(parent: Path) -> AbstractContextManager[Path]:
     """Give an empty folder in `parent`, which only this user may enter, and remove it at the end, as `claimed` does."""
+    if parent == Path(tempfile.gettempdir()):  # where workers are killed while their command goes on
+        sweep(parent)
     own = parent / f"{PREFIX}{token_hex(8)}"
     return claimed(own, own)
 
