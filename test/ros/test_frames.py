@@ -43,11 +43,15 @@ def test_bytes_are_those_of_rosbags_and_are_read_back():
 
 @pytest.mark.dds
 def test_without_tf2_msgs_the_rest_is_played_and_that_is_said(domain, client, bag):
+    from std_srvs.srv import Trigger
+
     client.hear("scenarios")
-    nodes = {"player": ("-p", f"bag:={bag}", "-p", "rate:=100.0"), "preview": (), "traffic": ()}
+    nodes = {"player": ("-p", f"bag:={bag}", "-p", "rate:=100.0", "-p", "paused:=true"), "preview": (), "traffic": ()}
     started = {
         node: start_nodes(node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain), WITHOUT_TF2="1") for node, words in nodes.items()
     }
+    client.until(lambda: client.node.count_publishers("scenarios") == 1, "a publisher of scenarios")
+    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
     client.wait("scenarios", 5)
     for node, process in started.items():
         client.until(lambda node=node: (node, "/") in client.node.get_node_names_and_namespaces() or node == "player", node)
