@@ -189,9 +189,7 @@ def _to_openscenario(folder: Path, case: Case, exported: Exported, export: Expor
 
 def _to_osi(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
     road, name = _road_file(case, export), f"case_{case.number}_{exported.index}.mcap"
-    data, notes = write_osi(case, exported, folder / road)
-    (folder / name).write_bytes(data)
-    return Written((name, road), notes)
+    return Written((name, road), write_osi(folder / name, case, exported, folder / road))
 
 
 def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Written:
