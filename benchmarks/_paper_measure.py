@@ -12,7 +12,6 @@ from benchmarks._paper_chain import LENGTH, NOISE, place, rotation, sample, Samp
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.evaluation import (
     Bootstrap,
-    linear_changepoints,
     mean_correlation,
     mean_error,
     pair_similarities,

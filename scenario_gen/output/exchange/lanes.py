@@ -246,9 +246,3 @@ def _places(lane_map: LaneMap) -> Iterator[Place]:
         for side in ("right", "left"):
             for place in range(len(getattr(strip, side))):
                 yield k, side, place
-
-
-def stations(reference: Floats) -> Floats:
-    """Return (M,) the length [m] along a polyline (M, 2+) to each of its points."""
-    steps = np.diff(reference[:, :2], axis=0)
-    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
