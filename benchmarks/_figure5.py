@@ -10,6 +10,7 @@ from pathlib import Path
 import re
 from time import process_time
 
+from benchmarks._linear_pieces import linear_changepoints
 from benchmarks._size import sized
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Changepoints that know everything: the best piecewise-linear approximation of the speeds, which constant acceleration within a
-primitive (paper IV-B) asks for.
+"""Changepoints that know everything: the best piecewise-linear approximation of the speeds.
+
+Constant acceleration within a primitive (paper IV-B) asks for it.
 """
 
 import numpy as np

@@ -142,6 +142,6 @@ def _picture_of_grid(road: Road) -> str:
         sheet.shape("polygon", np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), fill="#d4d9e2")
     for kind, poses in (("in", road.entries), ("out", road.exits)):
         for x, y, yaw in poses:
-            line = np.array([(x, y), (x, y) + unit(float(yaw))])
-            _arrow(sheet, line, 0, kind)
+            start = np.array((x, y))
+            _arrow(sheet, np.stack([start, start + unit(float(yaw))]), 0, kind)
     return sheet.svg(road.name)

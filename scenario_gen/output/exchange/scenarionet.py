@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import Lane
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
-from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.types import height, join_ego, Scenario, Vehicle
 
 VERSION = "MetaDrive v0.4.3"  # the description's, not the simulator's
