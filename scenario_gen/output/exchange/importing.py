@@ -21,6 +21,7 @@ from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.markup import Element, read_xml
 from scenario_gen.logs import is_commonroad, is_known, is_osi, LogConfig, read_raw
 from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics.plane import place
 from scenario_gen.output.exchange.openscenario import SPEEDS
 from scenario_gen.output.exchange.xml import number
 from scenario_gen.types import Vehicle
@@ -162,10 +163,7 @@ def _followed(follow: Element, name: str, box: Element, speed: float | None, spe
     result = np.array(rows)
     result[:, 4] = np.unwrap(result[:, 4])
     center, size = box.one("Center"), box.one("Dimensions")
-    x, y = center.number("x"), center.number("y")
-    cos, sin = np.cos(result[:, 4]), np.sin(result[:, 4])
-    result[:, 1] += x * cos - y * sin
-    result[:, 2] += x * sin + y * cos
+    result[:, 1:3] = place(result[:, [1, 2, 4]], center.number("x"), center.number("y"))
     if speeds is not None and len(speeds) == len(result):
         result[:, 3] = speeds
     return _track(follow.place, name, (size.number("length"), size.number("width")), result, speed)
