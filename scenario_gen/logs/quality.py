@@ -10,7 +10,7 @@ import math
 import numpy as np
 import shapely
 
-from scenario_gen.numerics.plane import corners
+from scenario_gen.numerics.boxes import corners
 from scenario_gen.types import Encounter, together
 
 
@@ -149,10 +149,9 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
 
 def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
     """Return the pairs whose footprints overlap at some sample, with the share of their common samples and the largest area."""
-    poses = np.dstack((encounter.position, encounter.heading))
-    polygons = [
-        shapely.polygons(corners(own, body.length, body.width)) for own, body in zip(poses, encounter.vehicles, strict=True)
-    ]
+    poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
+    footprints = [corners(poses[n], vehicle.length, vehicle.width) for n, vehicle in enumerate(encounter.vehicles)]
+    polygons = [shapely.polygons(each) for each in footprints]
     overlaps = []
     for a, b in combinations(range(len(polygons)), 2):
         area = shapely.area(shapely.intersection(polygons[a], polygons[b]))

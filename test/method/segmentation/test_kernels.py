@@ -8,18 +8,16 @@ from itertools import permutations
 import numba
 import numpy as np
 import pytest
-from scipy.special import gammainccinv, gammaln
+from scipy.special import gammaln
 from scipy.stats import kstest, multivariate_normal, norm
 
-from scenario_gen.method.segmentation.hdp_hmm import chain, emission, observed, random
+from scenario_gen.method.segmentation.hdp_hmm import emission, observed, random
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.emission import BLOCK
 from scenario_gen.method.segmentation.hdp_hmm.model import States
-from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean, new_top, Place, Prior, Problem, unexplained
+from scenario_gen.method.segmentation.hdp_hmm.problem import new_top, Place, Prior, Problem
 from scenario_gen.method.segmentation.hdp_hmm.random import TAIL
-from scenario_gen.method.segmentation.hdp_hmm.start import kmeans
 from scenario_gen.method.segmentation.posterior import matched_labels
-from scenario_gen.method.segmentation.trends import chi2_above
 from scenario_gen.numerics.kernels import OPTIONS
 
 
@@ -29,8 +27,7 @@ def from_python(helper):
 
 
 block_log_likelihood, block_likelihood = from_python(emission.block_log_likelihood), from_python(emission.block_likelihood)
-accumulate, log_gammas = from_python(emission.accumulate), from_python(emission.log_gammas)
-observed_log_likelihood, update_outer = from_python(observed.observed_log_likelihood), from_python(chain.update_outer)
+log_gammas, observed_log_likelihood = from_python(emission.log_gammas), from_python(observed.observed_log_likelihood)
 normal, beyond = from_python(random.normal), from_python(random.beyond)
 
 
@@ -77,59 +74,6 @@ def test_likelihood_of_the_observed_channels_is_the_marginal():
         2.0 * np.pi
     )
     assert out[0] == pytest.approx(truth)
-
-
-def test_statistics_follow_the_labels():
-    rng = np.random.default_rng(2)
-    v, before, mass = rng.normal(size=(60, 3)), rng.integers(0, 4, 60), rng.uniform(0.5, 2.0, 60)
-    mass[7] = 0.0
-    outer, sums = np.zeros((5, 3, 3)), np.zeros((5, 2))
-    accumulate(v, before, mass, outer, sums)
-    labels = rng.integers(1, 5, 60)
-    update_outer(v, before, labels, mass, outer, sums)
-    np.testing.assert_allclose(sums[:, 1], np.bincount(labels, mass, minlength=5), atol=1e-12)
-    np.testing.assert_array_equal(sums[:, 0], np.bincount(labels[mass > 0.0], minlength=5))
-    for k in range(5):
-        own = v[labels == k]
-        np.testing.assert_allclose(np.tril(outer[k]), np.tril((own.T * mass[labels == k]) @ own), atol=1e-12)
-
-
-def test_residuals_of_regressions():
-    rng = np.random.default_rng(3)
-    z, y, labels = np.column_stack([np.ones(80), rng.normal(size=(80, 2))]), rng.normal(size=(80, 2)), rng.integers(0, 3, 80)
-    precision, residual, scatter, squares = np.eye(3) * 0.3, np.empty((80, 2)), np.empty((2, 2)), np.empty(80)
-    g0 = np.block([[precision, np.zeros((3, 2))], [np.zeros((2, 3)), np.eye(2)]])
-    unexplained(np.hstack([z, y]), np.ones(80), labels, g0, 3, residual, scatter, squares)
-    for k in range(3):
-        own = labels == k
-        fit = np.linalg.solve(z[own].T @ z[own] + precision, z[own].T @ y[own])
-        np.testing.assert_allclose(residual[own], y[own] - z[own] @ fit, atol=1e-12)
-    np.testing.assert_allclose(scatter, residual.T @ residual, atol=1e-12)
-
-
-def test_kmeans_finds_what_is_far_apart():
-    rng = np.random.default_rng(4)
-    truth = np.repeat([0, 1, 2], 40)
-    x = rng.normal(size=(120, 2)) + np.array([[0.0, 0.0], [30.0, 0.0], [0.0, 30.0]])[truth]
-    centres, labels = np.empty((2, 3)), np.empty(120, np.int64)
-    kmeans(x, 7, 10, centres, labels)
-    assert len({(a, b) for a, b in zip(truth, labels, strict=True)}) == 3
-    np.testing.assert_allclose(centres[:, labels[0]], x[:40].mean(axis=0))
-    kmeans(np.ones((6, 1)), 7, 10, np.empty((1, 3)), np.empty(6, np.int64))
-
-
-@pytest.mark.parametrize("width", [1, 4, 5])
-def test_moving_mean(width):
-    x = np.arange(12.0) ** 2
-    padded = np.concatenate([np.full(width, x[0]), x, np.full(width, x[-1])])
-    truth = [padded[t + width - width // 2 : t + 2 * width - width // 2].mean() for t in range(12)]
-    np.testing.assert_allclose(moving_mean(x, width), truth)
-    np.testing.assert_allclose(moving_mean(np.column_stack([x, -x]), width)[:, 1], -np.array(truth))
-
-
-@pytest.mark.parametrize(("degrees", "chance"), [(2, 1e-6), (4, 1e-4), (16, 0.3), (48, 1e-9)])
-def test_chi_squared_quantile(degrees, chance):
-    assert chi2_above(degrees, chance) == pytest.approx(2.0 * gammainccinv(degrees / 2.0, chance), rel=1e-9)
 
 
 def test_a_chain_goes_on_from_the_labels_it_ended_with():
