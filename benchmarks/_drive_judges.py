@@ -23,7 +23,8 @@ from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.road_lanes import lane_map_of
+from scenario_gen.output.exchange.derived_lanes import lane_map_of
+from scenario_gen.roads import RoadConfig
 from scenario_gen.types.ego import split_off
 
 STEP = 0.1  # s, of both
@@ -137,7 +138,7 @@ def _write_problem(path: Path, trial: Trial) -> None:
     ids = [vehicle.id for vehicle in scenario.vehicles]
     others, ego = split_off(scenario, trial.ego if isinstance(trial.ego, int) else ids.index(trial.ego))
     one = Exported(scenario.index, scenario.seed, "0" * 64, replace(others, witness=None), ego, driven=True)
-    lanes = lane_map_of(trial.road, "", None, {}, [scenario], export.run_out)
+    lanes = lane_map_of(trial.road, [scenario], RoadConfig.lane_width, export.run_out)
     path.write_bytes(write_commonroad(Case(1, "", "road", 0, (one,), lanes), one, export)[0])
     (vehicle,) = ego.vehicles
     path.with_suffix(".size.json").write_text(json.dumps([vehicle.length, vehicle.width]))

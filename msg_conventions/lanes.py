@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""LaneNetwork ⇄ `road/lanes` (visualization_msgs/Marker): the lanes of a vector map beside its grid.
+"""LaneNetwork ⇄ `road/lanes` (visualization_msgs/Marker): the lanes of a road beside its grid.
 
 One LINE_LIST draws all borders, the left one of a lane before its right one, lane after lane, each as pairs of neighbouring
 points. `text` is a JSON object: `name`, `notes`, and of every lane its `id`, the number of `points` of a border, `successors` and
 `beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Where the map has traffic rules there are also
 `rules`, of each its `id`, `kind`, `lanes`, `over` (places in the list of lanes) and `line` (points of the stop line), and
-`rules_kept`. Action 2 (delete) means that the road has no
+`rules_kept`. Lanes that were drawn with a built-in road have `drawn` true. Action 2 (delete) means that the road has no
 lanes. Stamp and frame: the map's. QoS: reliable, transient_local, depth 1.
 """
 
@@ -58,6 +58,8 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
             for rule in network.rules
         ]
         document["rules_kept"] = network.rules_kept
+    if network.drawn:
+        document["drawn"] = True
     return document
 
 
@@ -95,7 +97,8 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
         lanes = tuple(_lanes(document["lanes"], points, what))
         notes = tuple(str(note) for note in document["notes"])
         rules = tuple(map(_rule, document.get("rules", ())))
-        return frame_id, LaneNetwork(str(document["name"]), lanes, notes, rules, document.get("rules_kept", True) is not False)
+        kept, drawn = document.get("rules_kept", True) is not False, document.get("drawn", False) is True
+        return frame_id, LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}") from None
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
-from scenario_gen.roads.ways import relative
+from scenario_gen.roads.ways import relative, reverse
 from scenario_gen.types import Road
 
 _PARALLEL = np.radians(3.0)
@@ -33,11 +33,6 @@ class Arm:
     pose: Floats
     inward: Floats
     outward: Floats
-
-
-def reverse(pose: Floats) -> Floats:
-    """The same place (3,) [m, m, rad], heading the other way."""
-    return np.asarray(pose + np.array([0.0, 0.0, np.pi]))
 
 
 def arms_of(road: Road) -> tuple[Arm, ...]:

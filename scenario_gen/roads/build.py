@@ -87,7 +87,7 @@ def road_and_template(
 
 def _on_other_side(encounter: Encounter, road: Road) -> bool:
     """Whether a road's traffic keeps to the other side than the template's."""
-    return road.lanes is not None and _differs(encounter, road.lanes)
+    return road.map_lanes is not None and _differs(encounter, road.map_lanes)
 
 
 def _differs(encounter: Encounter, network: LaneNetwork) -> bool:

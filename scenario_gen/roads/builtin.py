@@ -10,9 +10,11 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import corners
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
-from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, LANE_GAP, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
+from scenario_gen.roads.drawn import Plan, PlannedArm, road_of
+from scenario_gen.roads.sketch import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, Sketch, SLACK
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
 from scenario_gen.types import Encounter, Road
 
@@ -66,9 +68,9 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
         yaw = _OUTWARD[arm]
         reach = layout.side if arm in side_arms else layout.main
         arms.append(PlannedArm(np.array([*(unit(yaw) * reach), yaw]), layout.lanes, layout.lanes))
-    entries, exits = lane_ends(arms, config)
-    shift = np.array([*low, 0.0])
-    return Road(name, drivable, config.resolution, np.zeros(2), entries - shift, exits - shift)
+    west, east = (arm.pose[:2] for arm in arms[:2])
+    axis = Curve(np.array([[*west, 0.0], [*east, 0.0]]))
+    return road_of(Plan(arms, axis), name, low, drivable, config)
 
 
 def _corner(u: Floats, v: Floats, radius: float) -> Bools:
@@ -86,7 +88,7 @@ def draw_paper(name: str, config: RoadConfig) -> Road:
     if name not in ("straight", "t_intersection"):
         raise InputError(f"road {name} has no paper version; choose straight or t_intersection")
     cells = replace(config, lane_width=_PAPER_LANE, corner_radius=50.0, resolution=1.0)
-    return draw(name, Layout(main=500.0, side=500.0, lanes=1), cells)
+    return replace(draw(name, Layout(main=500.0, side=500.0, lanes=1), cells), lanes=None)  # its lengths are cells
 
 
 def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Layout:

@@ -19,8 +19,9 @@ from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.arms import RING_ROOM
 from scenario_gen.roads.builtin import junction_centre
 from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.drawn import lane_ends, Plan, PlannedArm, Way
 from scenario_gen.roads.shaped import fitting_width
-from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, LANE_GAP, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
+from scenario_gen.roads.sketch import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, Sketch, SLACK
 from scenario_gen.roads.ways import draw_ring_route, draw_route
 from scenario_gen.template import clean_tracks, sharpness_of, Track, turn_of
 from scenario_gen.types import Encounter, Road
@@ -93,7 +94,7 @@ def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> R
     directions = _directions(name, tracks)
     longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
     turn = np.pi - longest.yaw  # the longest arm leads west
-    pose_of: dict[tuple[int, bool], Floats] = {}
+    lane_of: dict[tuple[int, bool], tuple[int, int]] = {}  # arm and lane of each end
     arms: list[PlannedArm] = []
     for direction in directions:
         offset, lanes = _lanes(direction, config)
@@ -104,15 +105,18 @@ def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> R
             raise RefusedError(f"road {name} would need {max(most)} lanes in one direction; {_MOST_LANES} are drawn at most")
         pose = np.array([*(reach * unit(yaw) + offset * unit(yaw + np.pi / 2.0)), yaw])
         arms.append(PlannedArm(pose, *(max(count, config.lanes) for count in most)))
-        pose_of.update({key: arms[-1].lane(lane, config, inward=key[1]) for key, lane in lanes.items()})
-    sketch = Sketch()
+        lane_of.update({key: (len(arms) - 1, lane) for key, lane in lanes.items()})
+    sketch, ways = Sketch(), dict[Way, Curve]()
     _draw_arms(sketch, arms, config)
     for i, track in enumerate(tracks):
-        if (i, True) in pose_of and (i, False) in pose_of and not track.still:
-            way = draw_route(pose_of[i, True], pose_of[i, False], lambda _: True, sharpness_of(track))
+        if (i, True) in lane_of and (i, False) in lane_of and not track.still:
+            (a, first), (b, last) = lane_of[i, True], lane_of[i, False]
+            ends = arms[a].lane(first, config, inward=True), arms[b].lane(last, config, inward=False)
+            way = draw_route(*ends, lambda _: True, sharpness_of(track))
             if way is not None:
                 _sweep(sketch, way, track.vehicle.length, track.vehicle.width)
-    return sketch.road(name, *lane_ends(arms, config), config)
+                ways.setdefault((a, first, b, last), way)
+    return sketch.road(name, Plan(arms, ways=ways), config)
 
 
 def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -158,7 +162,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
             way = draw_ring_route(entry, leave, np.zeros(2), radius, lambda _: True)
             if way is not None:
                 _sweep(sketch, way, length, wide)
-    return sketch.road(name, entries, exits, config)
+    return sketch.road(name, Plan(arms, ring=radius), config)
 
 
 def _sweep(sketch: Sketch, way: Curve, length: float, width: float) -> None:

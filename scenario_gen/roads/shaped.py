@@ -14,9 +14,10 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
+from scenario_gen.roads.drawn import Plan, PlannedArm
+from scenario_gen.roads.sketch import ARM_COUNT, ROOM, SHORTEST, Sketch, SLACK
 from scenario_gen.roads.ways import draw_route, extended
-from scenario_gen.template import clean_tracks, FrenetTracks, main_line, MainLine, sharpness_of, to_frenet, Track
+from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, sharpness_of, to_frenet, Track
 from scenario_gen.types import Encounter, Road
 
 _RAMP_ANGLE = np.radians(12.0)
@@ -63,7 +64,7 @@ def draw_along(name: str, main: MainLine, lanes: int, config: RoadConfig) -> Roa
             corner = at[:2] + half * out + way * width * unit(at[2])
             along = float(at[2] + (0.0 if way > 0.0 else np.pi))
             sketch.corner(corner, *((along, yaw) if way * side > 0.0 else (yaw, along)), config.corner_radius)
-    return sketch.road(name, *lane_ends(arms, config), config)
+    return sketch.road(name, Plan(arms, line), config)
 
 
 def main_axis(name: str, main: MainLine, config: RoadConfig) -> Curve:
@@ -72,15 +73,6 @@ def main_axis(name: str, main: MainLine, config: RoadConfig) -> Curve:
     own = float(main.shape.points[-1, 2] - main.shape.points[0, 2])
     extra = float(np.copysign(_BEND, own)) - own if name == "curve" and abs(own) < _BEND else 0.0
     return extended(main.shape, extra, run)
-
-
-def bent_axis(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Curve | None:
-    """The dividing line of the road `name` for a template along which it bends; None if it is drawn otherwise."""
-    try:
-        main = main_line(to_frenet(tracks), tracks)
-    except RefusedError:  # a junction's template
-        return None
-    return main_axis(name, main, config) if bends(name, main) else None
 
 
 def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -111,13 +103,14 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
     yaw = np.pi - side * _RAMP_ANGLE  # out along the ramp
     ramp = np.array([*(joined + reach[0] * unit(yaw)), yaw + np.pi])
     sketch = Sketch()
-    sketch.strip(Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]])), -lanes * width, lanes * width)
+    axis = Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]]))
+    sketch.strip(axis, -lanes * width, lanes * width)
     sketch.strip(Curve(np.array([ramp, [*joined, ramp[2]]])), -width / 2.0, width / 2.0)
     way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), lambda _: True, sharpness)
     if way is not None:
         sketch.sweep(way, 1.0, width)
-    entries, exits = lane_ends(arms, config)
-    return sketch.road(name, np.vstack((entries, ramp)), exits, config)
+    ways = {} if way is None else {(2, 0, 1, lanes - 1): way}
+    return sketch.road(name, Plan([*arms, PlannedArm.ramp(ramp, config)], axis, ways), config)
 
 
 def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:

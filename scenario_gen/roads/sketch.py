@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A drawing of a road: its arms, and strips, corners and swept footprints as polygons in metres; and the grid that they make."""
+"""A drawing of a road: strips, corners and swept footprints as polygons in metres; and the grid that they make."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,8 +12,9 @@ from scipy import ndimage
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import unit, unit_left
+from scenario_gen.numerics.plane import unit
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
+from scenario_gen.roads.drawn import Plan, road_of
 from scenario_gen.types import Road
 
 ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4, "roundabout": 4}
@@ -26,27 +26,6 @@ _BORDER = 2.0  # metres of wall around the grid
 _SLIVER = 60.0  # m²: smaller holes are filled
 _STEP = 0.5  # metres between two cross sections of a strip
 _FLAT = np.radians(165.0)  # kerbs that meet at more make no corner
-
-
-@dataclass(frozen=True, eq=False)
-class PlannedArm:
-    """The end (3,) of an arm's dividing line, heading out, and its numbers of lanes in and out."""
-
-    pose: Floats
-    inward: int
-    outward: int
-
-    def lane(self, k: int, config: RoadConfig, *, inward: bool) -> Floats:
-        """The pose (3,) [m, m, rad] of lane k, counted from the dividing line, heading as its traffic does."""
-        left = (k + 0.5) * config.lane_width * (1.0 if inward == (config.traffic_side == "right") else -1.0)
-        yaw = self.pose[2]
-        return np.array([*(self.pose[:2] + left * unit_left(yaw)), yaw + np.pi if inward else yaw])
-
-
-def lane_ends(arms: Sequence[PlannedArm], config: RoadConfig) -> tuple[Floats, Floats]:
-    """The entries (E, 3) and exits (X, 3) [m, m, rad] of some arms."""
-    entries = [arm.lane(k, config, inward=True) for arm in arms for k in range(arm.inward)]
-    return np.array(entries), np.array([arm.lane(k, config, inward=False) for arm in arms for k in range(arm.outward)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +76,8 @@ class Sketch:
                 brush.polygon([(x, y) for x, y in cells.tolist()], fill=fill)
         return low, np.array(image, dtype=np.bool_)
 
-    def road(self, name: str, entries: Floats, exits: Floats, config: RoadConfig) -> Road:
-        """The road, its lower-left corner at (0, 0); small holes between polygons are filled unless islands were drawn.
+    def road(self, name: str, plan: Plan, config: RoadConfig) -> Road:
+        """The road with its lanes, its lower-left corner at (0, 0); small holes are filled unless islands were drawn.
 
         Raises:
             RefusedError: it has more cells than are allowed.
@@ -107,8 +86,7 @@ class Sketch:
         if not self.islands:
             part, _ = ndimage.label(~drivable)
             drivable |= np.bincount(part.ravel())[part] <= _SLIVER / np.square(config.resolution)
-        shift = np.array([*low, 0.0])
-        return Road(name, drivable, config.resolution, np.zeros(2), entries - shift, exits - shift)
+        return road_of(plan, name, low, drivable, config)
 
 
 def _arc(centre: Floats, first: Floats, last: Floats, radius: float) -> Floats:

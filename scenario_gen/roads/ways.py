@@ -130,6 +130,11 @@ def relative(pose: Floats, xy: Floats) -> tuple[float, float]:
     return float(ahead), float(left)
 
 
+def reverse(pose: Floats) -> Floats:
+    """The same place (3,) [m, m, rad], heading the other way."""
+    return np.asarray(pose + np.array([0.0, 0.0, np.pi]))
+
+
 def line_between(shape: Curve, entry: Floats, leave: Floats) -> tuple[Curve, float] | None:
     """The line from one pose (3,) to another that goes straight on, takes the bends of `shape`, and goes straight on again.
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The lanes of a vector map: their borders, what follows what, where one may change, how fast."""
+"""The lanes of a road: their borders, what follows what, where one may change, how fast."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -106,7 +106,7 @@ class TrafficRule:
 
 @dataclass(frozen=True, eq=False)
 class LaneNetwork:
-    """The lanes of a map that cars may use, or of a part of it; in metres in the map's own frame.
+    """The lanes of a road that cars may use, those of a map or of a part of it; in metres in the road's own frame.
 
     Attributes:
         name: of the map, for people.
@@ -114,6 +114,7 @@ class LaneNetwork:
         notes: how it was read: projection, what was left out, which part it is.
         rules: its signs, lights and rights of way.
         rules_kept: whether scenarios keep to the rules.
+        drawn: whether it was drawn with its road: it is shown and exported, and nobody is held to it.
     """
 
     name: str
@@ -121,6 +122,7 @@ class LaneNetwork:
     notes: tuple[str, ...] = field(default=())
     rules: tuple[TrafficRule, ...] = ()
     rules_kept: bool = True
+    drawn: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.lanes)

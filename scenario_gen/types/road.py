@@ -28,7 +28,7 @@ class Road:
         entries: (E, 3) x, y, yaw: centre of each lane by which traffic comes in, heading into the road.
         exits: (X, 3) x, y, yaw: centre of each lane by which traffic leaves, heading out of the road.
         frame_id: the frame of all poses.
-        lanes: the lanes of a vector map that the grid was drawn from, in the same frame; None: nothing is known of lanes.
+        lanes: those of a vector map that the grid was drawn from, or those drawn with it; None: nothing is known of lanes.
         obstructed: (H, W) bool; cells that would be drivable, but for something that stands there. None: nothing does.
     """
 
@@ -60,6 +60,11 @@ class Road:
             raise InputError(
                 f"road {self.name!r} has origin {self.origin}; at most {FARTHEST:g} m from the frame's origin are read"
             )
+
+    @property
+    def map_lanes(self) -> LaneNetwork | None:
+        """The lanes of a vector map: templates are placed on them, and who drives is held to them."""
+        return None if self.lanes is None or self.lanes.drawn else self.lanes
 
     def __repr__(self) -> str:
         height, width = (self.resolution * cells for cells in self.drivable.shape)

@@ -94,7 +94,7 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         "junction": place_at_junction,
         "search": place_by_search,
     }
-    if road.lanes is not None and config.placement != "search":
+    if road.map_lanes is not None and config.placement != "search":
         return place_on_lanes(tracks, road, config)
     if config.placement != "auto":
         return ways[config.placement](tracks, road, config)

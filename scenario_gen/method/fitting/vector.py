@@ -26,7 +26,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     Raises:
         RefusedError: there is none; says why not.
     """
-    network = road.lanes
+    network = road.map_lanes
     if network is None:
         raise RefusedError(f"road {road.name} has no lanes")
     reason, fallback = "", None

@@ -71,7 +71,7 @@ class Checker:
         self._dynamics_limits = np.array([getattr(self._limits, name) for name in dynamics.LIMITS])
         if self.road is not None:
             self._ground = inside.Ground.of(self.road)
-        lanes = self.road.lanes if self.road is not None else None
+        lanes = self.road.map_lanes if self.road is not None else None
         self._rules = RuleCheck(lanes) if lanes is not None and lanes.rules else None
 
     @classmethod
@@ -114,7 +114,7 @@ class Checker:
             "stop_not_kept: no template's waits are known": self.waits,
         }
         sentences = tuple(sentence for sentence, given in missing.items() if given is None)
-        lanes = self.road.lanes if self.road is not None else None
+        lanes = self.road.map_lanes if self.road is not None else None
         if lanes is not None and lanes.rules and not lanes.rules_kept:
             sentences += ("traffic_rule: the request ignores the map's rules",)
         return sentences
@@ -305,7 +305,7 @@ class Checker:
 
     def _wrong_ways(self, scenario: Scenario) -> Iterator[Violation]:
         """Vehicles that drive against all lanes where they are, at the samples."""
-        if self.road is None or self.road.lanes is None:
+        if self.road is None or self.road.map_lanes is None:
             return
         against = drives_against(self.road, scenario.position, scenario.heading) & scenario.there
         for i in np.flatnonzero(against.any(axis=1)).tolist():

@@ -4,17 +4,19 @@
 """What of a bag is exported: every scenario with its road's lanes and its ego, case by case."""
 
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.provenance import read_parameters
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.lanes import Lane, LaneMap, lanes_of
-from scenario_gen.output.exchange.road_lanes import lane_map_of
+from scenario_gen.output.exchange.derived_lanes import derived_lanes, lane_map_of
+from scenario_gen.output.exchange.lanes import LaneMap
+from scenario_gen.roads import RoadConfig
 from scenario_gen.types import Road, Scenario, split_off, tokens
 
 TOPICS = ("tracks", "map", "road/lanes", "fit/info", SCENARIOS, INFO)
@@ -70,6 +72,7 @@ class Case:
         start_ns: the template's stamp.
         scenarios: those asked for.
         lane_map: of the road; the same whichever scenarios are asked for.
+        other_lanes: derived ones, where those are of a vector map.
     """
 
     number: int
@@ -78,11 +81,12 @@ class Case:
     start_ns: int
     scenarios: tuple[Exported, ...]
     lane_map: LaneMap
+    other_lanes: LaneMap | None = None
 
-    @cached_property
-    def lanes(self) -> tuple[Lane, ...]:
-        """All lanes; of a vector map its own."""
-        return self.lane_map.network or lanes_of(self.lane_map)
+    @property
+    def strips(self) -> LaneMap:
+        """The lanes for a format of strips, which cannot hold those of every vector map: of that, derived ones."""
+        return self.lane_map if self.other_lanes is None else self.other_lanes
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +190,10 @@ def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, in
     road: Road | None = space.road_of(group.entry, group.stamp)
     if road is None and space.data("map"):
         road = space.road
-    tracks = space.tracks_of(group.entry, group.stamp)
+    width = RoadConfig.lane_width
     values = next((s.values for s in reversed(space.summaries) if group.entry and s.request == group.entry.request), {})
+    with suppress(InputError):  # a bag of others says nothing of our parameters
+        width = read_parameters(RoadConfig(), values, "road.", "export").lane_width
     everybody: Sequence[Scenario] = [s for exported in group.scenarios for s in (exported.others, exported.ego) if s is not None]
     name = group.entry.road if group.entry else ""
     return Case(
@@ -196,5 +202,6 @@ def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, in
         road_name=name or "road",
         start_ns=group.stamp,
         scenarios=tuple(exported for exported in group.scenarios if not indices or exported.index in indices),
-        lane_map=lane_map_of(road, name, tracks, values, everybody, export.run_out),
+        lane_map=lane_map_of(road, everybody, width, export.run_out),
+        other_lanes=derived_lanes(everybody, road, width, export.run_out) if road and road.map_lanes else None,
     )

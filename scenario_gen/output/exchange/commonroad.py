@@ -20,10 +20,10 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.lanes import Lane
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
 from scenario_gen.output.exchange.xml import add, comment, Element, number, serialized
-from scenario_gen.types import is_truck, LaneNetwork, RuleKind, Scenario
+from scenario_gen.types import is_truck, Lane, LaneNetwork, RuleKind, Scenario
 
 OBSTACLES, PROBLEM, INTERSECTION, SIGNS = 100_000, 200_000, 300_000, 400_000  # ids from here on; lanelets count from 1
 SIGN_IDS = {RuleKind.STOP: "206", RuleKind.GIVE_WAY: "205", RuleKind.PRIORITY: "301"}
@@ -69,27 +69,28 @@ def write_commonroad(case: Case, exported: Exported, export: ExportConfig = Expo
             "timeStepSize": f"{step:.9f}".rstrip("0"),
         },
     )
-    comment(root, f"lanelets: {case.lane_map.network_origin or case.lane_map.origin}")
+    comment(root, f"lanelets: {case.lane_map.origin}")
     location = add(root, "location")
     add(location, "geoNameId", "-999")  # the format's value for unknown, as 999 below
     add(location, "gpsLatitude", "999")
     add(location, "gpsLongitude", "999")
     tags = add(root, "scenarioTags")
     add(tags, "simulated")
-    if any(lane.turn for lane in case.lanes):
+    lane_map = case.lane_map
+    if any(map(lane_map.turn, range(len(lane_map.network.lanes)))):
         add(tags, "intersection")
-    signs = _signs(case.lane_map.vector)
-    for lane in case.lanes:
-        _lanelet(root, lane, [sign for sign in signs if lane.id - 1 in sign.lanes])
+    signs = _signs(lane_map.network)
+    for k in range(len(lane_map.network.lanes)):
+        _lanelet(root, lane_map, k, [sign for sign in signs if k in sign.lanes])
     for sign in signs:
         _sign(root, sign)
-    _intersection(root, case.lanes)
+    _intersection(root, lane_map)
     for n, vehicle in enumerate(scenario.vehicles):
         comment(root, f"vehicle {vehicle.id}")
         _obstacle(root, scenario, n)
     if exported.ego is None:
         comment(root, "a placeholder: nobody is left out of this scenario, and the format demands a planning problem")
-        _placeholder(root, case.lanes, len(scenario.time))
+        _placeholder(root, lane_map.network.lanes[0], len(scenario.time))
     else:
         comment(root, f"vehicle {exported.ego.vehicles[0].id}")
         _problem(root, exported.ego, step, export)
@@ -128,10 +129,8 @@ class _Sign:
         return "trafficSignRef" if self.number else "trafficLightRef"
 
 
-def _signs(network: LaneNetwork | None) -> list[_Sign]:
-    """Return the signs of a vector map, one for each of its speed limits, and its lights."""
-    if network is None:
-        return []
+def _signs(network: LaneNetwork) -> list[_Sign]:
+    """Return the signs of a road, one for each of its speed limits, and its lights."""
     limits: dict[float, set[int]] = {}
     for k, lane in enumerate(network.lanes):
         if lane.speed_limit > 0.0:
@@ -154,17 +153,17 @@ def _sign(root: Element, sign: _Sign) -> None:
     add(state, "color", "inactive")
 
 
-def _lanelet(root: Element, lane: Lane, signs: Sequence[_Sign] = ()) -> None:
-    lanelet = add(root, "lanelet", id=lane.id)
+def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -> None:
+    lane = lane_map.network.lanes[k]
+    lanelet = add(root, "lanelet", id=k + 1)
     _points(lanelet, "leftBound", lane.left)
     _points(lanelet, "rightBound", lane.right)
-    for other in lane.predecessors:
-        add(lanelet, "predecessor", ref=other)
-    for other in lane.successors:
-        add(lanelet, "successor", ref=other)
-    for tag, beside in (("adjacentLeft", lane.left_of), ("adjacentRight", lane.right_of)):
-        if beside is not None:
-            add(lanelet, tag, ref=beside[0], drivingDir="same" if beside[1] else "opposite")
+    for other in sorted(lane_map.network.predecessors[k]):
+        add(lanelet, "predecessor", ref=other + 1)
+    for other in sorted(lane.successors):
+        add(lanelet, "successor", ref=other + 1)
+    for side, (other, same) in sorted(lane_map.neighbours(k).items()):
+        add(lanelet, f"adjacent{side.title()}", ref=other + 1, drivingDir="same" if same else "opposite")
     at_line = [sign for sign in signs if len(sign.line)]
     if at_line:
         stop = add(lanelet, "stopLine")
@@ -173,31 +172,29 @@ def _lanelet(root: Element, lane: Lane, signs: Sequence[_Sign] = ()) -> None:
             add(point, "x", x)
             add(point, "y", y)
         add(stop, "lineMarking", "solid")
-    add(lanelet, "laneletType", "unknown" if lane.derived else "urban")
-    if lane.turn:
+    add(lanelet, "laneletType", "unknown" if lane_map.is_derived(k) else "urban")
+    if lane_map.turn(k):
         add(lanelet, "laneletType", "intersection")
     add(lanelet, "userOneWay", "vehicle")
     for sign in signs:
         add(lanelet, sign.tag, ref=sign.id)
 
 
-def _intersection(root: Element, lanes: Sequence[Lane]) -> None:
+def _intersection(root: Element, lane_map: LaneMap) -> None:
     """Say of every strip that leads into the junction where one can go from it."""
-    by_id = {lane.id: lane for lane in lanes}
-    incoming = [lane for lane in lanes if not lane.turn and any(by_id[other].turn for other in lane.successors)]
-    if not incoming:
+    lanes, turn = lane_map.network.lanes, lane_map.turn
+    arms = [[k for k in side if any(map(turn, lanes[k].successors))] for strip in lane_map.strips for side in strip]
+    arms = [incoming for incoming in arms if incoming]
+    if not arms:
         return
     intersection = add(root, "intersection", id=INTERSECTION)
-    for k, strip in enumerate(dict.fromkeys(lane.strip for lane in incoming)):
-        element = add(intersection, "incoming", id=INTERSECTION + 1 + k)
-        own = [lane for lane in incoming if lane.strip == strip]
-        for lane in own:
-            add(element, "incomingLanelet", ref=lane.id)
-        for turn in ("right", "straight", "left"):
-            for lane in own:
-                for other in lane.successors:
-                    if by_id[other].turn == turn:
-                        add(element, f"successors{turn.title()}", ref=other)
+    for n, incoming in enumerate(arms):
+        element = add(intersection, "incoming", id=INTERSECTION + 1 + n)
+        for k in incoming:
+            add(element, "incomingLanelet", ref=k + 1)
+        for way in ("right", "straight", "left"):
+            for other in (other for k in incoming for other in sorted(lanes[k].successors) if turn(other) == way):
+                add(element, f"successors{way.title()}", ref=other + 1)
 
 
 def _exact(parent: Element, tag: str, value: float) -> None:
@@ -267,9 +264,9 @@ def _goal(problem: Element, pose: tuple[float, float, float], size: tuple[float,
     _interval(goal, "orientation", yaw - GOAL_TURN, yaw + GOAL_TURN)
 
 
-def _placeholder(root: Element, lanes: Sequence[Lane], steps: int) -> None:
+def _placeholder(root: Element, lane: Lane, steps: int) -> None:
     """Append a problem that is solved by standing still, near the beginning of the first lane, on its run-out."""
-    middle = lanes[0].middle
+    middle = lane.centre
     at = min(int(np.searchsorted(Curve.through(middle).station, 5.0)), len(middle) - 2)
     yaw = float(np.arctan2(*(middle[at + 1] - middle[at])[::-1]))
     x, y = middle[at].tolist()

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lanes of a road that has none: along what the scenarios drive, as wide as a lane where the grid leaves room."""
+"""The lanes that are exported: those of the road, and derived ones along what is driven, as wide as the grid leaves room."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,8 +12,9 @@ from shapely import contains_xy, covers, make_valid, Polygon, polygons, prepare,
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.output.exchange.lanes import Lane, LaneMap, lanes_of, network_lanes, Strip
-from scenario_gen.types import LaneNetwork, Road, Scenario, together
+from scenario_gen.output.exchange.lanes import LaneMap, with_run_out
+from scenario_gen.roads import drivable_beside
+from scenario_gen.types import Lane, LaneNetwork, Road, Scenario, together
 
 STEP = 1.0  # metres between points of a lane
 APART = 0.5  # metres between points of a path that it is laid through
@@ -23,6 +24,30 @@ ACROSS = 0.6  # rad by which a vehicle in a lane may be turned in it
 CUT = 5.0  # metres of a path that may lie across all lanes, as where a corner is cut
 SAME_LANE, SAME_WAY = 1.0, 0.35  # metres and rad within which a path lies in another one's lane
 NEAR = 3  # points of a lane on both sides over which it keeps its widest
+
+
+def lane_map_of(road: Road | None, scenarios: Sequence[Scenario], lane_width: float, run_out: float) -> LaneMap:
+    """Return the lanes of a road, and derived ones for those who do not keep to them; derived ones alone where it has none.
+
+    A vehicle does not where a footprint leaves them in some scenario, or where no lane has its direction, as of one that turns
+    off the road across the others' lanes.
+
+    Args:
+        road: as the bag has it; None if it has none.
+        scenarios: all of the case.
+        lane_width: metres, of lanes that are derived.
+        run_out: metres by which lanes are continued straight on; those of a vector map are not.
+    """
+    if road is None or road.lanes is None:
+        return derived_lanes(scenarios, road, lane_width, run_out)
+    drawn = road.lanes.drawn
+    network = with_run_out(road.lanes, run_out) if drawn else road.lanes
+    missing = _not_kept(network, scenarios)
+    added = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
+    origin = f"the true lanes of {network.name}" if drawn else f"the lanes of map {network.name}"
+    if missing:
+        origin += f", and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
+    return LaneMap(replace(network, lanes=(*network.lanes, *added)), len(added), origin)
 
 
 def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float) -> LaneMap:
@@ -46,66 +71,35 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
             home = len(lanes)
             lanes.append((name, paths[name]))
         homes[name] = home
-    strips = []
+    derived = []
     for k, (name, path) in enumerate(lanes):
         members = {member for member, home in homes.items() if home == k}
-        strips.append(_lane(f"along vehicle {name}", path, members, scenarios, road, lane_width, run_out))
+        derived.append(_lane(f"along vehicle {name}", path, members, scenarios, road, lane_width, run_out))
     origin = "derived: one lane along each path that the scenarios drive; the road itself is a grid without lanes"
-    return LaneMap(tuple(strips), (), "right", origin, derived=True)
+    return LaneMap(LaneNetwork("derived", tuple(derived)), len(derived), origin)
 
 
-def with_all_vehicles(lane_map: LaneMap, scenarios: Sequence[Scenario], road: Road, lane_width: float) -> LaneMap:
-    """Return a map with a derived lane added along the path of every vehicle that the lanes do not suffice for.
-
-    They do not where a footprint leaves them in some scenario, or where no lane has the vehicle's direction, as of one that turns
-    off the road across the others' lanes.
-    """
-    missing = _not_kept(lanes_of(lane_map), scenarios)
-    if not missing:
-        return lane_map
-    strips = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
-    if lane_map.side == "left":
-        strips = [replace(s, offset=s.offset - s.right[0], left=s.right, right=s.left) for s in strips]
-    origin = f"{lane_map.origin}, and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
-    return replace(lane_map, strips=(*lane_map.strips, *strips), added=len(strips), origin=origin)
-
-
-def with_network(
-    lane_map: LaneMap, network: LaneNetwork, scenarios: Sequence[Scenario], road: Road, lane_width: float
-) -> LaneMap:
-    """Return derived lanes with the lanes of a vector map beside them, and a derived one for who does not keep to those."""
-    own = network_lanes(network)
-    missing = _not_kept(own, scenarios)
-    strips = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
-    added = lanes_of(replace(lane_map, strips=tuple(strips))) if strips else ()
-    lanes = (*own, *(replace(lane, id=len(own) + lane.id) for lane in added))
-    origin = f"the lanes of map {network.name}"
-    if missing:
-        origin += f", and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
-    return replace(lane_map, network=lanes, network_origin=origin, vector=network)
-
-
-def _not_kept(lanes: Sequence[Lane], scenarios: Sequence[Scenario]) -> dict[str, Curve]:
+def _not_kept(network: LaneNetwork, scenarios: Sequence[Scenario]) -> dict[str, Curve]:
     """Return the paths, by id, of vehicles that leave the lanes or drive across them."""
-    area = union_all(make_valid([Polygon(np.concatenate([lane.left, lane.right[::-1]])) for lane in lanes]))
+    area = union_all(make_valid([Polygon(lane.outline) for lane in network.lanes]))
     prepare(area)
     missing: dict[str, Curve] = {}
     for scenario in scenarios:
         for n, vehicle in enumerate(scenario.vehicles):
             if vehicle.id not in missing:
                 path = driven_path(scenario, n)
-                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, lanes) > CUT:
+                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, network) > CUT:
                     missing[vehicle.id] = path
     return missing
 
 
-def _unled(path: Curve, lanes: Sequence[Lane]) -> float:
+def _unled(path: Curve, network: LaneNetwork) -> float:
     """Return the metres of a path on which no lane has nearly its direction."""
     led = np.zeros(len(path.points), dtype=np.bool_)
-    for lane in lanes:
-        inside = np.flatnonzero(~led & contains_xy(Polygon(np.concatenate([lane.left, lane.right[::-1]])), path.points[:, :2]))
+    for lane in network.lanes:
+        inside = np.flatnonzero(~led & contains_xy(Polygon(lane.outline), path.points[:, :2]))
         if len(inside):
-            middle = Curve.through(lane.middle)
+            middle = Curve.through(lane.centre)
             yaw = middle.at(middle.project(path.points[inside, :2])[0])[:, 2]
             led[inside] |= np.cos(path.points[inside, 2] - yaw) > np.cos(ACROSS)
     return float(np.diff(path.station)[~led[1:]].sum())
@@ -141,8 +135,8 @@ def _runs_in(path: Curve, lane: Curve) -> bool:
 
 def _lane(
     name: str, path: Curve, members: set[str], scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float
-) -> Strip:
-    """Return the strip of one lane, which holds every footprint of its members.
+) -> Lane:
+    """Return a lane that holds every footprint of its members.
 
     Its edges lie as far from the path on both sides, so that the lane's middle, which planners follow, is as smooth as the path.
     """
@@ -151,11 +145,12 @@ def _lane(
     more = max(run_out, AROUND)
     reference = path.cut(float(station.min()) - more, float(station.max()) + more, STEP)
     room = np.minimum(*(_room(reference, sign, road, lane_width / 2.0, more) for sign in (1.0, -1.0)))
-    half = np.maximum(room, widest_near(reference, station - station.min() + more, np.abs(offset) + MARGIN))
-    return Strip(name, reference.points, half, 2.0 * half[None], np.zeros((0, len(half))))
+    half = np.maximum(room, _widest_near(reference, station - station.min() + more, np.abs(offset) + MARGIN))
+    left, right = (reference.beside(reference.station, sign * half)[:, :2] for sign in (1.0, -1.0))
+    return Lane(name, left, right)
 
 
-def widest_near(line: Curve, station: Floats, wide: Floats) -> Floats:
+def _widest_near(line: Curve, station: Floats, wide: Floats) -> Floats:
     """Return (M,) for each point of a line the largest of distances (P,) [m] at stations (P,) [m] within `NEAR` points of it."""
     widest = np.zeros(len(line.points))
     at = np.clip(np.searchsorted(line.station, station), 1, len(line.points) - 1)
@@ -177,13 +172,7 @@ def outline(scenario: Scenario, n: int) -> Floats:
 
 def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out: float) -> Floats:
     """Return (M,) how far [m] the road is drivable to one side of each point, at most `most`; the run-outs are as wide."""
-    wide = np.full(len(reference.points), most)
     if road is None:
-        return wide
-    distance = np.arange(0.0, most, road.resolution / 2.0)
-    station = np.repeat(reference.station[:, None], len(distance), axis=1)
-    poses = reference.beside(station, sign * distance[None, :])
-    drivable = road.drivable_at(poses[..., :2])
-    free = np.logical_and.accumulate(drivable, axis=1).sum(axis=1) * road.resolution / 2.0
+        return np.full(len(reference.points), most)
     on_run_out = (reference.station < run_out) | (reference.station > reference.length - run_out)
-    return np.where(on_run_out, most, np.minimum(free, most))
+    return np.where(on_run_out, most, drivable_beside(road, reference, sign, most))

@@ -22,6 +22,7 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.output.exchange.osi import write_osi
@@ -154,15 +155,15 @@ def _format(target: str, road: str) -> ExportFormat:
     return to
 
 
-def _has_own_lanes(case: Case, to: ExportFormat) -> bool:
-    """Say whether the lanes of a vector map are written."""
-    return to.own_lanes and bool(case.lane_map.network)
+def _lanes(case: Case, to: ExportFormat) -> LaneMap:
+    """Return the lanes that a format is given."""
+    return case.lane_map if to.own_lanes else case.strips
 
 
 def _origin(case: Case, to: ExportFormat, export: ExportConfig) -> str:
     if export.map:
         return "; ".join((f"the lanes of {Path(export.map).name}", *read_network(Path(export.map)).notes))
-    return case.lane_map.network_origin if _has_own_lanes(case, to) else case.lane_map.origin
+    return _lanes(case, to).origin
 
 
 def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFormat, export: ExportConfig) -> dict[str, object]:
@@ -171,7 +172,7 @@ def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFor
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
-        "lanes": "derived" if case.lane_map.derived and not _has_own_lanes(case, to) and not export.map else "true",
+        "lanes": "derived" if _lanes(case, to).derived and not export.map else "true",
         "index": exported.index,
         "seed": exported.seed,
         "sha256": exported.sha256,
@@ -221,7 +222,7 @@ def _roads(case: Case, export: ExportConfig) -> Mapping[str, bytes]:
     if export.map:
         refuse_other_map(case, Path(export.map))
         return {_road_file(case, export): Path(export.map).read_bytes()}
-    return {_road_file(case, export): write_opendrive(case.lane_map, case.road_name, case.start_ns)}
+    return {_road_file(case, export): write_opendrive(case.strips, case.road_name, case.start_ns)}
 
 
 def refuse_other_map(case: Case, path: Path) -> None:

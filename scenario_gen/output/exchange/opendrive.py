@@ -8,15 +8,17 @@ The inertial frame is the scenarios' frame, x east, y north. A straight piece of
 are linear between points. The date is that of the template's stamp.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime, UTC
 from itertools import groupby, pairwise
 
 import numpy as np
 
 from scenario_gen.numerics import Floats, wrap_angle
-from scenario_gen.output.exchange.lanes import joined, Joint, LaneMap, Strip
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.xml import add, comment, Element, serialized
+from scenario_gen.types import Lane
 
 ROADS, JUNCTION = 1, 1000  # ids: of the first road, and of the junction
 STRAIGHT = 1e-7  # rad by which the headings of a straight piece may differ
@@ -24,17 +26,57 @@ GOES_ON = 1e-5  # metres by which a width or an offset may differ from its linea
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # on [-1, 1]
 
 
+@dataclass(frozen=True, eq=False)
+class _Strip:
+    """Lanes side by side, as a road of OpenDRIVE.
+
+    Attributes:
+        lanes: the lanes on the "right" of the reference line and on the "left", from the middle outwards.
+        reference: (M, 3) x [m], y [m], yaw [rad, unwrapped].
+        offset: metres by which the line between left and right lanes lies to the left of the reference line.
+        widths: (L, M) metres, of the lanes of each side.
+    """
+
+    lanes: dict[str, tuple[int, ...]]
+    reference: Floats
+    offset: Floats
+    widths: dict[str, Floats]
+
+    @classmethod
+    def of(cls, lane_map: LaneMap, along: tuple[int, ...], against: tuple[int, ...]) -> "_Strip":
+        """Return a strip about the line between its directions, or the middle of its only lane; it runs as `along` does."""
+        lanes, right = lane_map.network.lanes, lane_map.side == "right"
+        first = lanes[along[0]]
+        across = first.left - first.right
+        yaw = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
+        widths = [np.stack([_width(lanes[k]) for k in side]) if side else np.zeros((0, len(yaw))) for side in (along, against)]
+        alone = len(along) + len(against) == 1
+        line = first.centre if alone else first.left if right else first.right
+        offset = (0.5 if right else -0.5) * widths[0][0] if alone else np.zeros(len(yaw))
+        order = ("right", "left") if right else ("left", "right")
+        sides = (widths[0], widths[1][:, ::-1])
+        named = dict(zip(order, sides, strict=True))
+        return cls(dict(zip(order, (along, against), strict=True)), np.column_stack((line, yaw)), offset, named)
+
+
+def _width(lane: Lane) -> Floats:
+    return np.asarray(np.hypot(*(lane.left - lane.right).T))
+
+
+Place = tuple[int, str, int]
+"""A road, a side of it and a lane's place there, from the middle outwards."""
+
+
 def write_opendrive(lane_map: LaneMap, name: str, start_ns: int) -> bytes:
     """Return a lane map as the bytes of an OpenDRIVE file.
 
     Args:
-        lane_map: all lanes.
+        lane_map: all lanes; in the junction of a drawn road each joins one lane to one.
         name: of the network, for people.
         start_ns: stamp whose day is the file's date.
     """
     root = Element("OpenDRIVE")
-    everything = np.concatenate([strip.edges(side).reshape(-1, 2) for strip in lane_map.strips for side in ("right", "left")])
-    (west, south), (east, north) = everything.min(axis=0).tolist(), everything.max(axis=0).tolist()
+    (west, south), (east, north) = lane_map.network.box.tolist()
     date = datetime.fromtimestamp(start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S")
     add(
         root,
@@ -51,11 +93,17 @@ def write_opendrive(lane_map: LaneMap, name: str, start_ns: int) -> bytes:
         vendor="scenario_gen",
     )
     comment(root, f"lanes: {lane_map.origin}")
-    joints = {joint.by: joint for joint in lane_map.joints}
-    for k, strip in enumerate(lane_map.strips):
-        _road(root, lane_map, k, strip, joints.get(k))
-    if lane_map.joints:
-        _junction(root, lane_map)
+    strips = [_Strip.of(lane_map, *strip) for strip in lane_map.strips]
+    places = {k: (n, side, m) for n, strip in enumerate(strips) for side, ks in strip.lanes.items() for m, k in enumerate(ks)}
+    joints: dict[int, tuple[Place, Place, Place]] = {}  # by road: the lane before, its own, the lane after
+    for k, lane in enumerate(lane_map.network.lanes):
+        if lane_map.turn(k):
+            joints[places[k][0]] = places[lane_map.network.predecessors[k][0]], places[k], places[lane.successors[0]]
+    arms = {place[0] for joint in joints.values() for place in (joint[0], joint[2])}
+    for n, strip in enumerate(strips):
+        _road(root, lane_map, n, strip, joints.get(n), leads_on=n in arms)
+    if joints:
+        _junction(root, joints)
     return serialized(root)
 
 
@@ -64,18 +112,21 @@ def lane_id(side: str, place: int) -> int:
     return (place + 1) * (-1 if side == "right" else 1)
 
 
-def _road(root: Element, lane_map: LaneMap, k: int, strip: Strip, joint: Joint | None) -> None:
+def _road(
+    root: Element, lane_map: LaneMap, n: int, strip: _Strip, joint: tuple[Place, Place, Place] | None, *, leads_on: bool
+) -> None:
     """Append a road; `joint` says what it connects, None if it is no way through the junction."""
     pieces = list(_pieces(strip.reference))
     station = np.concatenate([[0.0], np.cumsum([piece[0] for piece in pieces])])
     rule = "RHT" if lane_map.side == "right" else "LHT"
     junction = -1 if joint is None else JUNCTION
-    road = add(root, "road", name=strip.name, length=float(station[-1]), id=ROADS + k, junction=junction, rule=rule)
+    name = ", ".join(lane_map.network.lanes[k].id for side in strip.lanes.values() for k in side)
+    road = add(root, "road", name=name, length=float(station[-1]), id=ROADS + n, junction=junction, rule=rule)
     link = add(road, "link")
     if joint is not None:
-        add(link, "predecessor", elementType="road", elementId=ROADS + joint.start, contactPoint="end")
-        add(link, "successor", elementType="road", elementId=ROADS + joint.goal, contactPoint="end")
-    elif lane_map.joints and not lane_map.is_derived(k):
+        add(link, "predecessor", elementType="road", elementId=ROADS + joint[0][0], contactPoint="end")
+        add(link, "successor", elementType="road", elementId=ROADS + joint[2][0], contactPoint="end")
+    elif leads_on:
         add(link, "successor", elementType="junction", elementId=JUNCTION)
     add(add(road, "type", s=0.0, type="town"), "speed", max="no limit")
     view = add(road, "planView")
@@ -90,24 +141,14 @@ def _road(root: Element, lane_map: LaneMap, k: int, strip: Strip, joint: Joint |
     for s, value, slope in _linear(station, strip.offset):
         add(lanes, "laneOffset", s=s, a=value, b=slope, c=0.0, d=0.0)
     section = add(lanes, "laneSection", s=0.0)
+    ends = (None, None) if joint is None else (lane_id(*joint[0][1:]), lane_id(*joint[2][1:]))
     for side in ("left", "center", "right"):
-        widths: Floats = np.zeros((0, 0)) if side == "center" else getattr(strip, side)
         if side == "center":
             _lane(add(section, side), 0, "none", [], (None, None))
-        elif len(widths):
-            parent = add(section, side)
-            order = range(len(widths)) if side == "right" else range(len(widths) - 1, -1, -1)  # from left to right
-            for place in order:
-                ends = _lane_links(lane_map, joint, side, place)
-                _lane(parent, lane_id(side, place), "driving", list(_linear(station, widths[place])), ends)
-
-
-def _lane_links(lane_map: LaneMap, joint: Joint | None, side: str, place: int) -> tuple[int | None, int | None]:
-    """Return the ids of the lanes before and after a lane of a connecting road."""
-    if joint is None:
-        return None, None
-    start, by, goal = joined(lane_map, joint)
-    return (lane_id(*start[1:]), lane_id(*goal[1:])) if by[1:] == (side, place) else (None, None)
+        elif len(strip.lanes[side]):
+            parent, order = add(section, side), range(len(strip.lanes[side]))
+            for place in order if side == "right" else order[::-1]:  # from left to right
+                _lane(parent, lane_id(side, place), "driving", list(_linear(station, strip.widths[side][place])), ends)
 
 
 def _lane(
@@ -122,18 +163,11 @@ def _lane(
         add(lane, "width", sOffset=s, a=value, b=slope, c=0.0, d=0.0)
 
 
-def _junction(root: Element, lane_map: LaneMap) -> None:
+def _junction(root: Element, joints: Mapping[int, tuple[Place, Place, Place]]) -> None:
     junction = add(root, "junction", name="junction", id=JUNCTION, type="default")
-    for k, joint in enumerate(lane_map.joints):
-        connection = add(
-            junction,
-            "connection",
-            id=k,
-            incomingRoad=ROADS + joint.start,
-            connectingRoad=ROADS + joint.by,
-            contactPoint="start",
-        )
-        start, by, _ = joined(lane_map, joint)
+    for k, (start, by, _) in enumerate(joints.values()):
+        roads = {"incomingRoad": ROADS + start[0], "connectingRoad": ROADS + by[0]}
+        connection = add(junction, "connection", id=k, **roads, contactPoint="start")
         add(connection, "laneLink", **{"from": lane_id(*start[1:]), "to": lane_id(*by[1:])})
 
 

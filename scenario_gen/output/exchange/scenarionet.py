@@ -20,7 +20,7 @@ import numpy as np
 from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.lanes import Lane
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
 from scenario_gen.types import height, join_ego, Scenario, Vehicle
 
@@ -56,7 +56,7 @@ def description(case: Case, exported: Exported, export: ExportConfig) -> dict[st
         "object_summary": {vehicle.id: _summary(tracks[vehicle.id], vehicle.id) for vehicle in motion.vehicles},
         "number_summary": _numbers(tracks),
     }  # fmt: skip
-    lanes = {str(lane.id): _lane(lane) for lane in case.lanes}
+    lanes = {str(k + 1): _lane(case.lane_map, k) for k in range(len(case.lane_map.network.lanes))}
     return {
         "id": name,
         "version": VERSION,
@@ -121,20 +121,19 @@ def _numbers(tracks: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _lane(lane: Lane) -> dict[str, Any]:
-    """Return a lane as a feature of the map."""
-
-    def beside(other: tuple[int, bool] | None) -> list[str]:
-        return [str(other[0])] if other is not None and other[1] else []
-
+def _lane(lane_map: LaneMap, k: int) -> dict[str, Any]:
+    """Return lane k as a feature of the map."""
+    network, sides = lane_map.network, lane_map.neighbours(k)
+    lane = network.lanes[k]
+    beside = {side: [str(other + 1)] for side, (other, same) in sides.items() if same}
     return {
         "type": "LANE_SURFACE_STREET",
-        "polyline": lane.middle.astype(np.float32),
-        "polygon": np.concatenate([lane.left, lane.right[::-1]]).astype(np.float32),
-        "entry_lanes": [str(name) for name in lane.predecessors],
-        "exit_lanes": [str(name) for name in lane.successors],
-        "left_neighbor": beside(lane.left_of),
-        "right_neighbor": beside(lane.right_of),
+        "polyline": lane.centre.astype(np.float32),
+        "polygon": lane.outline.astype(np.float32),
+        "entry_lanes": [str(other + 1) for other in sorted(network.predecessors[k])],
+        "exit_lanes": [str(other + 1) for other in sorted(lane.successors)],
+        "left_neighbor": beside.get("left", []),
+        "right_neighbor": beside.get("right", []),
     }
 
 

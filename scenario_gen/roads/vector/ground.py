@@ -31,7 +31,7 @@ def directions(road: Road) -> npt.NDArray[np.uint16]:
     Several lanes may lie in a cell, as in a junction; each allows what differs from it by at most 90°.
     """
     directions = np.zeros(road.drivable.shape, dtype=np.uint16)
-    for lane in road.lanes.lanes if road.lanes is not None else ():
+    for lane in road.map_lanes.lanes if road.map_lanes is not None else ():
         rows, columns = _cells(road, lane)
         directions[rows, columns] |= _bits(road, lane, rows, columns)
     directions[directions == 0] = _ALL
@@ -75,9 +75,9 @@ def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
         path: (M, 3) x, y [m], yaw [rad] of its fitted path; its own lanes are those along which it lies.
         vehicle: where its footprint has no room at the path's ends, it keeps the whole road.
     """
-    if road.lanes is None or not len(path):
+    if road.map_lanes is None or not len(path):
         return road
-    lanes = road.lanes.lanes
+    lanes = road.map_lanes.lanes
     own = {k for k, lane in enumerate(lanes) if on_lane(lane, path, 2)}
     own |= {other for k in own for other in lanes[k].beside}
     cells = np.zeros(road.drivable.shape, dtype=np.bool_)
@@ -93,8 +93,8 @@ def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
 
 def along_lanes(road: Road, poses: Floats) -> Bools:
     """Return (M,) whether poses (M, 3) x, y [m], yaw [rad] lie in a lane about its way; everywhere, on a road without lanes."""
-    along = np.full(len(poses), road.lanes is None)
-    for lane in road.lanes.lanes if road.lanes is not None else ():
+    along = np.full(len(poses), road.map_lanes is None)
+    for lane in road.map_lanes.lanes if road.map_lanes is not None else ():
         near = ~along & _in_box(lane, poses)
         along[near] = _along(lane, poses[near])
     return along

@@ -16,7 +16,7 @@ from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import derived_lanes
 from scenario_gen.output.exchange.importing import read_scenario_file
-from scenario_gen.output.exchange.lanes import network_lanes
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.motion import at_times
 from scenario_gen.roads import read_network
 from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
@@ -146,8 +146,7 @@ def test_signs_lights_and_stop_lines_of_a_vector_map_are_written_and_read_again(
     kinds = (RuleKind.TRAFFIC_LIGHT, RuleKind.STOP, RuleKind.GIVE_WAY, RuleKind.PRIORITY)
     rules = tuple(TrafficRule(kind, kind, (k % 2,), (), line if k == 1 else np.zeros((0, 2))) for k, kind in enumerate(kinds))
     network = LaneNetwork("town", lanes, (), rules)
-    made = derived_lanes([crossing()], None, 3.5, 20.0)
-    data, _ = write_commonroad(*case_of(crossing(), lane_map=replace(made, network=network_lanes(network), vector=network)))
+    data, _ = write_commonroad(*case_of(crossing(), lane_map=LaneMap(network, 0, "town")))
     root = ET.fromstring(data)
     tags = list(dict.fromkeys(child.tag for child in root))
     assert tags[:5] == ["location", "scenarioTags", "lanelet", "trafficSign", "trafficLight"]

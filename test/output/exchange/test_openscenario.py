@@ -11,11 +11,10 @@ from small_scenarios import crossing, one_vehicle
 from test_commonroad import case_of
 
 from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.output.exchange.importing import read_scenario_file
-from scenario_gen.output.exchange.lanes import lanes_of
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
-from scenario_gen.output.exchange.road_lanes import true_lanes
 from scenario_gen.roads import RoadConfig
 from scenario_gen.roads.build import build_road
 
@@ -119,7 +118,7 @@ def along(geometry, s):
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
     config = RoadConfig(lanes=2, traffic_side=side)
-    lane_map = true_lanes(build_road("t_intersection", None, config), "t_intersection", None, config, [], 15.0)
+    lane_map = lane_map_of(build_road("t_intersection", None, config), [], 3.5, 15.0)
     data = write_opendrive(lane_map, "t", 0)
     assert data == write_opendrive(lane_map, "t", 0)
     root = ET.fromstring(data)
@@ -150,4 +149,4 @@ def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
         links = connection.findall("laneLink")
         assert len(links) == 1 and all(one.attrib["to"] in lanes and one.attrib["from"] in arms for one in links)
     driving = [lane for lane in root.iter("lane") if lane.attrib["type"] == "driving"]
-    assert len(driving) == len(lanes_of(lane_map))
+    assert len(driving) == len(lane_map.network.lanes)
