@@ -43,6 +43,8 @@ def map_picture(name: str, encounter: Encounter | None = None) -> tuple[str, lis
     if not is_vector_map(name):
         road = build_road(name, encounter)
         arms = f"{len(road.entries)} entries, {len(road.exits)} exits"
+        if road.lanes is not None:
+            return _picture(road.lanes, ()), [f"{road.name}: {road!r}, {len(road.lanes.lanes)} lanes, {arms}"]
         return _picture_of_grid(road), [f"{road.name}: {road!r}, {arms}; it has no lanes to show"]
     network = read_network(split(name)[0])
     junctions = sorted({lane.junction for lane in network.lanes if lane.junction})
@@ -98,7 +100,7 @@ def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
     corners = np.concatenate([network.box, *(place.box for place in found)])
     sheet = _Sheet(corners.min(axis=0), corners.max(axis=0))
     junctions: dict[str, list[Floats]] = defaultdict(list)
-    for lane in network.lanes:
+    for lane in sorted(network.lanes, key=lambda lane: not lane.junction):  # an arm's borders lie over the ways' ends
         kind = "turn" if lane.junction else "lane"
         sheet.shape("polygon", lane.outline, **{"class": kind})
         if lane.junction:

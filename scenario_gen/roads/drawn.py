@@ -93,7 +93,8 @@ def road_of(plan: Plan, name: str, low: Floats, drivable: Bools, config: RoadCon
     """
     shift = np.array([*low, 0.0])
     arms = [replace(arm, pose=arm.pose - shift) for arm in plan.arms]
-    road = Road(name, drivable, config.resolution, np.zeros(2), *lane_ends(arms, config))
+    entries, exits = (ends - shift for ends in lane_ends(plan.arms, config))
+    road = Road(name, drivable, config.resolution, np.zeros(2), entries, exits)
     axis = None if plan.axis is None else Curve(plan.axis.points - shift)
     ways = {places: Curve(way.points - shift) for places, way in plan.ways.items()}
     lanes = _Drawing(road, Plan(arms, axis, ways, plan.ring), -low, config).lanes()

@@ -103,8 +103,11 @@ def road_data(road: Road) -> dict[str, Any]:
 
 
 def _lane_borders(road: Road) -> list[list[float]]:
-    """Return the borders of the road's lanes, each x, y, x, y … [m]; none where no lanes are known, or too many."""
-    lanes = road.lanes.lanes if road.lanes is not None else ()
+    """Return the borders of the road's lanes, each x, y, x, y … [m]; none where no lanes are known, or too many.
+
+    Nobody paints borders inside the junction of a built-in road.
+    """
+    lanes = [] if road.lanes is None else [lane for lane in road.lanes.lanes if not (road.lanes.drawn and lane.junction)]
     borders = [border for lane in lanes for border in (lane.left, lane.right)]
     step = max(1, -(-len(borders) * 2 // MAX_BORDERS))
     kept = [np.linspace(0, len(border) - 1, min(len(border), 25)).round().astype(np.int64) for border in borders]
