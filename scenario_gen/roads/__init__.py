@@ -3,7 +3,6 @@
 
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
-from scenario_gen.roads.arms import Arm, arms_of, ring_of, unused_arms
 from scenario_gen.roads.build import build_road, BUILT_IN, DrawRoad, road_and_template, ROADS
 from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.roads.clearance import (
@@ -22,7 +21,7 @@ from scenario_gen.roads.clearance import (
 )
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.connectivity import common_component, component_cells
-from scenario_gen.roads.drawn import drivable_beside
+from scenario_gen.roads.drawn import drivable_beside, ways_through
 from scenario_gen.roads.obstacles import read_obstacles
 from scenario_gen.roads.vector.ground import along_lanes, drives_against, own_ground
 from scenario_gen.roads.vector.match import Course
@@ -30,14 +29,13 @@ from scenario_gen.roads.vector.network import FAULTY
 from scenario_gen.roads.vector.place import NoPlaceError, Place, placements, places, tracks_on
 from scenario_gen.roads.vector.read import is_vector_map, read_network, split
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, flare_begins, line_between, relative, reverse
+from scenario_gen.roads.ways import draw_route, draw_u_turn, relative
 
 __all__ = [
-    "BUILT_IN", "CONTACT", "FAULTY", "ROADS", "Arm", "Course", "DrawRoad", "NoPlaceError", "Place", "RoadConfig", "RuleCheck",
-    "along_lanes", "arms_of", "blocked_before", "build_road", "clearance_field", "clearance_in_cells", "common_component",
-    "component_cells", "distance_transform", "draw", "draw_ring_route", "draw_route", "draw_u_turn", "drivable_beside",
-    "drives_against", "flare_begins", "footprint_fits", "free_length", "is_vector_map", "layout_for", "line_between",
-    "nearest_pose_with_room", "own_ground", "placements", "places", "read_network", "read_obstacles", "relative", "reverse",
-    "ring_of", "road_and_template", "segment_free", "segments_free", "split", "to_cells", "to_metres", "tracks_on",
-    "unused_arms",
+    "BUILT_IN", "CONTACT", "FAULTY", "ROADS", "Course", "DrawRoad", "NoPlaceError", "Place", "RoadConfig", "RuleCheck",
+    "along_lanes", "blocked_before", "build_road", "clearance_field", "clearance_in_cells", "common_component",
+    "component_cells", "distance_transform", "draw", "draw_route", "draw_u_turn", "drivable_beside", "drives_against",
+    "footprint_fits", "free_length", "is_vector_map", "layout_for", "nearest_pose_with_room", "own_ground", "placements",
+    "places", "read_network", "read_obstacles", "relative", "road_and_template", "segment_free", "segments_free", "split",
+    "to_cells", "to_metres", "tracks_on", "ways_through",
 ]  # fmt: skip

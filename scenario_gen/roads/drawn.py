@@ -3,14 +3,14 @@
 
 """The lanes of a drawn road: along its arms from their ends to the junction, and ways through that from lane to lane.
 
-An arm has its lanes from its end to its mouth, where the road grows wider than the lanes or somebody begins to turn. Its outer
-borders lie half a cell's diagonal outside, where the cells' corners are. A way that the template drives is the one that the road
-was drawn for, another one the clothoid that routes are made of; where it bends it is wider than a lane, as far as the road is.
+An arm has its lanes from its end to its mouth, where the road grows wider than the lanes or somebody begins to turn. A way that
+the template drives is the one that the road was drawn for, another one the clothoid that routes are made of; where it bends it is
+wider than a lane, as far as the road is.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise, permutations
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -24,8 +24,7 @@ from scenario_gen.types import Lane, LaneNetwork, Road
 Way = tuple[int, int, int, int]
 """Arm and lane that a way comes from, arm and lane that it leads to; lanes count from the dividing line."""
 
-_STEP_M = 1.0  # between cross-sections
-_HALF_DIAGONAL = 0.7072  # of a cell, in sides
+_STEP_M, _WAY_STEP_M = 1.0, 0.5  # between cross-sections, of arms and of ways
 _BEFORE_M = 1.0  # that a mouth lies before the place where the road is wider
 _STEADY = 5  # cells along an arm for which the road is wider
 _SHORTEST_M = 0.5  # of an arm
@@ -107,7 +106,6 @@ class _Drawing:
     def __init__(self, road: Road, plan: Plan, centre: Floats, config: RoadConfig) -> None:
         self._road, self._plan, self._centre, self._config = road, plan, centre, config
         self._sign = 1.0 if config.traffic_side == "right" else -1.0  # lanes in lie so many times their offset to the right
-        self._extra = _HALF_DIAGONAL * road.resolution
         self._lines = [self._line(k) for k in range(len(plan.arms))]
         self._joined = len(plan.arms) > 2
         self._mouths = [self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)]
@@ -175,14 +173,14 @@ class _Drawing:
         """The borders of an arm's lanes in or out from the dividing line outwards, in the direction of traffic."""
         line = self._lines[k].cut(0.0, self._mouths[k], _STEP_M)
         side = -self._sign if inward else self._sign
-        offsets = side * (self._config.lane_width * np.arange(count + 1) + self._extra * (np.arange(count + 1) == count))
+        offsets = side * self._config.lane_width * np.arange(count + 1)
         borders = [line.beside(line.station, np.full(len(line.points), offset))[:, :2] for offset in offsets]
         return borders if inward else [border[::-1] for border in borders]
 
     def _ways(self) -> dict[Way, Curve]:
         """The ways of the template, those from each lane straight on to the same lane of each other arm, and those that lack."""
         arms = self._plan.arms
-        pairs = list(permutations(range(len(arms)), 2))
+        pairs = [(a, b) for a, b in product(range(len(arms)), repeat=2) if a != b or self._plan.ring]
         usual = [
             (a, i, b, j)
             for a, b in pairs
@@ -205,11 +203,11 @@ class _Drawing:
         start = self._middle(a, -self._sign * (i + 0.5))
         goal = reverse(self._middle(b, self._sign * (j + 0.5)))
         if driven is not None:
-            way: Curve | None = driven.cut(self._mouths[a], driven.length - self._mouths[b], _STEP_M)
-        elif abs(angle_between(goal[2], start[2])) > _TURN_BACK:
-            return None
+            way: Curve | None = driven.cut(self._mouths[a], driven.length - self._mouths[b], _WAY_STEP_M)
         elif self._plan.ring:
             way = draw_ring_route(start, goal, self._centre, self._plan.ring, lambda _: True)
+        elif abs(angle_between(goal[2], start[2])) > _TURN_BACK:
+            return None
         elif self._plan.axis is not None and max(a, b) < 2 and i == j:
             line = self._plan.axis if a == 0 else self._plan.axis.reversed()
             line = line.cut(self._mouths[a], line.length - self._mouths[b], _STEP_M)
@@ -218,7 +216,7 @@ class _Drawing:
             way = draw_route(start, goal, lambda _: True)
         if way is None or not self._road.drivable_at(way.points[:, :2]).all():
             return None
-        return way.cut(0.0, way.length, _STEP_M)
+        return way.cut(0.0, way.length, _WAY_STEP_M)
 
     def _middle(self, k: int, lanes: float) -> Floats:
         """The pose (3,) at an arm's mouth so many lanes to the left of its dividing line, heading inwards."""
@@ -244,6 +242,18 @@ class _Drawing:
             edges.append(own + (1.0 - share[:, None]) * off[0] + share[:, None] * off[1])
             edges[-1][[0, -1]] = ends
         return edges[0], edges[1]
+
+
+def ways_through(road: Road) -> dict[tuple[int, int], Curve]:
+    """Return the ways from the end of an entry's lane to that of an exit's, by the indices of the two, that a drawn road has."""
+    network = road.lanes if road.lanes is not None and road.lanes.drawn else LaneNetwork(road.name, ())
+    ways = {}
+    for e, first in enumerate(network.entries):
+        for way in network.lanes[first].successors:
+            (last,) = network.lanes[way].successors
+            line = np.concatenate([network.lanes[k].centre for k in (first, way, last)])
+            ways[e, network.exits.index(last)] = Curve.through(line)
+    return ways
 
 
 def drivable_beside(road: Road, line: Curve, sign: float, most: float) -> Floats:

@@ -16,7 +16,6 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
-from scenario_gen.roads.arms import RING_ROOM
 from scenario_gen.roads.builtin import junction_centre
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import lane_ends, Plan, PlannedArm, Way
@@ -28,6 +27,7 @@ from scenario_gen.types import Encounter, Road
 
 _RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
 _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
+_RING_ROOM = 0.5  # metres that a roundabout's lane is wider on each side
 _SAME_ARM = np.radians(30.0)  # directions that differ by less are those of one arm
 _MERGED = np.radians(45.0)  # and by so much if the road has too few arms otherwise
 _PART = np.radians(75.0)  # a vehicle that is still turning may go on by so much to an arm
@@ -153,7 +153,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         sketch.strip(Curve(np.array([[*(radius * unit(yaw)), yaw], arm.pose])), -width, width)
         arms.append(arm)
     around = unit(np.linspace(0.0, 2.0 * np.pi, 97))
-    half = width / 2.0 + RING_ROOM
+    half = width / 2.0 + _RING_ROOM
     sketch.drivable.append((radius + half) * around)
     sketch.islands.append((radius - half) * around)
     entries, exits = lane_ends(arms, config)

@@ -135,33 +135,6 @@ def reverse(pose: Floats) -> Floats:
     return np.asarray(pose + np.array([0.0, 0.0, np.pi]))
 
 
-def line_between(shape: Curve, entry: Floats, leave: Floats) -> tuple[Curve, float] | None:
-    """The line from one pose (3,) to another that goes straight on, takes the bends of `shape`, and goes straight on again.
-
-    What the shape turns too little or too much, up to 25°, is spread evenly over it.
-
-    Returns:
-        The line, and the arc length [m] on it at which the shape begins; None if the two poses are not so to each other.
-    """
-    own = float(shape.points[-1, 2] - shape.points[0, 2])
-    extra = angle_between(leave[2] - entry[2], own)
-    if abs(extra) > np.radians(25.0):
-        return None
-    bent = _bent(shape, extra)
-    turn = float(bent[-1, 2])
-    ahead, left = relative(entry, leave[:2])
-    if abs(np.sin(turn)) < 0.05:
-        after = before = (ahead - float(bent[-1, 0])) / 2.0 if np.cos(turn) > 0.0 else -1.0
-        if abs(left - float(bent[-1, 1]) - after * np.sin(turn)) > 0.3:
-            return None
-    else:
-        after = (left - float(bent[-1, 1])) / np.sin(turn)
-        before = ahead - float(bent[-1, 0]) - after * np.cos(turn)
-    if min(before, after) < -0.05:
-        return None
-    return _joined(entry, max(before, 0.0), bent, max(after, 0.0)), max(before, 0.0)
-
-
 def extended(shape: Curve, extra: float, run: float) -> Curve:
     """The shape from the origin along x, turned by `extra` [rad] more, evenly, and `run` metres straight on at both ends."""
     return _joined(np.zeros(3), run, _bent(shape, extra), run)

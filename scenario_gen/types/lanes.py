@@ -153,6 +153,16 @@ class LaneNetwork:
         return tuple(k for k, lane in enumerate(self.lanes) if not lane.successors)
 
     @cached_property
+    def arms(self) -> dict[str, tuple[int, ...]]:
+        """The lanes of each arm of a drawn road, which are named arm.lane; a road through is one arm."""
+        arms: dict[str, tuple[int, ...]] = {}
+        for k, lane in enumerate(self.lanes):
+            if self.drawn and not lane.junction:
+                name = lane.id.partition(".")[0]
+                arms[name] = (*arms.get(name, ()), k)
+        return arms
+
+    @cached_property
     def traffic_side(self) -> str:
         """Return "right" or "left": on which side of the road traffic drives; "" where no lane has an oncoming one beside it.
 

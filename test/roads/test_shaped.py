@@ -10,7 +10,6 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road
-from scenario_gen.roads.arms import arms_of, ring_of
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.segmentation import Segmentation
 
@@ -44,6 +43,16 @@ def made(*motions, width=1.9):
     return Encounter("made", vehicles, 0, 100_000_000, poses[..., :2], poses[..., 2], speed)
 
 
+def ring_of(road):
+    """Centre and radius of the circle on which the way from an arm back to it lies, but for its ends."""
+    (way,) = (lane.centre for lane in road.lanes.lanes if lane.id == "1.-1>1.1")
+    points = way[len(way) // 4 : -len(way) // 4]
+    x, y, rest = np.linalg.lstsq(
+        np.column_stack((2.0 * points, np.ones(len(points)))), np.square(points).sum(axis=1), rcond=None
+    )[0]
+    return np.array([x, y]), np.sqrt(rest + x * x + y * y)
+
+
 def fitted(encounter, road_name):
     labels = np.repeat(np.arange(4), T // 4)
     pieces = Segmentation(labels, np.array([35, 70, 105]), np.zeros(T), ("piece",) * 4)
@@ -65,7 +74,7 @@ def test_a_turn_of_any_angle_is_kept_and_its_conflict_too(angle, road_name):
 def test_who_crosses_needs_four_arms_and_a_road_of_three_is_refused():
     encounter = made(motion(line(0.0), 8.0), motion(line(np.radians(70.0), 25.0, -40.0), 8.0))
     road, fit = fitted(encounter, "four_way")
-    assert len(arms_of(road)) == 4 and fit.lost == ()
+    assert len(road.lanes.arms) == 4 and fit.lost == ()
     with pytest.raises(RefusedError, match="t_intersection has 3 arms, and the template comes and goes by 4"):
         build_road("t_intersection", encounter)
 
@@ -108,9 +117,8 @@ def test_a_roundabout_is_sized_to_the_speed_and_gone_about():
 
 
 def test_roads_without_a_template_are_of_their_kind():
-    assert ring_of(build_road("roundabout")) is not None
-    first, second = arms_of(build_road("curve"))
-    turn = (np.degrees(second.pose[2] - first.pose[2]) + 360.0) % 360.0 - 180.0
-    assert abs(turn) == pytest.approx(20.0, abs=1.0)
+    assert ring_of(build_road("roundabout"))[1] == pytest.approx(13.0, abs=0.1)
+    curve = build_road("curve")
+    assert abs(np.degrees(curve.exits[1, 2] - curve.entries[0, 2])) == pytest.approx(20.0, abs=1.0)
     merge = build_road("merge")
     assert len(merge.entries) == 3 and len(merge.exits) == 2

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from scenario_gen.roads.shaped import PLAIN_LINE
-from scenario_gen.roads.ways import draw_ring_route, draw_route, extended, line_between
+from scenario_gen.roads.ways import draw_ring_route, draw_route
 
 
 def anywhere(_):
@@ -35,19 +34,6 @@ def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(turn, 
     if 1.5 * abs(turn) / sharpness < 50.0:  # there is room for it
         assert np.abs(bend).max() == pytest.approx(sharpness, rel=0.05)
     assert np.abs(np.diff(bend)).max() < 0.5 * np.abs(bend).max()  # the shortest transition has three samples
-
-
-def test_a_line_between_two_poses_takes_the_bends_of_a_shape():
-    shape = extended(PLAIN_LINE.shape, 0.9, 0.0)
-    start, end = np.array([3.0, -2.0, 0.4]), np.zeros(3)
-    road = extended(shape, 0.0, 15.0)
-    cos, sin = np.cos(0.4), np.sin(0.4)
-    local = road.points[-1]
-    end = np.array([3.0 + local[0] * cos - local[1] * sin, -2.0 + local[0] * sin + local[1] * cos, 0.4 + local[2]])
-    line, at = line_between(shape, start, end)
-    assert at == pytest.approx(15.0, abs=0.01)
-    assert line.length == pytest.approx(road.length, abs=0.01)
-    assert line_between(shape, start, end + np.array([0.0, 0.0, 1.0])) is None  # 57° more than the shape turns
 
 
 @pytest.mark.parametrize(("leave", "turn"), [(0.0, 0.0), (np.pi / 2.0, np.pi / 2.0), (-np.pi / 2.0, -np.pi / 2.0)])

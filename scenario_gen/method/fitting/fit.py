@@ -15,13 +15,11 @@ from scenario_gen.method.fitting.finish import finish
 from scenario_gen.method.fitting.given import place_given, place_in_own_frame
 from scenario_gen.method.fitting.junction import has_lanes, place_at_junction
 from scenario_gen.method.fitting.kept import refuse_lost_conflicts
-from scenario_gen.method.fitting.lanes import place_along_lanes
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.fitting.requested import refuse_impossible, refuse_misfits
 from scenario_gen.method.fitting.search import place_by_search
-from scenario_gen.method.fitting.vector import place_on_lanes
+from scenario_gen.method.fitting.vector import place_along_road, place_on_lanes
 from scenario_gen.numerics import Floats
-from scenario_gen.roads import arms_of
 from scenario_gen.template import clean_tracks, Track
 from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation
 
@@ -90,7 +88,7 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         return place_in_own_frame(encounter, road, config)[0]
     tracks = clean_tracks(encounter)
     ways: dict[str, Callable[[tuple[Track, ...], Road, FittingConfig], Placement]] = {
-        "lanes": place_along_lanes,
+        "lanes": place_along_road if road.map_lanes is None else place_on_lanes,
         "junction": place_at_junction,
         "search": place_by_search,
     }
@@ -100,15 +98,15 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         return ways[config.placement](tracks, road, config)
     own, share = None, 0.0
     reasons: list[str] = []
-    order: tuple[str, ...]
     try:
         own, share = place_in_own_frame(encounter, road, config)
     except RefusedError as error:
         reasons.append(f"in its own frame, {error}")
     if own is not None and share >= _AT_HOME:
         return own
-    if has_lanes(road) or len(arms_of(road)) > 1:
-        order, reasons = ("lanes", "junction"), []
+    order: tuple[str, ...] = ("lanes", "junction") if road.lanes is not None else ("junction",)
+    if road.lanes is not None or has_lanes(road):
+        reasons = []
     elif own is not None and share >= _NEAR_HOME:
         return own
     else:
@@ -118,6 +116,6 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
             return ways[name](tracks, road, config)
         except RefusedError as error:
             reasons.append(str(error))
-    if order != ("search",):  # what stands against it on one road, or at a junction where the road has one
-        reasons = reasons[-1:] if len(arms_of(road)) > 2 else reasons[:1]
+    if order == ("lanes", "junction"):  # what stands against it on one road, or at a junction where the road has one
+        reasons = reasons[-1:] if road.lanes is not None and len(road.lanes.arms) > 2 else reasons[:1]
     raise RefusedError(f"the template does not fit road {road.name}: " + "; ".join(reasons))

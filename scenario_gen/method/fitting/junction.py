@@ -10,6 +10,7 @@ vehicles, not with that of assignments. Then the best assignments are solved for
 the template: headings and relative positions at sampled instants, turns, crossings.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
@@ -24,7 +25,7 @@ from scenario_gen.method.fitting.placement import check_scale, has_room, Placeme
 from scenario_gen.method.fitting.relations import find_relations, Relation
 from scenario_gen.numerics import Floats, frozen, Ints, wrap_angle
 from scenario_gen.numerics.kernels import F2, F3, kernel, OUTI2
-from scenario_gen.roads import draw_ring_route, draw_route, draw_u_turn, relative, ring_of
+from scenario_gen.roads import draw_route, draw_u_turn, relative, ways_through
 from scenario_gen.template import in_words, manoeuvre_of, MOST_CHANGE, sharpness_of, Track, turn_of
 from scenario_gen.types import Road, Vehicle
 
@@ -44,6 +45,7 @@ _MOST_LOST = 0.2  # share of the relations; what is lost is reported
 _TURN_TOLERANCE = MOST_CHANGE
 _HEADING_LIMIT = np.radians(50.0)  # a fitted vehicle may be turned from the template (after the rigid motion) by this on average
 _SHARPNESS_STEP = 0.25  # of the logarithm of a curvature: vehicles that differ by less share their ways
+_END = 3.0  # metres at both ends of a way, where footprints reach beyond the road's end
 _APEXES = np.arange(0.2, 0.81, 0.05)  # places along a road at which a U-turn is tried
 
 
@@ -124,18 +126,18 @@ def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[Way]]:
 def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool, sharpness: float | None = None) -> list[Way]:
     fits = partial(has_room, road, vehicle)
     everything: list[Way] = []
-    ring = ring_of(road)
+    through = ways_through(road)
     for e, entry in enumerate(road.entries):
         for x, leave in enumerate(road.exits):
-            curve = draw_ring_route(entry, leave, *ring, fits) if ring else draw_route(entry, leave, fits, sharpness)
-            if curve is not None:
-                everything.append(Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
-            elif u_turns:
+            way = through.get((e, x))
+            if way is None or not fits(way.cut(_END, way.length - _END).points):
+                way = draw_route(entry, leave, fits, sharpness)
+            curves = [] if way is None else [way]
+            if not curves and u_turns:
                 reach = max(float(np.hypot(*(other[:2] - entry[:2]))) for other in road.exits)
-                for apex in _APEXES * reach:
-                    curve = draw_u_turn(entry, leave, float(apex), fits)
-                    if curve is not None:
-                        everything.append(Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
+                drawn = (draw_u_turn(entry, leave, float(apex), fits) for apex in _APEXES * reach)
+                curves = [curve for curve in drawn if curve is not None]
+            everything += [Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])) for curve in curves]
     return everything
 
 
@@ -260,6 +262,13 @@ class _Laying:
         return np.asarray(motion + np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0])
 
 
+def _lanes_of(road: Road, ways: Iterable[Way]) -> list[int]:
+    """The lanes by which ways enter and leave a drawn junction."""
+    if road.lanes is None:
+        return []
+    return [k for way in ways for k in (road.lanes.entries[way.entry], road.lanes.exits[way.leave])]
+
+
 @kernel(F2, F3, OUTI2)
 def _nearest(points: Floats, samples: Floats, which: Ints) -> None:
     """Fill `which` (W, K) with the sample of each of W ways that is nearest to each of K points (K, 2) [m], the first of equals.
@@ -300,5 +309,5 @@ def _placed(
     notes.append(f"assignment chosen at a cost of {choice.cost:.1f} m²")
     refuse_lost_turns(tracks, tuple(placed), road.name)
     placement = Placement.of(tuple(placed), scale, notes, (manoeuvre_of(turn_of(track)) for track in placed))
-    unused = find_unused(road, [way.curve.points[k] for way in choice.ways.values() for k in (0, -1)])
+    unused = find_unused(road, _lanes_of(road, choice.ways.values()))
     return separated(replace(placement, unused=unused), config, sideways=0.0, own=tracks)

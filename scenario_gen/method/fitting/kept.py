@@ -12,7 +12,6 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
-from scenario_gen.roads import arms_of, unused_arms
 from scenario_gen.template import Conflict, find_conflicts, in_words, keeps, Track, turn_of, turns_to_keep
 from scenario_gen.types import Encounter, Loss, Road
 
@@ -83,13 +82,15 @@ def keeps_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> boo
     return {pair for pair, conflict in before.items() if not conflict.following} <= after.keys()
 
 
-def find_unused(road: Road, used: Iterable[Floats]) -> tuple[Loss, ...]:
-    """That arms of a junction are not used, given the poses (3,) at which vehicles' ways enter and leave it."""
-    arms, unused = len(arms_of(road)), len(unused_arms(road, used))
-    if not unused:
+def find_unused(road: Road, used: Iterable[int]) -> tuple[Loss, ...]:
+    """That arms of a drawn junction are not used, given the lanes that vehicles drive on."""
+    arms = road.lanes.arms if road.lanes is not None and road.lanes.drawn else {}
+    of_lane = {k: arm for arm, lanes in arms.items() for k in lanes}
+    unused = len(arms) - len({of_lane[k] for k in used if k in of_lane})
+    if len(arms) < 3 or not unused:
         return ()
     used_by_nobody = f"{'is' if unused == 1 else 'are'} not used: nobody in the template comes or goes there"
-    return (Loss("arm", (), f"{unused} of the {arms} arms of road {road.name} {used_by_nobody}"),)
+    return (Loss("arm", (), f"{unused} of the {len(arms)} arms of road {road.name} {used_by_nobody}"),)
 
 
 def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:

@@ -67,7 +67,8 @@ def test_lanes_do_not_depend_on_what_is_chosen(small_bag):
     everything = read_cases(small_bag)
     for case in read_cases(small_bag, indices=[1]):
         (same,) = [one for one in everything if one.number == case.number]
-        assert all(np.array_equal(a.left, b.left) for a, b in zip(*(one.lane_map.network.lanes for one in (case, same)), strict=True))
+        lanes = zip(case.lane_map.network.lanes, same.lane_map.network.lanes, strict=True)
+        assert all(np.array_equal(a.left, b.left) for a, b in lanes)
 
 
 def test_round_trips_close(small_bag, tmp_path):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapely import box, coverage_union_all, Polygon, union_all
+from shapely import box, coverage_union_all, make_valid, Polygon, union_all
 from small_scenarios import moving
 
 from scenario_gen.output.exchange.derived_lanes import derived_lanes, footprints, lane_map_of
@@ -18,7 +18,7 @@ from scenario_gen.types.lanes import LaneNetwork
 
 
 def area_of(lanes):
-    return union_all([Polygon(lane.outline) for lane in lanes])
+    return union_all([make_valid(Polygon(lane.outline)) for lane in lanes])
 
 
 def lanes_on(name, config, run_out=1.0):
@@ -60,7 +60,8 @@ def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
             assert step @ ahead > 0.99 * np.hypot(*step)
     lanes_each = 1 if name == "roundabout" else 2
     arms = len(road.exits) // lanes_each
-    ways = lanes_each * arms * (arms - 1) + (1 if name == "merge" else 0)  # the ramp leads to the outermost lane
+    more = {"merge": 1, "roundabout": arms}.get(name, 0)  # the ramp leads to the outermost lane; one may turn back
+    ways = lanes_each * arms * (arms - 1) + more
     assert sum(bool(lane_map.turn(k)) for k in range(len(lanes))) == ways
     for k, lane in enumerate(lanes):
         for other in lane.successors:
