@@ -13,10 +13,12 @@ depth 1.
 
 from collections.abc import Sequence
 import hashlib
+from typing import Any
 
 import numpy as np
 
-from msg_conventions.cdr import CdrWriter
+from msg_conventions.cdr import encode
+from msg_conventions.layouts import PREDICTED, TRACKED
 from msg_conventions.odometry import encode_odometry
 from msg_conventions.poses import pose_rows
 from scenario_gen.numerics import Floats
@@ -29,7 +31,6 @@ STEP_NS, HORIZON_NS = 500_000_000, 10_000_000_000
 CAR, TRUCK = 1, 2  # labels of ObjectClassification
 BOUNDING_BOX = 0  # type of Shape
 ORIENTATION_KNOWN = 2  # TrackedObjectKinematics.AVAILABLE
-_NO_COVARIANCE = bytes(36 * 8)
 
 
 def uuid_of(vehicle: Vehicle) -> bytes:
@@ -56,23 +57,14 @@ class AutowareEncoder:
 
     def predicted_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as PredictedObjects."""
-        here = self.present_at(k)
-        writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
-        for n in here:
-            self._object(writer, n, k)
-            _path(writer, self.poses[n, self._ahead(n, k)])
-            _shape(writer, self.scenario.vehicles[n])
-        return writer.finish()
+        objects = [self._object(n, k) | _predicted(self.poses[n, self._ahead(n, k)]) for n in self.present_at(k)]
+        return encode(PREDICTED, stamp=stamp_ns, frame_id=self.scenario.frame_id, objects=objects)
 
     def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as TrackedObjects."""
-        here = self.present_at(k)
-        writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
-        for n in here:
-            self._object(writer, n, k)
-            writer.pack("B", ORIENTATION_KNOWN, int(self.scenario.speed[n, k] == 0.0))
-            _shape(writer, self.scenario.vehicles[n])
-        return writer.finish()
+        still = self.scenario.speed[:, k] == 0.0
+        objects = [self._object(n, k) | {"orientation": ORIENTATION_KNOWN, "is_stationary": still[n]} for n in self.present_at(k)]
+        return encode(TRACKED, stamp=stamp_ns, frame_id=self.scenario.frame_id, objects=objects)
 
     def odometry(self, k: int, stamp_ns: int, n: int = 0) -> bytes:
         """Return vehicle `n` at instant `k` as the ego's Odometry."""
@@ -87,9 +79,9 @@ class AutowareEncoder:
         at = np.minimum(np.searchsorted(self.time_ns, wanted), last)
         return list(map(int, at))
 
-    def _object(self, writer: CdrWriter, n: int, k: int) -> None:
-        """Append id, existence, class and kinematics."""
-        _kinematics(writer, self.scenario.vehicles[n], self.poses[n, k], *self._rates(n, k))
+    def _object(self, n: int, k: int) -> dict[str, Any]:
+        """Return id, existence, class, kinematics and shape."""
+        return _object(self.scenario.vehicles[n], self.poses[n, k], *self._rates(n, k))
 
     def _rates(self, n: int, k: int) -> tuple[float, float, float]:
         """Return speed [m/s], acceleration [m/s²] and yaw rate [rad/s]."""
@@ -108,12 +100,11 @@ def encode_predicted_objects(
         frame_id: of the road.
         stamp_ns: now.
     """
-    writer = CdrWriter().header(stamp_ns, frame_id).pack("I", len(vehicles))
-    for vehicle, state, path in zip(vehicles, states, paths, strict=True):
-        _kinematics(writer, vehicle, _shape_poses(vehicle, state[None, :3])[0], *state[3:].tolist())
-        _path(writer, _shape_poses(vehicle, path))
-        _shape(writer, vehicle)
-    return writer.finish()
+    objects = [
+        _object(vehicle, _shape_poses(vehicle, state[None, :3]), *state[3:]) | _predicted(_shape_poses(vehicle, path))
+        for vehicle, state, path in zip(vehicles, states, paths, strict=True)
+    ]
+    return encode(PREDICTED, stamp=stamp_ns, frame_id=frame_id, objects=objects)
 
 
 def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp_ns: int) -> bytes:
@@ -122,21 +113,22 @@ def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp
     return encode_odometry(np.array([*axle, *state[2:4]]), float(state[5]), BASE_LINK, frame_id, stamp_ns)
 
 
-def _kinematics(writer: CdrWriter, vehicle: Vehicle, pose: Floats, speed: float, acceleration: float, rate: float) -> None:
-    """Append id, existence, class, pose (7,), twist and acceleration."""
-    writer.raw(uuid_of(vehicle)).pack("f", 1.0).pack("I", 1).pack("B", TRUCK if is_truck(vehicle) else CAR).pack("f", 1.0)
-    writer.pack("d", *pose).raw(_NO_COVARIANCE)
-    writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
-    writer.pack("d", acceleration, *[0.0] * 5).raw(_NO_COVARIANCE)
+def _object(vehicle: Vehicle, pose: Floats, speed: float, acceleration: float, rate: float) -> dict[str, Any]:
+    """Return what both messages say of a vehicle; `pose` (7,)."""
+    return {
+        "id": np.frombuffer(uuid_of(vehicle), dtype=np.uint8),
+        "existence": 1.0,
+        "classes": [{"label": TRUCK if is_truck(vehicle) else CAR, "probability": 1.0}],
+        "pose": pose,
+        "twist": (speed, 0.0, 0.0, 0.0, 0.0, rate),
+        "acceleration": (acceleration, 0.0, 0.0, 0.0, 0.0, 0.0),
+        "shape": {"type": BOUNDING_BOX, "dimensions": (vehicle.length, vehicle.width, height(vehicle))},
+    }
 
 
-def _path(writer: CdrWriter, poses: Floats) -> None:
-    """Append a single predicted path, of poses (K, 7)."""
-    writer.pack("I", 1).pack("I", len(poses)).align(8).raw(poses.tobytes()).stamp(STEP_NS).pack("f", 1.0)
-
-
-def _shape(writer: CdrWriter, vehicle: Vehicle) -> None:
-    writer.pack("B", BOUNDING_BOX).pack("I", 0).pack("d", vehicle.length, vehicle.width, height(vehicle))
+def _predicted(poses: Floats) -> dict[str, Any]:
+    """Return a single predicted path, of poses (K, 7)."""
+    return {"paths": [{"poses": poses, "step": STEP_NS, "confidence": 1.0}]}
 
 
 def _poses(scenario: Scenario, n: int) -> Floats:

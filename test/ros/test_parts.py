@@ -10,9 +10,10 @@ import pytest
 from rclpy.parameter import Parameter
 import yaml
 
-from msg_conventions.cdr import CdrWriter
+from msg_conventions.cdr import encode
 from msg_conventions.hashes import encode_hashes
 from msg_conventions.lanes import encode_lanes
+from msg_conventions.layouts import HEADER
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.worker import Worker
@@ -29,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def _message(stamp: int) -> bytes:
-    return CdrWriter().header(stamp, "map").finish()
+    return encode(HEADER, stamp=stamp, frame_id="map")
 
 
 def test_inputs_are_complete_only_with_equal_stamps():
@@ -52,7 +53,7 @@ def test_inputs_are_complete_only_with_equal_stamps():
 
 def test_inputs_are_complete_only_if_they_are_those_that_belong_together():
     inputs = Inputs(("tracks", "fit", "fit/info"), ("map",))
-    one, other = (CdrWriter().header(1, frame).finish() for frame in ("map", "odom"))
+    one, other = (encode(HEADER, stamp=1, frame_id=frame) for frame in ("map", "odom"))
     messages = {"tracks": _message(1), "map": one, "fit": _message(1)}
     for topic, data in messages.items():
         inputs.put(topic, data)
