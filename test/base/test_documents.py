@@ -18,39 +18,24 @@ from scenario_gen.pipeline import PipelineConfig
 
 NAMES = sorted(flatten(PipelineConfig()))
 TEXTS = [
-    "'",
-    "...",
-    "!!timestamp x",
-    "2024-99-99",
-    "<<: *a",
-    "%YAML 9.9",
-    "!!pairs [a]",
-    "!!omap [a]",
-    "\t",
-    "!!bool x",
-    '!!int ""',
+    *(
+        "'",
+        "...",
+        "!!timestamp x",
+        "2024-99-99",
+        "<<: *a",
+        "%YAML 9.9",
+        "!!pairs [a]",
+        "!!omap [a]",
+        "\t",
+        "!!bool x",
+        "*a",
+        "%s%n",
+    ),
+    *("a: &a {b: *a}", "{a: [}", "!<tag:yaml.org,2002:python/name:os.system> x", "\x1b", "!!float x", "!!map [a]", "!!set {a}"),
+    *("!!binary a", '!!int ""'),
 ]
-TEXTS += [
-    "9" * 5000,
-    "0x" + "f" * 5000,
-    "a: &a {b: *a}",
-    "{a: [}",
-    "!<tag:yaml.org,2002:python/name:os.system> x",
-    "\x1b",
-    "!!float x",
-]
-TEXTS += [
-    "? [a]\n: b",
-    "[" * 5000,
-    "a" * 2_000_000,
-    "\ud800",
-    "!!map [a]",
-    "--- a\n--- b",
-    "!!set {a}",
-    "!!binary a",
-    "%s%n",
-    "*a",
-]
+TEXTS += ["9" * 5000, "0x" + "f" * 5000, "? [a]\n: b", "[" * 5000, "a" * 2_000_000, "\ud800", "--- a\n--- b"]
 
 
 @pytest.mark.parametrize("file", crash_files("params/*", "params_*", "deep.yaml", "map_alias*"), indirect=True)
