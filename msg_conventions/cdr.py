@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from msg_conventions.layouts import Layout
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats
 
 HEADER = b"\x00\x01\x00\x00"  # encapsulation: CDR, little-endian, no options
 NANOSECONDS = 1_000_000_000
@@ -159,10 +158,6 @@ class CdrReader:
         """Read `count` items (n,) of a numpy type, the first one aligned; nothing (no padding either) if `count` is 0."""
         kind = np.dtype(dtype)
         return np.frombuffer(self._take(kind.itemsize * count, alignment) if count else b"", dtype=kind, count=count)
-
-    def floats(self, count: int) -> Floats:
-        """Read `count` float64 (n,), of any unit, that belong to one or more structures."""
-        return self.array("<f8", count, 8)
 
     def string(self) -> str:
         """Read a string.

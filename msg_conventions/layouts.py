@@ -31,7 +31,7 @@ STATUS: Layout = {"level": "u1", "name": "string", "message": "string", "hardwar
 DIAGNOSTICS = HEADER | {"statuses": [STATUS]}
 
 POINT: Layout = {"transforms": [POSE], "velocities": [TWIST], "accelerations": [TWIST], "time": "time"}
-TRAJECTORY = HEADER | {"names": ["string"], "points": [POINT]}
+TRAJECTORY = HEADER | {"names": ["string"], "count": "u4"}  # then as many points
 
 CLOUD_FIELD: Layout = {"name": "string", "offset": "u4", "datatype": "u1", "count": "u4"}
 CLOUD = HEADER | {"size": "2u4", "fields": [CLOUD_FIELD], "is_bigendian": "u1", "steps": "2u4", "data": ["u1"], "is_dense": "u1"}

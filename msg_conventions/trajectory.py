@@ -30,7 +30,6 @@ FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
 FASTEST = 1e4  # m/s: no vehicle is faster, and sums of squares stay finite
 MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
 LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
-BEGIN = layouts.HEADER | {"names": ["string"], "count": "u4"}  # of points
 SEQUENCES = {"transforms": 7, "velocities": 6, "accelerations": 6}  # of a point, and the numbers of an entry
 SMALLEST, LARGEST = 0.01, 1000.0  # metres of a footprint
 ABSENT = -1000.0  # m: z of a vehicle that is not there
@@ -107,7 +106,7 @@ def encode(trajectory: Trajectory) -> bytes:
     if not all(np.isfinite(value).all() for value in values):
         raise InputError("a trajectory with a value that is not finite cannot be sent")
     stamp, frame, names = trajectory.stamp_ns, trajectory.frame_id, joint_names(trajectory.vehicles)
-    begin = encode_fields(BEGIN, stamp=stamp, frame_id=frame, names=names, count=count)
+    begin = encode_fields(layouts.TRAJECTORY, stamp=stamp, frame_id=frame, names=names, count=count)
     points = np.zeros(count, dtype=_point_type(n))
     for name in SEQUENCES:
         points["n_" + name] = n
@@ -139,9 +138,9 @@ def decode_first(data: bytes, what: str) -> tuple[Trajectory, int]:
         InputError: as `decode`.
     """
     reader = CdrReader(data, what)
-    head = reader.fields(layouts.HEADER, framed=True)
-    vehicles = tuple(vehicle_of(reader.string()) for _ in range(reader.count()))
-    n, count = len(vehicles), reader.count(20)
+    head = reader.fields(layouts.TRAJECTORY, framed=True)
+    vehicles = tuple(map(vehicle_of, head.names))
+    n, count = len(vehicles), head.count
     if not n:
         raise InputError(f"{what}: joint_names is empty; at least one vehicle is needed")
     time_ns, pose, velocity, acceleration = _uniform(reader, n, count) or _one_by_one(reader, what, n, count)
