@@ -42,14 +42,15 @@ class AutowareEncoder:
     """Encodes a scenario's instants, one after the other."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Take the scenario and compute its poses and yaw rates once."""
+        """Take the scenario and compute its vehicles' states (N, T, 6), as `encode_predicted_objects` takes them, once."""
         self.scenario = scenario
-        self.yaw_rate = np.zeros_like(scenario.heading)
         self.time_ns = np.rint(scenario.time * 1e9).astype(np.int64)
-        self.poses = np.stack([_poses(scenario, n) for n in range(len(scenario.vehicles))])
+        rate = np.zeros_like(scenario.heading)
         for n, (first, last) in enumerate(scenario.present.tolist()):
             there = slice(first, last + 1)
-            self.yaw_rate[n, there] = np.gradient(scenario.heading[n, there], scenario.time[there])
+            rate[n, there] = np.gradient(scenario.heading[n, there], scenario.time[there])
+        rest = (scenario.heading, scenario.speed, scenario.acceleration, rate)
+        self.states = np.concatenate((scenario.position, np.stack(rest, axis=-1)), axis=-1)
 
     def present_at(self, k: int) -> list[int]:
         """Return the vehicles that are present at instant `k`."""
@@ -57,35 +58,28 @@ class AutowareEncoder:
 
     def predicted_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as PredictedObjects."""
-        objects = [self._object(n, k) | _predicted(self.poses[n, self._ahead(n, k)]) for n in self.present_at(k)]
-        return encode(PREDICTED, stamp=stamp_ns, frame_id=self.scenario.frame_id, objects=objects)
+        here, frame = self.present_at(k), self.scenario.frame_id
+        vehicles, paths = [self.scenario.vehicles[n] for n in here], [self.states[n, self._ahead(n, k), :3] for n in here]
+        return encode_predicted_objects(vehicles, self.states[here, k], paths, frame, stamp_ns)
 
     def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as TrackedObjects."""
-        still = self.scenario.speed[:, k] == 0.0
-        objects = [self._object(n, k) | {"orientation": ORIENTATION_KNOWN, "is_stationary": still[n]} for n in self.present_at(k)]
+        objects = [
+            _object(self.scenario.vehicles[n], self.states[n, k])
+            | {"orientation": ORIENTATION_KNOWN, "is_stationary": self.scenario.speed[n, k] == 0.0}
+            for n in self.present_at(k)
+        ]
         return encode(TRACKED, stamp=stamp_ns, frame_id=self.scenario.frame_id, objects=objects)
 
     def odometry(self, k: int, stamp_ns: int, n: int = 0) -> bytes:
         """Return vehicle `n` at instant `k` as the ego's Odometry."""
-        scenario = self.scenario
-        pose = (*scenario.position[n, k], scenario.heading[n, k], *self._rates(n, k))
-        return encode_kinematic_state(scenario.vehicles[n], np.array(pose), scenario.frame_id, stamp_ns)
+        return encode_kinematic_state(self.scenario.vehicles[n], self.states[n, k], self.scenario.frame_id, stamp_ns)
 
     def _ahead(self, n: int, k: int) -> list[int]:
         """Return the instants of the predicted path from `k` on: those at whole steps, while the vehicle is there."""
         last = int(self.scenario.present[n, 1])
         wanted = np.arange(self.time_ns[k], min(self.time_ns[last], self.time_ns[k] + HORIZON_NS) + 1, STEP_NS)
-        at = np.minimum(np.searchsorted(self.time_ns, wanted), last)
-        return list(map(int, at))
-
-    def _object(self, n: int, k: int) -> dict[str, Any]:
-        """Return id, existence, class, kinematics and shape."""
-        return _object(self.scenario.vehicles[n], self.poses[n, k], *self._rates(n, k))
-
-    def _rates(self, n: int, k: int) -> tuple[float, float, float]:
-        """Return speed [m/s], acceleration [m/s²] and yaw rate [rad/s]."""
-        return float(self.scenario.speed[n, k]), float(self.scenario.acceleration[n, k]), float(self.yaw_rate[n, k])
+        return [int(at) for at in np.minimum(np.searchsorted(self.time_ns, wanted), last)]
 
 
 def encode_predicted_objects(
@@ -101,7 +95,7 @@ def encode_predicted_objects(
         stamp_ns: now.
     """
     objects = [
-        _object(vehicle, _shape_poses(vehicle, state[None, :3]), *state[3:]) | _predicted(_shape_poses(vehicle, path))
+        _object(vehicle, state) | {"paths": [{"poses": _shape_poses(vehicle, path), "step": STEP_NS, "confidence": 1.0}]}
         for vehicle, state, path in zip(vehicles, states, paths, strict=True)
     ]
     return encode(PREDICTED, stamp=stamp_ns, frame_id=frame_id, objects=objects)
@@ -113,31 +107,22 @@ def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp
     return encode_odometry(np.array([*axle, *state[2:4]]), float(state[5]), BASE_LINK, frame_id, stamp_ns)
 
 
-def _object(vehicle: Vehicle, pose: Floats, speed: float, acceleration: float, rate: float) -> dict[str, Any]:
-    """Return what both messages say of a vehicle; `pose` (7,)."""
+def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
+    """Return what both messages say of a vehicle; `state` (6,) as in `encode_kinematic_state`."""
+    _, _, _, speed, acceleration, rate = state.tolist()
     return {
         "id": np.frombuffer(uuid_of(vehicle), dtype=np.uint8),
         "existence": 1.0,
         "classes": [{"label": TRUCK if is_truck(vehicle) else CAR, "probability": 1.0}],
-        "pose": pose,
+        "pose": _shape_poses(vehicle, state[None, :3]),
         "twist": (speed, 0.0, 0.0, 0.0, 0.0, rate),
         "acceleration": (acceleration, 0.0, 0.0, 0.0, 0.0, 0.0),
         "shape": {"type": BOUNDING_BOX, "dimensions": (vehicle.length, vehicle.width, height(vehicle))},
     }
 
 
-def _predicted(poses: Floats) -> dict[str, Any]:
-    """Return a single predicted path, of poses (K, 7)."""
-    return {"paths": [{"poses": poses, "step": STEP_NS, "confidence": 1.0}]}
-
-
-def _poses(scenario: Scenario, n: int) -> Floats:
-    """Return (T, 7) poses of a vehicle's shape, as on the wire."""
-    return _shape_poses(scenario.vehicles[n], np.column_stack([scenario.position[n], scenario.heading[n]]))
-
-
 def _shape_poses(vehicle: Vehicle, poses: Floats) -> Floats:
     """Return (K, 7) poses of a vehicle's shape, as on the wire, of poses (K, 3) x, y [m], yaw [rad]."""
     rows = pose_rows(poses)
     rows[:, 2] = height(vehicle) / 2.0
-    return np.ascontiguousarray(rows)
+    return rows

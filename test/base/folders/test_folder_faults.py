@@ -53,7 +53,7 @@ class Case:
         assert [path.name for path in target.parent.iterdir()] == ["out"]
 
 
-EVERY = 1 if LONG else 3
+EVERY = 1 if LONG else 4
 CASES = {"texts": (write_texts, True), "nothing_there": (write_texts, False), "bag": (write_bag, True)}
 
 
