@@ -10,13 +10,14 @@ from pathlib import Path
 import re
 from time import process_time
 
+from benchmarks._linear_pieces import linear_changepoints
 from benchmarks._size import sized
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import evaluate_scenarios, replay
-from scenario_gen.method.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
+from scenario_gen.method.evaluation.references import uniform_changepoints, without_changepoints
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput

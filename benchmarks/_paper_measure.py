@@ -8,11 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from benchmarks._linear_pieces import linear_changepoints
 from benchmarks._paper_chain import LENGTH, NOISE, place, rotation, sample, Sampled, SIGMA
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.evaluation import (
     Bootstrap,
-    linear_changepoints,
     mean_correlation,
     mean_error,
     pair_similarities,

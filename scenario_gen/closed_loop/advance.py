@@ -5,10 +5,11 @@
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, WORLD, World
+from scenario_gen.closed_loop.certified import pose_at, WORLD, World
 from scenario_gen.closed_loop.driver import ACCELERATION, CLOCK, EGO_CLOCK, HELD, MANNER, Manner, RATE, WAITED
 from scenario_gen.closed_loop.others import react
 from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B, B1, F, F1, F2, I, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
@@ -139,7 +140,7 @@ def at_goal(goal: Floats, beside: float, stays: bool, pose: Floats) -> bool:
 
 
 @kernel(F2, F2, B1, I)
-def overlaps(vehicles: Floats, half: Floats, here: Bools, ego: int) -> bool:
+def ego_hits(vehicles: Floats, half: Floats, here: Bools, ego: int) -> bool:
     """Whether the ego overlaps another that is here; vehicles (N, 4) x, y, yaw, speed, half sizes (N, 2)."""
     mine, other = np.empty(7), np.empty(7)
     fill_box(vehicles[ego, 0], vehicles[ego, 1], vehicles[ego, 2], half[ego, 0], half[ego, 1], mine)

@@ -18,6 +18,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, frozen
+from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT3
 from scenario_gen.template import conflict_of, lag_behind
 from scenario_gen.types import Scenario, tokens, yielders_of
@@ -109,7 +110,7 @@ def certified(scenario: Scenario, ego: int | str) -> Certified:
     speed, yaw = scenario.speed, scenario.heading
     velocity = speed[..., None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
     motion = frozen(np.concatenate([scenario.position, yaw[..., None], speed[..., None], velocity], axis=2))
-    half = frozen([(0.5 * vehicle.length, 0.5 * vehicle.width) for vehicle in scenario.vehicles])
+    half = frozen([vehicle.half for vehicle in scenario.vehicles])
     n, count = len(ids), int(np.ceil(time[-1] / CELL - 1e-9))
     cells, order = np.empty((n, count, 8)), np.empty((n, n, count))
     spans = frozen(time[scenario.present])
@@ -165,28 +166,6 @@ def pose_at(time: Floats, motion: Floats, clock: float, out: Floats) -> None:
     out[2] = a[2] + u * (b[2] - a[2])
     out[3] = a[3] + u * (b[3] - a[3])
     out[4] = (b[3] - a[3]) / h
-
-
-@kernel(inline=True)
-def boxes_meet(a: Floats, b: Floats) -> bool:
-    """Whether two boxes (7,) overlap: each x, y [m], cos, sin, half length, half width, radius [m]. Source: separating axes."""
-    dx, dy, reach = b[0] - a[0], b[1] - a[1], a[6] + b[6]
-    if dx * dx + dy * dy >= reach * reach:
-        return False
-    cos, sin = abs(a[2] * b[2] + a[3] * b[3]), abs(a[2] * b[3] - a[3] * b[2])
-    return bool(
-        abs(dx * a[2] + dy * a[3]) < a[4] + b[4] * cos + b[5] * sin
-        and abs(dy * a[2] - dx * a[3]) < a[5] + b[4] * sin + b[5] * cos
-        and abs(dx * b[2] + dy * b[3]) < b[4] + a[4] * cos + a[5] * sin
-        and abs(dy * b[2] - dx * b[3]) < b[5] + a[4] * sin + a[5] * cos
-    )
-
-
-@kernel(inline=True)
-def fill_box(x: float, y: float, yaw: float, length: float, width: float, out: Floats) -> None:
-    """Write a box of half sizes `length` and `width` [m] at a pose [m, rad] into `out` (7,), as `boxes_meet` takes it."""
-    out[0], out[1], out[2], out[3] = x, y, np.cos(yaw), np.sin(yaw)
-    out[4], out[5], out[6] = length, width, np.sqrt(length * length + width * width)
 
 
 FAR = 1e15  # metres; where the boxes are of a vehicle that is not on the scene

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
+from scenario_gen.closed_loop.certified import pose_at, World
 from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B, F, I1, kernel, named
 
 AHEAD = 60.0  # metres of its path that it looks along for who is ahead

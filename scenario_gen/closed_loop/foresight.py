@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
+from scenario_gen.closed_loop.certified import pose_at, World
 from scenario_gen.closed_loop.driver import EGO_CLOCK, EGO_RATE, FREE, Manner, ON_PATH, rate_after, Self
 from scenario_gen.closed_loop.order import limit, PARTS
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
 
 SLOW = 0.2  # m/s; a certified speed below it counts as this one where it divides

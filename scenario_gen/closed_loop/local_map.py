@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.closed_loop.certified import fill_box
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics.boxes import fill_box
 from scenario_gen.numerics.kernels import B1, F1, F2, I, kernel, OUTB2
 
 REACH = 30.0  # metres from the ego to each side of the grid

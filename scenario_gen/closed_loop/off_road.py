@@ -17,7 +17,7 @@ from scenario_gen.method.validity import containment as inside
 from scenario_gen.method.validity import control_points
 from scenario_gen.numerics import Bools, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
-from scenario_gen.roads import blocked_before, clearance_in_cells, distance_transform, to_cells
+from scenario_gen.roads import clearance_in_cells, distance_transform, to_cells
 from scenario_gen.types import once_per_object, Road, Scenario
 
 FARTHEST = 10.0  # metres; margins and depths beyond are told as this
@@ -51,18 +51,8 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
     vehicle = motion.vehicles[drive.ego]
     control, out = np.empty((1, len(motion.time) - 1, 4, 2)), np.empty((1, 2))
     control_points(motion.time, motion.position[ego], motion.heading[ego], motion.speed[ego], control)
-    half = (0.5 * vehicle.length, 0.5 * vehicle.width)
-    inside.first_exits(
-        motion.time,
-        control,
-        motion.heading[ego],
-        np.array([half]),
-        clearance_in_cells(road),
-        blocked_before(road),
-        np.array((*road.origin, road.resolution)),
-        RESOLUTION,
-        out,
-    )
+    half = vehicle.half
+    inside.first_exits(motion.time, control, motion.heading[ego], np.array([half]), inside.Ground.of(road), RESOLUTION, out)
     if out[0, 0] == inside.PROVEN:
         poses = np.column_stack([motion.position[drive.ego], motion.heading[drive.ego]])
         room = _measured(road, poses, half, outside=False)[:, 0].min()

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
+from scenario_gen.closed_loop.certified import pose_at, World
 from scenario_gen.closed_loop.driver import (
     ACCELERATION,
     CLOCK,
@@ -39,6 +39,7 @@ from scenario_gen.closed_loop.driver import (
 from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, FORESEEN, Foreseen, weakest
 from scenario_gen.closed_loop.order import keep_order, limit
 from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
 
 CREEP = 0.5  # m/s; the foresight lets everyone creep, so that nobody waits for one who waits for it; who is slower waits

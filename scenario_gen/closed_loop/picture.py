@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.boxes import corners
 
 SIZE = 400  # pixels of each side
 SCALE = 4.0  # pixels a metre
@@ -27,9 +28,9 @@ def picture(loop: ClosedLoop, state: State) -> npt.NDArray[np.uint8]:
         draw.line(_pixels(task.route[:, :2], centre), fill=ROUTE, width=2)
     found = loop.observe(state)
     for pose, size in zip(found.others, found.sizes, strict=True):
-        draw.polygon(_pixels(_corners(pose[:3], *size[:2].tolist()), centre), fill=OTHER)
+        draw.polygon(_pixels(corners(pose[None, :3], *size[:2].tolist())[0], centre), fill=OTHER)
     body = loop.scenario.vehicles[loop.ego]
-    draw.polygon(_pixels(_corners(np.array((ego.x, ego.y, ego.yaw)), body.length, body.width), centre), fill=EGO)
+    draw.polygon(_pixels(corners(np.array([(ego.x, ego.y, ego.yaw)]), body.length, body.width)[0], centre), fill=EGO)
     return np.asarray(image, dtype=np.uint8)
 
 
@@ -46,15 +47,6 @@ def _ground(loop: ClosedLoop, centre: Floats) -> npt.NDArray[np.uint8]:
         cells = loop.road.drivable[np.ix_(row.clip(0, height - 1), column.clip(0, width - 1))]
         pixels[inside & cells] = ASPHALT
     return pixels
-
-
-def _corners(pose: Floats, length: float, width: float) -> Floats:
-    """Return the corners (4, 2) in metres of a footprint at x, y, yaw."""
-    x, y, yaw = pose.tolist()
-    ahead = np.array((float(np.cos(yaw)), float(np.sin(yaw))))
-    left = np.array((-ahead[1], ahead[0]))
-    signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))
-    return np.array([(x, y) + 0.5 * (a * length * ahead + b * width * left) for a, b in signs])
 
 
 def _pixels(points: Floats, centre: Floats) -> list[tuple[float, float]]:

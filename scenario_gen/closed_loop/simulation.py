@@ -15,7 +15,7 @@ from zlib import crc32
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.closed_loop.advance import advance, at_goal, overlaps
+from scenario_gen.closed_loop.advance import advance, at_goal, ego_hits
 from scenario_gen.closed_loop.certified import CELL, Certified, certified, World
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.driver import Manner
@@ -290,7 +290,7 @@ class ClosedLoop:
 
     def hit(self, state: State) -> bool:
         """Whether the ego overlaps another at this instant."""
-        return bool(overlaps(state.vehicles, self.certified.half, state.here, self.ego))
+        return bool(ego_hits(state.vehicles, self.certified.half, state.here, self.ego))
 
     def off_road(self, state: State) -> bool:
         """Whether the ego's footprint covers a cell that is not drivable at this instant; False if no road is known."""

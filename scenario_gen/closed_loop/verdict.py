@@ -221,7 +221,7 @@ def _contact(drive: Drive, i: int, j: int) -> float | None:
     heading, speed = motion.heading[pair][:, span], motion.speed[pair][:, span]
     control, out = np.empty((2, len(time) - 1, 4, 2)), np.empty((1, 3))
     control_points(time, position, heading, speed, control)
-    half = np.array([(0.5 * motion.vehicles[k].length, 0.5 * motion.vehicles[k].width) for k in pair])
+    half = np.array([motion.vehicles[k].half for k in pair])
     apart.first_contacts(time, control, heading, half, 0.0, RESOLUTION, out)
     return (
         None if out[0, 0] == apart.PROVEN else _first(drive, pair, float(out[0, 1]), lambda m: footprint_distance(m, 0, 1) <= 0.0)

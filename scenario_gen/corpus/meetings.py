@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import FASTEST, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
 from scenario_gen.logs import APART, METRES_PER_SECOND_APART, shortest
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.kernels import F, F1, I, I1, kernel
+from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, named
 
 BIN = 500_000  # µs
 SPREAD = 0.0006  # degrees, 65 m or so, between two messages of one vehicle in one bin: further, and there are two of them
@@ -250,25 +250,29 @@ def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bo
     kept = np.zeros(len(pairs["a"]), dtype=bool)
     for k, (a, b, first, last) in enumerate(zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)):
         wide = LONGITUDE * np.cos(float(rows["lat"][own[a]][0]) * np.pi / 180.0)
-        one, other = ((rows["bin"][own[n]], north[own[n]], rows["lon"][own[n]]) for n in (a, b))
-        kept[k] = _least_apart(*one, *other, wide, first, last, steps) <= reach * reach
+        one, other = (_Sent(rows["bin"][own[n]], north[own[n]], rows["lon"][own[n]]) for n in (a, b))
+        kept[k] = _least_apart(one, other, wide, first, last, steps) <= reach * reach
     return kept
 
 
-@kernel(I1, F1, F1, I1, F1, F1, F, I, I, I)
-def _least_apart(
-    bins: Ints,
-    north: Floats,
-    lon: Floats,
-    others: Ints,
-    norths: Floats,
-    lons: Floats,
-    wide: float,
-    first: int,
-    last: int,
-    steps: int,
-) -> float:
-    """Square of how near [m²] one, at bins (M,) from first to last, comes to another, at bins (N,) at most `steps` away."""
+class _Sent(NamedTuple):
+    """Where a vehicle is in bins (M,) in which it sends: how far north [m] and at which longitude [degrees]."""
+
+    bins: Ints
+    north: Floats
+    lon: Floats
+
+
+_SENT = named(_Sent, I1, F1, F1)
+
+
+@kernel(_SENT, _SENT, F, I, I, I)
+def _least_apart(one: _Sent, other: _Sent, wide: float, first: int, last: int, steps: int) -> float:
+    """Square of how near [m²] one, in bins from first to last, comes to the other, at most `steps` bins away.
+
+    `wide` is the length of a degree of longitude [m].
+    """
+    bins, others = one.bins, other.bins
     least = np.inf
     begin = 0
     for m in range(len(bins)):
@@ -278,7 +282,7 @@ def _least_apart(
             begin += 1
         n = begin
         while n < len(others) and others[n] <= bins[m] + steps:
-            up, right = north[m] - norths[n], lon[m] * wide - lons[n] * wide
+            up, right = one.north[m] - other.north[n], (one.lon[m] - other.lon[n]) * wide
             least = min(least, up * up + right * right)
             n += 1
     return least

@@ -10,7 +10,7 @@ import math
 import numpy as np
 import shapely
 
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics.boxes import corners
 from scenario_gen.types import Encounter, together
 
 
@@ -147,19 +147,11 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
     )
 
 
-def footprints(encounter: Encounter, vehicle: int) -> Floats:
-    """Return the corners (T, 4, 2) [m] of a vehicle's footprint, counter-clockwise from the rear right."""
-    body = encounter.vehicles[vehicle]
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [body.length / 2.0, body.width / 2.0]
-    cos, sin = np.cos(encounter.heading[vehicle]), np.sin(encounter.heading[vehicle])
-    turn = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
-    turned: Floats = corners @ np.swapaxes(turn, 1, 2) + encounter.position[vehicle][:, None, :]
-    return turned
-
-
 def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
     """Return the pairs whose footprints overlap at some sample, with the share of their common samples and the largest area."""
-    polygons = [shapely.polygons(footprints(encounter, n)) for n in range(len(encounter.vehicles))]
+    poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
+    footprints = [corners(poses[n], vehicle.length, vehicle.width) for n, vehicle in enumerate(encounter.vehicles)]
+    polygons = [shapely.polygons(each) for each in footprints]
     overlaps = []
     for a, b in combinations(range(len(polygons)), 2):
         area = shapely.area(shapely.intersection(polygons[a], polygons[b]))

@@ -18,9 +18,9 @@ from scenario_gen.method.sampling import Cancelled, TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, suitable_roads, with_suitable_roads
 from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import draw_route, footprint_fits, nearest_pose_with_room, road_and_template
-from scenario_gen.template import footprint_gap
 from scenario_gen.types import Encounter, ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
 
 BISECTIONS = 7
@@ -217,7 +217,7 @@ class _Search:
         others = [m for m in range(len(rows)) if m != n and not np.isnan(rows[m, 0])]
 
         def gap(pose: Floats) -> float:
-            gaps = [footprint_gap(vehicles[n], pose[None], vehicles[m], rows[[m]])[0][0] for m in others]
+            gaps = [footprint_gaps(vehicles[n].half, pose[None], vehicles[m].half, rows[[m]])[0][0] for m in others]
             return float(min(gaps, default=np.inf))
 
         state = request.states(end)[name]

@@ -35,13 +35,6 @@ def place(poses: Floats, ahead: Floats | float, left: Floats | float) -> Floats:
     return np.stack((x + ahead * cos - left * sin, y + ahead * sin + left * cos), axis=-1)
 
 
-def corners(poses: Floats, length: float, width: float) -> Floats:
-    """Return the corners (M, 4, 2) [m] of footprints at poses (M, 3), counter-clockwise from the front left one."""
-    ahead = np.array([1.0, -1.0, -1.0, 1.0]) * length / 2.0
-    left = np.array([1.0, 1.0, -1.0, -1.0]) * width / 2.0
-    return place(poses[:, None], ahead, left)
-
-
 def edge_lengths(points: Floats) -> Floats:
     """Return the lengths (M - 1,) [m] of the edges of a polyline (M, 2) [m]."""
     step = np.diff(points, axis=0)

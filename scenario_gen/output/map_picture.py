@@ -4,14 +4,15 @@
 """A map as a picture (SVG): its lanes and their directions, junctions, arms, and the places where a template fits."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import islice
 from xml.sax.saxutils import escape
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, runs
+from scenario_gen.numerics.plane import unit
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
 from scenario_gen.template import clean_tracks
 from scenario_gen.types import Encounter, LaneNetwork, Road, RuleKind
@@ -135,19 +136,12 @@ def _picture_of_grid(road: Road) -> str:
     """Draw the rows of drivable cells, and the entries and exits."""
     height, width = road.drivable.shape
     sheet = _Sheet(road.origin, road.origin + np.array([width, height]) * road.resolution)
-    for row, (first, stop) in _strips(road):
+    for row, (first, stop) in ((row, run) for row, cells in enumerate(road.drivable) for run in runs(cells)):
         x0, x1 = (road.origin[0] + edge * road.resolution for edge in (first, stop))
         y0, y1 = (road.origin[1] + edge * road.resolution for edge in (row, row + 1))
         sheet.shape("polygon", np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), fill="#d4d9e2")
     for kind, poses in (("in", road.entries), ("out", road.exits)):
         for x, y, yaw in poses:
-            line = np.array([(x, y), (x + np.cos(float(yaw)), y + np.sin(float(yaw)))])
-            _arrow(sheet, line, 0, kind)
+            start = np.array((x, y))
+            _arrow(sheet, np.stack([start, start + unit(float(yaw))]), 0, kind)
     return sheet.svg(road.name)
-
-
-def _strips(road: Road) -> Iterable[tuple[int, tuple[int, int]]]:
-    """Yield the runs of drivable cells by row."""
-    for row, cells in enumerate(road.drivable):
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], cells, [False])).astype(np.int8)))
-        yield from ((row, (int(a), int(b))) for a, b in edges.reshape(-1, 2))

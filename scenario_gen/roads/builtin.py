@@ -9,7 +9,8 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.numerics.plane import corners, unit
+from scenario_gen.numerics.boxes import corners
+from scenario_gen.numerics.plane import unit
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, LANE_GAP, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track

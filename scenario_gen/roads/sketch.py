@@ -11,8 +11,9 @@ from PIL import Image, ImageDraw
 from scipy import ndimage
 
 from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import corners, unit, unit_left
+from scenario_gen.numerics.plane import unit, unit_left
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.types import Road
 

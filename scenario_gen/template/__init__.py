@@ -19,7 +19,7 @@ from scenario_gen.template.interaction import (
 from scenario_gen.template.manoeuvre import in_words, keeps, manoeuvre_of, MOST_CHANGE, sharpness_of, turn_of, turns_to_keep
 from scenario_gen.template.path_crossing import pair_crossings, path_crossing
 from scenario_gen.template.reactions import reactions_of
-from scenario_gen.template.separation import footprint_gap, least_gap, least_gaps, own_paths, separate, smallest_gaps
+from scenario_gen.template.separation import least_gap, least_gaps, own_paths, separate, smallest_gaps
 from scenario_gen.template.side import mirrored, traffic_side
 from scenario_gen.template.size import MOST_SAMPLES, MOST_VEHICLES, refuse_too_large
 from scenario_gen.template.starts import Equation, solve_starts
@@ -43,7 +43,6 @@ __all__ = [
     "conflict_of",
     "find_conflicts",
     "find_waits",
-    "footprint_gap",
     "in_words",
     "keeps",
     "lag_behind",

@@ -19,6 +19,7 @@ from scipy import ndimage
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, Ints, runs
+from scenario_gen.numerics.boxes import Box, box_gap
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
 from scenario_gen.types import ALWAYS, Encounter, once_per_object, Segmentation, Vehicle
 
@@ -223,16 +224,10 @@ def _block_circles(poses: Floats) -> Floats:
 
 
 @kernel(inline=True)
-def _boxes_meet(dx: float, dy: float, ca: float, sa: float, half_a: Size, cb: float, sb: float, half_b: Size) -> bool:
-    """True if two boxes of half length and width `half_*`, centres (dx, dy) apart, overlap (separating axes)."""
-    (la, wa), (lb, wb) = half_a, half_b
-    cos, sin = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)
-    return (
-        abs(dx * ca + dy * sa) < la + lb * cos + wb * sin - DEPTH
-        and abs(dy * ca - dx * sa) < wa + lb * sin + wb * cos - DEPTH
-        and abs(dx * cb + dy * sb) < lb + la * cos + wa * sin - DEPTH
-        and abs(dy * cb - dx * sb) < wb + la * sin + wa * cos - DEPTH
-    )
+def _boxes_meet(a: Floats, half_a: Size, b: Floats, half_b: Size) -> bool:
+    """True if two boxes at poses (t, x, y, cos, sin) overlap by more than DEPTH."""
+    one, other = Box(a[1], a[2], a[3], a[4], half_a[0], half_a[1]), Box(b[1], b[2], b[3], b[4], half_b[0], half_b[1])
+    return box_gap(one, other) < -DEPTH
 
 
 @kernel(inline=True)
@@ -246,7 +241,7 @@ def _meets_sweep(pose: Floats, half: Size, poses: Floats, circles: Floats, other
             continue
         for i in range(b * BLOCK, min(poses.shape[0], (b + 1) * BLOCK)):
             dx, dy = poses[i, 1] - x, poses[i, 2] - y
-            if dx * dx + dy * dy < reach * reach and _boxes_meet(dx, dy, pose[3], pose[4], half, poses[i, 3], poses[i, 4], other):
+            if dx * dx + dy * dy < reach * reach and _boxes_meet(pose, half, poses[i], other):
                 return True
     return False
 
@@ -312,8 +307,7 @@ def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: 
         last = max(near, 0)
         if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < np.cos(FOLLOWING_ANGLE):
             continue
-        dx, dy = b[near, 1] - a[i, 1], b[near, 2] - a[i, 2]
-        if _boxes_meet(dx, dy, a[i, 3], a[i, 4], half_a, b[near, 3], b[near, 4], half_b):
+        if _boxes_meet(a[i], half_a, b[near], half_b):
             shared += step
             lead += step * np.sign(b[near, 0] - a[i, 0])
     return shared, lead

@@ -12,10 +12,11 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import ahead_and_left, unit
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types import Encounter, once_per_object, together, Vehicle
+from scenario_gen.types import Encounter, once_per_object, together
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path
@@ -34,40 +35,6 @@ class Separation:
     tracks: tuple[Track, ...]
     moved: Floats
     notes: tuple[str, ...]
-
-
-def _reach(vehicle: Vehicle, turned: Floats) -> Floats:
-    """(T,) half the width of a footprint, turned by these angles, along an axis."""
-    return vehicle.length / 2.0 * np.abs(np.cos(turned)) + vehicle.width / 2.0 * np.abs(np.sin(turned))
-
-
-def footprint_gap(a: Vehicle, poses_a: Floats, b: Vehicle, poses_b: Floats) -> tuple[Floats, Floats]:
-    """Signed gap of two oriented footprints by the separating-axis theorem.
-
-    Source: separating axes (Gottschalk, Lin & Manocha 1996).
-
-    Args:
-        a: first footprint.
-        poses_a: (T, 3).
-        b: second footprint.
-        poses_b: (T, 3).
-
-    Returns:
-        (T,) metres: the largest separation over the four axes, negative by how deep they overlap (between corners the true
-        distance is larger, so this is the safe side); and (T, 2) the axis, from b to a.
-    """
-    between = poses_a[:, :2] - poses_b[:, :2]
-    gap = np.full(len(between), -np.inf)
-    axis = np.zeros((len(between), 2))
-    for yaw in (poses_a[:, 2], poses_a[:, 2] + np.pi / 2.0, poses_b[:, 2], poses_b[:, 2] + np.pi / 2.0):
-        n = unit(yaw)
-        along = (between * n).sum(axis=1)
-        reach = _reach(a, poses_a[:, 2] - yaw) + _reach(b, poses_b[:, 2] - yaw)
-        separation = np.abs(along) - reach
-        better = separation > gap
-        gap = np.where(better, separation, gap)
-        axis = np.where(better[:, None], np.where(along >= 0.0, 1.0, -1.0)[:, None] * n, axis)
-    return gap, axis
 
 
 def smallest_gaps(tracks: Sequence[Track]) -> Floats:
@@ -154,7 +121,7 @@ class _Gap(NamedTuple):
 
 
 def _least_gap(tracks: Sequence[Track], poses: Sequence[Floats], i: int, j: int) -> _Gap:
-    gap, axis = footprint_gap(tracks[i].vehicle, poses[i], tracks[j].vehicle, poses[j])
+    gap, axis = footprint_gaps(tracks[i].vehicle.half, poses[i], tracks[j].vehicle.half, poses[j])
     gap = np.where(tracks[i].there & tracks[j].there, gap, np.inf)
     at = int(np.argmin(gap))
     return _Gap(float(gap[at]), (i, j), at, axis[at])
@@ -208,11 +175,11 @@ def own_paths(encounter: Encounter) -> Separation:
 def least_gaps(encounter: Encounter) -> Floats:
     """Return the least gap (N,) [m] of each vehicle to any other, negative if they overlap; inf if it is never beside one."""
     poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
-    least = np.full(len(poses), np.inf)
+    half, least = [vehicle.half for vehicle in encounter.vehicles], np.full(len(poses), np.inf)
     for a, b in combinations(range(len(poses)), 2):
         common = together(encounter.present, a, b)
         if common.stop > common.start:
-            gap, _ = footprint_gap(encounter.vehicles[a], poses[a, common], encounter.vehicles[b], poses[b, common])
+            gap, _ = footprint_gaps(half[a], poses[a, common], half[b], poses[b, common])
             least[[a, b]] = np.minimum(least[[a, b]], float(gap.min()))
     return frozen(least)
 

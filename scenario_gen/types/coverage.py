@@ -51,20 +51,8 @@ class Coverage:
         def number(value: float) -> float | None:
             return float(f"{value:.5g}") if math.isfinite(value) else None
 
-        spreads = {
-            name: {
-                "label": spread.label,
-                "unit": spread.unit,
-                "values": [number(value) for value in spread.values],
-                "template": number(spread.template),
-            }
+        figures = {
+            name: {**vars(spread), "values": [number(value) for value in spread.values], "template": number(spread.template)}
             for name, spread in self.spreads.items()
         }
-        return {
-            "index": list(self.index),
-            "figures": spreads,
-            "bins": list(self.bins),
-            "pairs": {name: list(counts) for name, counts in self.pairs.items()},
-            "picks": dict(self.picks),
-            "orders": dict(self.orders),
-        }
+        return {"index": self.index, "figures": figures, **{k: getattr(self, k) for k in ("bins", "pairs", "picks", "orders")}}

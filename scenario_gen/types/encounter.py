@@ -21,6 +21,11 @@ class Vehicle:
     length: float = 4.8
     width: float = 1.9
 
+    @property
+    def half(self) -> tuple[float, float]:
+        """Half its length and half its width [m]."""
+        return 0.5 * self.length, 0.5 * self.width
+
 
 @dataclass(frozen=True, eq=False)
 class Tracks:

@@ -6,13 +6,10 @@
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
-import pytest
-import shapely
 
 from scenario_gen.numerics.plane import (
     ahead_and_left,
     angle_between,
-    corners,
     edge_lengths,
     edge_yaws,
     meeting_shares,
@@ -37,14 +34,6 @@ def test_an_angle_between_two_is_wrapped_and_turns_one_into_the_other(angle, oth
     between = angle_between(angle, other)
     assert -np.pi <= between < np.pi
     assert np.allclose(unit(other + between), unit(angle), atol=1e-9)
-
-
-@given(NUMBER, NUMBER, NUMBER, st.floats(1.0, 20.0), st.floats(1.0, 5.0))
-def test_corners_are_those_of_a_rectangle_about_its_pose_counter_clockwise(x, y, yaw, length, width):
-    ring = shapely.LinearRing(corners(np.array([[x, y, yaw]]), length, width)[0])
-    box = shapely.Polygon(ring)
-    assert ring.is_ccw and box.area == pytest.approx(length * width)
-    assert (box.centroid.x, box.centroid.y) == pytest.approx((x, y), abs=1e-9)
 
 
 def test_a_polyline_is_had_again_from_its_directions_and_lengths():

@@ -11,7 +11,7 @@ import pytest
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.template.frenet import to_frenet
-from scenario_gen.template.separation import footprint_gap, separate, smallest_gaps
+from scenario_gen.template.separation import separate, smallest_gaps
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter, Vehicle
 
@@ -136,24 +136,6 @@ def test_turns_and_crossings_are_not_along_a_road():
         to_frenet(clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), line(0.0, 30.0, 0.0, 5.0))))
     with pytest.raises(RefusedError, match="across"):
         to_frenet(clean_tracks(encounter_of(line(0.0, 0.0, 0.0, 8.0), line(30.0, -30.0, np.pi / 2.0, 5.0))))
-
-
-@settings(max_examples=60)
-@given(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0), st.floats(-3.14, 3.14), st.floats(-3.14, 3.14))
-def test_footprint_gap_has_the_sign_of_shapely(x, y, yaw_a, yaw_b):
-    shapely = pytest.importorskip("shapely")
-    from shapely import affinity
-
-    car = Vehicle("a")
-    poses = (np.array([[x, y, yaw_a]]), np.array([[0.0, 0.0, yaw_b]]))
-    boxes = [
-        affinity.translate(affinity.rotate(shapely.box(-2.4, -0.95, 2.4, 0.95), p[0, 2], use_radians=True), p[0, 0], p[0, 1])
-        for p in poses
-    ]
-    gap = float(footprint_gap(car, poses[0], car, poses[1])[0][0])
-    distance = boxes[0].distance(boxes[1])
-    assert (gap < 0.0) == (distance == 0.0) or abs(gap) < 1e-9
-    assert gap <= distance + 1e-9
 
 
 def test_overlapping_vehicles_are_pulled_apart_by_the_least():

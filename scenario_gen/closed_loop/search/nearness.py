@@ -10,8 +10,8 @@ each other in their lanes are always near, and never meet.
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import boxes_meet, fill_box
 from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import F2, kernel, OUT1
 from scenario_gen.types import Scenario
 
@@ -37,7 +37,7 @@ def time_apart(motion: Scenario, here: Bools, ego: int, other: int) -> float:
     columns = (*motion.position[other].T, motion.heading[other])
     b = np.column_stack([fine, *(np.interp(fine, time[its], column[its]) for column in columns)])
     vehicles = motion.vehicles
-    half = np.array([(0.5 * vehicles[k].length, 0.5 * vehicles[k].width) for k in (ego, other)])
+    half = np.array([vehicles[k].half for k in (ego, other)])
     out = np.array([APART])
     _least_shift(a, b, half, out)
     return float(out[0])

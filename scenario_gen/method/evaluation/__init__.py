@@ -8,21 +8,21 @@ from scenario_gen.method.evaluation.comparison import compare, comparison_table,
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
 from scenario_gen.method.evaluation.criticality import criticality
-from scenario_gen.method.evaluation.dtw import Alignment, dtw, dtw_distance, feature_matrix, mean_feature
+from scenario_gen.method.evaluation.dtw import dtw_distance, feature_matrix, mean_feature
 from scenario_gen.method.evaluation.evaluate import evaluate, evaluate_scenarios, MEASURED
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.metrics import MetricGroup
 from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, Motion
 from scenario_gen.method.evaluation.oracle import replay
-from scenario_gen.method.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
+from scenario_gen.method.evaluation.references import uniform_changepoints, without_changepoints
 from scenario_gen.method.evaluation.samples import Samples, Template
 from scenario_gen.method.evaluation.similarity import mean_correlation, mean_error, pair_similarities
 
 __all__ = [
-    "MEASURED", "MEASURES", "Alignment", "Bootstrap", "Difference", "EvaluationConfig", "MetricGroup", "Motion", "Samples",
+    "MEASURED", "MEASURES", "Bootstrap", "Difference", "EvaluationConfig", "MetricGroup", "Motion", "Samples",
     "Template", "at_common", "at_count", "at_period", "clustered_wilson", "compare", "comparison_table", "coverage_of",
-    "criticality", "dtw", "dtw_distance", "evaluate", "evaluate_scenarios", "feature_matrix", "footprint_distance",
-    "linear_changepoints", "mean_correlation", "mean_error", "mean_feature", "pair_similarities", "paired_difference",
+    "criticality", "dtw_distance", "evaluate", "evaluate_scenarios", "feature_matrix", "footprint_distance",
+    "mean_correlation", "mean_error", "mean_feature", "pair_similarities", "paired_difference",
     "read_evaluations", "replay", "time_to_collision", "uniform_changepoints", "wilson", "without_changepoints",
 ]  # fmt: skip

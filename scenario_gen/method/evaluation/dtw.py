@@ -9,15 +9,14 @@ difference is wrapped. A kernel takes the kind of distance as one number, `turn`
 circle's circumference.
 """
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, frozen, frozen_ints, Ints, wrap_angle
-from scenario_gen.numerics.kernels import F, F2, F3, I, kernel, OUT1, OUT2, OUTI2
+from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics.kernels import F, F2, F3, I, kernel, OUT1, OUT2
 
 Distance = Literal["euclidean", "manhattan", "angle"]
 _TURN: dict[Distance, float] = {"euclidean": 0.0, "manhattan": np.inf, "angle": 2.0 * np.pi}
@@ -120,67 +119,6 @@ def _wavefront(a: Floats, b: Floats, turn: float, band: int) -> float:
     return float(old[n])
 
 
-@kernel(F2, F2, F, I, OUT2)
-def _accumulate(a: Floats, b: Floats, turn: float, band: int, total: Floats) -> None:
-    """Write the cost of the best path to every cell into total (n, m), row by row; outside the band it is infinite."""
-    n, m = total.shape
-    below, above = max(0, n - m) + band, max(0, m - n) + band
-    cost = np.empty(m)
-    for i in range(n):
-        _distances(a, i, b, turn, cost)
-        for j in range(m):
-            if j - i > above or i - j > below:
-                total[i, j] = np.inf
-                continue
-            best = 0.0 if i == 0 and j == 0 else np.inf
-            if i > 0:
-                best = min(best, total[i - 1, j])
-            if j > 0:
-                best = min(best, total[i, j - 1])
-            if i > 0 and j > 0:
-                best = min(best, total[i - 1, j - 1])
-            total[i, j] = best + cost[j]
-
-
-@kernel(F2, OUTI2)
-def _trace(total: Floats, path: Ints) -> int:
-    """Write the best path backwards into path (n + m - 1, 2); return its number of steps."""
-    i, j = total.shape[0] - 1, total.shape[1] - 1
-    count = 0
-    while True:
-        path[count, 0], path[count, 1] = i, j
-        count += 1
-        if i == 0 and j == 0:
-            return count
-        if i == 0:
-            j -= 1
-        elif j == 0:
-            i -= 1
-        else:
-            diagonal, up, left = total[i - 1, j - 1], total[i - 1, j], total[i, j - 1]
-            if diagonal <= up and diagonal <= left:
-                i, j = i - 1, j - 1
-            elif up <= left:
-                i -= 1
-            else:
-                j -= 1
-
-
-@dataclass(frozen=True, eq=False)
-class Alignment:
-    """The best warping of one series onto another.
-
-    Attributes:
-        distance: sum of the distances along the path.
-        path: (L, 2) sample indices, from (0, 0) to (n - 1, m - 1).
-        accumulated: (n, m) cost of the best path to each cell; infinite outside the band.
-    """
-
-    distance: float
-    path: Ints
-    accumulated: Floats
-
-
 def dtw_distance(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean", band: int | None = None) -> float:
     """Exact DTW distance of two series: the least sum of distances over all monotone paths.
 
@@ -197,17 +135,6 @@ def dtw_distance(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "eucli
     """
     left, right = _channels(a, distance), _channels(b, distance)
     return float(_wavefront(left, right, _TURN[distance], _band(left, right, band)))
-
-
-def dtw(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean", band: int | None = None) -> Alignment:
-    """Exact DTW with its path and accumulated matrix; arguments and errors as in `dtw_distance`."""
-    left, right = _channels(a, distance), _channels(b, distance)
-    n, m = left.shape[1], right.shape[1]
-    total = np.empty((n, m))
-    _accumulate(left, right, _TURN[distance], _band(left, right, band), total)
-    path = np.empty((n + m - 1, 2), dtype=np.int64)
-    count = _trace(total, path)
-    return Alignment(float(total[-1, -1]), frozen_ints(path[:count][::-1]), frozen(total))
 
 
 def feature_matrix(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean") -> Floats:

@@ -28,6 +28,7 @@ import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import at_period, Motion
+from scenario_gen.numerics.plane import unit
 from scenario_gen.template import Conflict, conflict_of
 from scenario_gen.types import Encounter, Measures, Pair, Scenario
 
@@ -136,7 +137,6 @@ def _closing_speed(motion: Motion, a: int, b: int, conflict: Conflict | None) ->
         at = min(max(round(conflict.entry_first / motion.dt), both.start), both.stop - 1)
         both = slice(at, at + 1)
     way = motion.position[b, both] - motion.position[a, both]
-    direction = np.stack([np.cos(motion.heading[[a, b], both]), np.sin(motion.heading[[a, b], both])], axis=-1)
-    velocity = motion.speed[[a, b], both, None] * direction
+    velocity = motion.speed[[a, b], both, None] * unit(motion.heading[[a, b], both])
     distance = np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-9)
     return float((-((velocity[1] - velocity[0]) * way).sum(axis=-1) / distance).max())

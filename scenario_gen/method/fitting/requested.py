@@ -9,8 +9,8 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.roads import footprint_fits
-from scenario_gen.template import footprint_gap
 from scenario_gen.types import Encounter, Fit, Road
 
 STAND = 0.05  # m/s, a speed below this is met by standing
@@ -45,7 +45,7 @@ def refuse_misfits(fit: Fit, starts: Floats, goals: Floats) -> None:
     for name, rows, states, first in (("starts", starts, fit.requested.start, True), ("goals", goals, fit.requested.end, False)):
         requested = ~np.isnan(rows[:, 0])
         for (i, a), (j, b) in combinations(enumerate(fit.vehicles), 2):
-            gap = float(footprint_gap(a, states[[i], :3], b, states[[j], :3])[0][0])
+            gap = float(footprint_gaps(a.half, states[[i], :3], b.half, states[[j], :3])[0][0])
             if gap <= 0.0 and (requested[i] or requested[j]):
                 raise RefusedError(f"at the {NAMES[name]} that is asked vehicles {a.id} and {b.id} overlap by {-gap:.2f} m")
         for i in np.flatnonzero(requested).tolist():

@@ -15,7 +15,7 @@ import numpy as np
 
 from scenario_gen.method.sampling.deviations import soft_clipped
 from scenario_gen.method.sampling.freedom import Freedom, onward, seconds_onward
-from scenario_gen.method.sampling.path import BasePath, states
+from scenario_gen.method.sampling.path import BasePath, ClockRead, Displaced, SpeedDrawn, states
 from scenario_gen.method.sampling.speed_profile.model import SpeedModel
 from scenario_gen.method.sampling.time_warp import Clock, DT, template_times
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
@@ -96,6 +96,9 @@ def nearest_cell(clock: Clock, at: Floats) -> Ints:
     return np.asarray(np.clip(np.round(at / step).astype(np.int64), 0, len(clock.grid) - 1))
 
 
+_Read = tuple[Clock, ClockRead]  # a clock, and what it says at some times
+
+
 @dataclass(frozen=True, eq=False)
 class _Drawn:
     """What is drawn of one vehicle, see `Batch`; ok: (S,) whether a speed keeps what must hold."""
@@ -107,28 +110,16 @@ class _Drawn:
     speed: Floats
     ok: Bools
 
-    def states(self, model: VehicleModel, at: Floats, counts: Ints, read: "_Read | None" = None) -> tuple[Floats, "_Read"]:
+    def states(self, model: VehicleModel, at: Floats, counts: Ints, read: _Read | None = None) -> tuple[Floats, _Read]:
         """States (S, T, 5) at times (S, T) [s] on the clock, the first `counts` (S,) of them; and what was read of the clock."""
-        if read is None or read.clock is not self.clock:  # a shared one is read once
-            tau, pace, slope = np.zeros(at.shape), np.ones(at.shape), np.zeros(at.shape)
-            template_times(self.clock.grid, self.clock.time, self.clock.rate, at, counts, tau, pace, slope)
-            read = _Read(self.clock, tau, pace, slope)
+        if read is None or read[0] is not self.clock:  # a shared one is read once
+            now = ClockRead(np.zeros(at.shape), np.ones(at.shape), np.zeros(at.shape), counts)
+            template_times(self.clock.grid, self.clock.time, self.clock.rate, at, counts, *now[:3])
+            read = self.clock, now
         out, spline = np.empty((*at.shape, 5)), model.speed.spline
-        states(
-            self.curve, self.arc, model.path.spacing, spline.breaks, spline.first, spline.pieces, self.speed,
-            read.tau, read.pace, read.slope, counts, out,
-        )  # fmt: skip
+        speed = SpeedDrawn(spline.breaks, spline.first, spline.pieces, self.speed)
+        states(Displaced(self.curve, self.arc, model.path.spacing), speed, read[1], out)
         return out, read
-
-
-@dataclass(frozen=True, eq=False)
-class _Read:
-    """A clock read at some times: (S, T) template times [s], rates and their slopes [1/s]."""
-
-    clock: Clock
-    tau: Floats
-    pace: Floats
-    slope: Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,8 +28,8 @@ def spread_out(features: Sequence[tuple[float, ...]], count: int) -> list[int]:
     at: Floats = np.clip(np.array(features, dtype=np.float64), -FAR, FAR)
     _, bins = np.unique(np.floor(at), axis=0, return_inverse=True)
     bins = bins.reshape(-1)
-    chosen = [int(np.argmin(_distance(at, np.median(at, axis=0))))]
-    nearest = _distance(at, at[chosen[0]])
+    chosen = [int(np.argmin(np.linalg.norm(at - np.median(at, axis=0), axis=1)))]
+    nearest = np.linalg.norm(at - at[chosen[0]], axis=1)
     taken = np.zeros(len(at), dtype=np.bool_)
     taken[chosen[0]] = True
     opened = np.zeros(int(bins.max()) + 1, dtype=np.bool_)
@@ -41,14 +41,5 @@ def spread_out(features: Sequence[tuple[float, ...]], count: int) -> list[int]:
         best = int(np.argmax(np.where(allowed, nearest, -1.0)))
         chosen.append(best)
         taken[best], opened[bins[best]] = True, True
-        nearest = np.minimum(nearest, _distance(at, at[best]))
+        nearest = np.minimum(nearest, np.linalg.norm(at - at[best], axis=1))
     return chosen
-
-
-def _distance(points: Floats, centre: Floats) -> Floats:
-    """Distances (S,) of points (S, d) to one (d,)."""
-    step = points - centre
-    total = np.zeros(len(points))
-    for column in step.T:
-        total = np.hypot(total, column)
-    return total

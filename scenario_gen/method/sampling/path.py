@@ -10,12 +10,13 @@ the very curve that is driven, and with d = d' = 0 at an end the asked position 
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from scenario_gen.numerics import Floats, frozen, Ints
-from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, OUT2, OUT3
+from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, named, OUT2, OUT3
 from scenario_gen.types import Route
 
 NODE_SPACING = 1.0  # m; a cubic through nodes this far apart is within 0.1 mm of an arc of radius 5 m
@@ -165,73 +166,98 @@ def _pose(c: Floats, j: int, h: float, x: float, out: Floats) -> None:
     out[2] = np.arctan2(dy, dx)
 
 
-@kernel(F3, F2, F, F1, I1, F3, F2, F2, F2, F2, I1, OUT3)
-def states(
-    curve: Floats,
-    arc: Floats,
-    h: float,
-    breaks: Floats,
-    first: Ints,
-    pieces: Floats,
-    speed: Floats,
-    tau: Floats,
-    pace: Floats,
-    slope: Floats,
-    count: Ints,
-    out: Floats,
-) -> None:
-    """States of one vehicle of every sample.
+class Displaced(NamedTuple):
+    """The paths of S samples, see `BasePath.displaced`.
 
-    Args:
-        curve: (S, G, 4) path, see `BasePath.displaced`; G = 1 for a vehicle that stands throughout.
+    Attributes:
+        curve: (S, G, 4); G = 1 for a vehicle that stands throughout.
         arc: (S, G) arc lengths [m].
-        h: node spacing [m].
-        breaks: (m + 1,) template times [s] between the pieces of the speed.
+        spacing: of the route's nodes [m].
+    """
+
+    curve: Floats
+    arc: Floats
+    spacing: float
+
+
+class SpeedDrawn(NamedTuple):
+    """The speeds of S samples, splines on the template's clock.
+
+    Attributes:
+        breaks: (m + 1,) template times [s] between the pieces.
         first: (m,) the first of the four coefficients of each piece.
-        pieces: (m, 4, 4) the pieces of a spline, see `SpeedSpline.pieces`.
-        speed: (S, n) coefficients [m/s].
+        pieces: (m, 4, 4) see `SpeedSpline.pieces`.
+        coefficients: (S, n) m/s.
+    """
+
+    breaks: Floats
+    first: Ints
+    pieces: Floats
+    coefficients: Floats
+
+
+class ClockRead(NamedTuple):
+    """What the clocks of S samples say at up to T instants.
+
+    Attributes:
         tau: (S, T) template times [s], ascending.
         pace: (S, T) rate of the sample's clock there.
         slope: (S, T) 1/s, its derivative.
-        count: (S,) how many of them are asked for.
-        out: (S, T, 5) x, y [m], yaw [rad, not unwrapped], speed [m/s], acceleration [m/s²].
+        counts: (S,) how many of them are asked for.
     """
-    g, m = curve.shape[1], pieces.shape[0]
+
+    tau: Floats
+    pace: Floats
+    slope: Floats
+    counts: Ints
+
+
+@kernel(inline=True)
+def _read_piece(speed: SpeedDrawn, s: int, i: int, out: Floats) -> None:
+    """Write the polynomial (4,) of piece i of sample s."""
+    for power in range(4):
+        out[power] = 0.0
+        for q in range(4):
+            out[power] += speed.pieces[i, power, q] * speed.coefficients[s, speed.first[i] + q]
+
+
+@kernel(inline=True)
+def _driven(p: Floats, x: float) -> float:
+    """Metres driven in the first x seconds of a piece."""
+    return float(x * (p[0] + x * (p[1] / 2.0 + x * (p[2] / 3.0 + x * p[3] / 4.0))))
+
+
+@kernel(named(Displaced, F3, F2, F), named(SpeedDrawn, F1, I1, F3, F2), named(ClockRead, F2, F2, F2, I1), OUT3)
+def states(path: Displaced, speed: SpeedDrawn, clock: ClockRead, out: Floats) -> None:
+    """Fill `out` (S, T, 5) with x, y [m], yaw [rad, not unwrapped], speed [m/s], acceleration [m/s²] of one vehicle."""
+    breaks, h = speed.breaks, path.spacing
+    g, m = path.curve.shape[1], speed.pieces.shape[0]
     p = np.empty(4)
-    for s in range(curve.shape[0]):
-        i, j, start, before, fresh = 0, 0, 0.0, -1.0, True
-        c = curve[s]
-        for k in range(count[s]):
-            t = min(max(tau[s, k], breaks[0]), breaks[m])
-            while True:
-                if fresh:
-                    for power in range(4):
-                        p[power] = 0.0
-                        for q in range(4):
-                            p[power] += pieces[i, power, q] * speed[s, first[i] + q]
-                    fresh = False
-                if i == m - 1 or t < breaks[i + 1]:
-                    break
-                x = breaks[i + 1] - breaks[i]
-                start += x * (p[0] + x * (p[1] / 2.0 + x * (p[2] / 3.0 + x * p[3] / 4.0)))
+    for s in range(path.curve.shape[0]):
+        i, j, start, before = 0, 0, 0.0, -1.0
+        c, arc = path.curve[s], path.arc[s]
+        _read_piece(speed, s, i, p)
+        for k in range(clock.counts[s]):
+            t = min(max(clock.tau[s, k], breaks[0]), breaks[m])
+            while i < m - 1 and t >= breaks[i + 1]:
+                start += _driven(p, breaks[i + 1] - breaks[i])
                 i += 1
-                fresh = True
-            x = t - breaks[i]
+                _read_piece(speed, s, i, p)
+            x, r = t - breaks[i], clock.pace[s, k]
             u, du = p[0] + x * (p[1] + x * (p[2] + x * p[3])), p[1] + x * (2.0 * p[2] + x * 3.0 * p[3])
-            r = pace[s, k]
             out[s, k, 3] = max(u / r, 0.0)
-            out[s, k, 4] = (du - u / r * slope[s, k]) / (r * r)
+            out[s, k, 4] = (du - u / r * clock.slope[s, k]) / (r * r)
             if g == 1:
                 out[s, k, 0], out[s, k, 1] = c[0, 0], c[0, 1]
                 out[s, k, 2] = np.arctan2(c[0, 3], c[0, 2])
                 continue
-            at = start + x * (p[0] + x * (p[1] / 2.0 + x * (p[2] / 3.0 + x * p[3] / 4.0)))
+            at = start + _driven(p, x)
             if at == before:  # stands
                 out[s, k, :3] = out[s, k - 1, :3]
                 continue
             before = at
-            while j < g - 2 and at > arc[s, j + 1]:
+            while j < g - 2 and at > arc[j + 1]:
                 j += 1
-            while j > 0 and at < arc[s, j]:
+            while j > 0 and at < arc[j]:
                 j -= 1
-            _pose(c, j, h, _fraction(c, j, h, at - arc[s, j], arc[s, j + 1] - arc[s, j]), out[s, k])
+            _pose(c, j, h, _fraction(c, j, h, at - arc[j], arc[j + 1] - arc[j]), out[s, k])

@@ -10,7 +10,7 @@ from scipy import linalg
 
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import Problem
-from scenario_gen.method.segmentation.hdp_hmm.smoother import expected_statistics
+from scenario_gen.method.segmentation.hdp_hmm.smoother import expected_statistics, Rows
 from scenario_gen.method.segmentation.posterior import Posterior
 from scenario_gen.numerics import Bools, Floats, Ints
 
@@ -113,11 +113,12 @@ def settle_emissions(problem: Problem, share: Floats, posterior: Posterior) -> E
     if p == 1:
         now.regression[:, :, 0] = (share @ problem.y) / np.maximum(total, 1e-300)[:, None]
     outer, sums = np.empty((p + d, p + d)), np.empty(2)
+    rows = Rows(problem.v, hidden, unused, weight, posterior.dof)
     for _ in range(ROUNDS):
         regression, scatter = np.empty_like(now.regression), np.empty_like(now.covariance)
         for k in range(states):
             coef = whitened(now.regression[k], now.covariance[k])
-            expected_statistics(problem.v, hidden, unused, share[k], coef, weight, posterior.dof, outer, sums)
+            expected_statistics(rows, share[k], coef, outer, sums)
             pull = mean @ precision + weight * outer[p:, :p]
             a = linalg.solve(precision + weight * outer[:p, :p], pull.T, assume_a="pos").T
             cross = a @ outer[:p, p:]

@@ -76,6 +76,9 @@ class StickyHDPHMM:
         posterior_: all that was sampled.
     """
 
+    states: int
+    random_state: int | None
+
     def __init__(
         self,
         *,
@@ -98,23 +101,7 @@ class StickyHDPHMM:
         random_state: int | None = None,
     ) -> None:
         """Take the parameters of `SamplerConfig` and a seed (None: another one at every fit); `fit` checks them."""
-        self.emission = emission
-        self.order = order
-        self.states = states
-        self.chains = chains
-        self.sweeps = sweeps
-        self.r_hat = r_hat
-        self.moves = moves
-        self.dof = dof
-        self.mean_weight = mean_weight
-        self.weight = weight
-        self.gamma_shape = gamma_shape
-        self.gamma_rate = gamma_rate
-        self.alpha_kappa_shape = alpha_kappa_shape
-        self.alpha_kappa_rate = alpha_kappa_rate
-        self.rho_a = rho_a
-        self.rho_b = rho_b
-        self.random_state = random_state
+        vars(self).update({name: value for name, value in locals().items() if name != "self"})
 
     def fit(self, X: Data, lengths: npt.ArrayLike | None = None, y: object = None) -> Self:
         """Sample the segmentations of X, and estimate each state's parameters from them.

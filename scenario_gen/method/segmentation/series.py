@@ -5,6 +5,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+import warnings
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -145,29 +146,20 @@ def _from_medians(x: Floats, ends: Ints) -> tuple[Floats, Floats]:
     gap = np.full((SIDE, x.shape[1]), np.nan)
     pieces = np.split(x, ends[:-1])
     separated = np.concatenate([gap, *(part for piece in pieces for part in (piece, gap))])
-    windows = np.sort(sliding_window_view(separated, SIDE, axis=0), axis=-1)  # NaN come last
-    count = np.maximum((~np.isnan(windows)).sum(axis=-1, keepdims=True), 1)
-    low, high = (np.take_along_axis(windows, place, axis=-1)[..., 0] for place in ((count - 1) // 2, count // 2))
-    median = 0.5 * (low + high)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of windows that hold NaN alone
+        median = np.nanmedian(sliding_window_view(separated, SIDE, axis=0), axis=-1)
     at = np.arange(len(x)) + SIDE * np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))  # its row among the gaps
     return x - median[at], x - median[at + SIDE + 1]
 
 
 def independent(x: Floats) -> Ints:
-    """Columns of x (T, D) that are no linear combination of those before them.
-
-    Gram-Schmidt; its second pass removes the rounding errors of the first.
-    """
-    basis: list[Floats] = []
-    kept = []
-    for i, column in enumerate((x - x.mean(axis=0)).T):
-        rest = column
-        for _ in range(2):
-            for direction in basis:
-                rest = rest - (direction @ rest) * direction
-        length = np.linalg.norm(rest)
-        if length > COLLINEAR * np.linalg.norm(column):
-            basis.append(rest / length)
+    """Columns of x (T, D) that are no linear combination of those before them."""
+    x = x - x.mean(axis=0)
+    kept: list[int] = []
+    for i, column in enumerate(x.T):
+        rest = column - x[:, kept] @ np.linalg.lstsq(x[:, kept], column)[0]
+        if np.linalg.norm(rest) > COLLINEAR * np.linalg.norm(column):
             kept.append(i)
     return np.array(kept, dtype=np.int64)
 

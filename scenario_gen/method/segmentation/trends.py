@@ -11,7 +11,6 @@ places where the posterior sees some chance of one, and which it does miss, are 
 """
 
 from dataclasses import dataclass, field
-import math
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -116,7 +115,7 @@ class Trends:
 
     def threshold(self, chance: float) -> float:
         """Return the gain that noise alone exceeds with probability `chance`: a quantile of χ² with one degree per signal."""
-        return chi2_above(len(self.signals), chance)
+        return float(special.chdtri(len(self.signals), chance))
 
     @property
     def samples(self) -> int:
@@ -191,25 +190,6 @@ class Trends:
             if best[0] <= least_gain:
                 return points
             points.insert(best[2], best[1])
-
-
-def chi2_above(degrees: int, chance: float) -> float:
-    """Return what a χ² variable of an even number of degrees of freedom exceeds with probability `chance`.
-
-    For 2n degrees P(χ² > 2x) = e^-x Σ_{i<n} x^i / i!, the chance of fewer than n events where x are expected.
-    """
-    low, high = 0.0, 1.0
-
-    def exceeds(x: float) -> bool:
-        terms = [i * np.log(x) - special.gammaln(i + 1.0) - x for i in range(degrees // 2)]
-        return math.fsum(np.exp(term) for term in terms) > chance
-
-    while exceeds(high):
-        low, high = high, 2.0 * high
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if exceeds(middle) else (low, middle)
-    return low + high
 
 
 def course(position: Floats, speed: Floats, dt: float) -> tuple[Floats, Floats]:

@@ -17,7 +17,7 @@ from scenario_gen.method.validity.dynamics import control_points, is_motion
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
 from scenario_gen.numerics import Bools, Floats, runs
-from scenario_gen.roads import blocked_before, clearance_in_cells, drives_against, RuleCheck
+from scenario_gen.roads import drives_against, RuleCheck
 from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, required_orders, time_gaps, Wait
 from scenario_gen.types import (
     at_ends,
@@ -70,8 +70,7 @@ class Checker:
         self._limits = self.limits or Limits()
         self._dynamics_limits = np.array([getattr(self._limits, name) for name in dynamics.LIMITS])
         if self.road is not None:
-            self._clearance, self._blocked = clearance_in_cells(self.road), blocked_before(self.road)
-            self._grid = np.array((*self.road.origin, self.road.resolution))
+            self._ground = inside.Ground.of(self.road)
         lanes = self.road.lanes if self.road is not None else None
         self._rules = RuleCheck(lanes) if lanes is not None and lanes.rules else None
 
@@ -135,14 +134,14 @@ class Checker:
             return Verdict((broken,), not_applicable=len(self.conflicts or ()))
         time, heading = scenario.time, scenario.heading
         n, t = heading.shape
-        half = np.array([(0.5 * vehicle.length, 0.5 * vehicle.width) for vehicle in scenario.vehicles])
+        half = np.array([vehicle.half for vehicle in scenario.vehicles])
         control = np.empty((n, t - 1, 4, 2))
         control_points(time, scenario.position, heading, scenario.speed, control)
         violations = [
             *self._ends(scenario),
             *self._boundary_states(scenario),
             *self._dynamics(scenario),
-            *self._overlaps(scenario, control, half),
+            *self._contacts(scenario, control, half),
             *self._exits(scenario, control, half),
             *self._wrong_ways(scenario),
             *self._broken_rules(scenario),
@@ -233,7 +232,7 @@ class Checker:
             cause, sentence = dynamics.MESSAGES[dynamics.Check(row)]
             yield Violation(cause, time, (i,), f"vehicle {i}: {sentence.format(value=value, limit=limit)}")
 
-    def _overlaps(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
+    def _contacts(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         n, limits = len(half), self._limits
         out = np.full((n * (n - 1) // 2, 3), np.nan)  # NaN is no proof: a pair that nothing looks at is refused
         bounds = (limits.clearance, limits.time_resolution)
@@ -292,9 +291,7 @@ class Checker:
                 np.ascontiguousarray(control[rows, at.start : at.stop - 1]),
                 np.ascontiguousarray(scenario.heading[rows, at]),
                 half[rows],
-                self._clearance,
-                self._blocked,
-                self._grid,
+                self._ground,
                 self._limits.time_resolution,
                 out[rows],
             )

@@ -13,6 +13,7 @@ import numpy as np
 
 from scenario_gen.method.validity.dynamics import stretch
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.boxes import axes, Box, reaches
 from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, OUT2
 
 BLOCK = 16  # intervals that share one bounding box
@@ -27,31 +28,24 @@ def _gap(d: Floats, yaw_a: float, yaw_b: float, half_a: Floats, half_b: Floats, 
     The headings are within turn_a and turn_b of yaw_a and yaw_b. A box's extent along its own axis l grows by at most
     w sin(turn) <= w turn, along any other line by at most (half diagonal) turn.
     """
-    radius_a, radius_b = np.hypot(half_a[0], half_a[1]), np.hypot(half_b[0], half_b[1])
-    cos, sin = abs(np.cos(yaw_a - yaw_b)), abs(np.sin(yaw_a - yaw_b))
+    a = Box(0.0, 0.0, np.cos(yaw_a), np.sin(yaw_a), half_a[0], half_a[1])
+    b = Box(0.0, 0.0, np.cos(yaw_b), np.sin(yaw_b), half_b[0], half_b[1])
+    by_a, by_b = np.hypot(a.length, a.width) * turn_a, np.hypot(b.length, b.width) * turn_b
+    grown = a.width * turn_a + by_b, a.length * turn_a + by_b, b.width * turn_b + by_a, b.length * turn_b + by_a
+    axis, reach = axes(a, b), reaches(a, b)
     best = -np.inf
-    for axis in range(4):
-        own, other, yaw = (half_a, half_b, yaw_a) if axis < 2 else (half_b, half_a, yaw_b)
-        nx, ny = np.cos(yaw), np.sin(yaw)
-        if axis % 2 == 0:
-            extent = own[0] + other[0] * cos + other[1] * sin
-            grown = own[1]
-        else:
-            nx, ny = -ny, nx
-            extent = own[1] + other[0] * sin + other[1] * cos
-            grown = own[0]
-        extent += grown * turn_a + radius_b * turn_b if axis < 2 else grown * turn_b + radius_a * turn_a
+    for k in range(4):
         low, high = np.inf, -np.inf
         for i in range(4):
-            along = nx * d[i, 0] + ny * d[i, 1]
+            along = axis[k][0] * d[i, 0] + axis[k][1] * d[i, 1]
             low, high = min(low, along), max(high, along)
-        best = max(best, max(low, -high) - extent)
+        best = max(best, max(low, -high) - reach[k] - grown[k])
     return best
 
 
 @kernel(inline=True)
-def _box_distance(low_x: float, high_x: float, low_y: float, high_y: float) -> float:
-    """Distance of the origin from an axis-parallel box."""
+def _from_origin(low_x: float, high_x: float, low_y: float, high_y: float) -> float:
+    """Distance of the origin from what lies between these bounds."""
     x, y = max(low_x, -high_x, 0.0), max(low_y, -high_y, 0.0)
     return float(np.sqrt(x * x + y * y))
 
@@ -105,8 +99,6 @@ def first_contacts(
 ) -> None:
     """Fill `out` (N (N - 1) / 2, 3) with status, time [s] and gap [m] of the first contact of each pair i < j.
 
-    Source: separating axes (Gottschalk, Lin & Manocha 1996), swept.
-
     Args:
         time: (T,) seconds.
         control: (N, T - 1, 4, 2) control points, metres.
@@ -129,7 +121,7 @@ def first_contacts(
                 if out[pair, 0] != PROVEN:
                     break
                 p, q = bounds[i, b], bounds[j, b]
-                if _box_distance(q[0] - p[1], q[1] - p[0], q[2] - p[3], q[3] - p[2]) > reach:
+                if _from_origin(q[0] - p[1], q[1] - p[0], q[2] - p[3], q[3] - p[2]) > reach:
                     continue
                 for k in range(b * BLOCK, min(intervals, (b + 1) * BLOCK)):
                     low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
@@ -138,7 +130,7 @@ def first_contacts(
                         d[c, 1] = control[j, k, c, 1] - control[i, k, c, 1]
                         low_x, high_x = min(low_x, d[c, 0]), max(high_x, d[c, 0])
                         low_y, high_y = min(low_y, d[c, 1]), max(high_y, d[c, 1])
-                    if _box_distance(low_x, high_x, low_y, high_y) > reach:
+                    if _from_origin(low_x, high_x, low_y, high_y) > reach:
                         continue
                     h = time[k + 1] - time[k]
                     yaw_i[0], yaw_i[1] = heading[i, k], heading[i, k + 1] - heading[i, k]

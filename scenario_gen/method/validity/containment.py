@@ -9,11 +9,15 @@ longer and wider by what the control points and the rotation can add; that recta
 Where neither suffices the stretch is halved, until it is proven, the footprint itself is off the road, or it is too short.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from scenario_gen.method.validity.dynamics import stretch
 from scenario_gen.numerics import Counts, Floats
-from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, N2, OUT2
+from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, N2, named, OUT2
+from scenario_gen.roads import blocked_before, clearance_in_cells
+from scenario_gen.types import Road
 
 CONTACT = 1e-9  # cells, an overlap this small only touches
 PROVEN, FOUND, UNPROVEN = 0.0, 1.0, 2.0
@@ -102,17 +106,32 @@ def _first_exit(
     return PROVEN, 1.0
 
 
-@kernel(F1, F4, F2, F2, F2, N2, F1, F, OUT2)
+class Ground(NamedTuple):
+    """A road as `first_exits` reads it.
+
+    Attributes:
+        clearance: (H, W) distance [cells] from each centre to the nearest cell that is not drivable.
+        blocked: (H, W + 1) from `blocked_before`.
+        x: of the grid's lower-left corner, metres.
+        y: likewise.
+        size: of a cell, metres.
+    """
+
+    clearance: Floats
+    blocked: Counts
+    x: float
+    y: float
+    size: float
+
+    @classmethod
+    def of(cls, road: Road) -> "Ground":
+        """Read a road."""
+        return cls(clearance_in_cells(road), blocked_before(road), road.origin[0], road.origin[1], road.resolution)
+
+
+@kernel(F1, F4, F2, F2, named(Ground, F2, N2, F, F, F), F, OUT2)
 def first_exits(
-    time: Floats,
-    control: Floats,
-    heading: Floats,
-    half: Floats,
-    clearance: Floats,
-    blocked: Counts,
-    grid: Floats,
-    resolution: float,
-    out: Floats,
+    time: Floats, control: Floats, heading: Floats, half: Floats, ground: Ground, resolution: float, out: Floats
 ) -> None:
     """Fill `out` (N, 2) with status and time [s] at which each vehicle first leaves drivable cells.
 
@@ -121,13 +140,11 @@ def first_exits(
         control: (N, T - 1, 4, 2) control points, metres.
         heading: (N, T) rad.
         half: (N, 2) half lengths and half widths, metres.
-        clearance: (H, W) distance [cells] from each centre to the nearest cell that is not drivable.
-        blocked: (H, W + 1) from `blocked_before`.
-        grid: (3,) x, y of the grid's lower-left corner and cell size, metres.
+        ground: the road.
         resolution: shortest stretch of time [s] looked at.
         out: status PROVEN, FOUND or UNPROVEN, and the time where not proven.
     """
-    size = grid[2]
+    size = ground.size
     b, yaw, extent = np.empty((4, 2)), np.empty(2), np.empty(2)
     for i in range(control.shape[0]):
         out[i, 0] = PROVEN
@@ -135,13 +152,13 @@ def first_exits(
         for k in range(control.shape[1]):
             stands = k > 0 and heading[i, k + 1] == heading[i, k]
             for c in range(4):
-                b[c, 0], b[c, 1] = (control[i, k, c, 0] - grid[0]) / size, (control[i, k, c, 1] - grid[1]) / size
+                b[c, 0], b[c, 1] = (control[i, k, c, 0] - ground.x) / size, (control[i, k, c, 1] - ground.y) / size
                 stands = stands and b[c, 0] == b[0, 0] and b[c, 1] == b[0, 1]
             if stands:  # where it stood at the end of the interval before
                 continue
             h = time[k + 1] - time[k]
             yaw[0], yaw[1] = heading[i, k], heading[i, k + 1] - heading[i, k]
-            status, u = _first_exit(b, h, yaw, extent, clearance, blocked, resolution)
+            status, u = _first_exit(b, h, yaw, extent, ground.clearance, ground.blocked, resolution)
             if status != PROVEN:
                 out[i, 0], out[i, 1] = status, time[k] + u * h
                 break

@@ -17,9 +17,10 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.lanes import Lane, stations
+from scenario_gen.output.exchange.lanes import Lane
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
 from scenario_gen.output.exchange.xml import add, comment, Element, number, serialized
 from scenario_gen.types import is_truck, LaneNetwork, RuleKind, Scenario
@@ -269,7 +270,7 @@ def _goal(problem: Element, pose: tuple[float, float, float], size: tuple[float,
 def _placeholder(root: Element, lanes: Sequence[Lane], steps: int) -> None:
     """Append a problem that is solved by standing still, near the beginning of the first lane, on its run-out."""
     middle = lanes[0].middle
-    at = min(int(np.searchsorted(stations(middle), 5.0)), len(middle) - 2)
+    at = min(int(np.searchsorted(Curve.through(middle).station, 5.0)), len(middle) - 2)
     yaw = float(np.arctan2(*(middle[at + 1] - middle[at])[::-1]))
     x, y = middle[at].tolist()
     problem = add(root, "planningProblem", id=PROBLEM)

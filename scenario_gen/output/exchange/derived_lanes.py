@@ -10,9 +10,10 @@ import numpy as np
 from shapely import contains_xy, covers, make_valid, Polygon, polygons, prepare, union_all
 
 from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.lanes import Lane, LaneMap, lanes_of, network_lanes, Strip
-from scenario_gen.types import LaneNetwork, Road, Scenario
+from scenario_gen.types import LaneNetwork, Road, Scenario, together
 
 STEP = 1.0  # metres between points of a lane
 APART = 0.5  # metres between points of a path that it is laid through
@@ -112,7 +113,8 @@ def _unled(path: Curve, lanes: Sequence[Lane]) -> float:
 
 def footprints(scenario: Scenario, n: int) -> Floats:
     """Return the corners (T, 4, 2) [m] of a vehicle's footprint at every instant at which it is there."""
-    return np.stack(np.split(outline(scenario, n, (-0.5, 0.5)), 4), axis=1)[:, [0, 1, 3, 2]]
+    there, vehicle = together(scenario.present, n, n), scenario.vehicles[n]
+    return corners(np.column_stack((scenario.position[n, there], scenario.heading[n, there])), vehicle.length, vehicle.width)
 
 
 def driven_path(scenario: Scenario, n: int) -> Curve:
@@ -167,19 +169,10 @@ def _rows(scenario: Scenario, members: set[str]) -> list[int]:
     return [n for n, vehicle in enumerate(scenario.vehicles) if vehicle.id in members]
 
 
-def outline(scenario: Scenario, n: int, parts: Sequence[float] = (-0.5, 0.0, 0.5)) -> Floats:
-    """Return points (P, 2) [m] of the outline of a vehicle's footprint at every instant at which it is there."""
-    first, last = scenario.present[n].tolist()
-    vehicle = scenario.vehicles[n]
-    x, y = scenario.position[n, first : last + 1].T
-    yaw = scenario.heading[n, first : last + 1]
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    points = []
-    for u in parts:
-        for v in (-0.5, 0.5):
-            along, across = u * vehicle.length, v * vehicle.width
-            points.append(np.column_stack((x + along * cos - across * sin, y + along * sin + across * cos)))
-    return np.concatenate(points)
+def outline(scenario: Scenario, n: int) -> Floats:
+    """Return points (P, 2) [m] of the outline of a vehicle's footprint at every instant: corners and middles of sides."""
+    around = footprints(scenario, n)
+    return np.concatenate([around, 0.5 * (around[:, [1, 3]] + around[:, [0, 2]])], axis=1).reshape(-1, 2)
 
 
 def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out: float) -> Floats:

@@ -16,6 +16,7 @@ import numpy as np
 
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import unit_left
 from scenario_gen.output.exchange.derived_lanes import outline, widest_near
 from scenario_gen.output.exchange.lanes import Joint, LaneMap, Strip
 from scenario_gen.roads import Arm, arms_of, draw_ring_route, draw_route, flare_begins, reverse, ring_of
@@ -109,19 +110,15 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
 
 def _ramps(road: Road, arms: Sequence[Arm], width: float, side: str) -> list[Arm]:
     """Return an arm of one lane, by which nobody leaves, for each entry that is in no arm."""
-    known = [arm.pose[:2] + offset * _left(arm.pose) for arm in arms for offset in arm.inward]
+    known = [arm.pose[:2] + offset * unit_left(arm.pose[2]) for arm in arms for offset in arm.inward]
     offset = width / 2.0 if side == "right" else -width / 2.0  # lanes in lie to the left of who looks out, on the right side
     ramps = []
     for entry in road.entries:
         if all(float(np.hypot(*(entry[:2] - place))) > EVEN for place in known):
             out = reverse(entry)
-            pose = np.array([*(out[:2] - offset * _left(out)), out[2]])
+            pose = np.array([*(out[:2] - offset * unit_left(out[2])), out[2]])
             ramps.append(Arm(pose, np.array([offset]), np.zeros(0)))
     return ramps
-
-
-def _left(pose: Floats) -> Floats:
-    return np.array([-np.sin(pose[2]), np.cos(pose[2])])
 
 
 def _between(arms: Sequence[Arm]) -> Curve | None:

@@ -107,12 +107,7 @@ def export_bag(
         InputError: the bag cannot be read, or not what is asked for of it; `out` may not be replaced.
         RefusedError: no scenario can be written in that format.
     """
-    to = EXPORTS[target]
-    if export.map and not to.takes_map:
-        raise InputError(f"map: --to {target} writes lanes of its own; a map can be given with --to openscenario or osi")
-    if export.map and Path(export.map).suffix.lower() not in to.maps:
-        known = "OpenDRIVE (.xodr)" + (" or Lanelet2 (.osm)" if ".osm" in to.maps else "")
-        raise InputError(f"map {export.map}: --to {target} takes a road of {known}")
+    to = _format(target, export.map)
     cases = read_cases(bag, export, config, namespace=namespace, indices=indices)
     notes: list[str] = []
     entries: list[dict[str, object]] = []
@@ -142,6 +137,21 @@ def export_bag(
         document = {"format": target, "notes": notes, "scenarios": entries, "sha256": digests}
         write_text(folder / MANIFEST, json.dumps(document, indent=2) + "\n")
     return Export(len(entries), tuple(notes))
+
+
+def _format(target: str, road: str) -> ExportFormat:
+    """Return a format of `EXPORTS`, if it takes the map that is given ("": none).
+
+    Raises:
+        InputError: it does not.
+    """
+    to = EXPORTS[target]
+    if road and not to.takes_map:
+        raise InputError(f"map: --to {target} writes lanes of its own; a map can be given with --to openscenario or osi")
+    if road and Path(road).suffix.lower() not in to.maps:
+        known = "OpenDRIVE (.xodr)" + (" or Lanelet2 (.osm)" if ".osm" in to.maps else "")
+        raise InputError(f"map {road}: --to {target} takes a road of {known}")
+    return to
 
 
 def _has_own_lanes(case: Case, to: ExportFormat) -> bool:
@@ -189,9 +199,7 @@ def _to_openscenario(folder: Path, case: Case, exported: Exported, export: Expor
 
 def _to_osi(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
     road, name = _road_file(case, export), f"case_{case.number}_{exported.index}.mcap"
-    data, notes = write_osi(case, exported, folder / road)
-    (folder / name).write_bytes(data)
-    return Written((name, road), notes)
+    return Written((name, road), write_osi(folder / name, case, exported, folder / road))
 
 
 def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Written:

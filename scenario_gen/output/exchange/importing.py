@@ -4,26 +4,26 @@
 """`scenario-gen import`: trajectories of other software's files as a table that is read as a log.
 
 Columns: vehicle, t_s from the file's time zero, x_m and y_m of the footprint's centre, speed_mps, heading_rad from +x
-counter-clockwise, length_m, width_m. CommonRoad (2018b, 2020a) gives all of it; a missing speed is derived. OpenSCENARIO
+counter-clockwise, length_m, width_m. A missing speed is derived. OpenSCENARIO
 poses the rear axle, and its vertices have no speeds: the centre follows from the bounding box; the speeds are those of our own
 files' property; in others' files they are derived from positions and times, but for the first, which the initial action says.
-Traces of OSI and tables of omega-prime are read as logs are (`logs.adapters`).
+CommonRoad (2018b, 2020a), traces of OSI and tables of omega-prime are read as logs are (`logs.adapters`).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 import math
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError, of_system, reading
-from scenario_gen.logs import is_known, is_osi, LogConfig, read_raw
+from scenario_gen.base.errors import InputError, of_system
+from scenario_gen.base.markup import Element, read_xml
+from scenario_gen.logs import is_commonroad, is_known, is_osi, LogConfig, read_raw
 from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics.plane import place
 from scenario_gen.output.exchange.openscenario import SPEEDS
-from scenario_gen.output.exchange.xml import number, Place, read_xml
+from scenario_gen.output.exchange.xml import number
 from scenario_gen.types import Vehicle
 
 HEADER = "vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m"
@@ -60,17 +60,12 @@ def read_scenario_file(path: Path) -> Imported:
     Raises:
         InputError: it cannot be read, is none of these, or holds no trajectory with times; file and place are named.
     """
-    if is_osi(path) or is_known(path, name="omega_prime"):
+    if path.is_file() and (is_osi(path) or is_known(path, name="omega_prime") or is_commonroad(path)):
         return _log(path)
-    with reading(path):
-        root = read_xml(path)
-        place = Place(path, root, root.tag)
-        if root.tag == "commonRoad":
-            result = _commonroad(place)
-        elif root.tag == "OpenSCENARIO":
-            result = _openscenario(place)
-        else:
-            raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read, and OSI's .mcap")
+    root = read_xml(path, str(path))
+    if root.tag != "OpenSCENARIO":
+        raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read, and OSI's .mcap")
+    result = _openscenario(root)
     if not result.tracks:
         raise InputError(f"{path}: no vehicle with a trajectory in it" + "".join(f"; {note}" for note in result.notes))
     return result
@@ -97,63 +92,42 @@ def import_file(path: Path, out: Path) -> Imported:
     return result
 
 
-def _commonroad(root: Place) -> Imported:
-    """Return what a CommonRoad file has on vehicles in motion."""
-    step = root.attribute("timeStepSize")
-    if step <= 0.0:
-        raise root.error(f"timeStepSize is {step:g}; it must be positive")
-    tracks, notes = [], []
-    left_out: dict[str, int] = {}
-    for obstacle in root.all("dynamicObstacle"):
-        kind = (obstacle.child("type").element.text or "").strip()
-        if kind in ("pedestrian", "bicycle"):
-            left_out[kind] = left_out.get(kind, 0) + 1
-            continue
-        if obstacle.element.find("trajectory") is None:
-            left_out["obstacle without a trajectory"] = left_out.get("obstacle without a trajectory", 0) + 1
-            continue
-        rectangle = obstacle.child("shape/rectangle")
-        states = [obstacle.child("initialState"), *obstacle.all("trajectory/state")]
-        rows = np.array([_state(state, step) for state in states])
-        length, width = rectangle.value("length"), rectangle.value("width")
-        tracks.append(_track(obstacle.error, obstacle.text("id"), (length, width), rows, None))
-    notes += [f"{count} × {kind} left out" for kind, count in left_out.items()]
-    if static := len(root.element.findall("staticObstacle")):
-        notes.append(f"{static} × static obstacle left out")
-    return Imported(tuple(tracks), tuple(notes))
+def _each(element: Element, path: str) -> list[Element]:
+    """Return every descendant along a path of names."""
+    found = [element]
+    for tag in path.split("/"):
+        found = [child for parent in found for child in parent.all(tag)]
+    return found
 
 
-def _state(state: Place, step: float) -> tuple[float, ...]:
-    """Return time [s], x, y [m], speed [m/s], NaN if it is not given, and heading [rad] of a state."""
-    point = state.child("position/point")
-    message = state.element.find("velocity") is not None
-    speed = state.value("velocity/exact") if message else float("nan")
-    heading = state.value("orientation/exact")
-    return state.value("time/exact") * step, point.value("x"), point.value("y"), speed, heading
+def _one(element: Element, path: str) -> Element:
+    """Return the first descendant along a path of names; what is missing is an error."""
+    for tag in path.split("/"):
+        element = element.one(tag)
+    return element
 
 
-def _openscenario(root: Place) -> Imported:
+def _openscenario(root: Element) -> Imported:
     """Return what an OpenSCENARIO file has on vehicles that follow timed polylines."""
-    boxes: dict[str, Place] = {}
+    boxes: dict[str, Element] = {}
     own: dict[str, Floats | None] = {}
     notes = []
-    for entity in root.all("Entities/ScenarioObject", "name"):
-        box = entity.element.find("Vehicle/BoundingBox")
+    for entity in _each(root, "Entities/ScenarioObject"):
+        name, box = entity.get("name"), entity.first("Vehicle", "BoundingBox")
         if box is None:
-            notes.append(f"{entity.text('name')} left out: it is no vehicle with a bounding box in this file")
+            notes.append(f"{name} left out: it is no vehicle with a bounding box in this file")
         else:
-            boxes[entity.text("name")] = entity.child("Vehicle/BoundingBox")
-            own[entity.text("name")] = _own_speeds(entity)
+            boxes[name], own[name] = box, _own_speeds(entity)
     speeds = {
-        private.text("entityRef"): target.attribute("value")
-        for private in root.all("Storyboard/Init/Actions/Private", "entityRef")
-        for target in private.all("PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed")
+        private.get("entityRef"): target.number("value")
+        for private in _each(root, "Storyboard/Init/Actions/Private")
+        for target in _each(private, "PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed")
     }
     tracks = []
-    for group in root.all("Storyboard/Story/Act/ManeuverGroup", "name"):
-        for follow in group.all("Maneuver/Event/Action/PrivateAction/RoutingAction/FollowTrajectoryAction"):
-            for actor in group.all("Actors/EntityRef", "entityRef"):
-                name = actor.text("entityRef")
+    for group in _each(root, "Storyboard/Story/Act/ManeuverGroup"):
+        for follow in _each(group, "Maneuver/Event/Action/PrivateAction/RoutingAction/FollowTrajectoryAction"):
+            for actor in _each(group, "Actors/EntityRef"):
+                name = actor.get("entityRef")
                 if name in boxes:
                     tracks.append(_followed(follow, name, boxes[name], speeds.get(name), own[name]))
     still = sorted(set(boxes) - {track.vehicle for track in tracks})
@@ -161,68 +135,63 @@ def _openscenario(root: Place) -> Imported:
     return Imported(tuple(tracks), tuple(notes))
 
 
-def _own_speeds(entity: Place) -> Floats | None:
+def _own_speeds(entity: Element) -> Floats | None:
     """Return the speeds (K,) [m/s] that a file of ours has as a property of the vehicle; None if it has none, or damaged ones."""
-    for own in entity.all("Vehicle/Properties/Property", "name"):
-        if own.element.get("name") == SPEEDS:
+    for own in _each(entity, "Vehicle/Properties/Property"):
+        if own.attributes.get("name") == SPEEDS:
             try:
-                speeds = np.array(own.text("value").split(), dtype=np.float64)
+                speeds = np.array(own.get("value").split(), dtype=np.float64)
             except ValueError:
                 return None
             return speeds if np.isfinite(speeds).all() else None
     return None
 
 
-def _followed(follow: Place, name: str, box: Place, speed: float | None, speeds: Floats | None) -> Track:
+def _followed(follow: Element, name: str, box: Element, speed: float | None, speeds: Floats | None) -> Track:
     """Return the track of a vehicle that follows a trajectory in absolute time."""
-    timing = follow.child("TimeReference/Timing")
-    if timing.text("domainAbsoluteRelative") != "absolute":
-        raise timing.error("its times are relative to a trigger; only absolute ones are read")
-    scale, offset = timing.attribute("scale"), timing.attribute("offset")
+    timing = _one(follow, "TimeReference/Timing")
+    if timing.get("domainAbsoluteRelative") != "absolute":
+        raise InputError(f"{timing.place}: its times are relative to a trigger; only absolute ones are read")
+    scale, offset = timing.number("scale"), timing.number("offset")
     rows = []
-    for vertex in follow.child("TrajectoryRef/Trajectory/Shape/Polyline").all("Vertex", "time"):
-        world = vertex.child("Position/WorldPosition")
-        time = vertex.attribute("time") * scale + offset
-        rows.append((time, world.attribute("x"), world.attribute("y"), float("nan"), world.attribute("h", 0.0)))
+    for vertex in _one(follow, "TrajectoryRef/Trajectory/Shape/Polyline").all("Vertex"):
+        world = _one(vertex, "Position/WorldPosition")
+        time = vertex.number("time") * scale + offset
+        rows.append((time, world.number("x"), world.number("y"), float("nan"), world.number("h", 0.0)))
     if len(rows) < 2:
-        raise follow.error(f"its polyline has {len(rows)} vertices; at least 2 are needed")
+        raise InputError(f"{follow.place}: its polyline has {len(rows)} vertices; at least 2 are needed")
     result = np.array(rows)
     result[:, 4] = np.unwrap(result[:, 4])
-    center, size = box.child("Center"), box.child("Dimensions")
-    x, y = center.attribute("x"), center.attribute("y")
-    cos, sin = np.cos(result[:, 4]), np.sin(result[:, 4])
-    result[:, 1] += x * cos - y * sin
-    result[:, 2] += x * sin + y * cos
+    center, size = box.one("Center"), box.one("Dimensions")
+    result[:, 1:3] = place(result[:, [1, 2, 4]], center.number("x"), center.number("y"))
     if speeds is not None and len(speeds) == len(result):
         result[:, 3] = speeds
-    return _track(follow.error, name, (size.attribute("length"), size.attribute("width")), result, speed)
+    return _track(follow.place, name, (size.number("length"), size.number("width")), result, speed)
 
 
-def _track(
-    error: Callable[[str], InputError], vehicle: str, size: tuple[float, float], rows: Floats, speed: float | None
-) -> Track:
-    """Return a track whose times ascend; speeds that are not given are derived.
+def _track(place: str, vehicle: str, size: tuple[float, float], rows: Floats, speed: float | None) -> Track:
+    """Return a track whose times ascend; speeds that are not given are derived. `place` begins messages.
 
     Raises:
         InputError: a time is not later than the one before, a size is not positive, or there are too many rows.
     """
     if len(rows) > MOST_ROWS:
-        raise error(f"{len(rows)} states; at most {MOST_ROWS} are read")
+        raise InputError(f"{place}: {len(rows)} states; at most {MOST_ROWS} are read")
     if min(size) <= 0.0:
-        raise error(f"a footprint of {size[0]:g} m × {size[1]:g} m; both must be positive")
+        raise InputError(f"{place}: a footprint of {size[0]:g} m × {size[1]:g} m; both must be positive")
     if len(rows) < 2 or (np.diff(rows[:, 0]) <= 0.0).any():
-        raise error("times must ascend, and be two at least")
+        raise InputError(f"{place}: times must ascend, and be two at least")
     if np.isnan(rows[:, 3]).any():
         rows[:, 3] = _speeds(rows, speed)
     if not np.isfinite(rows).all():
-        raise error("its times, places or speeds are beyond all numbers")
+        raise InputError(f"{place}: its times, places or speeds are beyond all numbers")
     if any(not c.isprintable() or c in ',"' for c in vehicle) or not vehicle:
-        raise error(f"the id {vehicle[:40]!r} cannot stand in a table; rename it")
+        raise InputError(f"{place}: the id {vehicle[:40]!r} cannot stand in a table; rename it")
     return Track(vehicle, *size, rows)
 
 
 def _log(path: Path) -> Imported:
-    """Return the vehicles of a trace of OSI or a table of omega-prime; sizes that are not given are a car's."""
+    """Return the vehicles of a file that is read as logs are; sizes that are not given are a car's."""
     log = read_raw([path], LogConfig())
     tracks = []
     for seen in log.vehicles:
@@ -232,15 +201,10 @@ def _log(path: Path) -> Imported:
         heading = np.unwrap(np.where(np.isnan(seen.heading), _directions(seen.fix), seen.heading))
         rows = np.column_stack((seen.fix_ns * 1e-9, seen.fix, speed, heading))
         usual = Vehicle(seen.id)
-        length, width = (
-            own if own > 0.0 else known_size for own, known_size in ((seen.length, usual.length), (seen.width, usual.width))
-        )
-        tracks.append(_track(partial(_fault, path, seen.id), seen.id, (length, width), rows, None))
+        sizes = (seen.length, usual.length), (seen.width, usual.width)
+        length, width = (known_size if math.isnan(own) or own == 0.0 else own for own, known_size in sizes)
+        tracks.append(_track(f"{path}, vehicle {seen.id}", seen.id, (length, width), rows, None))
     return Imported(tuple(tracks), log.notes)
-
-
-def _fault(path: Path, vehicle: str, sentence: str) -> InputError:
-    return InputError(f"{path}, vehicle {vehicle}: {sentence}")
 
 
 def _directions(places: Floats) -> Floats:

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics.plane import unit_left
 from scenario_gen.types import LaneNetwork
 
 DECIMALS = 6
@@ -45,8 +46,7 @@ class Strip:
 
     def beside(self, distance: Floats) -> Floats:
         """Return points (M, 2) at distances (M,) [m] to the left of the reference line."""
-        x, y, yaw = self.reference.T
-        return np.column_stack((x - distance * np.sin(yaw), y + distance * np.cos(yaw)))
+        return np.asarray(self.reference[:, :2] + distance[:, None] * unit_left(self.reference[:, 2]))
 
     def edges(self, side: str) -> Floats:
         """Return the edges (L, M, 2) [m] of one side's L - 1 lanes, "right" or "left", from the middle outwards."""
@@ -246,9 +246,3 @@ def _places(lane_map: LaneMap) -> Iterator[Place]:
         for side in ("right", "left"):
             for place in range(len(getattr(strip, side))):
                 yield k, side, place
-
-
-def stations(reference: Floats) -> Floats:
-    """Return (M,) the length [m] along a polyline (M, 2+) to each of its points."""
-    steps = np.diff(reference[:, :2], axis=0)
-    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])

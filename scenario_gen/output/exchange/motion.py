@@ -6,8 +6,10 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.plane import unit
 from scenario_gen.types import Scenario
 
 EVEN = 1e-9  # seconds by which steps may differ and still be one
@@ -28,37 +30,20 @@ def at_even_steps(scenario: Scenario, step: float) -> Scenario:
 
 def at_times(scenario: Scenario, time: Floats) -> Scenario:
     """Return the scenario at instants (M,) [s] within it: cubic Hermite positions, linear headings, speeds and accelerations."""
-    k = np.clip(np.searchsorted(scenario.time, time, side="right") - 1, 0, len(scenario.time) - 2)
-    length = (scenario.time[k + 1] - scenario.time[k])[None, :]
-    u = (time - scenario.time[k])[None, :] / length
-    velocity = _velocity(scenario)
-    h00, h10 = (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u), u * (1.0 - u) * (1.0 - u)
-    h01, h11 = u * u * (3.0 - 2.0 * u), u * u * (u - 1.0)
-    position = (
-        h00[..., None] * scenario.position[:, k]
-        + (h10 * length)[..., None] * velocity[:, k]
-        + h01[..., None] * scenario.position[:, k + 1]
-        + (h11 * length)[..., None] * velocity[:, k + 1]
-    )
+    velocity = scenario.speed[..., None] * unit(scenario.heading)
 
     def linear(values: Floats) -> Floats:
-        return values[:, k] + u * (values[:, k + 1] - values[:, k])
+        return np.stack([np.interp(time, scenario.time, row) for row in values])
 
     return replace(
         scenario,
         time=time,
-        position=position,
+        position=CubicHermiteSpline(scenario.time, scenario.position, velocity, axis=1)(time),
         heading=linear(scenario.heading),
-        speed=np.maximum(linear(scenario.speed), 0.0),
+        speed=linear(scenario.speed),
         acceleration=linear(scenario.acceleration),
         present=_presence(scenario, time),
     )
-
-
-def _velocity(scenario: Scenario) -> Floats:
-    """Return velocities (N, T, 2) [m/s] along the headings."""
-    speed, heading = scenario.speed, scenario.heading
-    return np.stack((speed * np.cos(heading), speed * np.sin(heading)), axis=-1)
 
 
 def _presence(scenario: Scenario, time: Floats) -> Ints:

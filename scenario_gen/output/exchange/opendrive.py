@@ -21,10 +21,7 @@ from scenario_gen.output.exchange.xml import add, comment, Element, serialized
 ROADS, JUNCTION = 1, 1000  # ids: of the first road, and of the junction
 STRAIGHT = 1e-7  # rad by which the headings of a straight piece may differ
 GOES_ON = 1e-5  # metres by which a width or an offset may differ from its linear piece
-_GAUSS = (np.array([-0.9061798459386640, -0.5384693101056831, 0.0, 0.5384693101056831, 0.9061798459386640]) + 1.0) / 2.0
-_WEIGHTS = (
-    np.array([0.2369268850561891, 0.4786286704993665, 0.5688888888888889, 0.4786286704993665, 0.2369268850561891]) / 2.0
-)  # Gauss-Legendre with five points on [0, 1]
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # on [-1, 1]
 
 
 def write_opendrive(lane_map: LaneMap, name: str, start_ns: int) -> bytes:
@@ -166,10 +163,10 @@ def _pieces(reference: Floats) -> Iterator[tuple[float, Curve3 | None]]:
 
 def _length(curve: Curve3) -> float:
     """Return the length [m] of a cubic for p from 0 to 1."""
-    p = _GAUSS
+    p = 0.5 * (_GAUSS + 1.0)
     du = curve[1] + 2.0 * curve[2] * p + 3.0 * curve[3] * p * p
     dv = curve[5] + 2.0 * curve[6] * p + 3.0 * curve[7] * p * p
-    return float(np.sum(_WEIGHTS * np.hypot(du, dv)))
+    return float(0.5 * _WEIGHTS @ np.hypot(du, dv))
 
 
 def _merged(

@@ -12,12 +12,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, UTC
 from functools import cache
-from io import BytesIO
 import math
 from pathlib import Path
 from typing import Any
 
-from mcap.writer import Writer
 import numpy as np
 
 from scenario_gen.base.errors import InputError, needs
@@ -51,10 +49,11 @@ class _Part:
     yaw_rate: Floats
 
 
-def write_osi(case: Case, exported: Exported, road: Path) -> tuple[bytes, tuple[str, ...]]:
-    """Return a scenario as the bytes of an MCAP file, and notes.
+def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[str, ...]:
+    """Write a scenario to an MCAP file; return notes.
 
     Args:
+        path: of the file.
         case: whose stamp is the file's date.
         exported: the scenario; its ego, or else its first vehicle, is the host.
         road: an OpenDRIVE file, in the scenario's frame.
@@ -70,18 +69,15 @@ def write_osi(case: Case, exported: Exported, road: Path) -> tuple[bytes, tuple[
     time, parts = _parts(exported, numbers)
     host = numbers[-1] if exported.ego is not None else numbers[0]
     text, frame = _text(road), _frame(road)
-    stream = BytesIO()
-    writer = Writer(stream)
-    writer.start(library="scenario_gen")
-    writer.add_metadata(betterosi.OSI_TRACE_METADATA_NAME, _metadata(case, exported))
-    channels = {topic: _channel(writer, topic, kind) for topic, kind in ((OBJECTS, "GroundTruth"), (MAP, "MapAsamOpenDrive"))}
-    drawn = betterosi.MapAsamOpenDrive(map_reference=road.name, open_drive_xml_content=text)
-    writer.add_message(channels[MAP], log_time=0, data=drawn.to_binary(), publish_time=0)
-    for k, stamp in enumerate(np.round(time * NS).astype(np.int64).tolist()):
-        message = _ground_truth(parts, k, stamp, host, road.name, frame)
-        writer.add_message(channels[OBJECTS], log_time=stamp, data=message.to_binary(), publish_time=stamp, sequence=k)
-    writer.finish()
-    return stream.getvalue(), notes
+    date = datetime.fromtimestamp(case.start_ns // NS, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    about = f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}"
+    metadata = {"creation_time": date, "description": about, "authors": "scenario_gen"}
+    with betterosi.Writer(path, metadata=metadata, library="scenario_gen", descriptor_set=_definitions()) as trace:
+        drawn = betterosi.MapAsamOpenDrive(map_reference=road.name, open_drive_xml_content=text)
+        trace.add(drawn, topic=MAP, log_time=0)
+        for k, stamp in enumerate(np.round(time * NS).astype(np.int64).tolist()):
+            trace.add(_ground_truth(parts, k, stamp, host, road.name, frame), topic=OBJECTS, log_time=stamp)
+    return notes
 
 
 def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]]:
@@ -225,44 +221,14 @@ def _frame(road: Path) -> Frame:
     return Frame(" ".join(reference.text.split()) if reference is not None else "", moved)
 
 
-def _metadata(case: Case, exported: Exported) -> dict[str, str]:
-    """Return the file's metadata, as the trace file format asks for them."""
-    import betterosi
-
-    date = datetime.fromtimestamp(case.start_ns // NS, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    about = f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}"
-    found: dict[str, str] = betterosi.prepare_required_file_metadata(
-        {"creation_time": date, "description": about, "authors": "scenario_gen"}
-    )
-    return found
-
-
-def _channel(writer: Writer, topic: str, kind: str) -> int:
-    """Announce a topic of a message of OSI; return its number."""
-    import betterosi
-
-    schema = writer.register_schema(f"osi3.{kind}", "protobuf", _definition(getattr(betterosi, kind).desc().file.name))
-    number: int = writer.register_channel(topic, "protobuf", schema, betterosi.prepare_channel_metadata())
-    return number
-
-
 @cache
-def _definition(name: str) -> bytes:
-    """Return the files of a message's definition, without comments, and no others: a FileDescriptorSet."""
+def _definitions() -> bytes:
+    """Return the definitions of OSI's messages without comments, an eighth of all: a FileDescriptorSet."""
     import betterosi
     from protobuf.wkt import FileDescriptorSet
 
     whole = FileDescriptorSet.from_binary(betterosi.load_descriptor_set(betterosi.DEFAULT_VERSION))
-    files = {file.name: file for file in whole.file}
-    needed: dict[str, Any] = {}
-
-    def add(one: str) -> None:
-        if one not in needed:
-            for other in files[one].dependency:
-                add(other)
-            files[one].source_code_info = None
-            needed[one] = files[one]
-
-    add(name)
-    definition: bytes = FileDescriptorSet(file=list(needed.values())).to_binary()
-    return definition
+    for file in whole.file:
+        file.source_code_info = None
+    definitions: bytes = whole.to_binary()
+    return definitions

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import Lane
@@ -76,7 +77,7 @@ def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
         return np.where(there if np.ndim(values) == 1 else there[:, None], values, 0.0).astype(np.float32)
 
     heading, speed = motion.heading[n], motion.speed[n]
-    velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=1)
+    velocity = speed[:, None] * unit(heading)
     state = {
         "position": masked(np.column_stack([motion.position[n], np.zeros(steps)])),
         "heading": masked(heading),
@@ -94,7 +95,7 @@ def _summary(track: Mapping[str, Any], name: str) -> dict[str, Any]:
     """Return what ScenarioNet's filters ask of a track."""
     valid, position = track["state"]["valid"], track["state"]["position"][:, :2].astype(np.float64)
     driven = position[valid]
-    moved = float(np.sqrt(np.square(np.diff(driven, axis=0)).sum(axis=1)).sum())
+    moved = float(edge_lengths(driven).sum())
     return {
         "type": "VEHICLE",
         "object_id": name,

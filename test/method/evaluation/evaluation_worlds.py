@@ -5,6 +5,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -64,6 +65,7 @@ def cross_road():
     return Road("cross", drivable, 0.5, np.array([-70.0, -70.0]), entries, exits)
 
 
+@cache
 def report_case(count=12, name="crossing", without=True):
     """A whole case of the report, around the crossing."""
     cars = (CARS[0], replace(CARS[1], id="south" if name == "crossing" else "A_VEHICLE_WITH_A_LONG_NAME"))

@@ -13,7 +13,6 @@ from scipy.spatial.distance import cdist
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.dtw import (
     blocks,
-    dtw,
     dtw_distance,
     feature_extents,
     feature_matrix,
@@ -41,26 +40,16 @@ def naive(a, b, metric, band):
 
 
 def test_by_hand():
-    found = dtw([0.0, 1.0, 2.0], [0.0, 2.0])
-    assert found.distance == dtw_distance([0.0, 1.0, 2.0], [0.0, 2.0]) == 1.0
-    assert found.accumulated.tolist() == [[0.0, 2.0], [1.0, 1.0], [3.0, 1.0]]
-    assert found.path.tolist() == [[0, 0], [1, 0], [2, 1]] or found.path.tolist() == [[0, 0], [1, 1], [2, 1]]
+    assert dtw_distance([0.0, 1.0, 2.0], [0.0, 2.0]) == 1.0
     assert dtw_distance([[0.0, 0.0]], [[3.0, 4.0]]) == 5.0
     assert dtw_distance([[0.0, 0.0]], [[3.0, 4.0]], "manhattan") == 7.0
 
 
 @settings(max_examples=60)
 @given(series(2), series(2), st.sampled_from(["euclidean", "manhattan"]), st.one_of(st.none(), st.integers(0, 5)))
-def test_distance_path_and_matrix_agree_with_a_naive_transcription(a, b, distance, band):
+def test_the_distance_agrees_with_a_naive_transcription(a, b, distance, band):
     expected = naive(a, b, {"manhattan": "cityblock"}.get(distance, distance), band)
-    found = dtw(a, b, distance, band)
-    np.testing.assert_allclose(found.accumulated, expected, rtol=1e-12, atol=1e-9)
     assert dtw_distance(a, b, distance, band) == pytest.approx(expected[-1, -1], rel=1e-12, abs=1e-9)
-    cost = cdist(a, b, {"manhattan": "cityblock"}.get(distance, distance))
-    assert cost[tuple(found.path.T)].sum() == pytest.approx(found.distance, rel=1e-12, abs=1e-9)
-    steps = np.diff(found.path, axis=0)
-    assert found.path[0].tolist() == [0, 0] and found.path[-1].tolist() == [len(a) - 1, len(b) - 1]
-    assert ((steps == 0) | (steps == 1)).all() and (steps.sum(axis=1) > 0).all()
 
 
 @pytest.mark.parametrize("shape", [(300, 300), (257, 400), (1000, 700)])

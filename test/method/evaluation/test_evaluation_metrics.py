@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 from scipy import stats
 from scipy.spatial.distance import jensenshannon
-from shapely import affinity
-from shapely.geometry import box
 
 from scenario_gen.method.evaluation import diversity, evaluate_scenarios, similarity
 from scenario_gen.method.evaluation.bootstrap import Bootstrap, wilson
@@ -41,17 +39,6 @@ def test_footprint_distance_by_hand():
     )  # a cross, no corner inside
 
 
-@settings(max_examples=100)
-@given(st.lists(st.floats(-8, 8), min_size=2, max_size=2), st.floats(-4, 4), st.floats(-4, 4))
-def test_footprint_distance_equals_shapely(xy, yaw_a, yaw_b):
-    motion = still([(0, 0), xy], (yaw_a, yaw_b), ((5, 2), (4, 1.7)))
-    shapes = [
-        affinity.translate(affinity.rotate(box(-v.length / 2, -v.width / 2, v.length / 2, v.width / 2), yaw, (0, 0), True), *at)
-        for v, yaw, at in zip(motion.vehicles, (yaw_a, yaw_b), ((0, 0), xy), strict=True)
-    ]
-    assert footprint_distance(motion, 0, 1)[0] == pytest.approx(shapes[0].distance(shapes[1]), abs=1e-9)
-
-
 def test_time_to_collision_by_hand():
     head_on = still([(0, 0), (24, 0)], (0, np.pi), speed=(5.0, 5.0))  # 20 m between bumpers, closing at 10 m/s
     assert time_to_collision(head_on, 0, 1) == pytest.approx(2.0)
@@ -64,7 +51,7 @@ def test_time_to_collision_by_hand():
     assert time_to_collision(still([(0, 0), (1, 0)], (0, 0)), 0, 1) == 0.0  # they overlap now
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(*[st.tuples(st.floats(-b, b), st.floats(-b, b)) for b in (20, 3)], st.tuples(st.floats(0.5, 12), st.floats(0.5, 12)))
 def test_footprints_touch_at_the_time_to_collision(place, yaws, speeds):
     motion = still([(0, 0), place], yaws, speed=speeds)
@@ -77,7 +64,7 @@ def test_footprints_touch_at_the_time_to_collision(place, yaws, speeds):
 
     if np.isinf(found):
         assert all(distance(t) >= 0.0 for t in np.linspace(0, 5, 11))
-        assert not any(distance(t) == 0.0 and distance(t + 0.01) == 0.0 for t in np.linspace(0, 10, 201))
+        assert not any(distance(t) == 0.0 and distance(t + 0.01) == 0.0 for t in np.linspace(0, 10, 41))
     else:
         assert distance(found) < 1e-6
         assert all(distance(share * found) > 0.0 for share in (0.0, 0.3, 0.6, 0.9)) or found == 0.0

@@ -125,7 +125,7 @@ CASES = {
 def test_geweke(case):
     """Prior draws and the chain (labels, parameters | series) <-> (series | labels, parameters) have the same moments."""
     order, dof, moves, (gaps, hidden) = CASES[case]
-    d, samples, draws = 2, 12, 2500 if LONG else 800
+    d, samples, draws = 2, 12, 2500 if LONG else 400
     rng = np.random.default_rng([11, list(CASES).index(case)])
     forward = []
     for _ in range(draws):

@@ -5,6 +5,7 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lengths import LONG
 import numpy as np
 import pytest
 
@@ -21,7 +22,7 @@ def two_states(seed: int, dimensions: int = 2) -> tuple[np.ndarray, np.ndarray]:
     return rng.normal(size=(240, dimensions)) + 4.0 * labels[:, None] / np.sqrt(dimensions), labels
 
 
-@pytest.mark.parametrize("dimensions", [1, 3, 24])
+@pytest.mark.parametrize("dimensions", [1, 24])
 def test_finds_states_and_shares_them(dimensions):
     x, labels = two_states(5, dimensions)
     posterior = segment_series(x, seed=1)
@@ -71,7 +72,7 @@ def test_constant_channel_and_constant_series():
     assert segment_series(np.ones((50, 3))).labels.max() == 0
 
 
-@pytest.mark.parametrize("tremble", [1e-7, 1e-3, 0.1])
+@pytest.mark.parametrize("tremble", [1e-7, 0.1])
 def test_channel_that_varies_less_than_it_is_known_hides_nothing(tremble):
     """A vehicle that stands throughout: blown up to unit variance, its trembling drowned every other channel's changes."""
     x, labels = two_states(8)
@@ -87,7 +88,7 @@ def test_refuses_what_it_cannot_use(bad):
         segment_series(bad)
 
 
-@settings(max_examples=25)
+@settings(max_examples=200 if LONG else 12)
 @given(st.integers(4, 40), st.integers(1, 8), st.integers(0, 1000), st.sampled_from(["gaussian", "autoregressive"]))
 def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
     rng = np.random.default_rng(seed)
@@ -101,14 +102,6 @@ def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
     assert intervals.shape == (len(posterior.changepoints), 2)
     assert (intervals[:, 0] <= intervals[:, 1]).all()
     assert posterior.primitives().sum() == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("emission", ["gaussian", "autoregressive"])
-def test_more_channels_than_samples(emission):
-    x = np.random.default_rng(3).normal(size=(10, 12))
-    posterior = segment_series(x, SamplerConfig(emission=emission), seed=0)
-    assert posterior.labels.shape == (10,)
-    assert np.isfinite(posterior.probability).all()
 
 
 def test_states_whose_means_lie_close_are_told_apart():
@@ -216,11 +209,10 @@ def test_heavy_tails_are_told_from_states():
     assert segment_series(x, seed=0).dof == 0.0
 
 
-@pytest.mark.parametrize("size", [30.0, 1e6])
-def test_single_outliers_are_no_states(size):
+def test_single_outliers_are_no_states():
     x, labels = many_states(6)
     rng = np.random.default_rng(0)
-    x[rng.uniform(size=len(x)) < 0.01] += size
+    x[rng.uniform(size=len(x)) < 0.01] += 1e6
     assert found_as_drawn(segment_series(x, seed=0), labels)
 
 
@@ -243,7 +235,7 @@ def test_a_sequence_shorter_than_the_order_is_named():
         segment_series(x, SamplerConfig(emission="autoregressive", order=2), ends=(100, 103, 240))
 
 
-@pytest.mark.parametrize("missing", [0.15, 0.4])
+@pytest.mark.parametrize("missing", [0.4])
 def test_what_is_missing_does_not_make_the_rest_look_correlated(missing):
     """Gaps are filled with lines between neighbours; those once let independent samples count for two thirds."""
     rng = np.random.default_rng(0)

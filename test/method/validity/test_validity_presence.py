@@ -120,21 +120,12 @@ def overlaps(scenario, limits):
     return [found for found in oracle_violations(scenario, None, None, None, None, limits, 0.02) if found.startswith("overlap")]
 
 
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=1000 if LONG else 40)
-def test_checker_and_oracle_agree_on_who_comes_and_goes(seed):
-    compare(seed)
-
-
-def test_checker_and_oracle_agree_on_groups_of_nine():
-    for seed in range(600 if LONG else 4):
-        compare(seed, 9)
-
-
-def test_the_random_cases_are_of_every_kind():
-    found = [compare(seed) for seed in range(30)]
-    assert 5 <= sum(valid for valid, _ in found) <= 25
+def test_checker_and_oracle_agree_on_who_comes_and_goes():
+    found = [compare(seed) for seed in range(1000 if LONG else 40)]
+    assert LONG or 5 <= sum(valid for valid, _ in found) <= 35
     assert set().union(*(spans for _, spans in found)) == {0, 1, 2, 3}
+    for seed in range(600 if LONG else 3):
+        compare(seed, 9)
 
 
 @given(st.integers(0, 10_000))

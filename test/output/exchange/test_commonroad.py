@@ -137,17 +137,6 @@ def test_trucks_are_trucks(tmp_path):
     assert [element.text for element in written(tmp_path, truck)[1].iterfind("dynamicObstacle/type")] == ["truck"]
 
 
-def test_what_was_written_is_read_back(tmp_path):
-    scenario = crossing(present=[[0, 60], [0, 41]])
-    path, _, _ = written(tmp_path, scenario)
-    for n, track in enumerate(read_scenario_file(path).tracks):
-        last = int(scenario.present[n, 1]) + 1
-        assert np.allclose(track.rows[:, 0], scenario.time[:last], atol=1e-9)
-        assert np.abs(track.rows[:, 1:3] - scenario.position[n, :last]).max() < 1e-6
-        assert np.abs(track.rows[:, 3] - scenario.speed[n, :last]).max() < 1e-6
-        assert (track.length, track.width) == pytest.approx((scenario.vehicles[n].length, scenario.vehicles[n].width), abs=1e-9)
-
-
 def test_signs_lights_and_stop_lines_of_a_vector_map_are_written_and_read_again(tmp_path):
     """The light is off: no state of it is known. The schema wants signs before lights."""
     x = np.linspace(-60.0, 60.0, 30)

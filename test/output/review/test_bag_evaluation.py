@@ -6,7 +6,7 @@
 from base64 import b64decode
 from collections import Counter
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 import io
 
 from browser_tab import DESKTOP, PHONE, Tab
@@ -38,6 +38,7 @@ from scenario_gen.types.scenario import Cause, ScenarioSet
 QUICK = EvaluationConfig(resamples=50)
 
 
+@cache
 def real_run():
     """The synthetic merging case on a straight road."""
     (encounter,) = read_log([bundled("c")]).encounters

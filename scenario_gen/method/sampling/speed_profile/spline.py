@@ -20,8 +20,7 @@ KNOT_SPACING = 0.25  # s; farther apart, the steps of jerk between knots are tol
 MOST_KNOTS = 600  # of long encounters the knots are farther apart
 DEGREE = 3
 _BEFORE = 1e-9  # s
-_GAUSS_X = np.array([-0.8611363115940526, -0.3399810435848563, 0.3399810435848563, 0.8611363115940526])
-_GAUSS_W = np.array([0.3478548451374538, 0.6521451548625461, 0.6521451548625461, 0.3478548451374538])
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,20 +94,11 @@ class SpeedSpline:
 
     def driven(self, until: Floats) -> Floats:
         """(q, n) metres that each coefficient of 1 m/s drives until times (q,) [s]."""
-        cell = np.clip(np.searchsorted(self.breaks, until, side="right") - 1, 0, len(self.breaks) - 2)
-        half = 0.5 * (until - self.breaks[cell])
-        points = self.breaks[cell][:, None] + half[:, None] * (1.0 + _GAUSS_X)
-        return np.asarray(self._driven_before[cell] + self._summed(points, half[:, None] * _GAUSS_W))
+        return np.asarray(self._driven(until))
 
     @cached_property
-    def _driven_before(self) -> Floats:
-        """(m + 1, n) metres that each coefficient of 1 m/s drives until each break."""
-        whole = self._summed(*self._quadrature())
-        return frozen(np.concatenate([np.zeros((1, self.size)), np.cumsum(whole, axis=0)]))
-
-    def _summed(self, at: Floats, weight: Floats) -> Floats:
-        """(q, n) weighted sums of the basis functions over points (q, 4) [s]."""
-        return np.asarray((self.design(at.ravel()).reshape(*at.shape, self.size) * weight[..., None]).sum(axis=1))
+    def _driven(self) -> BSpline:
+        return BSpline(self.knots, np.eye(self.size), DEGREE).antiderivative()
 
     @cached_property
     def gram(self) -> Floats:

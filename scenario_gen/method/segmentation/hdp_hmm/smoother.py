@@ -4,13 +4,14 @@
 """A hidden Markov model with known parameters: densities, forward-backward smoothing, and the statistics its emissions need."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import add_sample
 from scenario_gen.method.segmentation.hdp_hmm.observed import log_radial, without_hidden
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.kernels import B2, F, F1, F2, F3, I1, kernel, OUT1, OUT2
+from scenario_gen.numerics.kernels import B2, F, F1, F2, F3, I1, kernel, named, OUT1, OUT2
 
 LEAST_LOG = -600.0
 
@@ -146,23 +147,36 @@ def fill_hidden(hidden: Bools, factor: Floats, shift: Floats, share: float, inve
                 outer[at[b], at[c]] += share * inverse[q, b] * inverse[q, c]
 
 
-@kernel(F2, B2, B2, F1, F2, F, F, OUT2, OUT1)
-def expected_statistics(
-    v: Floats, hidden: Bools, unused: Bools, share: Floats, coef: Floats, weight: float, dof: float, outer: Floats, sums: Floats
-) -> None:
-    """Fill the expected statistics of one state: hidden channels and the masses of heavy-tailed noise at their conditional means.
+class Rows(NamedTuple):
+    """Samples and what is known of them.
 
-    Args:
+    Attributes:
         v: (T, P + D) rows (z, y), finite also where hidden.
         hidden: (T, D) which channels of y were not observed.
         unused: (T, D) the same, and all channels that say nothing of their own about how far off a sample is.
-        share: (T,) probability that the sample is this state's; 0 leaves it out.
-        coef: (D, P + D) emission, see `draw_emission`.
         weight: what a sample counts for.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
+    """
+
+    v: Floats
+    hidden: Bools
+    unused: Bools
+    weight: float
+    dof: float
+
+
+@kernel(named(Rows, F2, B2, B2, F, F), F1, F2, OUT2, OUT1)
+def expected_statistics(rows: Rows, share: Floats, coef: Floats, outer: Floats, sums: Floats) -> None:
+    """Fill the expected statistics of one state: hidden channels and the masses of heavy-tailed noise at their conditional means.
+
+    Args:
+        rows: T samples.
+        share: (T,) probability that the sample is this state's; 0 leaves it out.
+        coef: (D, P + D) emission, see `draw_emission`.
         outer: (P + D, P + D) output, Σ share E[mass v vᵀ].
         sums: (2,) output, Σ share and Σ share E[mass].
     """
+    v, hidden, unused, weight, dof = rows
     d, m = coef.shape
     p = m - d
     factor, inverse, shift, row = np.empty((d, d)), np.empty((d, d)), np.empty(d), np.empty(m)

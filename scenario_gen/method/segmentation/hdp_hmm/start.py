@@ -4,87 +4,15 @@
 """Where a chain starts: k-means over windows of the series."""
 
 from dataclasses import dataclass, replace
+import warnings
 
 import numpy as np
 from scipy import special
+from scipy.cluster.vq import kmeans2
 
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import compact, moving_mean, new_top, Place, Prior, Problem
-from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
-from scenario_gen.numerics import Floats, Ints
-from scenario_gen.numerics.kernels import F2, I, kernel, OUT2, OUTI1
-
-
-@kernel(inline=True)
-def distances(x: Floats, centres: Floats, used: int, out: Floats) -> None:
-    """Fill out[:used] with squared distances from x (D,) to centres (D, K)."""
-    for k in range(used):
-        out[k] = 0.0
-    for i in range(len(x)):
-        c = x[i]
-        row = centres[i]
-        for k in range(used):
-            out[k] += (c - row[k]) ** 2
-
-
-@kernel(inline=True)
-def spread_centres(state: State, x: Floats, centres: Floats) -> None:
-    """Fill centres (D, K) with samples of x (T, D), each drawn by its squared distance to those before (k-means++)."""
-    samples, d = x.shape
-    far = np.full(samples, np.inf)
-    for k in range(centres.shape[1]):
-        chosen = int(uniform(state) * samples)
-        if k > 0:
-            total = 0.0
-            for t in range(samples):
-                total += far[t]
-            chosen = pick(far, uniform(state) * total, -1)
-        for t in range(samples):
-            square = 0.0
-            for i in range(d):
-                square += (x[t, i] - x[chosen, i]) ** 2
-            far[t] = min(far[t], square)
-        for i in range(d):
-            centres[i, k] = x[chosen, i]
-
-
-@kernel(F2, I, I, OUT2, OUTI1)
-def kmeans(x: Floats, seed: int, rounds: int, centres: Floats, labels: Ints) -> None:
-    """k-means with the starts of k-means++ (Arthur & Vassilvitskii 2007).
-
-    Args:
-        x: (T, D).
-        seed: any integer.
-        rounds: of assigning and averaging.
-        centres: (D, K) output; where a cluster runs empty its centre stays.
-        labels: (T,) output.
-    """
-    samples, d = x.shape
-    states = centres.shape[1]
-    state: State = np.empty(1, np.uint64)
-    state[0] = np.uint64(seed)
-    spread_centres(state, x, centres)
-    near = np.empty(states)
-    counts = np.empty(states)
-    sums = np.empty((d, states))
-    for _ in range(rounds):
-        counts[:] = 0.0
-        sums[:] = 0.0
-        for t in range(samples):
-            distances(x[t], centres, states, near)
-            best = 0
-            for k in range(1, states):
-                if near[k] < near[best]:
-                    best = k
-            labels[t] = best
-            counts[best] += 1.0
-            for i in range(d):
-                sums[i, best] += x[t, i]
-        for k in range(states):
-            if counts[k] > 0.0:
-                for i in range(d):
-                    centres[i, k] = sums[i, k] / counts[k]
-
+from scenario_gen.numerics import Floats
 
 WINDOWS = (9, 15, 5, 25)
 GUESS = (25.0, 0.1)  # ν0 - D and κ0 to begin with
@@ -120,9 +48,10 @@ def cluster(problem: Problem, clusters: int, window: int, rng: np.random.Generat
     low, high = np.quantile(signals, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
     margin = FAR_MARGIN * (high - low)
     smooth = np.ascontiguousarray(moving_mean(np.clip(signals, low - margin, high + margin), window))
-    centres = np.empty((smooth.shape[1], min(clusters, max(2, len(smooth) // 4))))
-    labels = np.empty(len(smooth), np.int64)
-    kmeans(smooth, int(rng.integers(2**62)), KMEANS_ROUNDS, centres, labels)
+    centres = min(clusters, max(2, len(smooth) // 4))
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):  # of clusters that run empty, of samples that are all the same
+        warnings.simplefilter("ignore", UserWarning)
+        _, labels = kmeans2(smooth, centres, iter=KMEANS_ROUNDS, minit="++", rng=rng)
     return Place(compact(labels), problem.observed)
 
 
