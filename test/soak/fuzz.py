@@ -24,12 +24,9 @@ def run(state: Path) -> Iterator[Figure]:
         record = fuzz(target, state, EXECUTIONS, math.inf)
         found = [f"{failure.count} × {failure.signature}" for failure in record.failures.values()]
         found += guided(name, state / "guided")
-        yield Figure(
-            promise=f"{name}: damaged inputs end in errors of ours",
-            asked=f"{EXECUTIONS}; each ≤ {SECONDS:g} s of CPU and ≤ {MEMORY >> 30} GiB",
-            seen=f"{record.executions} in {record.seconds / 60.0:.1f} min: {'; '.join(found) or 'nothing else'}",
-            met=not found,
-        )
+        asked = f"{EXECUTIONS}; each ≤ {SECONDS:g} s of CPU and ≤ {MEMORY >> 30} GiB"
+        seen = f"{record.executions} in {record.seconds / 60.0:.1f} min: {'; '.join(found) or 'nothing else'}"
+        yield Figure(f"{name}: damaged inputs end in errors of ours", asked, seen, not found)
 
 
 def guided(name: str, state: Path) -> list[str]:
@@ -43,7 +40,6 @@ def guided(name: str, state: Path) -> list[str]:
         done.touch()
     found = state / "guided.jsonl"
     entries = map(json.loads, found.read_text().splitlines()) if found.exists() else ()
-    killed = [
-        f"{file.name} (libFuzzer)" for kind in ("crash", "timeout", "oom") for file in sorted(state.glob(f"{name}_{kind}-*"))
-    ]
+    ends = ("crash", "timeout", "oom")
+    killed = [f"{file.name} (libFuzzer)" for kind in ends for file in sorted(state.glob(f"{name}_{kind}-*"))]
     return [entry["signature"] for entry in entries if entry["target"] == name] + killed

@@ -8,8 +8,8 @@ import json
 import os
 from pathlib import Path
 
-from figures import Figure
-from tests import ROOT, run_file
+from figures import Figure, ROOT
+from tests import run_file
 
 ROUNDS = int(os.environ.get("SCENARIO_GEN_SOAK_ROUNDS", "20"))
 

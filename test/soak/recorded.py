@@ -8,9 +8,9 @@ from pathlib import Path
 import subprocess
 import sys
 
-from figures import Figure
+from figures import Figure, ROOT
 from lengths import DATA
-from tests import ROOT, run_file
+from tests import run_file
 
 
 def files() -> list[str]:
