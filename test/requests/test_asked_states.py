@@ -67,14 +67,14 @@ def test_what_is_asked_is_met(chain, plain, change):
 
 
 def refused(chain, **texts):
-    """The error of an impossible request; every suggestion in it has been taken, from its text alone, and works."""
+    """The error of an impossible request; its suggestions (short: the first) are taken, from the text alone, and work."""
     with pytest.raises(ImpossibleError) as caught:
         answer(chain, Request(**texts), count=COUNT)
     error = caught.value
     assert error.suggestions, str(error)
     offers = str(error).partition("Nearest possible: ")[2].split("; or ")
     assert len(offers) == len(error.suggestions)
-    for offer in offers:
+    for offer in offers if LONG else offers[:1]:
         taken = dict(re.findall(r"(starts|goals):='([^']*)'", offer))
         longer = re.search(r"max_stretch:=([0-9.]+)", offer)
         own = chain if longer is None else replace(chain, sampling=replace(chain.sampling, max_stretch=float(longer[1])))
