@@ -4,7 +4,6 @@
 """The page of the paper's figures in Chromium: no errors, no requests, all figures drawn, nothing wider than a phone."""
 
 from browser_tab import DESKTOP, PHONE, Tab
-from evaluation_worlds import crossing
 import pytest
 
 from benchmarks._paper_measure import run_case
@@ -53,12 +52,4 @@ def test_what_is_wider_than_a_phone_scrolls_in_its_own_frame(browser, page):
     assert frame.evaluate("e => e.getBoundingClientRect().right <= innerWidth && e.scrollWidth > e.clientWidth")
     frame.evaluate("e => e.scrollLeft = 200")
     assert frame.evaluate("e => e.scrollLeft") == 200
-    tab.page.close()
-
-
-def test_a_refused_encounter_has_its_reason_on_the_page(browser, tmp_path):
-    write_page(tmp_path, [run_case(crossing(), count=2, seed=1)], quality=[], provenance={})
-    tab = Tab(browser, tmp_path / "paper.html", PHONE)
-    assert "cannot be placed" in tab.page.locator("main").inner_text()
-    assert tab.troubles == []
     tab.page.close()
