@@ -99,9 +99,10 @@ def browser() -> Iterator[object]:
 
 
 LONGEST = """
-browser live_segmentation recorder over_dds loss demo_bag packaging bad_tracks restart frames asked_states under_load
-recorded_encounters requests_over_dds first_start benchmarks every_cpu signals diagnostics cli_out service_calls
-ros_parameters silence suites maps launching broken_bags cli rrt_star_connect fuzz fit
+browser generate_action object_store traffic loss live_segmentation recorder over_dds demo_bag twins node_options places
+under_load requests_over_dds maps frames bad_tracks launching diagnostics signals suites restart preview off_road reacting search
+batch suitable_roads recorded_encounters packaging pages same_encounters tasks asked_states cli cli_out library_alone every_cpu
+service_calls streams mistakes ros_parameters first_start examples plugin paper benchmarks fuzz fit
 """  # of the files of tests, longest first, so that none is left alone with one at the end
 ORDER = {name: place for place, name in enumerate(LONGEST.split())}
 
