@@ -129,6 +129,7 @@ def test_a_start_too_fast_to_stop(chain, plain):
     assert 25.0 < slower[3] < 38.0 and slower[:2] == error.suggestions[0].request.states("starts")["1"][:2]
 
 
+@pytest.mark.long
 def test_a_speed_above_the_limit(chain, plain):
     error = refused(chain, starts=state(plain, "start", 1, speed=60.0))
     assert "sampling.max_speed is 40" in str(error)
