@@ -26,10 +26,10 @@ from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, REPLAY
 from scenario_gen.closed_loop.ego import Pose
-from scenario_gen.closed_loop.origin import units_of
+from scenario_gen.closed_loop.origin import Trial, units_of
 from scenario_gen.closed_loop.results import as_json
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, State
-from scenario_gen.closed_loop.trials import Outcome, rates, run_trials, Trial
+from scenario_gen.closed_loop.trials import Outcome, rates, run_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.method.evaluation.bootstrap import paired_difference, wilson
 from scenario_gen.numerics.arrays import Floats

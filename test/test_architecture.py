@@ -53,7 +53,6 @@ CONCEPTS = {
 SECOND_HOMES = {  # that are there still; it may only shrink
     "rectangles: corners, overlap, distance": {
         "closed_loop/advance.py",
-        "closed_loop/picture.py",
         "logs/quality.py",
         "method/evaluation/geometry.py",
         "method/validity/checker.py",

@@ -36,12 +36,6 @@ def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
         yield Workers(count, scheduler, lambda done, total, left: show(f"{done} of {total} tasks, {left}"))
 
 
-def lines(texts: Sequence[str]) -> None:
-    """Print lines, letter by letter."""
-    for line in texts:
-        say(line)
-
-
 def conclude(failed: Sequence[str], out: Place) -> None:
     """Give the failed tasks.
 
@@ -75,7 +69,7 @@ def mine(
     with workers_of(workers, scheduler) as who:
         result = mined([place(one) for one in archive], corpus, config, workers=who)
     give(summary=result.lines(), page=corpus / PAGE)
-    lines([*result.lines(), f"page: {corpus / PAGE}"])
+    say(*result.lines(), f"page: {corpus / PAGE}", sep="\n")
     conclude(result.failed, corpus)
 
 
@@ -112,18 +106,8 @@ def batch(options: Batch) -> None:
             templates=options.templates, workers=who,
         )  # fmt: skip
     give(summary=result.lines())
-    lines(result.lines())
+    say(*result.lines(), sep="\n")
     conclude(result.failed, out)
-
-
-def needs_bag(bag: Path | None) -> None:
-    """Refuse a report without a bag.
-
-    Raises:
-        InputError: there is none.
-    """
-    if bag is None:
-        raise InputError("--report needs --bag: the page shows the bag of the scenarios found; give both")
 
 
 def shown(value: object) -> str:
@@ -150,25 +134,25 @@ def find(
     from scenario_gen.corpus import find as finding
     from scenario_gen.output.review.evaluation import write_page
 
-    if report is not None:
-        needs_bag(bag)
+    if report is not None and bag is None:
+        raise InputError("--report needs --bag: the page shows the bag of the scenarios found; give both")
     source = place(batch)
     found = finding.find(source, condition, limit)
     give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
     say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in found.rows], names=3)
-    lines(finding.coverage_lines(found, source))
+    say(*finding.coverage_lines(found, source), sep="\n")
     if again:
         for row in found.rows:
             finding.make_again(source, row)
-        lines([f"{len(found.rows)} scenarios generated again: all byte-identical"])
+        say(f"{len(found.rows)} scenarios generated again: all byte-identical")
     if bag is not None:
         finding.export_hits(source, found.rows, bag)
         give(bag=bag)
-        lines([f"bag: {bag}"])
+        say(f"bag: {bag}")
         if report is not None:
             write_page(bag, report)
             give(report=report)
-            lines([f"report: {report}"])
+            say(f"report: {report}")
 
 
 @commands.command(urls=("corpus",))
@@ -191,5 +175,5 @@ def library(
     with workers_of(workers, scheduler) as who:
         built = build(source, config, most=most, seed=seed, workers=who)
     give(summary=built.lines())
-    lines(built.lines())
+    say(*built.lines(), sep="\n")
     conclude(built.failed, source / "library")

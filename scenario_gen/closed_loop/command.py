@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 import os
 from pathlib import Path
 
@@ -13,17 +14,16 @@ from scenario_gen.base.parameters import assigned
 from scenario_gen.closed_loop.bounded import Decisions
 from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.origin import origins_of, Trial
 from scenario_gen.closed_loop.results import Beside, DRIVEN, JSON, JUNIT, notes, PAGE, write_drives
 from scenario_gen.closed_loop.trials import (
     Bars,
     broken_bars,
-    origins_of,
     Outcome,
     Rate,
     rates,
     read_trials,
     run_trials,
-    Trial,
     with_origins,
 )
 
@@ -96,10 +96,8 @@ class DriveRequest:
         Raises:
             InputError: a name is unknown, or a value does not suit.
         """
-        config = DriveCommandConfig()
-        for assignment in self.assignments:
-            config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
-        return config
+        named = (one if one.startswith(("bars.", "drive.")) else f"drive.{one}" for one in self.assignments)
+        return reduce(assigned, named, DriveCommandConfig())
 
 
 def drive_bag(
@@ -146,6 +144,5 @@ def drive_bag(
 
 def _unlooking(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:
     """Return the drives of a planner that looks at nobody: in all scenarios, or in UNLOOKING at most, spread over all."""
-    every = max(1, -(-len(trials) // UNLOOKING))
-    chosen = trials[::every]
+    chosen = trials[:: max(1, -(-len(trials) // UNLOOKING))]
     return with_origins(run(chosen, BLIND, config, lambda *_: None), chosen)

@@ -18,7 +18,8 @@ from scenario_gen.base.folders import Kind, write_text
 from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.trials import Outcome, passed_of, Rate, rates, Trial
+from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
 from scenario_gen.output.report.html import render_page
 
@@ -85,19 +86,13 @@ def document(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig
     return {
         "planner": planner,
         "parameters": {name: value for name, (_, value) in flatten(config).items()},
-        "summary": {name: _rate(rate) for name, rate in rates(outcomes).items()},
+        "summary": {name: rate.document() for name, rate in rates(outcomes).items()},
         "scores": scores(outcomes),
-        "unlooking_pass": _rate(passed_of(beside.unlooking)) if beside.unlooking else None,
+        "unlooking_pass": passed_of(beside.unlooking).document() if beside.unlooking else None,
         "against": None if beside.comparison is None else beside.comparison.document(),
         "notes": notes(outcomes, beside),
         "drives": drives,
     }
-
-
-def _rate(rate: Rate) -> dict[str, Any]:
-    share = rate.share
-    shares = {"share": share.value, "low": share.low, "high": share.high}
-    return {"count": rate.count, "of": rate.of, **shares, "encounters": rate.encounters}
 
 
 def as_json(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig, beside: Beside = Beside()) -> str:

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats.contingency import crosstab
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
@@ -28,9 +29,10 @@ from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.base.provenance import parameter_texts
 from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import agreed, arriving, spread, undone, Workers
+from scenario_gen.corpus.tables import rows_of, write_table
+from scenario_gen.corpus.tasks import agree, arriving, spread, undone, Workers
 from scenario_gen.logs import space_time_gap
 from scenario_gen.method.segmentation import (
     assign,
@@ -77,7 +79,6 @@ class Built:
     r_hat: float
     agreement: float
     seeds: float
-    growth: tuple[tuple[int, int], ...]
     limit: int
     failed: tuple[str, ...]
 
@@ -87,7 +88,6 @@ class Built:
             f"{self.primitives} primitives, fitted to {self.fitted} pairs; {self.segments} segments in all {self.assigned} pairs",
             f"convergence: split R̂ at most {self.r_hat:.3f}; two seeds agree to {self.seeds:.2f} (adjusted Rand)",
             f"pairs assigned agree with the fit to {self.agreement:.2f} (adjusted Rand)",
-            "primitives by pairs fitted: " + ", ".join(f"{found} of {count}" for count, found in self.growth),
         ]
         if self.r_hat > USUAL_R_HAT:
             lines.append("R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps")
@@ -152,15 +152,13 @@ def build(
     library, assignments = build_library(sample, config, seed)
     labels = _labels(assignments, sample)
     again = _labels(build_library(sample, config, seed + 1)[1], sample)
-    smaller = [len(sample) // part for part in (8, 4, 2) if len(sample) >= 4 * part]
-    growth = [(count, len(build_library(sample[:count], config, seed)[0].means)) for count in smaller]
     request = {"most": most, "seed": seed, "parameters": parameter_texts(config)}
     request["corpus"] = [sha256_of(here) for _, here in each_fetched(tables)]
     with _replaced(corpus / "library", request) as folder, spread(workers) as go:
         with arriving(folder / NAME) as part:
             library.save(part)
         tasks = [AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config) for table in tables]
-        failed = go(assign_table, undone(tasks, lambda task: task.target))
+        failed = go(assign_table, undone(tasks))
         if isinstance(folder, Path):
             sweep_tree(folder)  # what killed workers left
         segments: list[Place] = sorted((folder / SEGMENTS).glob("*.parquet"), key=str)
@@ -175,7 +173,6 @@ def build(
             r_hat=max(one.segmentation.r_hat for one in assignments),
             agreement=adjusted_rand(labels, fresh),
             seeds=adjusted_rand(labels, again),
-            growth=(*growth, (len(sample), len(library.means))),
             limit=config.sampler.states,
             failed=tuple(failed),
         )
@@ -197,10 +194,7 @@ def _replaced(folder: Place, request: Mapping[str, Any]) -> Iterator[Place]:
         with replaced_folder(folder, LIBRARY) as own:
             yield own
         return
-    before = agreed(folder, REQUEST, request, "library")
-    other = [key for key in request if before.get(key) != request[key]]
-    if other:
-        raise InputError(f"{folder} is a library of other {', '.join(other)}; remove it first")
+    agree(folder, REQUEST, request, "library")
     yield folder
 
 
@@ -224,11 +218,6 @@ def _labels_again(row: Mapping[str, Any], pair: Encounter) -> Ints:
 
 def assign_table(task: AssignTask) -> None:
     """Write, for each pair of a table's encounters, its changepoints and the primitive of each segment."""
-    if task.target.exists():
-        return
-    import pyarrow as pa
-    from pyarrow import parquet
-
     with fetched([task.library]) as (here,):
         library = PrimitiveLibrary.load(here)
     rows = []
@@ -240,17 +229,13 @@ def assign_table(task: AssignTask) -> None:
                 "reactions": json.dumps(reactions_of(pair).document([vehicle.id for vehicle in pair.vehicles])),
                 "changepoints": found.segmentation.changepoints.tolist(), "primitives": found.primitives.tolist(),
             })  # fmt: skip
-    ints = pa.list_(pa.int64())
-    kinds: dict[str, Any] = {**dict.fromkeys(("encounter", "kind", "pair", "reactions"), pa.string()), "seconds": pa.float64()}
-    schema = pa.schema([*kinds.items(), ("changepoints", ints), ("primitives", ints)])
-    with arriving(task.target) as part:
-        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), part, compression="zstd")
+    texts, ints = dict.fromkeys(("encounter", "kind", "pair", "reactions"), "string"), "int64[]"
+    write_table(task.target, rows, {**texts, "seconds": "double", "changepoints": ints, "primitives": ints})
 
 
 def adjusted_rand(one: Ints, other: Ints) -> float:
     """Return how far two labellings (T,) agree: 1 the same, 0 as by chance (Hubert & Arabie 1985)."""
-    table = np.zeros((int(one.max()) + 1, int(other.max()) + 1), dtype=np.int64)
-    np.add.at(table, (one, other), 1)
+    table = crosstab(one, other).count
 
     def choices(counts: Ints) -> float:
         return float((counts * (counts - 1) // 2).sum())

@@ -3,13 +3,12 @@
 
 """Mistakes of users: each gets one line that says what is wrong and what to do, exit code 2, and nothing is lost."""
 
+from functools import partial
 import resource
 import subprocess
 import sys
 
 import pytest
-
-from scenario_gen.cli.commands import main
 
 ROWS = "".join(f"{k / 10},a,{-60 + 0.8 * k:.2f},0,8\n{k / 10},b,0,{-70 + 0.8 * k:.2f},8\n" for k in range(150))
 LOG = f"t,id,x,y,speed\n{ROWS}"
@@ -21,7 +20,7 @@ SEARCH = ("search", "made/bag", "--planner", PLANNER)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(code_of, tmp_path_factory):
     """A folder with spaces and letters beyond ASCII in its path: a log, a result, and what is neither."""
     place = tmp_path_factory.mktemp("my data ü")
     (place / "my log ü.csv").write_text(LOG)
@@ -37,11 +36,8 @@ def folder(tmp_path_factory):
     (place / "bad.yaml").write_text("a: [")
     (place / "bad.json").write_text("{")
     (place / "nothing").mkdir()
-    arguments = ["scenario-gen", "generate", str(place / "my log ü.csv"), *ROAD, "--out", str(place / "made")]
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as end:
-        patch.setattr(sys, "argv", arguments)
-        main()
-    assert not end.value.code
+    assert code_of("generate", place / "my log ü.csv", *ROAD, "--out", place / "made") == 0
+    assert (place / "made" / "report.html").is_file() and (place / "made" / "bag").is_dir()
     return place
 
 
@@ -115,23 +111,11 @@ def test_a_mistake_is_one_line_and_loses_nothing(folder, run, monkeypatch, words
     assert files(folder) == before
 
 
-def test_spaces_and_letters_beyond_ascii_are_no_mistake(folder):
-    assert (folder / "made" / "report.html").is_file() and (folder / "made" / "bag").is_dir()
-
-
-def limited():
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-
-
-def command(folder, *words):
-    return {"args": [sys.executable, "-m", "scenario_gen", *words], "cwd": folder, "text": True, "stderr": subprocess.PIPE}
-
-
 def test_a_disk_that_is_full_is_one_line_and_loses_nothing(folder):
     """A file may not become longer than 20 kB, as if the disk were full there."""
-    before = files(folder)
-    words = (*GENERATE, "--seed", "1", "--out", "made")
-    ended = subprocess.run(**command(folder, *words), preexec_fn=limited, check=False)
+    before, words = files(folder), [sys.executable, "-m", "scenario_gen", *GENERATE, "--seed", "1", "--out", "made"]
+    limited = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (20_000, 20_000))
+    ended = subprocess.run(words, cwd=folder, text=True, stderr=subprocess.PIPE, preexec_fn=limited, check=False)
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
     assert line.startswith("error: made") and "File too large; what was there is untouched; make room" in line

@@ -22,7 +22,7 @@ from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import as_junit
-from scenario_gen.closed_loop.trials import find_planner, read_trials
+from scenario_gen.closed_loop.trials import read_trials
 
 PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
 
@@ -134,12 +134,13 @@ def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, w
 
 def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
     Hangs.drives = 0
-    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 3 s") as caught:
-        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=3", "overtime=1"])
+    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 1 s") as caught:
+        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=1", "overtime=1"])
         drive_bag(request, tmp_path / "out", run=in_processes(1))
     assert "of the 1 drives before: failures 1, collisions" in str(caught.value) and not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
     with pytest.raises(InputError, match=r"has ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time"):
         request = DriveRequest(bag, f"{__name__}:HangsInCompiledCode", count=2, assignments=["drive_time=0.5"])
@@ -154,14 +155,10 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
             DriveRequest(bag, f"{__name__}:{planner}", count=1, assignments=sets), tmp_path / planner, run=in_processes(1)
         )
         known[planner] = json.loads(result.written[0].read_text())
+        assert any(line.startswith("progress: 0.0 %") for line in result.broken)  # who never moves breaks a bar by default
         if planner == "Slow":
             assert result.decisions.slow >= 1 and result.decisions.longest >= 0.05
     assert known["Slow"] | {"planner": ""} == known["Still"] | {"planner": ""}
-
-
-def test_who_never_moves_breaks_a_bar_by_default(bag, tmp_path):
-    result = drive_bag(DriveRequest(bag, f"{__name__}:Still"), tmp_path / "out", run=in_processes(1))
-    assert any(line.startswith("progress: 0.0 %; at least 90.0 %") for line in result.broken)
 
 
 @pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
@@ -174,14 +171,6 @@ def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path,
 def test_junit_is_xml_whatever_things_are_called():
     suite = ElementTree.fromstring(as_junit([], "no\x01 name\ufffe"))
     assert suite.get("name") == r"no\x01 name\ufffe" and suite.get("tests") == "0"
-
-
-def test_a_module_that_ends_the_process_is_no_planner(tmp_path, monkeypatch):
-    (tmp_path / "ends.py").write_text("import sys; sys.exit(0)")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(InputError, match="--planner ends:X: SystemExit: 0"):
-        find_planner("ends:X")
 
 
 def test_a_folder_of_somebodys_own_is_refused_before_anything_is_driven(bag, tmp_path):
@@ -205,6 +194,7 @@ class Busy:
 """
 
 
+@pytest.mark.long
 def test_processes_of_a_killed_drive_end_with_it_whatever_they_are_at(bag, tmp_path):
     (tmp_path / "busy.py").write_text(BUSY)
     words = [sys.executable, "-m", "scenario_gen", "drive", str(bag), "--planner", "busy:Busy", "--workers", "2", "--out", "out"]

@@ -18,7 +18,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, reaction_time
 
-EXAMPLES = 2000 if LONG else 40
+EXAMPLES = 2000 if LONG else 15
 NEVER = 1e6  # s of patience
 
 
@@ -48,14 +48,6 @@ def test_reaction_times_follow_from_scenario_and_vehicle_alone():
     assert (ClosedLoop(turned, 0).reactions == times[0][::-1]).all()
     assert (ClosedLoop(replace(scenario, index=1), 0).reactions != times[0]).all()
     assert (ClosedLoop(scenario, 0, config=ClosedLoopConfig(reaction=0.0)).reactions == 0.0).all()
-
-
-def test_reaction_times_are_spread_evenly():
-    scenario = following(10.0, 10.0)
-    drawn = np.sort([reaction_time(replace(scenario, index=k), "v0", 1.0) for k in range(4000)])
-    assert drawn[0] >= 0.5 and drawn[-1] < 1.5
-    even = 0.5 + (np.arange(4000) + 0.5) / 4000
-    assert np.abs(drawn - even).max() < 1.63 / np.sqrt(4000)  # Kolmogorov's bound of 1 %
 
 
 @settings(max_examples=EXAMPLES)
@@ -94,11 +86,11 @@ def test_the_slower_they_react_the_more_of_them_touch_an_ego_that_brakes_hard():
     """One second behind an ego that brakes by 9 m/s²."""
     hits = dict.fromkeys((0.0, 0.5, 1.0, 1.5), 0)
     for reaction in hits:
-        for speed in np.linspace(6.0, 18.0, 12).tolist():
+        for speed in np.linspace(6.0, 18.0, 6).tolist():
             loop = ClosedLoop(following(speed, speed), 1, config=ClosedLoopConfig(reaction=reaction))
             hits[reaction] += touches(loop, braking_after(5, 9.0), 80)
     count = list(hits.values())
-    assert count[0] == 0 and count == sorted(count) and count[-1] == 12
+    assert count[0] == 0 and count == sorted(count) and count[-1] == 6
 
 
 @settings(max_examples=EXAMPLES)
@@ -126,13 +118,13 @@ def test_acceleration_changes_by_the_jerk_at_most_unless_the_order_forces_it(see
 def test_braking_is_as_sudden_as_that_of_recorded_drivers_whatever_the_ego_does():
     """99 of 100 steps in which somebody brakes, those that the order forced among them, in drawn scenarios."""
     found = []
-    for seed in range(10_000 if LONG else 100):
+    for seed in range(10_000 if LONG else 50):
         scenario = draw_scenario(seed)
         loop = ClosedLoop(scenario, seed % len(scenario.vehicles))
         drive = loop.drive(Anything(seed), lambda state, last=len(scenario.time) // 2: state.step >= last)
         found.append(braking_jerks(scenario, drive))
     jerk = np.concatenate(found)
-    assert len(jerk) > 500 and np.percentile(jerk, 99) <= 10.0
+    assert len(jerk) > 250 and np.percentile(jerk, 99) <= 10.0
 
 
 @settings(max_examples=EXAMPLES)

@@ -15,10 +15,11 @@ from benchmarks.drive import seen_at
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
-from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower
+from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.planners import ConstantSpeed
 from scenario_gen.closed_loop.results import as_json, as_junit, as_page
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.trials import Bars, broken_bars, find_planner, rates, run_trials, Trial
+from scenario_gen.closed_loop.trials import Bars, broken_bars, find_planner, rates, run_trials
 from scenario_gen.closed_loop.verdict import judge, Runner
 from scenario_gen.types.road import Road
 
@@ -141,12 +142,3 @@ def test_json_junit_rates_and_bars(trials):
 def test_a_planner_that_is_not_there_is_named(name, said):
     with pytest.raises(InputError, match=said):
         find_planner(name)
-
-
-def test_a_planner_that_fails_names_its_scenario(trials):
-    class Broken(IdmFollower):
-        def act(self, observation):
-            raise KeyError("lane")
-
-    with pytest.raises(InputError, match="scenario meet: the planner failed: KeyError: 'lane'"):
-        run_trials(trials, Broken)

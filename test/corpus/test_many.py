@@ -19,9 +19,5 @@ def test_workers_do_not_change_results_and_a_refusal_keeps_its_place():
     assert all(np.array_equal(a.position, b.position) for a, b in zip(alone[1], spread[1], strict=True))
     assert spread[1].evaluation.to_json() == alone[1].evaluation.to_json()
     assert generate_many([]) == []
-
-
-def test_a_road_that_does_not_exist_ends_it():
-    (encounter,) = read_log(str(ROOT / "examples" / "my_log.csv")).encounters
     with pytest.raises(InputError, match="fourway"):
         generate_many([(encounter, "fourway")], count=1)

@@ -31,9 +31,10 @@ from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.arriving import TOPICS
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.results import write_verdicts
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial
+from scenario_gen.closed_loop.trials import Outcome, read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.driving import (

@@ -80,6 +80,7 @@ def test_weights_add_up_to_the_natural_scenarios():
 
     search = Search(Always(1e-2), 0, 300)
     found = search.run()
+    assert found.first == 1 and found.rate.high > 0.95 and found.rate.low > 0.6
     assert sum(search.weights.values()) == pytest.approx(found.seen, rel=0.2)
     assert max(search.weights.values()) <= 1.0 / LEAST
 
@@ -97,7 +98,7 @@ def test_what_is_refused_costs_no_drive():
     assert len(problem.driven) == 200 and all(row[7] < 0.0 for row in problem.driven)
 
 
-@pytest.mark.parametrize("budget", [1, 10, 30, 100])
+@pytest.mark.parametrize("budget", [1, 30])
 def test_small_budgets_give_what_they_can(budget):
     found = Search(Plane(1e-2), 0, budget).run()
     assert found.drives == budget and 0.0 <= found.rate.low <= found.rate.high <= 1.0
@@ -111,15 +112,6 @@ def test_no_failure_leaves_an_upper_bound():
     found = Search(Never(1e-2), 0, 400).run()
     assert (found.first, found.rate.low) == (0, 0.0)
     assert 0.0 < found.rate.high < 0.2
-
-
-def test_failure_everywhere_is_a_rate_of_one():
-    class Always(Plane):
-        def margin(self, row):
-            return -1.0 - float(row[0] ** 2)
-
-    found = Search(Always(1e-2), 0, 300).run()
-    assert found.first == 1 and found.rate.high > 0.95 and found.rate.low > 0.6
 
 
 def test_nothing_valid_ends_the_search():
