@@ -169,8 +169,7 @@ def save_bag(
     target = out or beside(bag, f"{bag.resolve().name}_reindexed")
     result = reindex(bag, target, configured(parameter_file, assignments).bag)
     give(messages=result.messages, bag=target, notes=result.lines())
-    for line in (f"{result.messages} messages: {target}", *result.lines()):
-        say(line)
+    say(f"{result.messages} messages: {target}", *result.lines(), sep="\n")
 
 
 @commands.command("compare")

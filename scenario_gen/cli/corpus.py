@@ -6,6 +6,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
@@ -14,7 +15,7 @@ import typer
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.stores import Place, place
 from scenario_gen.cli.options import assigned_all, takes
-from scenario_gen.cli.output import Commands, give, say, say_rows, status
+from scenario_gen.cli.output import bars, Commands, give, say, say_rows
 
 if TYPE_CHECKING:
     from scenario_gen.corpus.tasks import Workers
@@ -32,8 +33,8 @@ def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
     """Give the workers; show the tasks done and the time left."""
     from scenario_gen.corpus.tasks import Workers
 
-    with status() as show:
-        yield Workers(count, scheduler, lambda done, total, left: show(f"{done} of {total} tasks, {left}"))
+    with bars() as advance:
+        yield Workers(count, scheduler, partial(advance, "tasks"))
 
 
 def conclude(failed: Sequence[str], out: Place) -> None:

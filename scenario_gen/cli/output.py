@@ -159,7 +159,7 @@ def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int =
     table = Table(*columns, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)
-    if terminal.measure(table).maximum <= terminal.width:
+    if terminal.measure(table, options=terminal.options.update(width=10_000)).maximum <= terminal.width:
         say(table)
         return
     for row in rows:

@@ -87,10 +87,8 @@ def units_of(names: Sequence[str], several: Sequence[Origin]) -> tuple[Ints, int
 
     That is its encounter; where all are of one encounter, those that are no copies of another count by themselves.
     """
-    encounters = sorted({one.encounter for one in several})
+    encounters, unit = np.unique([one.encounter for one in several], return_inverse=True)
     if len(encounters) > 1:
-        place = {name: k for k, name in enumerate(encounters)}
-        return np.array([place[one.encounter] for one in several], dtype=np.int64), len(encounters)
+        return unit, len(encounters)
     place = {name: k for k, name in enumerate(names)}
-    unit = [place.get(one.copy_of, k) for k, one in enumerate(several)]
-    return np.array(unit, dtype=np.int64), len(encounters)
+    return np.array([place.get(one.copy_of, k) for k, one in enumerate(several)], dtype=np.int64), len(encounters)

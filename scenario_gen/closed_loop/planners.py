@@ -34,7 +34,7 @@ class RouteFollower:
         self._near = float(around[np.argmin(np.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
         ahead = min(max(0.8 * ego.speed, 3.0), 15.0)
         along, left = ahead_and_left(self.route.at(self._near + ahead)[:2] - ego[:2], ego.yaw)
-        return float(2.0 * left / max(along * along + left * left, 1e-6)), self._near
+        return float(2.0 * left / np.maximum(along * along + left * left, 1e-6)), self._near
 
 
 @dataclass

@@ -67,10 +67,8 @@ class Terms:
     @property
     def pdms(self) -> float:
         """NAVSIM's score."""
-        weighted = math.fsum(weight * float(getattr(self, name)) for name, weight in WEIGHTS.items()) / math.fsum(
-            WEIGHTS.values()
-        )
-        return self.no_at_fault_collision * self.drivable_area * weighted
+        weighted = np.average([getattr(self, name) for name in WEIGHTS], weights=list(WEIGHTS.values()))
+        return self.no_at_fault_collision * self.drivable_area * float(weighted)
 
     @property
     def nuplan(self) -> float:

@@ -244,7 +244,7 @@ def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision
     velocity, its_velocity = ego.speed * unit(ego.yaw), other.speed * unit(other.yaw)
     away = np.subtract(other[:2], ego[:2])
     towards = away / max(math.hypot(*away), 1e-9)
-    mine, its = velocity @ towards, -its_velocity @ towards
+    mine, its = float(velocity @ towards), float(-its_velocity @ towards)
     ran = Runner.EGO if mine > 2.0 * max(its, 0.0) else Runner.OTHER if its > 2.0 * max(mine, 0.0) else Runner.BOTH
     speed = math.hypot(*(velocity - its_velocity))
     return Collision(at, drive.motion.vehicles[who].id, speed, ran, reason_of(loop, drive, who, at, ran))

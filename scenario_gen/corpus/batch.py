@@ -185,13 +185,13 @@ def generate_part(task: PartTask) -> None:
     Raises:
         OSError: the disk is full, or fails.
     """
-    cases, results = [], dict[str, GenerationResult]()
+    cases, scenarios, results = [], [], dict[str, GenerationResult]()
     for k, (row, table) in enumerate(_rows(task.templates)):
         case, result = _generate_case(row, table, f"/case_{k}", task)
         cases.append(case)
         if result is not None and len(result.generated.scenarios):
             results[f"/case_{k}"] = result
-    scenarios = [row for name, result in results.items() for row in _scenario_rows(name, result, cases, task)]
+            scenarios += _scenario_rows(case, result, task)
     if results:
         with arriving(task.file("bags", "")) as part, BagWriter(part) as bag:
             add_results(bag, results)
@@ -244,17 +244,14 @@ def _cause(text: str) -> str:
     return " ".join(word for word in text.split() if not any(c.isdigit() for c in word))[:80]
 
 
-def _scenario_rows(
-    namespace: str, result: GenerationResult, cases: Sequence[Mapping[str, Any]], task: PartTask
-) -> list[dict[str, Any]]:
+def _scenario_rows(case: Mapping[str, Any], result: GenerationResult, task: PartTask) -> list[dict[str, Any]]:
     """A row for each scenario of a case."""
-    case = next(case for case in cases if case["namespace"] == namespace)
     rows = []
     for scenario in result.generated.scenarios:
         motion = at_period(scenario, task.request.config.evaluation.period)
         measures = criticality(motion, task.request.config.evaluation.ttc_horizon)
         rows.append({
-            "template": case["template"], "kind": case["kind"], "vehicles": case["vehicles"], "namespace": namespace,
+            "template": case["template"], "kind": case["kind"], "vehicles": case["vehicles"], "namespace": case["namespace"],
             "part": task.number, "index": scenario.index, "seed": scenario.seed,
             "sha256": scenario_bytes(scenario, result.encounter)[1], "seconds": float(scenario.time[-1]),
             "distance": measures.min_distance, "ttc": measures.min_ttc, "pet": measures.pet,

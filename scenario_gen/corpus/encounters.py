@@ -67,13 +67,12 @@ class CleanTask:
 
 @dataclass(frozen=True)
 class LogTask:
-    """A log to read, of any format that `read_log` knows, files that readers look for `beside` it, and the table to write."""
+    """A log to read, of any format that `read_log` knows, and the table to write."""
 
     name: str
     paths: tuple[Place, ...]
     target: Place
     config: CorpusConfig
-    beside: tuple[Place, ...] = ()
 
 
 def clean_found(task: CleanTask) -> None:
@@ -126,8 +125,8 @@ def read_one_log(task: LogTask) -> None:
         InputError: the log cannot be used; the message names file and row.
     """
     try:
-        with fetched([*task.paths, *task.beside]) as here:
-            result = read_log(here[: len(task.paths)], task.config.log)
+        with fetched(task.paths) as here:
+            result = read_log(here, task.config.log)
     except NoEncounterError as error:  # a result: the log is not read again
         write_encounters(task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []})
         return

@@ -164,7 +164,8 @@ def build(
         segments: list[Place] = sorted((folder / SEGMENTS).glob("*.parquet"), key=str)
         rows = list(rows_of(segments))
         assigned = {row["pair"]: row for row in rows}
-        fresh = np.concatenate([_labels_again(assigned[pair.name], pair) for pair in sample])
+        own = [(assigned[pair.name], pair) for pair in sample]
+        fresh = np.concatenate([labels_of(row["changepoints"], row["primitives"], pair) for row, pair in own])
         built = Built(
             primitives=len(library.means),
             fitted=len(sample),
@@ -198,7 +199,7 @@ def _replaced(folder: Place, request: Mapping[str, Any]) -> Iterator[Place]:
     yield folder
 
 
-def labels_of(points: Ints, primitives: Ints, pair: Encounter) -> Ints:
+def labels_of(points: Sequence[int] | Ints, primitives: Sequence[int] | Ints, pair: Encounter) -> Ints:
     """(T,) primitive of each sample, from the changepoints (K,) and the primitive (K + 1,) of each segment."""
     edges = np.array([0, *points, len(pair.time)])
     return np.repeat(np.asarray(primitives, dtype=np.int64), np.diff(edges))
@@ -210,10 +211,6 @@ def _labels(assignments: Sequence[Assignment], pairs: Sequence[Encounter]) -> In
         labels_of(found.segmentation.changepoints, found.primitives, pair)
         for found, pair in zip(assignments, pairs, strict=True)
     ])  # fmt: skip
-
-
-def _labels_again(row: Mapping[str, Any], pair: Encounter) -> Ints:
-    return labels_of(np.array(row["changepoints"], dtype=np.int64), np.array(row["primitives"]), pair)
 
 
 def assign_table(task: AssignTask) -> None:

@@ -19,7 +19,6 @@ import os
 from pathlib import Path
 import shutil
 import tempfile
-import time
 import traceback
 from typing import Any, Protocol, TypeVar
 from uuid import uuid4
@@ -43,8 +42,8 @@ class _Task(Protocol):
 
 Task = TypeVar("Task")
 Target = TypeVar("Target", bound=_Task)
-Progress = Callable[[int, int, str], None]
-"""Told how many tasks are done, of how many, and how much time is left, in words."""
+Progress = Callable[[int, int], None]
+"""Called with how many tasks are done, of how many."""
 WORKERS = {  # their environment: one thread each; Dask's own has them return every freed array to the system, a fifth of all CPU
     **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
     "DASK_LOGGING__DISTRIBUTED": "critical",
@@ -183,11 +182,10 @@ class Spread:
         Raises:
             InputError: the scheduler was lost.
         """
-        begun, failed = time.monotonic(), []
+        failed = []
         for done, message in enumerate(self._outcomes(function, tasks), start=1):
             failed += [message] if message else []
-            left = (time.monotonic() - begun) / done * (len(tasks) - done)
-            self._told(done, len(tasks), f"{left:.0f} s left" if left < 600.0 else f"{left / 60.0:.0f} min left")
+            self._told(done, len(tasks))
         return sorted(failed)
 
     def _outcomes(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:

@@ -109,8 +109,8 @@ def test_an_unknown_topic_type_is_named(run, tmp_path, data):
 
 def test_a_road_with_no_way_through_is_refused(run, tmp_path):
     """Two strips of road with a wall between: the cars' own path crosses it, and no strip is long enough for them."""
-    cells = np.full((60, 800), 254, dtype=np.uint8)
-    cells[:, ::150] = 0
+    cells = np.full((60, 300), 254, dtype=np.uint8)
+    cells[:, ::100] = 0
     Image.fromarray(cells).save(tmp_path / "walled.pgm")
     facts = {"image": "walled.pgm", "resolution": 0.2, "origin": [-10.0, -6.0, 0.0], "negate": 0}
     facts |= {"occupied_thresh": 0.65, "free_thresh": 0.196, "mode": "trinary"}

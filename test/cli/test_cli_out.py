@@ -14,10 +14,8 @@ import sys
 import time
 
 import pytest
-from rich.table import Table
 
 from scenario_gen.base.folders.scratch import PREFIX
-from scenario_gen.base.terminal import Terminal
 from scenario_gen.logs.synthetic import bundled
 
 GENERATE = ("generate", bundled("c"), "--road", "straight", "--count", 2, "--set", "evaluation.resamples=20")
@@ -87,13 +85,6 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
     told = [run(*words)[1] for words in more]
     assert f"{literal} on straight" in told[0]
     assert all("\x1b" not in text and "\u202e" not in text for text in (said, *told))
-
-
-def test_a_terminal_shows_cells_and_lines_as_they_are(capsys):
-    table = Table("cause")
-    table.add_row(NAME + ":smile:")
-    Terminal(width=80).print(table, f"{NAME}:smile:")
-    assert capsys.readouterr().out.count(r"[red]a\x1b[31m*b*\u202e[/]:smile:") == 2
 
 
 @pytest.mark.parametrize(

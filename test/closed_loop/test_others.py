@@ -63,13 +63,6 @@ def test_nobody_answers_before_its_reaction_time_is_over(seed, differ, step):
         assert one[k].clock[1] == two[k].clock[1] and one[k].rate[1] == two[k].rate[1]
 
 
-def test_and_answers_then():
-    loop = ClosedLoop(following(15.0, 8.0), 1)
-    late = round(float(loop.reactions[0]) / 0.1)
-    drive = states(loop, braking_after(10, 8.0), 12 + late)
-    assert drive[10 + late].rate[0] == 1.0 and drive[11 + late].rate[0] < 1.0
-
-
 @settings(max_examples=EXAMPLES)
 @given(st.floats(2.0, 20.0), st.floats(0.5, 9.0), st.floats(0.0, 20.0), st.sampled_from([0.05, 0.1]))
 def test_a_follower_stops_for_the_ego_with_room_for_its_reaction_and_its_foot(speed, braking, spare, step):
@@ -170,14 +163,3 @@ def test_a_drive_can_be_branched_anywhere():
         last = drive[-1]
         for name in ("vehicles", "clock", "rate", "acceleration", "waited", "seen"):
             assert (getattr(state, name) == getattr(last, name)).all()
-
-
-def test_nobody_chatters_at_low_speed():
-    """A platoon behind an ego that brakes and goes on: nobody changes more than twice between braking and speeding up."""
-    loop = ClosedLoop(following(14.0, 14.0, 4), 3)
-    drive = states(loop, lambda k: Command(-6.0 if 10 < k < 80 else 2.0 if k >= 80 else 0.0, 0.0), 140)
-    speed = np.array([state.vehicles[:3, 3] for state in drive])
-    change = np.diff(speed, axis=0)
-    for i in range(3):
-        signs = np.sign(change[:, i])[np.abs(change[:, i]) > 0.03]
-        assert np.count_nonzero(np.diff(signs)) <= 2

@@ -16,7 +16,7 @@ from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus import batch as batches
-from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch, seed_of, tokens_of
+from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
@@ -26,9 +26,7 @@ pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")
 REQUEST, TEMPLATES = BatchRequest(count=3, seed=5), 3
 PATIENCE = 120.0  # seconds in which a process is at work
-interruptible = partial(
-    signal.signal, signal.SIGINT, signal.SIG_DFL
-)  # a shell may have it ignored
+interruptible = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell may have it ignored
 
 
 def digests(out):
@@ -171,8 +169,3 @@ def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypat
     assert made.failures == {LOST_CONFLICT: 4} and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
     assert {case["why"].split()[1] for case in cases} == set(ROADS)
-
-
-def test_names_and_seeds():
-    assert tokens_of(["a/map.osm", "b/map.osm", "straight"]) == ["map_0", "map_1", "straight"]
-    assert seed_of(1, "a", "b") != seed_of(1, "a", "c") != seed_of(2, "a", "c")

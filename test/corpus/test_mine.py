@@ -23,7 +23,6 @@ from scenario_gen.corpus.kinds import kind_of, Motion
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import clean_tasks, mine
 from scenario_gen.corpus.tables import rows_of
-from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.template.reactions import reactions_of
 
@@ -129,7 +128,7 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
 def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_path):
     """DSecond 20 s off in all rows of one of two files of a range; both of `_p001` and of a day that is not theirs."""
     (tmp_path / "in").mkdir()
-    lines = (archive / sorted(archive.glob("*.csv"))[0].name).read_text().splitlines()[:2000]
+    lines = (archive / sorted(archive.glob("*.csv"))[0].name).read_text().splitlines()[:8000]
     for name, add in (("TripStart_bsmrx_41000_p001.csv", 20_000), ("plain.csv", 0)):
         rows = [line.split(",") for line in lines]
         rows = [[*row[:6], str((int(row[6]) + add) % 60_000), *row[7:]] for row in rows if len(row) == 19]
@@ -137,7 +136,7 @@ def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_p
     mined = mine([tmp_path / "in"], tmp_path / "out")
     assert [note for note in mined.notes if "DSecond" in note and "41000" in note] and not mined.failed
     off, good = (mined.files[str(tmp_path / "in" / name)] for name in ("TripStart_bsmrx_41000_p001.csv", "plain.csv"))
-    assert off["said: stamps of another day"] > 1900 and not [why for why in off if "clocks" in why]
+    assert off["said: stamps of another day"] > 3000 and not [why for why in off if "clocks" in why]
     assert 0 < good["said: stamps that run backwards"] <= off["said: stamps that run backwards"]  # one clock tells less
 
 
@@ -147,13 +146,6 @@ def test_nothing_to_read_is_an_error(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="holds no log that can be read"):
         mine([tmp_path / "empty"], tmp_path / "out")
-
-
-def test_a_task_that_fails_leaves_nothing(tmp_path):
-    with pytest.raises(ZeroDivisionError), arriving(tmp_path / "a") as part:
-        part.write_text("half")
-        raise ZeroDivisionError
-    assert not list(tmp_path.iterdir())
 
 
 def straight(x, y, heading, speed, seconds=12.0):
@@ -196,18 +188,6 @@ def test_who_is_joined_to_whom():
     brief = [meeting(1, 2, 0, 4, 1.0)]
     assert group(brief, config) == []
     assert label(17 + (2 << 40)) == "17x2"
-
-
-def test_ranges_hold_as_many_files_as_have_numbers(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenario_gen.corpus.messages.MOST_FILES", 2)
-    files = [tmp_path / f"it's {k}.csv" for k in range(5)]
-    for path in files:
-        path.write_text(",".join(["1"] * 19) + "\n")
-    tasks = ranges(files, tmp_path / "out" / "messages", 1 << 20, 500)
-    assert [len(task.pieces) for task in tasks] == [2, 2, 1]
-    parse_range(tasks[0])
-    accounts = json.loads(tasks[0].target.with_suffix(".json").read_text())["files"]
-    assert {name: one["rows"] for name, one in accounts.items()} == {str(path): 1 for path in files[:2]}
 
 
 @given(

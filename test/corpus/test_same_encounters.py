@@ -54,7 +54,7 @@ def test_a_column_of_13(tmp_path, behind, speed):
 
 @pytest.mark.parametrize("seed", [3, pytest.param(5, marks=pytest.mark.long)])
 def test_an_archive(tmp_path, seed):
-    config = ArchiveConfig(20_000, 0.2, 12, 4, wrong_times=0.0, damaged=0.0, repeated_ids=0.0)
+    config = ArchiveConfig(30_000, 0.2, 12, 4, wrong_times=0.0, damaged=0.0, repeated_ids=0.0)
     planted = read_planted(write_archive(tmp_path / "in", config, seed))
     mined, read = both(tmp_path / "in", tmp_path / "out")
     assert [names for names, _, _ in read] == [names for names, _, _ in mined]

@@ -19,7 +19,7 @@ def test_every_task_is_run_once(tmp_path):
         assert go(write_once, tasks) == []
         assert go(write_once, tasks[:5]) == [f"{k}: {k} was run before" for k in range(5)]
     assert len(list(tmp_path.iterdir())) == 60
-    assert [done for done, *_ in told] == [*range(1, 61), *range(1, 6)]
+    assert [done for done, _ in told] == [*range(1, 61), *range(1, 6)]
 
 
 def test_only_the_task_that_ends_its_workers_fails(tmp_path):

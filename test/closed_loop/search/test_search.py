@@ -125,7 +125,11 @@ def test_a_planner_that_fails_is_named_and_its_drives_are_kept(bag, tmp_path):
 
 
 def test_a_planner_that_stands_misses_every_goal(bag, tmp_path):
-    result = search_failures(request_of(bag, "Stands", objective=Objective("goal"), budget=24), tmp_path / "out", workers=1)
+    result = search_failures(
+        request_of(bag, "Stands", objective=Objective("goal"), budget=12, assignments=["overtime=1.0"]),
+        tmp_path / "out",
+        workers=1,
+    )
     assert result.estimate.first == 1 and result.estimate.rate.high == 1.0 and result.estimate.rate.low > 0.7
 
 
@@ -164,23 +168,9 @@ def test_margins_are_zero_or_less_in_failures_alone(bag):
 
 
 def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
-    words = [
-        "search",
-        str(LOG),
-        "--road",
-        ROAD,
-        "--planner",
-        f"{__name__}:Blind",
-        "--ego",
-        "2",
-        "--budget",
-        "30",
-        "--workers",
-        "1",
-    ]
-    words += ["--out", str(tmp_path / "out")]
+    words = f"search {LOG} --road {ROAD} --planner {__name__}:Blind --ego 2 --budget 12 --workers 1 --out {tmp_path}/out".split()
     done = CliRunner().invoke(app, [*words, "--max-rate", "0.0", "--objective", "collision"])
     assert done.exit_code == 1 and "the failure rate may be above 0" in done.output, done.output
-    assert "natural drives alone" in done.output and json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 30
+    assert "natural drives alone" in done.output and json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 12
     refused = CliRunner().invoke(app, [*words, "--encounter", "none"])
     assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(refused.exception)
