@@ -222,8 +222,7 @@ class ClosedLoop:
         ego, n = moved.state, len(self._ids)
         number = state.step + 1
         time = number * config.step
-        before = np.empty((n, 4))
-        before[:, 0], before[:, 1], before[:, 2], before[:, 3] = state.clock, state.rate, state.acceleration, state.waited
+        before = np.column_stack([state.clock, state.rate, state.acceleration, state.waited])
         seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
         seen[0, :6], seen[1:] = ego, state.seen[: len(seen) - 1]
         after, vehicles, here = np.empty((n, 5)), np.empty((n, 4)), np.empty(n, dtype=np.bool_)

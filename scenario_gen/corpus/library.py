@@ -246,37 +246,34 @@ def _write_page(
     path: Path, library: PrimitiveLibrary, rows: Sequence[Mapping[str, Any]], pairs: Mapping[str, Encounter], built: Built
 ) -> None:
     """Write the page of primitives: how frequent, how long, what follows, and examples."""
-    seconds: Counter[int] = Counter()
-    segments: Counter[int] = Counter()
+    segments: dict[int, list[tuple[str, str, int, int]]] = {}  # pair, kind, begin and end of each, by primitive
     follows: Counter[tuple[int, int]] = Counter()
-    kinds: dict[int, Counter[str]] = {}
-    reactions: dict[int, Counter[str]] = {}
-    examples: dict[int, list[tuple[str, tuple[int, int]]]] = {}
     for row in rows:
-        pair = pairs[row["pair"]]
-        found = reactions_of(pair).edges
-        answers = {f"the {('first', 'second')[edge.who]} {VERBS[edge.kind]}" for edge in found} or {"nobody reacts"}
-        edges = [0, *row["changepoints"], len(pair.time)]
-        for primitive, (begin, end) in zip(row["primitives"], pairwise(edges), strict=True):
-            seconds[primitive] += end - begin
-            segments[primitive] += 1
-            kinds.setdefault(primitive, Counter())[row["kind"]] += 1
-            reactions.setdefault(primitive, Counter()).update(answers)
-            if len(examples.setdefault(primitive, [])) < EXAMPLES:
-                examples[primitive].append((row["pair"], (begin, end)))
+        edges = pairwise([0, *row["changepoints"], len(pairs[row["pair"]].time)])
+        for primitive, (begin, end) in zip(row["primitives"], edges, strict=True):
+            segments.setdefault(primitive, []).append((row["pair"], row["kind"], begin, end))
         follows.update(pairwise(row["primitives"]))
     dt = next(iter(pairs.values())).dt
-    total = sum(int(n) for n in seconds.values())
+    total = sum(end - begin for own in segments.values() for _, _, begin, end in own)
     cards = []
-    for k, count in segments.most_common():
+    for k, own in sorted(segments.items(), key=lambda item: -len(item[1])):
+        lasts = sum(end - begin for _, _, begin, end in own)
+        kinds = Counter(kind for _, kind, _, _ in own).most_common(4)
+        answers = Counter(answer for name, *_ in own for answer in _answers(pairs[name])).most_common()
         after = sorted(((n, to) for (start, to), n in follows.items() if start == k), reverse=True)[:3]
         lines = [
-            f"{count} segments, {100.0 * seconds[k] / total:.1f} % of the time, {seconds[k] * dt / count:.1f} s each",
-            "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds[k].most_common(4)),
-            "; ".join(f"{message} in {n} of them" for message, n in reactions[k].most_common()),
+            f"{len(own)} segments, {100.0 * lasts / total:.1f} % of the time, {lasts * dt / len(own):.1f} s each",
+            "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds),
+            "; ".join(f"{message} in {n} of them" for message, n in answers),
             "followed by " + (", ".join(f"{to} ({n} ×)" for n, to in after) or "nothing"),
-            *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, (begin, end) in examples[k]),
+            *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, _, begin, end in own[:EXAMPLES]),
         ]
-        pictures = [sketch(pairs[name], span) for name, span in examples[k]]
+        pictures = [sketch(pairs[name], (begin, end)) for name, _, begin, end in own[:EXAMPLES]]
         cards.append({"title": f"{k}: {library.descriptions[k]}", "lines": lines, "pictures": pictures})
     write_page(path, "Primitives of pairs of vehicles", built.lines()[0], cards, built.lines()[1:])
+
+
+def _answers(pair: Encounter) -> set[str]:
+    """Return who reacts in a pair, and how."""
+    edges = reactions_of(pair).edges
+    return {f"the {('first', 'second')[edge.who]} {VERBS[edge.kind]}" for edge in edges} or {"nobody reacts"}

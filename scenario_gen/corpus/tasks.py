@@ -194,10 +194,13 @@ class Spread:
             yield from (_guarded(function, task) for task in tasks)
             return
         needs("corpus", "dask", "distributed")
-        with _connected(self._scheduler):
+        try:
             if self._client is None:
                 self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
             yield from self._distributed(function, tasks)
+        except (OSError, TimeoutError, CancelledError) as error:
+            lost = f"{self._scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
+            raise InputError(f"{lost}; the same command goes on where it stopped") from error
 
     def _distributed(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
         """Yield as `_outcomes` does.
@@ -222,20 +225,6 @@ class Spread:
 
 
 @contextmanager
-def _connected(scheduler: str) -> Iterator[None]:
-    """Name the scheduler in what is raised when it is lost.
-
-    Raises:
-        InputError: it was.
-    """
-    try:
-        yield
-    except (OSError, TimeoutError, CancelledError) as error:
-        lost = f"{scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
-        raise InputError(f"{lost}; the same command goes on where it stopped") from error
-
-
-@contextmanager
 def spread(workers: Workers) -> Iterator[Spread]:
     """Give what runs tasks."""
     with ExitStack() as stack:
@@ -257,40 +246,29 @@ def _guarded(function: Callable[[Any], Any], task: Any) -> str:
 
 @contextmanager
 def _client(workers: int, scheduler: str) -> Iterator[Any]:
-    """A client of a cluster on this machine, or of one that runs."""
-    from distributed import Client
+    """A client of a cluster of processes on this machine, or of one that runs."""
+    import dask
+    from distributed import Client, LocalCluster
 
     for name in ("distributed", "distributed.client"):  # each has a level of its own
         logging.getLogger(name).setLevel(logging.CRITICAL)  # workers that die and a lost scheduler are named here
-    if scheduler:
-        with Client(scheduler) as client:
-            yield client
-        return
     with ExitStack() as stack:
-        place = stack.enter_context(scratch(Path(tempfile.gettempdir())))
-        with starting():
-            cluster = stack.enter_context(_cluster(workers, place))
-            stack.enter_context(ending(partial(_end, cluster)))
+        cluster: Any = scheduler
+        if not scheduler:
+            settings = {
+                "temporary-directory": str(stack.enter_context(scratch(Path(tempfile.gettempdir())))),
+                "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further task
+                "distributed.worker.daemon": True,
+                "distributed.worker.profile.enabled": False,
+                "distributed.admin.tick.interval": "500ms",
+                "distributed.nanny.pre-spawn-environ": WORKERS,
+            }
+            sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
+            stack.enter_context(dask.config.set(settings))
+            with starting():
+                cluster = stack.enter_context(LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0"))
+                stack.enter_context(ending(partial(_end, cluster)))
         yield stack.enter_context(Client(cluster))
-
-
-@contextmanager
-def _cluster(workers: int, place: Path) -> Iterator[Any]:
-    """Processes of this machine, which may write intermediate files to `place`."""
-    import dask
-    from distributed import LocalCluster
-
-    settings = {
-        "temporary-directory": str(place),
-        "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further task
-        "distributed.worker.daemon": True,
-        "distributed.worker.profile.enabled": False,
-        "distributed.admin.tick.interval": "500ms",
-        "distributed.nanny.pre-spawn-environ": WORKERS,
-    }
-    sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
-    with dask.config.set(settings), LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0") as cluster:
-        yield cluster
 
 
 def _end(cluster: Any) -> None:

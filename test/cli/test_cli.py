@@ -119,10 +119,3 @@ def test_a_road_with_no_way_through_is_refused(run, tmp_path):
     assert code == 2
     assert "walled" in printed and "does not fit" in printed
     assert not (tmp_path / "out").exists()
-
-
-def test_parameters_lists_every_stage(run):
-    code, printed = run("parameters")
-    assert code == 0
-    for stage in ("log", "segmentation", "road", "fitting", "planning", "sampling", "limits", "evaluation"):
-        assert f"\n{stage}." in f"\n{printed}"

@@ -13,31 +13,13 @@ import pytest
 from rich.console import Console
 
 from scenario_gen.base.terminal import Terminal
-from scenario_gen.cli import commands as cli
 from scenario_gen.cli import output
 from scenario_gen.cli.corpus import shown
-
-
-def names():
-    """The names of all commands."""
-    return [
-        entry.name or entry.callback.__name__
-        for group in cli.app.registered_groups
-        for entry in group.typer_instance.registered_commands
-    ]
 
 
 def test_version(ran):
     code, out, err = ran("--version")
     assert code == 0 and out.startswith("scenario-gen ") and out.strip()[-1].isdigit() and not err
-
-
-def test_commands_stand_in_groups(ran):
-    _, out, _ = ran("--help")
-    panels = [line for line in out.splitlines() if line.startswith("╭")]
-    for panel in ("Generate scenarios", "Look at a bag", "Test a planner", "Other formats", "Archives", "This installation"):
-        assert any(panel in line for line in panels)
-    assert all(f"│ {name} " in out for name in names())
 
 
 def one_object(text):

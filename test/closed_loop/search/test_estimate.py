@@ -93,7 +93,7 @@ def test_a_smaller_budget_is_the_beginning_of_a_larger_one():
 
 
 @pytest.mark.parametrize(
-    ("rate", "allowed", "budget"), [(1e-2, math.inf, 1), (1e-2, 0.0, 200), (1e-12, math.inf, 400), (1e-2, -math.inf, 100)]
+    ("rate", "allowed", "budget"), [(1e-2, math.inf, 1), (1e-2, 0.0, 200), (1e-300, math.inf, 400), (1e-2, -math.inf, 100)]
 )
 def test_little_budget_no_failure_and_nothing_valid_give_what_they_can(rate, allowed, budget):
     problem = Plane(rate, allowed)
