@@ -123,7 +123,7 @@ def test_a_library_is_the_same_in_a_store(bucket, corpus, tmp_path):
 class Failing(BaseHTTPRequestHandler):
     """Passes requests on to a server; every fifth gets 503 instead, every seventh nothing."""
 
-    to, requests = "", count(1)
+    protocol_version, to, requests = "HTTP/1.1", "", count(1)  # 1.1: who sends a body waits for 100 Continue
 
     def log_message(self, *_):
         """Be silent."""
@@ -131,6 +131,7 @@ class Failing(BaseHTTPRequestHandler):
     def _pass(self):
         number, body = next(self.requests), self.rfile.read(int(self.headers.get("Content-Length", 0)))
         if number % 7 == 0:
+            self.close_connection = True
             self.connection.shutdown(socket.SHUT_RDWR)
         elif number % 5 == 0:
             self.send_error(503)
@@ -139,10 +140,14 @@ class Failing(BaseHTTPRequestHandler):
             there.request(self.command, self.path, body, dict(self.headers))
             answer = there.getresponse()
             self.send_response(answer.status)
+            data = answer.read()
             for name, value in answer.getheaders():
-                self.send_header(name, value)
+                if name.lower() not in ("transfer-encoding", "connection", "content-length"):
+                    self.send_header(name, value)
+            self.send_header("Content-Length", answer.getheader("Content-Length", "0") if self.command == "HEAD" else len(data))
+            self.send_header("Connection", "close")
             self.end_headers()
-            self.wfile.write(answer.read())
+            self.wfile.write(data)
 
     do_GET = do_PUT = do_POST = do_HEAD = do_DELETE = _pass  # noqa: N815
 
