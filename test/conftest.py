@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Iterator
 import fcntl
+from functools import partial
 import gc
 import os
 from pathlib import Path
@@ -39,6 +40,12 @@ def made_once(factory: pytest.TempPathFactory, name: str, write: Callable[[Path]
             new.mkdir()
             write(new).rename(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], Path]], Path]:
+    """What gives a folder that is written once, by name and by what writes it."""
+    return partial(made_once, tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
