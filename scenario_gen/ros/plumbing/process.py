@@ -84,13 +84,13 @@ def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str
     for node in nodes:
         getattr(node, "cancel", list)()  # all at once, so that no node waits for the end of another
     for step in ("close", "destroy_node"):
-        for node in nodes:
+        for node in nodes:  # each has its time, for on a busy machine many take longer than one may
+            leave_within(getattr(node, "ENDING", ENDING))
             try:
                 getattr(node, step, list)()
             except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
                 code = print_error(error)
         _flush()
-        leave_within(ENDING)  # nothing is lost from here on
     return code
 
 
