@@ -172,3 +172,9 @@ def test_a_reversal_cuts_the_track(tmp_path):
     found, quality = groups(tmp_path, there, stand, back, car("2", 0, 25, 5, 5))
     assert quality.vehicles[0].reversals == 1
     assert [name for name, _ in found] == ["1,2", "1,2"]
+
+
+def test_a_column_of_13_is_encounters_of_three_and_who_is_in_two_is_named(tmp_path):
+    found, quality = groups(tmp_path, *(car(str(k + 1), 0, 19.9, -66 * k, 0, 33) for k in range(13)))
+    assert [names for names, _ in found] == [f"{k},{k + 1},{k + 2}" for k in range(1, 13, 2)]
+    assert [note for note in quality.notes if note.endswith("vehicle 3, 5, 7, 9, 11")]
