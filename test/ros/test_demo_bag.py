@@ -4,7 +4,9 @@
 """The demo's way: jobs through real nodes into one bag, and the bag through fresh nodes again."""
 
 import threading
+from types import SimpleNamespace
 
+from node_server import process
 import pytest
 from suite_processes import Processes, RESOURCES
 
@@ -30,6 +32,15 @@ def demo(tmp_path_factory):
     """The bag of two jobs, alone in its folder."""
     folder = tmp_path_factory.mktemp("demo")
     return run_suite(JOBS, PipelineConfig(), count=3, seed=7, bag=folder / "bag")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forked():
+    """Processes that have loaded the libraries, as the other tests have them."""
+    with pytest.MonkeyPatch.context() as patch:
+        context = SimpleNamespace(Process=process)
+        patch.setattr("scenario_gen.ros.plumbing.suite.multiprocessing", SimpleNamespace(get_context=lambda _: context))
+        yield
 
 
 def test_the_suite_records_several_jobs_in_their_namespaces(demo):
@@ -63,7 +74,7 @@ def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
         "gp_sampler": [*sim_time, "-p", "count:=3", "-p", "seed:=7"],
     }
     spaces = tuple(job.namespace for job in JOBS)
-    made = Processes(tmp_path, domain, nodes, {node: spaces for node in nodes if node != "player"})
+    made = Processes(tmp_path, domain, nodes, {node: spaces for node in nodes if node != "player"}, apart=nodes)
     try:
         derived = [f"{space}/{topic}" for space in spaces for topic in ("changepoints", "posterior", "fit", "scenarios")]
         client.hear(*derived)

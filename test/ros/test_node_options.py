@@ -32,7 +32,7 @@ def test_topics_services_and_the_node_are_remapped(start, client):
 
 def test_a_rule_for_one_node_leaves_the_others_of_its_process(start, client):
     client.hear("/b/tracks")
-    start("suite", "-r", "log_player:tracks:=/b/tracks", log_path=LOG, road_name="straight")
+    start("suite", "--nodes", "log_player,segmenter", "-r", "log_player:tracks:=/b/tracks", log_path=LOG, road_name="straight")
     client.wait("/b/tracks")
     assert "segmenter" in {one.node_name for one in client.node.get_subscriptions_info_by_topic("/tracks")}
     assert client.node.count_publishers("/tracks") == 0 and client.node.count_subscribers("/b/tracks") == 1

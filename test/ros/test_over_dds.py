@@ -24,7 +24,7 @@ CHAIN = ("log_player", "segmenter", "planner", "gp_sampler", "road_server", "eva
 @pytest.fixture(scope="module")
 def suite(tmp_path_factory, domain):
     """All nodes, at work on one log; ended as Ctrl-C does, and then looked at."""
-    yield from whole_chain(tmp_path_factory.mktemp("suite"), domain, CHAIN, count=4)
+    yield from whole_chain(tmp_path_factory.mktemp("suite"), domain, CHAIN, count=4, apart=CHAIN)
 
 
 def test_a_late_joiner_gets_everything(suite, client):
