@@ -12,8 +12,6 @@ import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.groups import part_of
-from scenario_gen.logs.growing import Group
 
 
 def car(name, begin, end, x, y, vx=0.0, vy=0.0):
@@ -82,16 +80,6 @@ def test_nobody_is_left_out_in_silence(tmp_path):
     once = pd.DataFrame({"t_s": [0.0], "vehicle_id": "once", "x_m": 0.0, "y_m": 0.0, "speed_mps": 1.0})
     _, result = presence(tmp_path, *cars, once)
     assert "fewer than two usable positions: vehicle once" in result.quality.notes
-
-
-def test_a_part_of_a_group_keeps_who_is_there_for_long_enough():
-    group = Group(0, 300, {3: (0, 300), 5: (0, 120), 8: (95, 300)})
-    part, left = part_of(group, 0, 100, LogConfig())
-    assert part == Group(0, 100, {3: (0, 100), 5: (0, 100)})
-    assert left == [(8, (95, 100))]
-    part, left = part_of(group, 90, 300, LogConfig())
-    assert part == Group(90, 300, {3: (90, 300), 8: (95, 300)})
-    assert left == [(5, (90, 120))]
 
 
 @given(st.lists(st.tuples(st.integers(0, 8), st.integers(1, 20), st.integers(-60, 60)), min_size=2, max_size=6))

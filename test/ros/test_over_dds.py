@@ -42,17 +42,6 @@ def test_a_late_joiner_gets_everything(suite, client):
         late.close()
 
 
-def test_the_origin_of_the_tracks_frame_is_said(suite, client):
-    client.hear("/diagnostics")
-
-    def origins():
-        return {status.values["origin"] for status in client.statuses() if status.name == "/log_player: encounter"}
-
-    client.until(origins, "the log player's word on its encounter")
-    (encounter,) = read_log(LOG).encounters
-    assert origins() == {"{!r},{!r}".format(*encounter.origin)}
-
-
 def test_in_process_gives_the_same_bytes(suite, client):
     client.hear("/scenarios")
     heard = client.wait("/scenarios", 4)
