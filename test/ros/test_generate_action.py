@@ -87,17 +87,17 @@ def test_the_codes_are_those_of_the_action():
 
 
 def test_goals_wait_for_the_inputs_are_served_in_turn_and_one_that_does_not_wait_is_told(environment, suite):
-    wanted = [{"parameters": {"count": 20 - k, "seed": k, "request": f"r{k}"}} for k in range(3)]
+    wanted = [{"parameters": {"count": 100 - k, "seed": k, "request": f"r{k}"}} for k in range(3)]
     (first, *others, hasty), heard, order = ask(environment, *wanted[:2], wanted[2] | {"then": "log_player"}, {"wait": 0.0})
     assert (first["status"], first["code"], first["request"]) == (SUCCEEDED, Code.OK, "r0")
-    assert first["requested"] == first["published"] == 20 and 0 <= first["first"] < first["last"]
+    assert first["requested"] == first["published"] == 100 and 0 <= first["first"] < first["last"]
     refused = sum(int(count) for cause, count in first["account"].items() if cause.startswith("refused."))
-    assert int(first["account"]["candidates"]) == first["last"] + 1 == 20 + refused
+    assert int(first["account"]["candidates"]) == first["last"] + 1 == 100 + refused
     assert any("tracks" in row[1] for row in first["feedback"])
-    assert [one["published"] for one in others] == [19, 18] and [k for k in order if k < 3][-1] == 2
+    assert [one["published"] for one in others] == [99, 98] and [k for k in order if k < 3][-1] == 2
     assert max(row[2] for row in others[1]["feedback"] if not row[1]) == 2, "two before it"
     assert (hasty["status"], hasty["code"]) == (ABORTED, Code.NOT_READY) and re.search("not active|waiting for", hasty["reason"])
-    assert heard["heard"] == 57
+    assert heard["heard"] == 297
     assert "ERROR" not in suite.read_text()
 
 
