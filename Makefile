@@ -104,12 +104,11 @@ $(TEST): $(READY) requirements/test.lock requirements/ros-test.lock
 	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(TEST)
 
-# The report's tests drive Chromium, package.xml is checked by xmllint, and the package of interfaces is compiled; where what they need
-# is missing and cannot be installed here, those tests skip with that reason.
+# The report's tests drive Chromium, and the package of interfaces is compiled; where what they need is missing and cannot be installed
+# here, those tests skip with that reason.
 tools:
 	@need=""; \
 	command -v chromium >/dev/null || command -v chromium-browser >/dev/null || need="chromium"; \
-	command -v xmllint >/dev/null || need="$$need libxml2-utils"; \
 	command -v c++ >/dev/null || need="$$need g++"; \
 	[ -z "$$need" ] || { \
 	  [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && \

@@ -65,7 +65,7 @@ setup(
     python_requires=">=3.11,<3.14",
     packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
     package_data={
-        NAME: ["py.typed", "*.pyi", "resources/*", "resources/**/*", "output/report/assets/*"],
+        NAME: ["py.typed", "*.pyi", "resources/*", "resources/**/*", "output/report/assets/*", "corpus/*.sql"],
         "msg_conventions": ["py.typed"],
     },
     data_files=[

@@ -17,8 +17,9 @@ from benchmarks.row import Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REPLAY
 from scenario_gen.closed_loop.ego import Pose
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, State, Task
-from scenario_gen.closed_loop.trials import Outcome, rates, Trial
+from scenario_gen.closed_loop.trials import Outcome, rates
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.commonroad import write_commonroad

@@ -9,10 +9,10 @@ from typing import Literal
 from benchmarks.row import Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, WitnessFollower
 from scenario_gen.closed_loop.reacting import needs_reaction
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Planner
-from scenario_gen.closed_loop.trials import Trial
 from scenario_gen.closed_loop.verdict import judge
 
 

@@ -79,7 +79,7 @@ def publish(topic: str, size: int, count: int, rate: float) -> None:
     from rclpy.qos import QoSProfile
     from std_msgs.msg import String
 
-    from msg_conventions.cdr import CdrWriter
+    from msg_conventions.cdr import encode
     import scenario_gen.ros.nodes  # noqa: F401  (what the wheels need)
 
     rclpy.init()
@@ -88,7 +88,7 @@ def publish(topic: str, size: int, count: int, rate: float) -> None:
     while sender.get_subscription_count() == 0:
         time.sleep(0.05)
     time.sleep(1.0)
-    data = CdrWriter().string("x" * max(0, size - 9)).finish()
+    data = encode({"data": "string"}, data="x" * max(0, size - 9))
     started = time.perf_counter()
     for k in range(count):
         if rate:

@@ -34,9 +34,10 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus.batch import seed_of
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, labels_of, pair_encounters, SHARED
 from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs.tables import COLUMNS
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.segmentation.library import assign, build_library, PrimitiveLibrary

@@ -26,10 +26,10 @@ from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, REPLAY
 from scenario_gen.closed_loop.ego import Pose
-from scenario_gen.closed_loop.origin import units_of
-from scenario_gen.closed_loop.results import as_json
+from scenario_gen.closed_loop.origin import Trial, units_of
+from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, State
-from scenario_gen.closed_loop.trials import Outcome, rates, run_trials, Trial
+from scenario_gen.closed_loop.trials import Outcome, rates, run_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.method.evaluation.bootstrap import paired_difference, wilson
 from scenario_gen.numerics.arrays import Floats
@@ -105,7 +105,7 @@ def planners(trials: list[Trial]) -> tuple[list[Row], list[Outcome]]:
     )
     again = run_trials(trials[:40], GOOD, workers=2)
     config = ClosedLoopConfig()
-    same = as_json(good[:40], GOOD, config) == as_json(again, GOOD, config)
+    same = Drives(good[:40], GOOD, config).json() == Drives(again, GOOD, config).json()
     rows.append(Row("same bytes in a second run, with two workers", float(same), "", "higher", 1.0))
     return rows, [*bad, *good]
 

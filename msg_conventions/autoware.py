@@ -13,10 +13,12 @@ depth 1.
 
 from collections.abc import Sequence
 import hashlib
+from typing import Any
 
 import numpy as np
 
-from msg_conventions.cdr import CdrWriter
+from msg_conventions.cdr import encode
+from msg_conventions.layouts import PREDICTED, TRACKED
 from msg_conventions.odometry import encode_odometry
 from msg_conventions.poses import pose_rows
 from scenario_gen.numerics import Floats
@@ -29,7 +31,6 @@ STEP_NS, HORIZON_NS = 500_000_000, 10_000_000_000
 CAR, TRUCK = 1, 2  # labels of ObjectClassification
 BOUNDING_BOX = 0  # type of Shape
 ORIENTATION_KNOWN = 2  # TrackedObjectKinematics.AVAILABLE
-_NO_COVARIANCE = bytes(36 * 8)
 
 
 def uuid_of(vehicle: Vehicle) -> bytes:
@@ -41,14 +42,15 @@ class AutowareEncoder:
     """Encodes a scenario's instants, one after the other."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Take the scenario and compute its poses and yaw rates once."""
+        """Take the scenario and compute its vehicles' states (N, T, 6), as `encode_predicted_objects` takes them, once."""
         self.scenario = scenario
-        self.yaw_rate = np.zeros_like(scenario.heading)
         self.time_ns = np.rint(scenario.time * 1e9).astype(np.int64)
-        self.poses = np.stack([_poses(scenario, n) for n in range(len(scenario.vehicles))])
+        rate = np.zeros_like(scenario.heading)
         for n, (first, last) in enumerate(scenario.present.tolist()):
             there = slice(first, last + 1)
-            self.yaw_rate[n, there] = np.gradient(scenario.heading[n, there], scenario.time[there])
+            rate[n, there] = np.gradient(scenario.heading[n, there], scenario.time[there])
+        rest = (scenario.heading, scenario.speed, scenario.acceleration, rate)
+        self.states = np.concatenate((scenario.position, np.stack(rest, axis=-1)), axis=-1)
 
     def present_at(self, k: int) -> list[int]:
         """Return the vehicles that are present at instant `k`."""
@@ -56,44 +58,28 @@ class AutowareEncoder:
 
     def predicted_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as PredictedObjects."""
-        here = self.present_at(k)
-        writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
-        for n in here:
-            self._object(writer, n, k)
-            _path(writer, self.poses[n, self._ahead(n, k)])
-            _shape(writer, self.scenario.vehicles[n])
-        return writer.finish()
+        here, frame = self.present_at(k), self.scenario.frame_id
+        vehicles, paths = [self.scenario.vehicles[n] for n in here], [self.states[n, self._ahead(n, k), :3] for n in here]
+        return encode_predicted_objects(vehicles, self.states[here, k], paths, frame, stamp_ns)
 
     def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as TrackedObjects."""
-        here = self.present_at(k)
-        writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
-        for n in here:
-            self._object(writer, n, k)
-            writer.pack("B", ORIENTATION_KNOWN, int(self.scenario.speed[n, k] == 0.0))
-            _shape(writer, self.scenario.vehicles[n])
-        return writer.finish()
+        objects = [
+            _object(self.scenario.vehicles[n], self.states[n, k])
+            | {"orientation": ORIENTATION_KNOWN, "is_stationary": self.scenario.speed[n, k] == 0.0}
+            for n in self.present_at(k)
+        ]
+        return encode(TRACKED, stamp=stamp_ns, frame_id=self.scenario.frame_id, objects=objects)
 
     def odometry(self, k: int, stamp_ns: int, n: int = 0) -> bytes:
         """Return vehicle `n` at instant `k` as the ego's Odometry."""
-        scenario = self.scenario
-        pose = (*scenario.position[n, k], scenario.heading[n, k], *self._rates(n, k))
-        return encode_kinematic_state(scenario.vehicles[n], np.array(pose), scenario.frame_id, stamp_ns)
+        return encode_kinematic_state(self.scenario.vehicles[n], self.states[n, k], self.scenario.frame_id, stamp_ns)
 
     def _ahead(self, n: int, k: int) -> list[int]:
         """Return the instants of the predicted path from `k` on: those at whole steps, while the vehicle is there."""
         last = int(self.scenario.present[n, 1])
         wanted = np.arange(self.time_ns[k], min(self.time_ns[last], self.time_ns[k] + HORIZON_NS) + 1, STEP_NS)
-        at = np.minimum(np.searchsorted(self.time_ns, wanted), last)
-        return list(map(int, at))
-
-    def _object(self, writer: CdrWriter, n: int, k: int) -> None:
-        """Append id, existence, class and kinematics."""
-        _kinematics(writer, self.scenario.vehicles[n], self.poses[n, k], *self._rates(n, k))
-
-    def _rates(self, n: int, k: int) -> tuple[float, float, float]:
-        """Return speed [m/s], acceleration [m/s²] and yaw rate [rad/s]."""
-        return float(self.scenario.speed[n, k]), float(self.scenario.acceleration[n, k]), float(self.yaw_rate[n, k])
+        return [int(at) for at in np.minimum(np.searchsorted(self.time_ns, wanted), last)]
 
 
 def encode_predicted_objects(
@@ -108,12 +94,11 @@ def encode_predicted_objects(
         frame_id: of the road.
         stamp_ns: now.
     """
-    writer = CdrWriter().header(stamp_ns, frame_id).pack("I", len(vehicles))
-    for vehicle, state, path in zip(vehicles, states, paths, strict=True):
-        _kinematics(writer, vehicle, _shape_poses(vehicle, state[None, :3])[0], *state[3:].tolist())
-        _path(writer, _shape_poses(vehicle, path))
-        _shape(writer, vehicle)
-    return writer.finish()
+    objects = [
+        _object(vehicle, state) | {"paths": [{"poses": _shape_poses(vehicle, path), "step": STEP_NS, "confidence": 1.0}]}
+        for vehicle, state, path in zip(vehicles, states, paths, strict=True)
+    ]
+    return encode(PREDICTED, stamp=stamp_ns, frame_id=frame_id, objects=objects)
 
 
 def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp_ns: int) -> bytes:
@@ -122,30 +107,22 @@ def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp
     return encode_odometry(np.array([*axle, *state[2:4]]), float(state[5]), BASE_LINK, frame_id, stamp_ns)
 
 
-def _kinematics(writer: CdrWriter, vehicle: Vehicle, pose: Floats, speed: float, acceleration: float, rate: float) -> None:
-    """Append id, existence, class, pose (7,), twist and acceleration."""
-    writer.raw(uuid_of(vehicle)).pack("f", 1.0).pack("I", 1).pack("B", TRUCK if is_truck(vehicle) else CAR).pack("f", 1.0)
-    writer.pack("d", *pose).raw(_NO_COVARIANCE)
-    writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
-    writer.pack("d", acceleration, *[0.0] * 5).raw(_NO_COVARIANCE)
-
-
-def _path(writer: CdrWriter, poses: Floats) -> None:
-    """Append a single predicted path, of poses (K, 7)."""
-    writer.pack("I", 1).pack("I", len(poses)).align(8).raw(poses.tobytes()).stamp(STEP_NS).pack("f", 1.0)
-
-
-def _shape(writer: CdrWriter, vehicle: Vehicle) -> None:
-    writer.pack("B", BOUNDING_BOX).pack("I", 0).pack("d", vehicle.length, vehicle.width, height(vehicle))
-
-
-def _poses(scenario: Scenario, n: int) -> Floats:
-    """Return (T, 7) poses of a vehicle's shape, as on the wire."""
-    return _shape_poses(scenario.vehicles[n], np.column_stack([scenario.position[n], scenario.heading[n]]))
+def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
+    """Return what both messages say of a vehicle; `state` (6,) as in `encode_kinematic_state`."""
+    _, _, _, speed, acceleration, rate = state.tolist()
+    return {
+        "id": np.frombuffer(uuid_of(vehicle), dtype=np.uint8),
+        "existence": 1.0,
+        "classes": [{"label": TRUCK if is_truck(vehicle) else CAR, "probability": 1.0}],
+        "pose": _shape_poses(vehicle, state[None, :3]),
+        "twist": (speed, 0.0, 0.0, 0.0, 0.0, rate),
+        "acceleration": (acceleration, 0.0, 0.0, 0.0, 0.0, 0.0),
+        "shape": {"type": BOUNDING_BOX, "dimensions": (vehicle.length, vehicle.width, height(vehicle))},
+    }
 
 
 def _shape_poses(vehicle: Vehicle, poses: Floats) -> Floats:
     """Return (K, 7) poses of a vehicle's shape, as on the wire, of poses (K, 3) x, y [m], yaw [rad]."""
     rows = pose_rows(poses)
     rows[:, 2] = height(vehicle) / 2.0
-    return np.ascontiguousarray(rows)
+    return rows

@@ -3,20 +3,58 @@
 
 """Plain CDR (XCDR1, little-endian), the bytes of a ROS 2 message, written and read without any ROS library.
 
+Most messages go through `encode` and `decode`, by their tables in layouts.py; paths and trajectories are laid out at once.
+
 Padding bytes are zero. (Fast CDR leaves them uninitialised, so two runs of rclpy disagree there; rosbags writes zeros too.)
 """
 
+from collections.abc import Mapping
+from functools import cache
 import struct
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from msg_conventions.layouts import Layout
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats
 
 HEADER = b"\x00\x01\x00\x00"  # encapsulation: CDR, little-endian, no options
 NANOSECONDS = 1_000_000_000
+
+
+@cache
+def _dtype(kind: str) -> np.dtype[Any]:
+    return np.dtype(kind).newbyteorder("<")
+
+
+def encode(layout: Layout, **values: Any) -> bytes:
+    """Return a message as CDR bytes; fields that are not given are zero or empty.
+
+    Args:
+        layout: one of `layouts`.
+        values: by field; a table's are a mapping, a sequence's anything with a length.
+
+    Raises:
+        InputError: a number or a stamp is out of range.
+    """
+    return CdrWriter().fields(layout, values).finish()
+
+
+def decode(layout: Layout, data: bytes, what: str, *, framed: bool = False) -> SimpleNamespace:
+    """Return the fields of a message.
+
+    Args:
+        layout: one of `layouts`.
+        data: CDR bytes.
+        what: names the message in errors.
+        framed: it has positions, so that its frame may not be empty.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    return CdrReader(data, what).fields(layout, framed=framed)
 
 
 def stamp_of(data: bytes, what: str) -> int:
@@ -32,58 +70,56 @@ class CdrWriter:
     """Appends values at their natural alignment, counted from the byte after the encapsulation header."""
 
     def __init__(self) -> None:
-        self._bytes = bytearray()
+        self.body = bytearray()
 
-    def align(self, size: int) -> "CdrWriter":
-        """Pad with zeros to a multiple of `size` bytes."""
-        self._bytes.extend(bytes(-len(self._bytes) % size))
-        return self
-
-    def raw(self, data: bytes) -> "CdrWriter":
-        """Append bytes as they are."""
-        self._bytes += data
-        return self
-
-    def pack(self, code: str, *values: float) -> "CdrWriter":
-        """Append numbers of one struct `code` ('I' uint32, 'i' int32, 'd' float64, 'f' float32, 'B' uint8, ...).
+    def fields(self, layout: Layout, values: Mapping[str, Any]) -> "CdrWriter":
+        """Append the fields of a table; those that are not among the values are zero or empty.
 
         Raises:
-            InputError: a number is out of range.
+            InputError: a number or a stamp is out of range.
         """
-        self.align(struct.calcsize("<" + code))
-        try:
-            self._bytes += struct.pack(f"<{len(values)}{code}", *values)
-        except struct.error as error:
-            raise InputError(f"a message cannot hold {values}: {error}") from None
+        for name, kind in layout.items():
+            self._append(kind, values.get(name))
         return self
-
-    def string(self, text: str) -> "CdrWriter":
-        """Append a string: uint32 length with the terminating zero, UTF-8 bytes, zero."""
-        data = text.encode() + b"\x00"
-        return self.pack("I", len(data)).raw(data)
-
-    def stamp(self, nanoseconds: int) -> "CdrWriter":
-        """Append builtin_interfaces/Time (or Duration): int32 seconds, uint32 nanoseconds.
-
-        Raises:
-            InputError: the seconds need more than 32 bits.
-        """
-        seconds, rest = divmod(nanoseconds, NANOSECONDS)
-        if not -(2**31) <= seconds < 2**31:
-            raise InputError(f"stamp {nanoseconds} ns does not fit a ROS time (32-bit seconds, until 2038)")
-        return self.pack("i", seconds).pack("I", rest)
-
-    def header(self, stamp_ns: int, frame_id: str) -> "CdrWriter":
-        """Append std_msgs/Header."""
-        return self.stamp(stamp_ns).string(frame_id)
-
-    def offset(self) -> int:
-        """Bytes written so far, without the encapsulation header."""
-        return len(self._bytes)
 
     def finish(self) -> bytes:
         """Return the message."""
-        return HEADER + bytes(self._bytes)
+        return HEADER + bytes(self.body)
+
+    def _append(self, kind: Any, value: Any) -> None:
+        if isinstance(kind, dict):
+            self.fields(kind, value or {})
+        elif kind == "string":
+            data = (value or "").encode() + b"\x00"
+            self._count(len(data))
+            self.body += data
+        elif kind == "time":
+            seconds, rest = divmod(value or 0, NANOSECONDS)
+            if not -(2**31) <= seconds < 2**31:
+                raise InputError(f"stamp {value} ns does not fit a ROS time (32-bit seconds, until 2038)")
+            self._count(seconds % 2**32)
+            self._count(rest)
+        elif isinstance(kind, str):
+            self._numbers(kind, np.zeros(_dtype(kind).shape) if value is None else value)
+        elif isinstance(kind[0], dict) or kind[0] == "string":
+            self._count(len(value or ()))
+            for item in value or ():
+                self._append(kind[0], item)
+        else:
+            self._count(0 if value is None else len(value))
+            self._numbers(kind[0], () if value is None else value)
+
+    def _count(self, count: int) -> None:
+        self.body += bytes(-len(self.body) % 4) + int(count).to_bytes(4, "little")
+
+    def _numbers(self, kind: str, value: Any) -> None:
+        dtype = _dtype(kind)
+        try:
+            numbers = np.asarray(value, dtype.base).reshape(-1, *dtype.shape)
+        except OverflowError as error:
+            raise InputError(f"a message cannot hold {value}: {error}") from None
+        if numbers.size:
+            self.body += bytes(-len(self.body) % dtype.base.itemsize) + numbers.tobytes()
 
 
 class CdrReader:
@@ -107,34 +143,21 @@ class CdrReader:
         self.place = start + size
         return self._data[start : start + size]
 
-    def one(self, code: str) -> Any:
-        """Read a number of struct `code`."""
-        size = struct.calcsize("<" + code)
-        return struct.unpack("<" + code, self._take(size, size))[0]
-
     def count(self, size: int = 1) -> int:
         """Read the length of a sequence whose items take at least `size` bytes each.
 
         Raises:
             InputError: less than that is left.
         """
-        count, left = int(self.one("I")), len(self._data) - self.place
+        count, left = int.from_bytes(self._take(4, 4), "little"), len(self._data) - self.place
         if count * size > left:
             raise InputError(f"{self._what}: {count} items are announced where {left} bytes are left")
         return count
-
-    def number(self) -> int:
-        """Read a uint32 that is no length."""
-        return int(self.one("I"))
 
     def array(self, dtype: npt.DTypeLike, count: int, alignment: int) -> npt.NDArray[Any]:
         """Read `count` items (n,) of a numpy type, the first one aligned; nothing (no padding either) if `count` is 0."""
         kind = np.dtype(dtype)
         return np.frombuffer(self._take(kind.itemsize * count, alignment) if count else b"", dtype=kind, count=count)
-
-    def floats(self, count: int) -> Floats:
-        """Read `count` float64 (n,), of any unit, that belong to one or more structures."""
-        return self.array("<f8", count, 8)
 
     def string(self) -> str:
         """Read a string.
@@ -150,7 +173,8 @@ class CdrReader:
 
     def stamp(self) -> int:
         """Read a Time or Duration in nanoseconds."""
-        return int(self.one("i")) * NANOSECONDS + int(self.one("I"))
+        seconds, rest = struct.unpack("<iI", self._take(8, 4))
+        return int(seconds) * NANOSECONDS + int(rest)
 
     def aligned(self, dtype: npt.DTypeLike, count: int) -> npt.NDArray[Any] | None:
         """Read `count` structures (n,) that each end at a multiple of 8 bytes; None, and nothing read, if less is left.
@@ -166,17 +190,29 @@ class CdrReader:
         body = self._data[start:end]
         return np.frombuffer(b"".join((body[:4], bytes(4), body[4:])) if amid else body, dtype=kind)
 
-    def header(self) -> tuple[int, str]:
-        """Read std_msgs/Header: stamp in nanoseconds and frame."""
-        return self.stamp(), self.string()
-
-    def framed_header(self) -> tuple[int, str]:
-        """Read the std_msgs/Header of a message with positions: its frame may not be empty.
+    def fields(self, layout: Layout, *, framed: bool = False) -> SimpleNamespace:
+        """Read the fields of a table: numbers, arrays, texts, stamps [ns], lists and namespaces; `framed` as in `decode`.
 
         Raises:
-            InputError: it is empty.
+            InputError: the frame may not be empty, but is.
         """
-        stamp_ns, frame_id = self.header()
-        if not frame_id:
+        found = SimpleNamespace(**{name: self._value(kind) for name, kind in layout.items()})
+        if framed and not found.frame_id:
             raise InputError(f"{self._what}: header.frame_id is empty; name the frame that the positions are in")
-        return stamp_ns, frame_id
+        return found
+
+    def _value(self, kind: Any) -> Any:
+        if isinstance(kind, dict):
+            return self.fields(kind)
+        if kind == "string":
+            return self.string()
+        if kind == "time":
+            return self.stamp()
+        if isinstance(kind, str):
+            dtype = _dtype(kind)
+            found = self.array(dtype, 1, dtype.base.itemsize)[0]
+            return found if dtype.shape else found.item()
+        if isinstance(kind[0], dict) or kind[0] == "string":
+            return [self._value(kind[0]) for _ in range(self.count())]
+        dtype = _dtype(kind[0])
+        return self.array(dtype, self.count(dtype.itemsize), dtype.base.itemsize)

@@ -18,8 +18,9 @@ import math
 import numpy as np
 
 from msg_conventions import trajectory
-from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.cdr import decode, encode
 from msg_conventions.diagnostics import Level, Status
+from msg_conventions.layouts import CLOUD
 from msg_conventions.tracks import encode_samples, FRAME
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
@@ -38,18 +39,8 @@ def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> byt
 
 def encode_live_changepoints(found: LiveChangepoints) -> bytes:
     """Return newly confirmed changepoints as CDR bytes; accelerations are not known yet: 0."""
-    return trajectory.encode(
-        Trajectory(
-            stamp_ns=found.start_ns,
-            frame_id=FRAME,
-            vehicles=found.vehicles,
-            time_ns=found.time_ns,
-            position=found.position,
-            heading=found.heading,
-            speed=found.speed,
-            acceleration=np.zeros_like(found.speed),
-        )
-    )
+    states = (found.position, found.heading, found.speed, np.zeros_like(found.speed))
+    return trajectory.encode(Trajectory(found.start_ns, FRAME, found.vehicles, found.time_ns, *states))
 
 
 def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepoints") -> Segmentation:
@@ -69,12 +60,8 @@ def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepo
         raise InputError(f"{what}: times must increase and be those of samples 1 to {samples - 1} of the tracks")
     marks = np.zeros(samples)
     marks[index] = 1.0
-    return Segmentation(
-        labels=np.cumsum(marks).astype(np.int64),
-        changepoints=index,
-        changepoint_probability=marks,
-        descriptions=tuple(f"segment {k}" for k in range(len(index) + 1)),
-    )
+    descriptions = tuple(f"segment {k}" for k in range(len(index) + 1))
+    return Segmentation(np.cumsum(marks).astype(np.int64), index, marks, descriptions)
 
 
 def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
@@ -86,11 +73,12 @@ def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
     cloud["primitive"] = segmentation.labels
     cloud["t"] = encounter.time
     cloud["p"] = segmentation.changepoint_probability
-    writer = CdrWriter().header(encounter.start_ns, FRAME).pack("I", n, samples, len(POINT.names or ()))
-    for name, (kind, offset, *_) in (POINT.fields or {}).items():
-        writer.string(name).pack("I", offset).pack("B", DATATYPES[kind.str]).pack("I", 1)
-    writer.pack("B", 0).pack("I", POINT.itemsize, POINT.itemsize * samples, cloud.nbytes)
-    return writer.raw(cloud.tobytes()).pack("B", 1).finish()
+    columns = (POINT.fields or {}).items()
+    fields = [{"name": name, "offset": at, "datatype": DATATYPES[kind.str], "count": 1} for name, (kind, at, *_) in columns]
+    steps, data = (POINT.itemsize, POINT.itemsize * samples), np.frombuffer(cloud, dtype=np.uint8)
+    return encode(
+        CLOUD, stamp=encounter.start_ns, frame_id=FRAME, size=(n, samples), fields=fields, steps=steps, data=data, is_dense=1
+    )
 
 
 def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior") -> Segmentation:
@@ -99,28 +87,14 @@ def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str 
     Raises:
         InputError: the message is damaged or not of this convention.
     """
-    reader = CdrReader(data, what)
-    reader.header()
-    n, samples = reader.number(), reader.number()
-    names = []
-    for _ in range(reader.count()):
-        names.append(reader.string())
-        reader.number(), reader.one("B"), reader.number()  # offset, datatype, count
-    reader.one("B")  # is_bigendian
-    point_step = reader.number()
-    reader.number()  # row_step
-    size = reader.count()
-    if tuple(names) != POINT.names or point_step != POINT.itemsize or size != n * samples * POINT.itemsize or size == 0:
+    found = decode(CLOUD, data, what)
+    n, samples = found.size.tolist()
+    size, names = n * samples * POINT.itemsize, tuple(field.name for field in found.fields)
+    if names != POINT.names or found.steps[0] != POINT.itemsize or len(found.data) != size or size == 0:
         raise InputError(f"{what}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}")
-    cloud = reader.array(POINT, n * samples, 1).reshape(n, samples)
-    reader.one("B")  # is_dense
+    cloud = found.data.view(POINT).reshape(n, samples)
     labels = cloud["primitive"][0].astype(np.int64)
-    return Segmentation(
-        labels=labels,
-        changepoints=1 + np.flatnonzero(np.diff(labels)),
-        changepoint_probability=cloud["p"][0].astype(np.float64),
-        descriptions=descriptions,
-    )
+    return Segmentation(labels, 1 + np.flatnonzero(np.diff(labels)), cloud["p"][0].astype(np.float64), descriptions)
 
 
 def segmentation_status(segmentation: Segmentation, node: str, duration: float) -> Status:

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
-from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import DIAGNOSTICS
 
 TYPE = "diagnostic_msgs/msg/DiagnosticArray"
 TEMPLATE = "template_stamp"
@@ -39,12 +40,16 @@ class Status:
 
 def encode_diagnostics(statuses: Sequence[Status], stamp_ns: int) -> bytes:
     """Return the statuses as CDR bytes."""
-    writer = CdrWriter().header(stamp_ns, "").pack("I", len(statuses))
-    for status in statuses:
-        writer.pack("B", status.level).string(status.name).string(status.message).string("").pack("I", len(status.values))
-        for key, value in status.values.items():
-            writer.string(key).string(value)
-    return writer.finish()
+    fields = [
+        {
+            "level": one.level,
+            "name": one.name,
+            "message": one.message,
+            "values": [{"key": key, "value": value} for key, value in one.values.items()],
+        }
+        for one in statuses
+    ]
+    return encode(DIAGNOSTICS, stamp=stamp_ns, statuses=fields)
 
 
 def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tuple[Status, ...]]:
@@ -53,18 +58,12 @@ def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tup
     Raises:
         InputError: the message is damaged.
     """
-    reader = CdrReader(data, what)
-    stamp_ns, _ = reader.header()
-    statuses = []
-    for _ in range(reader.count()):
-        level, name, message = reader.one("B"), reader.string(), reader.string()
-        reader.string()  # hardware id
-        values = {}
-        for _ in range(reader.count()):
-            key = reader.string()
-            values[key] = reader.string()
-        statuses.append(Status(name, Level(min(level, Level.STALE)), message, values))
-    return stamp_ns, tuple(statuses)
+    message = decode(DIAGNOSTICS, data, what)
+    statuses = (
+        Status(one.name, Level(min(one.level, Level.STALE)), one.message, {value.key: value.value for value in one.values})
+        for one in message.statuses
+    )
+    return message.stamp, tuple(statuses)
 
 
 def decimal_stamp(stamp_ns: int) -> str:

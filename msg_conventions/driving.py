@@ -24,11 +24,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.paths import read_poses
+from msg_conventions import trajectory
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import CLOCK, VELOCITY, VELOCITY_STAMPED
+from msg_conventions.paths import read_path
 from msg_conventions.poses import poses_of
 from msg_conventions.roads import encode_grid, OCCUPIED
-from msg_conventions.trajectory import decode
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats
 
@@ -46,12 +47,12 @@ class Way:
 
 def encode_clock(stamp_ns: int) -> bytes:
     """Return a Clock as CDR bytes."""
-    return CdrWriter().stamp(stamp_ns).finish()
+    return encode(CLOCK, clock=stamp_ns)
 
 
 def encode_twist(speed: float, yaw_rate: float) -> bytes:
     """Return a Twist of linear.x [m/s] and angular.z [rad/s] as CDR bytes."""
-    return CdrWriter().pack("d", speed, 0.0, 0.0, 0.0, 0.0, yaw_rate).finish()
+    return encode(VELOCITY, twist=(speed, 0.0, 0.0, 0.0, 0.0, yaw_rate))
 
 
 def decode_twist(data: bytes, what: str = "ego/cmd_vel", *, stamped: bool = False) -> tuple[int, str, float, float]:
@@ -60,10 +61,9 @@ def decode_twist(data: bytes, what: str = "ego/cmd_vel", *, stamped: bool = Fals
     Raises:
         InputError: the message is damaged.
     """
-    reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.header() if stamped else (0, "")
-    values = reader.floats(6).tolist()
-    return stamp_ns, frame_id, values[0], values[5]
+    found = decode(VELOCITY_STAMPED if stamped else VELOCITY, data, what)
+    speed, _, _, _, _, yaw_rate = found.twist.tolist()
+    return (found.stamp, found.frame_id, speed, yaw_rate) if stamped else (0, "", speed, yaw_rate)
 
 
 def decode_trajectory(data: bytes, what: str = "ego/trajectory") -> Way:
@@ -72,7 +72,7 @@ def decode_trajectory(data: bytes, what: str = "ego/trajectory") -> Way:
     Raises:
         InputError: the message is damaged, empty, or holds a value that is not finite.
     """
-    found = decode(data, what)
+    found = trajectory.decode(data, what)
     if not len(found.time_ns):
         raise InputError(f"{what} is empty")
     poses = np.column_stack([found.position[0], found.heading[0]])
@@ -85,9 +85,7 @@ def decode_timed_path(data: bytes, what: str = "ego/path") -> Way:
     Raises:
         InputError: the message is damaged or empty, a value is not finite, or the stamps do not ascend.
     """
-    reader = CdrReader(data, what)
-    _, frame_id = reader.header()
-    stamps, _, rows = read_poses(reader)
+    _, frame_id, stamps, _, rows = read_path(data, what)
     if not len(rows):
         raise InputError(f"{what} is empty")
     if (np.diff(stamps) <= 0).any():

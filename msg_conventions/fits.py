@@ -35,18 +35,8 @@ def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
     speed = encounter.speed[:, fit.anchor_index] * np.array([[vehicle.scale] for vehicle in fit.fitted])
     for k, state in ((0, fit.requested.start), (-1, fit.requested.end)):
         poses[:, k], speed[:, k] = state[:, :3], state[:, 3]
-    return trajectory.encode(
-        Trajectory(
-            stamp_ns=encounter.start_ns,
-            frame_id=frame_id,
-            vehicles=fit.vehicles,
-            time_ns=fit.anchor_index * encounter.dt_ns,
-            position=poses[..., :2],
-            heading=poses[..., 2],
-            speed=speed,
-            acceleration=np.zeros_like(speed),
-        )
-    )
+    time_ns, states = fit.anchor_index * encounter.dt_ns, (poses[..., :2], poses[..., 2], speed, np.zeros_like(speed))
+    return trajectory.encode(Trajectory(encounter.start_ns, frame_id, fit.vehicles, time_ns, *states))
 
 
 def decode_fit(data: bytes, what: str = "fit") -> tuple[int, str, BoundaryStates, Floats]:

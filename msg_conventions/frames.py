@@ -9,7 +9,8 @@ footprint's centre, x ahead. QoS: reliable; /tf volatile, /tf_static transient_l
 
 from collections.abc import Sequence
 
-from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import TRANSFORMS
 from msg_conventions.poses import pose_rows, poses_of
 from scenario_gen.numerics import Floats
 
@@ -18,10 +19,9 @@ TYPE = "tf2_msgs/msg/TFMessage"
 
 def encode_frames(poses: Floats, children: Sequence[str], parent: str, stamp_ns: int) -> bytes:
     """Return the frames `children` at `poses` (N, 3) x [m], y [m], yaw [rad] of `parent`, as CDR bytes."""
-    writer = CdrWriter().pack("I", len(children))
-    for row, child in zip(pose_rows(poses), children, strict=True):
-        writer.header(stamp_ns, parent).string(child).pack("d", *row)
-    return writer.finish()
+    rows = zip(pose_rows(poses), children, strict=True)
+    header = {"stamp": stamp_ns, "frame_id": parent}
+    return encode(TRANSFORMS, transforms=[header | {"child": child, "pose": row} for row, child in rows])
 
 
 def decode_frames(data: bytes, what: str = "tf") -> list[tuple[int, str, str, Floats]]:
@@ -30,9 +30,5 @@ def decode_frames(data: bytes, what: str = "tf") -> list[tuple[int, str, str, Fl
     Raises:
         InputError: the message is damaged, or a pose is none.
     """
-    reader = CdrReader(data, what)
-    found = []
-    for _ in range(reader.count(72)):
-        stamp_ns, parent = reader.header()
-        found.append((stamp_ns, parent, reader.string(), poses_of(reader.floats(7)[None], what)[0]))
-    return found
+    found = decode(TRANSFORMS, data, what).transforms
+    return [(one.stamp, one.frame_id, one.child, poses_of(one.pose[None], what)[0]) for one in found]

@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import MARKER
 from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
@@ -36,31 +37,22 @@ def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> b
     points = np.concatenate(pairs) if pairs else np.zeros((0, 2))
     text = "" if network is None else json.dumps(_document(network), ensure_ascii=False)
     marker = Marker("lanes", LINE_LIST, ADD if lanes else DELETE, colour=(1.0, 1.0, 1.0, 0.7), points=points, text=text)
-    return marker.write(CdrWriter(), frame_id, stamp_ns).finish()
+    return encode(MARKER, **marker.fields(frame_id, stamp_ns))
 
 
 def _document(network: LaneNetwork) -> dict[str, Any]:
     lanes = [
-        {
-            "id": lane.id,
-            "points": len(lane.left),
-            "successors": lane.successors,
-            "beside": lane.beside,
-            "speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit,
-            "junction": lane.junction,
-        }
+        {"id": lane.id, "points": len(lane.left), "successors": lane.successors, "beside": lane.beside}
+        | {"speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit, "junction": lane.junction}
         for lane in network.lanes
     ]
+    rules = [
+        {"id": rule.id, "kind": rule.kind, "lanes": rule.lanes, "over": rule.over, "line": rule.line.tolist()}
+        for rule in network.rules
+    ]
     document: dict[str, Any] = {"name": network.name, "notes": network.notes, "lanes": lanes}
-    if network.rules:
-        document["rules"] = [
-            {"id": rule.id, "kind": rule.kind, "lanes": rule.lanes, "over": rule.over, "line": rule.line.tolist()}
-            for rule in network.rules
-        ]
-        document["rules_kept"] = network.rules_kept
-    if network.drawn:
-        document["drawn"] = True
-    return document
+    document |= {"rules": rules, "rules_kept": network.rules_kept} if rules else {}
+    return document | ({"drawn": True} if network.drawn else {})
 
 
 def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | None]:
@@ -69,31 +61,18 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
     Raises:
         InputError: the message is damaged, or its lanes contradict their borders.
     """
-    reader = CdrReader(data, what)
-    _, frame_id = reader.framed_header()
-    reader.string()
-    _, kind, action = (int(reader.one("i")) for _ in range(3))
-    reader.floats(10)
-    reader.array("<f4", 4, 4)
-    reader.stamp()
-    reader.one("B")
-    count = reader.count(24)
-    points = reader.floats(3 * count).reshape(count, 3)[:, :2]
-    reader.array("<f4", 4 * reader.count(16), 4)
-    reader.string()
-    reader.header()
-    reader.string()
-    reader.array(np.uint8, reader.count(), 1)
-    reader.array("<f4", 2 * reader.count(8), 4)
-    text = reader.string()
-    if action == DELETE:
+    found = decode(MARKER, data, what, framed=True)
+    frame_id, points = found.frame_id, found.points[:, :2]
+    if found.action == DELETE:
         return frame_id, None
-    if kind != LINE_LIST or action != ADD:
-        raise InputError(f"{what}: a marker of type {kind} and action {action}; a line list (5) that is added (0) holds lanes")
+    if (found.kind, found.action) != (LINE_LIST, ADD):
+        raise InputError(
+            f"{what}: a marker of type {found.kind}, action {found.action}; a line list (5) that is added (0) is needed"
+        )
     if not (np.abs(points) <= FARTHEST).all():
         raise InputError(f"{what}: a border has a point that is not finite or more than {FARTHEST:g} m away")
     try:
-        document = json.loads(text)
+        document = json.loads(found.text)
         lanes = tuple(_lanes(document["lanes"], points, what))
         notes = tuple(str(note) for note in document["notes"])
         rules = tuple(map(_rule, document.get("rules", ())))

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""visualization_msgs/Marker, written field by field: lines, boxes and texts that RViz and Foxglove draw."""
+"""visualization_msgs/Marker, lines, boxes and texts that RViz and Foxglove draw."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from msg_conventions.cdr import CdrWriter
 from msg_conventions.poses import pose_rows
 from scenario_gen.numerics import Floats
 
@@ -41,14 +41,8 @@ class Marker:
     points: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     text: str = ""
 
-    def write(self, writer: CdrWriter, frame_id: str, stamp_ns: int) -> CdrWriter:
-        """Append the marker to a message."""
-        writer.header(stamp_ns, frame_id).string(self.name).pack("i", 0, self.kind, self.action)
-        writer.pack("d", *pose_rows(np.array([self.pose]))[0], *self.scale)
-        writer.pack("f", *self.colour).stamp(0).pack("B", 0).pack("I", len(self.points))  # lifetime, frame_locked
-        if len(self.points):
-            writer.align(8).raw(np.column_stack((self.points, np.zeros(len(self.points)))).tobytes())
-        writer.pack("I", 0)  # colours
-        writer.string("").header(0, "").string("").pack("I", 0)  # texture: resource, image header, format, bytes
-        writer.pack("I", 0)  # uv coordinates
-        return writer.string(self.text).string("").string("").pack("I", 0).pack("B", 0)  # mesh: resource, file, bytes
+    def fields(self, frame_id: str, stamp_ns: int) -> dict[str, Any]:
+        """Return the marker's fields, as `layouts.MARKER` has them."""
+        points = np.column_stack((self.points, np.zeros(len(self.points))))
+        given = {"stamp": stamp_ns, "frame_id": frame_id, "points": points, "pose": pose_rows(np.array([self.pose]))}
+        return given | {name: getattr(self, name) for name in ("name", "kind", "action", "scale", "colour", "text")}

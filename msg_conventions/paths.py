@@ -10,11 +10,11 @@ QoS: reliable, transient_local, depth 1. Arc length is not in the message; it is
 
 from collections.abc import Sequence
 from functools import lru_cache
-import struct
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
+from msg_conventions import layouts
+from msg_conventions.cdr import CdrReader, encode, HEADER, NANOSECONDS
 from msg_conventions.poses import poses_of
 from msg_conventions.yaw import half_angle
 from scenario_gen.base.errors import InputError
@@ -22,6 +22,7 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Route
 
 TYPE = "nav_msgs/msg/Path"
+BEGIN = layouts.HEADER | {"count": "u4"}  # of poses
 
 
 def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) -> bytes:
@@ -32,40 +33,29 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
     """
     count = len(poses)
     if not count:
-        return CdrWriter().header(stamp_ns, frame_id).pack("I", 0).finish()
+        return encode(BEGIN, stamp=stamp_ns, frame_id=frame_id)
     if not np.isfinite(poses).all():
         raise InputError("a path with a value that is not finite cannot be sent")
-    first, kind, blank, text = _layout(frame_id)
     seconds, nanoseconds = np.divmod(stamps_ns, NANOSECONDS)
-    z, w = half_angle(poses[:, 2])
-    body = bytearray(blank * (count - 1))
-    rest = np.frombuffer(body, dtype=kind)
-    rest["sec"], rest["nanosec"] = seconds[1:], nanoseconds[1:]
-    pose = rest["pose"]
-    pose[:, :2], pose[:, 5], pose[:, 6] = poses[1:, :2], z[1:], w[1:]
-    stamp, begin, size = divmod(stamp_ns, NANOSECONDS), (seconds.item(0), nanoseconds.item(0)), len(text)
-    x, y = poses.item(0), poses.item(1)
-    try:
-        head = first.pack(*stamp, size, text, count, *begin, size, text, x, y, 0.0, 0.0, 0.0, z.item(0), w.item(0))
-    except struct.error as error:
-        raise InputError(f"a path of stamp {stamp_ns} ns cannot be sent: {error}") from None
-    return b"".join((HEADER, head, body))
+    if np.abs(seconds).max() >= 2**31:
+        raise InputError(f"a path of stamp {stamp_ns} ns cannot be sent: a stamp does not fit a ROS time (until 2038)")
+    text = frame_id.encode() + b"\x00"
+    begin = encode(BEGIN, stamp=stamp_ns, frame_id=frame_id, count=count)
+    rows = np.zeros(count, dtype=_pose_type(len(text)))
+    rows["sec"], rows["nanosec"], rows["size"], rows["frame"] = seconds, nanoseconds, len(text), text
+    pose = rows["pose"]
+    pose[:, :2] = poses[:, :2]
+    pose[:, 5], pose[:, 6] = half_angle(poses[:, 2])
+    body, used = rows.tobytes(), 12 + len(text)
+    gap = -(len(begin) - len(HEADER) + used) % 8  # before the first pose, which may begin amid 8 bytes
+    return b"".join((begin, body[:used], bytes(gap), body[used + -used % 8 :]))
 
 
 @lru_cache(maxsize=16)
-def _layout(frame_id: str) -> tuple[struct.Struct, np.dtype[np.void], bytes, bytes]:
-    """Return how a path begins, up to its first pose; the layout of each further pose, blank but for its frame; the frame.
-
-    A pose ends at a multiple of 8 bytes, so all after the first are laid out alike. Padding bytes are zero.
-    """
-    text = frame_id.encode() + b"\x00"
-    size = len(text)
-    to_count = -(12 + size) % 4
-    to_pose = -(12 + size + to_count + 4 + 12 + size) % 8
-    first = struct.Struct(f"<iII{size}s{to_count}xIiII{size}s{to_pose}x7d")
-    pad = -(12 + size) % 8
-    kind = [("sec", "<i4"), ("nanosec", "<u4"), ("size", "<u4"), ("frame", f"V{size + pad}"), ("pose", "<f8", (7,))]
-    return first, np.dtype(kind), struct.pack(f"<8xI{size}s{pad}x56x", size, text), text
+def _pose_type(size: int) -> np.dtype[np.void]:
+    """Return the layout of a pose that begins at a multiple of 8 bytes, in a frame of `size` bytes; it also ends at one."""
+    frame = size + -(12 + size) % 8
+    return np.dtype([("sec", "<i4"), ("nanosec", "<u4"), ("size", "<u4"), ("frame", f"S{frame}"), ("pose", "<f8", (7,))])
 
 
 def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints]:
@@ -74,25 +64,28 @@ def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints
     Raises:
         InputError: the message is damaged, or a pose is in another frame than the path.
     """
-    reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.framed_header()
-    stamps, frames, rows = read_poses(reader)
+    stamp_ns, frame_id, stamps, frames, rows = read_path(data, what, framed=True)
     for k, frame in enumerate(frames):
         if frame not in (frame_id, ""):
             raise InputError(f"{what}: pose {k} is in frame {frame!r}, the path in {frame_id!r}")
     return stamp_ns, frame_id, poses_of(rows, what), stamps
 
 
-def read_poses(reader: CdrReader) -> tuple[Ints, list[str], Floats]:
-    """Read geometry_msgs/PoseStamped[]: stamps (M,) [ns], frames and poses (M, 7) as on the wire."""
+def read_path(data: bytes, what: str, *, framed: bool = False) -> tuple[int, str, Ints, list[str], Floats]:
+    """Return stamp [ns] and frame, and of each pose its stamp [ns], frame and row (7,) as on the wire; `framed` as in `decode`.
+
+    Raises:
+        InputError: the message is damaged.
+    """
+    reader = CdrReader(data, what)
+    head = reader.fields(layouts.HEADER, framed=framed)
     count = reader.count(68)
-    rows, stamps = np.zeros((count, 7)), np.zeros(count, dtype=np.int64)
-    frames = []
+    rows, stamps, frames = np.zeros((count, 7)), np.zeros(count, dtype=np.int64), []
     for k in range(count):
-        stamps[k], frame = reader.header()
-        frames.append(frame)
-        rows[k] = reader.floats(7)
-    return stamps, frames, rows
+        stamps[k] = reader.stamp()
+        frames.append(reader.string())
+        rows[k] = reader.array("<f8", 7, 8)
+    return head.stamp, head.frame_id, stamps, frames, rows
 
 
 def chord_length(points: Floats) -> Floats:

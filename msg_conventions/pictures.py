@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import MARKERS, POLYGON
 from msg_conventions.markers import CUBE, DELETE_ALL, LINE_STRIP, Marker
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import Scenario, tokens, Vehicle
@@ -23,8 +24,8 @@ EGO_COLOUR = (0.06, 0.09, 0.16)
 def encode_footprint(vehicle: Vehicle, stamp_ns: int, frame_id: str) -> bytes:
     """Return the footprint in the vehicle's own frame: four corners, counter-clockwise from front left, metres, float32."""
     x, y = 0.5 * vehicle.length, 0.5 * vehicle.width
-    writer = CdrWriter().header(stamp_ns, frame_id).pack("I", 4)
-    return writer.pack("f", x, y, 0.0, -x, y, 0.0, -x, -y, 0.0, x, -y, 0.0).finish()
+    corners = ((x, y, 0.0), (-x, y, 0.0), (-x, -y, 0.0), (x, -y, 0.0))
+    return encode(POLYGON, stamp=stamp_ns, frame_id=frame_id, points=corners)
 
 
 def decode_footprint(data: bytes, what: str = "footprint") -> Floats:
@@ -33,10 +34,8 @@ def decode_footprint(data: bytes, what: str = "footprint") -> Floats:
     Raises:
         InputError: the message is damaged.
     """
-    reader = CdrReader(data, what)
-    reader.header()
-    count = reader.count()
-    return reader.array("<f4", 3 * count, 4).reshape(count, 3)[:, :2].astype(np.float64)
+    points: Floats = decode(POLYGON, data, what).points[:, :2].astype(np.float64)
+    return points
 
 
 def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
@@ -64,7 +63,4 @@ def vehicle_markers(vehicles: Sequence[Vehicle], states: Floats, here: Bools, eg
 
 def encode_markers(markers: Sequence[Marker], frame_id: str, stamp_ns: int) -> bytes:
     """Return markers as CDR bytes of a MarkerArray."""
-    writer = CdrWriter().pack("I", len(markers))
-    for marker in markers:
-        marker.write(writer, frame_id, stamp_ns)
-    return writer.finish()
+    return encode(MARKERS, markers=[marker.fields(frame_id, stamp_ns) for marker in markers])

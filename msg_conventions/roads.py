@@ -12,8 +12,10 @@ The road's name is not in the messages: nothing is computed from it.
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.cdr import decode, encode
 from msg_conventions.lanes import decode_lanes
+from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.layouts import MAP, POSES
 from msg_conventions.poses import pose_rows, poses_of
 from msg_conventions.trajectory import FARTHEST
 from msg_conventions.yaw import check_quaternions, yaw
@@ -25,6 +27,7 @@ MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
 POSES_TYPE = "geometry_msgs/msg/PoseArray"
 OCCUPIED, OBSTRUCTED = 100, 99
 OCCUPIED_FROM = 65
+ENDS = ("road/entries", "road/exits")
 
 
 def encode_map(road: Road, stamp_ns: int) -> bytes:
@@ -38,15 +41,14 @@ def encode_map(road: Road, stamp_ns: int) -> bytes:
 def encode_grid(cells: Ints, resolution: float, origin: Floats, frame_id: str, stamp_ns: int) -> bytes:
     """Return cells (H, W) of 0 to 100 or -1, with their size and the lower-left corner (2,) [m], as an OccupancyGrid."""
     height, width = cells.shape
-    writer = CdrWriter().header(stamp_ns, frame_id).stamp(stamp_ns).pack("f", resolution).pack("I", width, height)
-    writer.pack("d", *origin, 0.0, 0.0, 0.0, 0.0, 1.0).pack("I", cells.size)
-    return writer.raw(cells.astype(np.int8).tobytes()).finish()
+    corner, size = (*origin, 0.0, 0.0, 0.0, 0.0, 1.0), (width, height)
+    head = {"stamp": stamp_ns, "frame_id": frame_id, "load_time": stamp_ns}
+    return encode(MAP, **head, resolution=resolution, size=size, origin=corner, cells=cells.astype(np.int8).reshape(-1))
 
 
 def encode_poses(poses: Floats, frame_id: str, stamp_ns: int) -> bytes:
     """Return entries or exits, (M, 3) x, y, yaw, as CDR bytes."""
-    writer = CdrWriter().header(stamp_ns, frame_id).pack("I", len(poses))
-    return (writer.align(8).raw(pose_rows(poses).tobytes()) if len(poses) else writer).finish()
+    return encode(POSES, stamp=stamp_ns, frame_id=frame_id, poses=pose_rows(poses))
 
 
 def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
@@ -55,10 +57,8 @@ def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
     Raises:
         InputError: the message is damaged.
     """
-    reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.framed_header()
-    count = reader.count(56)
-    return stamp_ns, frame_id, poses_of(reader.floats(7 * count).reshape(count, 7), what)
+    found = decode(POSES, data, what, framed=True)
+    return found.stamp, found.frame_id, poses_of(found.poses, what)
 
 
 def decode_map(
@@ -69,12 +69,8 @@ def decode_map(
     Raises:
         InputError: the message is damaged, the map is rotated or empty, or the frames disagree.
     """
-    reader = CdrReader(data, name)
-    stamp_ns, frame_id = reader.framed_header()
-    reader.stamp()
-    resolution, width, height = float(reader.one("f")), reader.number(), reader.number()
-    origin = reader.floats(7)
-    cells = reader.array(np.int8, reader.count(), 1)
+    found = decode(MAP, data, name, framed=True)
+    (width, height), origin, cells, frame_id = found.size.tolist(), found.origin, found.cells, found.frame_id
     check_quaternions(origin[3:], f"{name}: info.origin")
     if width * height != len(cells):
         raise InputError(f"{name}: {width} x {height} cells are announced, {len(cells)} are there")
@@ -82,27 +78,13 @@ def decode_map(
         raise InputError(f"{name}: info.origin must be finite and not rotated")
     if (np.abs(origin[:3]) > FARTHEST).any():
         raise InputError(f"{name}: info.origin is {np.abs(origin[:3]).max():g} m away; at most {FARTHEST:g} is read")
-    ends: list[Floats] = []
-    for what, poses in (("road/entries", entries), ("road/exits", exits)):
-        if poses is None:
-            ends.append(np.zeros((0, 3)))
-            continue
-        _, frame, values = decode_poses(poses, what)
+    none = (frame_id, np.zeros((0, 3)))
+    ends = [none if end is None else decode_poses(end, topic)[1:] for topic, end in zip(ENDS, (entries, exits), strict=True)]
+    network = (frame_id, None) if lanes is None else decode_lanes(lanes)
+    for what, (frame, _) in zip((*ENDS, LANES), (*ends, network), strict=True):
         if frame != frame_id:
             raise InputError(f"{what}: frame {frame!r} is not the map's ({frame_id!r})")
-        ends.append(values)
-    frame, network = (frame_id, None) if lanes is None else decode_lanes(lanes)
-    if frame != frame_id:
-        raise InputError(f"road/lanes: frame {frame!r} is not the map's ({frame_id!r})")
-    road = Road(
-        name=name,
-        drivable=((cells >= 0) & (cells < OCCUPIED_FROM)).reshape(height, width),
-        obstructed=(cells == OBSTRUCTED).reshape(height, width) if (cells == OBSTRUCTED).any() else None,
-        resolution=resolution,
-        origin=origin[:2],
-        entries=ends[0],
-        exits=ends[1],
-        frame_id=frame_id,
-        lanes=network,
-    )
-    return stamp_ns, road
+    drivable = ((cells >= 0) & (cells < OCCUPIED_FROM)).reshape(height, width)
+    obstructed = (cells == OBSTRUCTED).reshape(height, width) if (cells == OBSTRUCTED).any() else None
+    (_, inward), (_, outward) = ends
+    return found.stamp, Road(name, drivable, found.resolution, origin[:2], inward, outward, frame_id, network[1], obstructed)

@@ -10,7 +10,6 @@ scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable, transient_l
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 import json
 from typing import Any
 
@@ -28,14 +27,16 @@ from scenario_gen.types import BoundaryStates, Cause, EgoSlot, FACTS, ORDERS, Sc
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
-REACTION, CUT = (
-    "reaction.",
-    "reaction.cut.",
-)  # who reacts to whom in the template, JSON; reactions that were cut because they closed a circle
+REACTION, CUT = "reaction.", "reaction.cut."  # who reacts to whom in the template, JSON; those cut because they closed a circle
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
 FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the requested states
 EGO_WITNESS = "ego_witness"  # of one with an ego slot
 Values = Mapping[str, str]
+
+
+def _value(key: str, default: str | None = "") -> Any:
+    """Return a property: one of the entry's values."""
+    return property(lambda entry: entry.status.values.get(key, default))
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class ScenarioEntry:
         seed: of the request.
         sha256: of the scenario's CDR bytes.
         status: with all values: `asked_start`, `asked_end`, `achieved_start`, `achieved_end`, `template`, `road`, `ego…`, hashes.
+        messages: SHA-256 of each of the scenario's messages, in order; one, `sha256`, where all are there throughout.
     """
 
     request: str
@@ -55,37 +57,13 @@ class ScenarioEntry:
     seed: int
     sha256: str
     status: Status
+    messages: tuple[str, ...]
 
-    @property
-    def road(self) -> str:
-        """Name of the road; "" if it is not there, as in entries of the nodes."""
-        return self.status.values.get("road", "")
-
-    @cached_property
-    def messages(self) -> tuple[str, ...]:
-        """SHA-256 of each of the scenario's messages, in order; one, `sha256`, where all are there throughout.
-
-        Raises:
-            InputError: they are damaged.
-        """
-        text = self.status.values.get(MESSAGES)
-        if text is None:
-            return (self.sha256,)
-        with guarded(f"{INFO}: {MESSAGES} of {self.status.message}"):
-            found = json.loads(text)
-        if not (isinstance(found, list) and found and all(isinstance(sha256, str) for sha256 in found)):
-            raise InputError(f"{INFO}: {MESSAGES} of {self.status.message} is no list of SHA-256")
-        return tuple(found)
-
-    @property
-    def ego(self) -> str:
-        """Token of the vehicle that was left out; "" if none was."""
-        return self.status.values.get("ego", "")
-
-    @property
-    def witness(self) -> str:
-        """SHA-256 of the message of its ego's witness; "" where it has none (no ego, or before version 0.6)."""
-        return self.status.values.get(EGO_WITNESS, "")
+    road = _value("road")  # name of the road; "" as in entries of the nodes
+    ego = _value("ego")  # token of the vehicle that was left out; "" if none was
+    witness = _value(EGO_WITNESS)  # SHA-256 of the message of its ego's witness; "" where it has none
+    template_hash = _value(TEMPLATE_HASH, None)  # of its template, the `tracks` (hashes.py); None: not known
+    map_hash = _value(MAP_HASH, None)
 
     @property
     def order(self) -> str:
@@ -103,16 +81,6 @@ class ScenarioEntry:
     def facts(self) -> dict[str, str]:
         """Further values about the scenario, see `Scenario.facts`."""
         return {key: text for key, text in self.status.values.items() if key.startswith(FACTS)}
-
-    @property
-    def template_hash(self) -> str | None:
-        """Hash of its template, the `tracks` (hashes.py); None before version 0.2."""
-        return self.status.values.get(TEMPLATE_HASH)
-
-    @property
-    def map_hash(self) -> str | None:
-        """Hash of its `map`, likewise."""
-        return self.status.values.get(MAP_HASH)
 
     def asked(self, what: str = INFO, *, witness: bool = False) -> BoundaryStates | None:
         """Return the requested start and end states (N, 4), None where they are not there.
@@ -242,14 +210,26 @@ def decode_info(data: bytes, what: str = INFO) -> tuple[Info, ...]:
     found: list[Info] = []
     for status in decode_diagnostics(data, what)[1]:
         values, where = status.values, f"{what}: {status.name!r}"
+        if not {"published", "sha256"} & values.keys():
+            continue
+        if "request" not in values:
+            raise InputError(f"{where}: request is missing")
         if "published" in values:
-            found.append(RequestSummary(_text(values, "request", where), _count(values, "published", where), status))
-        elif "sha256" in values:
-            index, seed = (_count(values, key, where) for key in ("index", "seed"))
-            entry = ScenarioEntry(_text(values, "request", where), index, seed, values["sha256"], status)
-            _ = entry.messages  # raises if they are damaged
-            found.append(entry)
+            found.append(RequestSummary(values["request"], _count(values, "published", where), status))
+        else:
+            found.append(_entry(status, where))
     return tuple(found)
+
+
+def _entry(status: Status, where: str) -> ScenarioEntry:
+    """Return the entry that a status is."""
+    values = status.values
+    index, seed = (_count(values, key, where) for key in ("index", "seed"))
+    with guarded(f"{where}: {MESSAGES} of {status.message}"):
+        messages = json.loads(values.get(MESSAGES, "null")) or [values["sha256"]]
+    if not (isinstance(messages, list) and all(isinstance(sha256, str) for sha256 in messages)):
+        raise InputError(f"{where}: {MESSAGES} of {status.message} is no list of SHA-256")
+    return ScenarioEntry(values["request"], index, seed, values["sha256"], status, tuple(messages))
 
 
 def scenario_entry(
@@ -277,14 +257,13 @@ def scenario_entry(
     """
     ids = [vehicle.id for vehicle in template]
     rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
-    sha256 = digest(data)
     several = messages_of(data) if not scenario.all_present else ()
     spans = [[float(scenario.time[first]), float(scenario.time[last])] for first, last in scenario.present.tolist()]
     values = {
         "request": request,
         "index": str(scenario.index),
         "seed": str(scenario.seed),
-        "sha256": sha256,
+        "sha256": digest(data),
         "achieved_start": _states_text(scenario, 0),
         "achieved_end": _states_text(scenario, -1),
         **({} if scenario.all_present else {PRESENT: json.dumps(spans)}),
@@ -298,7 +277,7 @@ def scenario_entry(
         **({FREED: json.dumps(asked.relaxed[rows].tolist())} if asked.relaxed[rows].any() else {}),
     }
     status = Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
-    return ScenarioEntry(request, scenario.index, scenario.seed, sha256, status)
+    return _entry(status, INFO)
 
 
 def request_summary(
@@ -364,9 +343,3 @@ def _count(values: Values, key: str, what: str) -> int:
     if not (text.isascii() and text.isdecimal() and len(text) < 20 and int(text) < 2**63):
         raise InputError(f"{what}: {key} is {text!r}; a whole number is needed")
     return int(text)
-
-
-def _text(values: Values, key: str, what: str) -> str:
-    if key not in values:
-        raise InputError(f"{what}: {key} is missing")
-    return values[key]

@@ -40,16 +40,9 @@ def _parts(scenario: Scenario, stamp_ns: int) -> Iterator[Trajectory]:
     for begin, end in pairwise(edges):
         first, last = scenario.present[begin].tolist()
         rows, at = slice(begin, end), slice(first, last + 1)
-        yield Trajectory(
-            stamp_ns=stamp_ns,
-            frame_id=scenario.frame_id,
-            vehicles=scenario.vehicles[rows],
-            time_ns=time_ns[at],
-            position=scenario.position[rows, at],
-            heading=scenario.heading[rows, at],
-            speed=scenario.speed[rows, at],
-            acceleration=scenario.acceleration[rows, at],
-        )
+        heading, speed, acceleration = (each[rows, at] for each in (scenario.heading, scenario.speed, scenario.acceleration))
+        states = (scenario.position[rows, at], heading, speed, acceleration)
+        yield Trajectory(stamp_ns, scenario.frame_id, scenario.vehicles[rows], time_ns[at], *states)
 
 
 def messages_of(data: bytes, what: str = "scenarios") -> tuple[bytes, ...]:
@@ -120,18 +113,9 @@ def _joined(parts: Sequence[Trajectory], time_ns: Ints, seed: int, index: int, w
         values = (part.position[..., 0], part.position[..., 1], part.heading, part.speed, part.acceleration)
         arrays.append(np.stack([np.pad(value, ((0, 0), widths), mode="edge") for value in values]))
     x, y, heading, speed, acceleration = np.concatenate(arrays, axis=1)
-    return Scenario(
-        vehicles=tuple(vehicle for part in parts for vehicle in part.vehicles),
-        time=time_ns / NANOSECONDS,
-        position=np.stack((x, y), axis=-1),
-        heading=heading,
-        speed=speed,
-        acceleration=acceleration,
-        seed=seed,
-        index=index,
-        frame_id=head.frame_id,
-        present=np.array(present, dtype=np.int64),
-    )
+    vehicles = tuple(vehicle for part in parts for vehicle in part.vehicles)
+    states = (np.stack((x, y), axis=-1), heading, speed, acceleration)
+    return Scenario(vehicles, time_ns / NANOSECONDS, *states, seed, index, head.frame_id, np.array(present, dtype=np.int64))
 
 
 def digest(data: bytes) -> str:

@@ -11,20 +11,21 @@ import math
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import FIX, VELOCITY_STAMPED
 
-FIXED, GPS, COVARIANCE_UNKNOWN = 0, 1, 0  # of NavSatStatus and NavSatFix
+FIXED, GPS = 0, 1  # of NavSatStatus
 
 
 def encode_fix(latitude: float, longitude: float, stamp_ns: int, frame_id: str) -> bytes:
     """Return a NavSatFix of degrees as CDR bytes."""
-    writer = CdrWriter().header(stamp_ns, frame_id).pack("b", FIXED).pack("H", GPS)
-    return writer.pack("d", latitude, longitude, 0.0, *[0.0] * 9).pack("B", COVARIANCE_UNKNOWN).finish()
+    place = (latitude, longitude, 0.0)
+    return encode(FIX, stamp=stamp_ns, frame_id=frame_id, status=FIXED, service=GPS, place=place)
 
 
 def encode_speed(speed: float, stamp_ns: int, frame_id: str) -> bytes:
     """Return a TwistStamped of m/s along the vehicle as CDR bytes."""
-    return CdrWriter().header(stamp_ns, frame_id).pack("d", speed, *[0.0] * 5).finish()
+    return encode(VELOCITY_STAMPED, stamp=stamp_ns, frame_id=frame_id, twist=(speed, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 def decode_fix(data: bytes, what: str = "fix") -> tuple[int, float, float]:
@@ -33,12 +34,9 @@ def decode_fix(data: bytes, what: str = "fix") -> tuple[int, float, float]:
     Raises:
         InputError: the message is damaged.
     """
-    reader = CdrReader(data, what)
-    stamp_ns, _ = reader.header()
-    status = reader.one("b")
-    reader.one("H")  # service
-    latitude, longitude, _altitude = reader.floats(3).tolist()
-    return (stamp_ns, latitude, longitude) if status >= FIXED else (stamp_ns, math.nan, math.nan)
+    found = decode(FIX, data, what)
+    latitude, longitude, _altitude = found.place.tolist() if found.status >= FIXED else [math.nan] * 3
+    return found.stamp, latitude, longitude
 
 
 def decode_speed(data: bytes, what: str = "speed") -> tuple[int, float]:
@@ -47,9 +45,8 @@ def decode_speed(data: bytes, what: str = "speed") -> tuple[int, float]:
     Raises:
         InputError: the message is damaged.
     """
-    reader = CdrReader(data, what)
-    stamp_ns, _ = reader.header()
-    return stamp_ns, speed_of(*reader.floats(2).tolist())
+    found = decode(VELOCITY_STAMPED, data, what)
+    return found.stamp, speed_of(*found.twist[:2].tolist())
 
 
 def speed_of(x: float, y: float) -> float:

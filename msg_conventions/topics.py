@@ -25,56 +25,44 @@ from scenario_gen.types import Quality
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
 TWIST_TYPE = "geometry_msgs/msg/TwistStamped"
 
-
 LATCHED = Quality()
 MANY = Quality(depth=1000)
 MANY_HEARD = Quality(depth=1000, keep_all=True)  # for subscribers that must not lose any: paced publishers then wait for them
 STREAM = Quality(depth=1000, transient_local=False)
 LIVE = Quality(depth=100, transient_local=False)
+NEWEST = Quality(depth=1, transient_local=False)
 
-TOPICS: dict[str, tuple[str, Quality]] = {
-    "map": (roads.MAP_TYPE, LATCHED),
-    "road/entries": (roads.POSES_TYPE, LATCHED),
-    "road/exits": (roads.POSES_TYPE, LATCHED),
-    lanes.TOPIC: (markers.TYPE, LATCHED),
-    "road/info": (diagnostics.TYPE, LATCHED),
-    "tracks": (trajectory.TYPE, LATCHED),
-    "changepoints": (trajectory.TYPE, LATCHED),
-    "changepoints/live": (trajectory.TYPE, MANY),
-    "posterior": (changepoints.POSTERIOR_TYPE, LATCHED),
-    "fit": (trajectory.TYPE, LATCHED),
-    "fit/info": (diagnostics.TYPE, LATCHED),
-    "vehicle_*/route": (paths.TYPE, LATCHED),
-    "vehicle_*/path": (paths.TYPE, LATCHED),
-    "vehicle_*/footprint": (pictures.FOOTPRINT_TYPE, LATCHED),
-    "vehicle_*/fix": (FIX_TYPE, STREAM),
-    "vehicle_*/speed": (TWIST_TYPE, STREAM),
-    "ego/start": (odometry.TYPE, LATCHED),
-    "ego/goal": (odometry.TYPE, LATCHED),
-    ego.WITNESS: (trajectory.TYPE, MANY),
-    "vehicle_*/odom": (odometry.TYPE, LIVE),
-    "traffic/markers": (markers.ARRAY_TYPE, LIVE),
-    "traffic/local_map": (roads.MAP_TYPE, Quality(depth=1, transient_local=False)),
-    "ego/route": (paths.TYPE, LATCHED),
-    "ego/cmd_vel": (driving.TWIST_TYPE, LIVE),
-    "ego/cmd_vel_stamped": (TWIST_TYPE, LIVE),
-    "ego/trajectory": (trajectory.TYPE, LIVE),
-    "ego/path": (paths.TYPE, LIVE),
-    "ego/odom": (odometry.TYPE, LIVE),
-    "verdicts": (diagnostics.TYPE, MANY),
-    autoware.OBJECTS: ("autoware_perception_msgs/msg/PredictedObjects", autoware.QUALITY),
-    autoware.EGO: (odometry.TYPE, autoware.QUALITY),
-    "clock": (driving.CLOCK_TYPE, Quality(depth=10, transient_local=False)),
-    "scenarios": (trajectory.TYPE, MANY),
-    "scenarios/info": (diagnostics.TYPE, MANY),
-    "markers": (markers.ARRAY_TYPE, LATCHED),
-    "preview": (markers.ARRAY_TYPE, LIVE),
-    "report": (diagnostics.TYPE, LATCHED),
-    "diagnostics": (diagnostics.TYPE, Quality(depth=100)),  # in a bag written without nodes: one message, which is latched
-    "/diagnostics": (diagnostics.TYPE, Quality(depth=100, transient_local=False)),  # all is repeated every second
-    "tf": (frames.TYPE, Quality(depth=100, transient_local=False)),
-    "tf_static": (frames.TYPE, LATCHED),
-}
+_TABLE: tuple[tuple[str, Quality, str], ...] = (
+    (trajectory.TYPE, LATCHED, "tracks changepoints fit"),
+    (trajectory.TYPE, MANY, f"changepoints/live scenarios {ego.WITNESS}"),
+    (trajectory.TYPE, LIVE, "ego/trajectory"),
+    (paths.TYPE, LATCHED, "vehicle_*/route vehicle_*/path ego/route"),
+    (paths.TYPE, LIVE, "ego/path"),
+    (roads.MAP_TYPE, LATCHED, "map"),
+    (roads.MAP_TYPE, NEWEST, "traffic/local_map"),
+    (roads.POSES_TYPE, LATCHED, "road/entries road/exits"),
+    (markers.TYPE, LATCHED, lanes.TOPIC),
+    (markers.ARRAY_TYPE, LATCHED, "markers"),
+    (markers.ARRAY_TYPE, LIVE, "traffic/markers preview"),
+    (changepoints.POSTERIOR_TYPE, LATCHED, "posterior"),
+    (pictures.FOOTPRINT_TYPE, LATCHED, "vehicle_*/footprint"),
+    (FIX_TYPE, STREAM, "vehicle_*/fix"),
+    (TWIST_TYPE, STREAM, "vehicle_*/speed"),
+    (TWIST_TYPE, LIVE, "ego/cmd_vel_stamped"),
+    (driving.TWIST_TYPE, LIVE, "ego/cmd_vel"),
+    (driving.CLOCK_TYPE, Quality(depth=10, transient_local=False), "clock"),
+    (odometry.TYPE, LATCHED, "ego/start ego/goal"),
+    (odometry.TYPE, LIVE, "vehicle_*/odom ego/odom"),
+    (odometry.TYPE, autoware.QUALITY, autoware.EGO),
+    ("autoware_perception_msgs/msg/PredictedObjects", autoware.QUALITY, autoware.OBJECTS),
+    (frames.TYPE, LIVE, "tf"),
+    (frames.TYPE, LATCHED, "tf_static"),
+    (diagnostics.TYPE, LATCHED, "road/info fit/info report"),
+    (diagnostics.TYPE, MANY, "scenarios/info verdicts"),
+    (diagnostics.TYPE, Quality(depth=100), "diagnostics"),  # in a bag written without nodes: one message, which is latched
+    (diagnostics.TYPE, LIVE, "/diagnostics"),  # all is repeated every second
+)
+TOPICS = {topic: (kind, quality) for kind, quality, topics in _TABLE for topic in topics.split()}
 
 
 def vehicle_topic(token: str, name: str) -> str:

@@ -28,18 +28,11 @@ def encode_tracks(encounter: Encounter) -> bytes:
 
 def encode_samples(encounter: Encounter, at: Ints) -> bytes:
     """Return the states at samples `at` (K,) of the encounter as CDR bytes."""
+    acceleration = np.gradient(encounter.speed, encounter.dt, axis=1)
+    states = (encounter.position[:, at], encounter.heading[:, at], encounter.speed[:, at], acceleration[:, at])
+    there = None if encounter.all_present else encounter.there[:, at]
     return trajectory.encode(
-        Trajectory(
-            stamp_ns=encounter.start_ns,
-            frame_id=FRAME,
-            vehicles=encounter.vehicles,
-            time_ns=at * encounter.dt_ns,
-            position=encounter.position[:, at],
-            heading=encounter.heading[:, at],
-            speed=encounter.speed[:, at],
-            acceleration=np.gradient(encounter.speed, encounter.dt, axis=1)[:, at],
-            there=None if encounter.all_present else encounter.there[:, at],
-        )
+        Trajectory(encounter.start_ns, FRAME, encounter.vehicles, at * encounter.dt_ns, *states, there=there)
     )
 
 
@@ -55,11 +48,8 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
     steps = np.diff(message.time_ns)
     if message.time_ns[0] != 0:
         raise InputError(f"{name}: the first sample is at {message.time_ns[0] * 1e-9:g} s; time_from_start must count from 0")
-    if (steps <= 0).any():
-        at = int(np.argmax(steps <= 0))
-        raise InputError(f"{name}: sample {at + 1} is not later than sample {at}; time_from_start must count in even steps")
-    if (steps != steps[0]).any():
-        at = int(np.argmax(steps != steps[0]))
+    if (uneven := (steps <= 0) | (steps != steps[0])).any():
+        at = int(np.argmax(uneven))
         raise InputError(
             f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the one before, sample 1 {steps[0] * 1e-9:g} s; "
             "time_from_start must count in even steps; resample the tracks (10 Hz is usual)"
@@ -69,16 +59,9 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
             f"{name}: {len(steps)} steps of {steps[0] * 1e-9:g} s; steps of 0.001 to 10 s and at most "
             f"{trajectory.LONGEST_NS * 1e-9:g} s in all are read"
         )
-    return Encounter(
-        name=name,
-        vehicles=message.vehicles,
-        start_ns=message.stamp_ns,
-        dt_ns=int(steps[0]),
-        position=message.position,
-        heading=message.heading,
-        speed=message.speed,
-        present=ALWAYS if message.there is None else _spans(message.there, message.vehicles, name),
-    )
+    states = (message.position, message.heading, message.speed)
+    present = ALWAYS if message.there is None else _spans(message.there, message.vehicles, name)
+    return Encounter(name, message.vehicles, message.stamp_ns, int(steps[0]), *states, present=present)
 
 
 def _spans(there: Bools, vehicles: tuple[Vehicle, ...], name: str) -> Ints:

@@ -17,7 +17,9 @@ import re
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
+from msg_conventions import layouts
+from msg_conventions.cdr import CdrReader, HEADER, NANOSECONDS
+from msg_conventions.cdr import encode as encode_fields
 from msg_conventions.yaw import check_quaternions, quaternion, yaw
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, Ints
@@ -28,6 +30,7 @@ FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
 FASTEST = 1e4  # m/s: no vehicle is faster, and sums of squares stay finite
 MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
 LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
+SEQUENCES = {"transforms": 7, "velocities": 6, "accelerations": 6}  # of a point, and the numbers of an entry
 SMALLEST, LARGEST = 0.01, 1000.0  # metres of a footprint
 ABSENT = -1000.0  # m: z of a vehicle that is not there
 
@@ -84,10 +87,9 @@ def vehicle_of(joint_name: str) -> Vehicle:
 
 def _point_type(n: int) -> np.dtype[np.void]:
     """Wire layout of a point of `n` vehicles that begins at a multiple of 8 bytes; it also ends at one."""
-    names = ("transforms", "velocities", "accelerations")
     sequences = [
         entry
-        for name, width in zip(names, (7, 6, 6), strict=True)
+        for name, width in SEQUENCES.items()
         for entry in (("n_" + name, "<u4"), ("pad_" + name, "<u4"), (name, "<f8", (n, width)))
     ]
     return np.dtype([*sequences, ("sec", "<i4"), ("nanosec", "<u4")])
@@ -103,12 +105,10 @@ def encode(trajectory: Trajectory) -> bytes:
     values = (trajectory.position, trajectory.heading, trajectory.speed, trajectory.acceleration)
     if not all(np.isfinite(value).all() for value in values):
         raise InputError("a trajectory with a value that is not finite cannot be sent")
-    head = CdrWriter().header(trajectory.stamp_ns, trajectory.frame_id).pack("I", n)
-    for name in joint_names(trajectory.vehicles):
-        head.string(name)
-    head.pack("I", count)
+    stamp, frame, names = trajectory.stamp_ns, trajectory.frame_id, joint_names(trajectory.vehicles)
+    begin = encode_fields(layouts.TRAJECTORY, stamp=stamp, frame_id=frame, names=names, count=count)
     points = np.zeros(count, dtype=_point_type(n))
-    for name in ("transforms", "velocities", "accelerations"):
+    for name in SEQUENCES:
         points["n_" + name] = n
     points["transforms"][..., :2] = trajectory.position.swapaxes(0, 1)
     if trajectory.there is not None:
@@ -119,7 +119,7 @@ def encode(trajectory: Trajectory) -> bytes:
     points["sec"], points["nanosec"] = np.divmod(trajectory.time_ns, NANOSECONDS)
     body = points.tobytes()
     # Behind an odd multiple of four the first point's length itself fills up to the boundary: no padding after it.
-    return head.raw(body if head.offset() % 8 == 0 else body[:4] + body[8:]).finish()
+    return begin + (body if (len(begin) - len(HEADER)) % 8 == 0 else body[:4] + body[8:])
 
 
 def decode(data: bytes, what: str) -> Trajectory:
@@ -138,34 +138,22 @@ def decode_first(data: bytes, what: str) -> tuple[Trajectory, int]:
         InputError: as `decode`.
     """
     reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.framed_header()
-    vehicles = tuple(vehicle_of(reader.string()) for _ in range(reader.count()))
-    n, count = len(vehicles), reader.count(20)
+    head = reader.fields(layouts.TRAJECTORY, framed=True)
+    vehicles = tuple(map(vehicle_of, head.names))
+    n, count = len(vehicles), head.count
     if not n:
         raise InputError(f"{what}: joint_names is empty; at least one vehicle is needed")
     time_ns, pose, velocity, acceleration = _uniform(reader, n, count) or _one_by_one(reader, what, n, count)
     if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
         raise InputError(f"{what}: the message holds a value that is not finite")
-    for name, values, most in (
-        ("position", pose[..., :2], FARTHEST),
-        ("speed", velocity, FASTEST),
-        ("quaternion", pose[..., 3:], 2.0),
-    ):
+    bounds = (("position", pose[..., :2], FARTHEST), ("speed", velocity, FASTEST), ("quaternion", pose[..., 3:], 2.0))
+    for name, values, most in bounds:
         if (np.abs(values) > most).any():
             raise InputError(f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read")
     check_quaternions(pose[..., 3:], what)
     there = pose[..., 2].T > 0.5 * ABSENT
-    found = Trajectory(
-        stamp_ns=stamp_ns,
-        frame_id=frame_id,
-        vehicles=vehicles,
-        time_ns=time_ns,
-        position=pose[..., :2].swapaxes(0, 1),
-        heading=yaw(pose[..., 3:]).T,
-        speed=velocity[..., 0].T,
-        acceleration=acceleration[..., 0].T,
-        there=None if there.all() else there,
-    )
+    states = (pose[..., :2].swapaxes(0, 1), yaw(pose[..., 3:]).T, velocity[..., 0].T, acceleration[..., 0].T)
+    found = Trajectory(head.stamp, head.frame_id, vehicles, time_ns, *states, there=None if there.all() else there)
     return found, len(HEADER) + reader.place
 
 
@@ -178,11 +166,10 @@ def _uniform(reader: CdrReader, n: int, count: int) -> Points | None:
     points = reader.aligned(_point_type(n), count) if n <= MANY else None
     if points is None:
         return None
-    names = ("transforms", "velocities", "accelerations")
-    if not all((points["n_" + name] == n).all() for name in names):
+    if not all((points["n_" + name] == n).all() for name in SEQUENCES):
         reader.place = place
         return None
-    pose, velocity, acceleration = (np.ascontiguousarray(points[name]) for name in names)
+    pose, velocity, acceleration = (np.ascontiguousarray(points[name]) for name in SEQUENCES)
     return points["sec"].astype(np.int64) * NANOSECONDS + points["nanosec"], pose, velocity, acceleration
 
 
@@ -192,18 +179,14 @@ def _one_by_one(reader: CdrReader, what: str, n: int, count: int) -> Points:
     Raises:
         InputError: naming `what`, where the message is damaged or lacks poses.
     """
-    time_ns: list[int] = []
-    blocks: tuple[list[Floats], ...] = ([], [], [])
-    for k in range(count):
-        for block, width in zip(blocks, (7, 6, 6), strict=True):
-            length = reader.count()
-            if length != n and (length or width == 7):
-                raise InputError(f"{what}: point {k} has {length} entries for {n} joint names")
-            block.append(reader.floats(length * width).reshape(length, width) if length else np.zeros((n, width)))
-        time_ns.append(reader.stamp())
-    shape = (count, n, -1)
-    pose, velocity, acceleration = (
-        np.array(block).reshape(shape) if count else np.zeros((0, n, width))
-        for block, width in zip(blocks, (7, 6, 6), strict=True)
-    )
-    return np.array(time_ns, dtype=np.int64), pose, velocity, acceleration
+    points = [reader.fields(layouts.POINT) for _ in range(count)]
+    blocks = []
+    for name, width in SEQUENCES.items():
+        rows = [getattr(point, name) for point in points]
+        for k, row in enumerate(rows):
+            if len(row) != n and (len(row) or width == 7):
+                raise InputError(f"{what}: point {k} has {len(row)} entries for {n} joint names")
+        block = [row if len(row) else np.zeros((n, width)) for row in rows]
+        blocks.append(np.array(block).reshape(count, n, width))
+    pose, velocity, acceleration = blocks
+    return np.array([point.time for point in points], dtype=np.int64), pose, velocity, acceleration

@@ -3,9 +3,9 @@
 
 """Shared fixtures; a rule that CI may not skip, with two exceptions; the short form of the tests and their order."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterator
 import fcntl
+from functools import partial
 import gc
 import os
 from pathlib import Path
@@ -40,6 +40,12 @@ def made_once(factory: pytest.TempPathFactory, name: str, write: Callable[[Path]
             new.mkdir()
             write(new).rename(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], Path]], Path]:
+    """What gives a folder that is written once, by name and by what writes it."""
+    return partial(made_once, tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
@@ -100,35 +106,17 @@ def browser() -> Iterator[object]:
 
 
 LONGEST = """
-browser live_segmentation recorder over_dds loss demo_bag packaging bad_tracks restart doctor frames asked_states under_load
-recorded_encounters requests_over_dds first_start benchmarks every_cpu signals diagnostics cli_out folder_faults service_calls
-ros_parameters streams silence suites maps launching broken_bags cli rrt_star_connect fuzz fit
-"""  # of the groups of tests, longest first
+browser generate_action object_store traffic loss live_segmentation recorder over_dds demo_bag twins node_options places
+under_load requests_over_dds maps frames bad_tracks launching diagnostics signals suites restart preview off_road reacting search
+batch suitable_roads recorded_encounters packaging pages same_encounters tasks asked_states cli cli_out library_alone every_cpu
+service_calls streams mistakes ros_parameters first_start examples plugin paper benchmarks fuzz fit
+"""  # of the files of tests, longest first, so that none is left alone with one at the end
 ORDER = {name: place for place, name in enumerate(LONGEST.split())}
 
 
-class LongestFirst(OrderedDict[str, dict[str, bool]]):
-    """Groups of tests that wait for a worker: the longest are taken first, so that none is left alone with one at the end."""
-
-    def popitem(self, last: bool = False) -> tuple[str, dict[str, bool]]:
-        """Return what is next; xdist asks for the first."""
-
-        def place(group: str) -> int:
-            name = Path(group.partition("::")[0]).stem.removeprefix("test_")  # of a test marked `spread` its id stands here
-            return ORDER.get(name, len(ORDER))
-
-        group = min(self, key=place)
-        return group, self.pop(group)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """Let xdist take the longest groups first; of itself it takes those of the most tests."""
-    from xdist.scheduler import LoadGroupScheduling
-
-    scheduler = LoadGroupScheduling(config, log)
-    scheduler.workqueue = LongestFirst()
-    return scheduler
+def pytest_configure(config: pytest.Config) -> None:
+    """Let xdist take groups as they come; of itself it takes those of the most tests first."""
+    config.option.loadscopereorder = False
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
@@ -138,10 +126,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if not item.get_closest_marker("long")]
-    for item in items if config.pluginmanager.hasplugin("xdist") else ():
+    if not config.pluginmanager.hasplugin("xdist"):
+        return
+    for item in items:
         if not item.get_closest_marker("spread"):
             needed = getattr(item, "fixturenames", ())  # items of launch_testing and other plugins need not have any
             item.add_marker(pytest.mark.xdist_group("browser" if "browser" in needed else item.path.stem))
+    items.sort(key=_place)
+
+
+def _place(item: pytest.Item) -> int:
+    group = item.get_closest_marker("xdist_group")
+    return ORDER.get((group.args[0] if group else item.path.stem).removeprefix("test_"), len(ORDER))
 
 
 def pytest_collection_finish() -> None:

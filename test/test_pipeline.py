@@ -19,7 +19,6 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
@@ -41,6 +40,19 @@ def case(encounter):
     return generate(encounter, "t_intersection", PipelineConfig(evaluation=QUICK), count=4, seed=3)
 
 
+def printed(case):
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([case]))
+    return console.export_text()
+
+
+def written(case, folder):
+    """The page, and the figures of the case."""
+    write_results(folder, [case], seed=3, title="", quality=(), provenance={})
+    (figures,) = json.loads((folder / "evaluation.json").read_text())["cases"]
+    return (folder / "report.html").read_text(encoding="utf-8"), figures
+
+
 def test_every_arm_has_its_row_and_its_account(case):
     assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, UNIFORM, NARROW, ORACLE]
     assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
@@ -50,27 +62,17 @@ def test_every_arm_has_its_row_and_its_account(case):
     assert not same, "other changepoints, other scenarios"
 
 
-def test_the_report_shows_it(case):
-    page = render(ReportInput([case]))
-    assert "<h3>Uniform changepoints</h3>" in page
-    assert f"<th>{UNIFORM}<small" in page
-    assert '"uniform":{"states"' in page
-
-
 def test_by_default_no_further_set_is_drawn_and_nothing_else_changes(encounter, case, tmp_path):
     plain = generate(encounter, "t_intersection", PipelineConfig(evaluation=replace(QUICK, compare=False)), count=4, seed=3)
     assert not EvaluationConfig().compare and not plain.references and not plain.refusals and plain.compared == (WITH,)
     rows = [{row["name"]: row for row in json.loads(one.evaluation.to_json())["rows"]} for one in (plain, case)]
     assert set(rows[1]) - set(rows[0]) == {WITHOUT, UNIFORM, NARROW}
     assert all(rows[0][name] == rows[1][name] for name in rows[0])
-    write_results(tmp_path, [plain], seed=3, title="", quality=(), provenance={})
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page, figures = written(plain, tmp_path)
     assert "--compare" in page and not any(f">{name}" in page.lower() for name in (WITHOUT, UNIFORM))
-    (figures,) = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
     assert set(figures["similarity"]["compared"]) == {WITH} and set(figures["similarity"]["beside"]) == {ORACLE}
-    console = Console(width=200, record=True, file=StringIO())
-    console.print(summary([plain]))
-    assert "--compare" in (text := console.export_text()) and "uniform" not in text and "|" not in text
+    text = printed(plain)
+    assert "--compare" in text and "uniform" not in text and "|" not in text
 
 
 def test_what_is_compared_is_drawn_with_the_same_freedom(case):
@@ -82,17 +84,14 @@ def test_what_is_compared_is_drawn_with_the_same_freedom(case):
 
 
 def test_the_first_figures_that_anybody_sees_are_those_of_the_delivered_set(case, tmp_path):
-    write_results(tmp_path, [case], seed=3, title="", quality=(), provenance={})
-    (figures,) = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
+    page, figures = written(case, tmp_path)
+    assert "<h3>Uniform changepoints</h3>" in page and f"<th>{UNIFORM}<small" in page
     assert next(iter(figures)) == "similarity" and next(iter(figures["similarity"]["compared"])) == WITH
     delivered = evaluate_scenarios(case.encounter, {WITH: case.generated}, config=QUICK).value(WITH, "e_position")
     assert figures["similarity"]["compared"][WITH]["e_position"] == pytest.approx(delivered, rel=1e-5)
-    console = Console(width=200, record=True, file=StringIO())
-    console.print(summary([case]))
-    said = next(line for line in console.export_text().splitlines() if "E position" in line)
+    said = next(line for line in printed(case).splitlines() if "E position" in line)
     words = [f"{word} {case.evaluation.value(row, 'e_position'):.3f}" for word, row in WORDS.items()]
     assert said.split() == f"E position {delivered:.3f} | {words[0]}, {words[1]} ({words[2]}, {words[3]})".split()
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
     cell = re.search(r'<td class="(good|bad)">([\d.]+)<small', page)
     assert float(cell[2]) == pytest.approx(delivered, rel=5e-3)
     assert (cell[1] == "good") == (case.best("e_position") == WITH)
@@ -102,9 +101,7 @@ def test_a_set_with_a_target_is_not_compared_with_sets_without_it(encounter):
     config = PipelineConfig(evaluation=QUICK)
     made = generate(encounter, "t_intersection", config, count=2, seed=3, request=Request(order="free"))
     assert made.compared == (WITH,) and "order" in made.apart
-    console = Console(width=200, record=True, file=StringIO())
-    console.print(summary([made]))
-    assert "nothing is compared: only the delivered set was drawn with order as asked" in console.export_text()
+    assert "nothing is compared" in printed(made)
 
 
 def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter, tmp_path):
@@ -112,14 +109,10 @@ def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter
     config = PipelineConfig(evaluation=QUICK, sampling=SamplingConfig(reactions="none"))
     free = generate(encounter, "t_intersection", config, count=2, seed=3)
     for made, kept in ((case, True), (free, False)):
-        write_results(tmp_path, [made], seed=3, title="", quality=(), provenance={})
-        console = Console(width=200, record=True, file=StringIO())
-        console.print(summary([made]))
+        page, figures = written(made, tmp_path)
         sentence = said if kept else f"{said}: the scenarios are not held to it"
-        assert sentence in [line.strip() for line in console.export_text().splitlines()]
-        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert sentence in [line.strip() for line in printed(made).splitlines()]
         assert said in page and ("are held to it" in page) == kept and ("are not held to it" in page) != kept
-        (figures,) = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
         assert figures["reactions"]["sentences"] == [sentence]
         (edge,) = figures["reactions"]["edges"]
         assert (edge["who"], edge["whom"], edge["kept"]) == ("2", "1", kept) and edge["lag"] == pytest.approx(0.4, abs=0.05)
@@ -134,11 +127,8 @@ def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path
     made = generate(lane, "corridor", config, count=2, seed=3, request=asked)
     (sentence,) = [said for said in made.generated.adaptations if "reaction" in said]
     assert sentence.startswith(f"{NOT_KEPT}: vehicle 2: drives ") and made.generated.reactions == ()
-    write_results(tmp_path, [made], seed=3, title="", quality=(), provenance={})
-    console = Console(width=200, record=True, file=StringIO())
-    console.print(summary([made]))
-    text = console.export_text()
+    page, figures = written(made, tmp_path)
+    text = printed(made)
     assert sentence in text and "1.5 s behind, and answers its speed after 1.2 s: the scenarios are not held to it" in text
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count(str(escape(sentence))) > 1 and "are not held to it" in page  # beside the reaction, and in accounts
-    assert json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]["adaptations"] == list(made.generated.adaptations)
+    assert figures["adaptations"] == list(made.generated.adaptations)

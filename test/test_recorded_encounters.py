@@ -23,8 +23,8 @@ from scenario_gen.types.generation import GenerationResult, WITHOUT
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
 COUNT = 50 if LONG else 5
-CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=1000 if LONG else 10, compare=True))
-NARROW = replace(CONFIG, sampling=replace(CONFIG.sampling, variety="narrow"))  # a few scenarios tell what changepoints are worth
+CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=1000 if LONG else 10))
+NARROW = replace(CONFIG, sampling=replace(CONFIG.sampling, variety="narrow"), evaluation=replace(CONFIG.evaluation, compare=True))
 pytestmark = pytest.mark.spread
 
 

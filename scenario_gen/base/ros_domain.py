@@ -5,43 +5,25 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-import fcntl
 import os
 from pathlib import Path
 import socket
 import tempfile
 
+from filelock import FileLock, Timeout
+
 from scenario_gen.base.errors import RefusedError
 
 DOMAINS = range(1, 102)  # above, the ports would be ephemeral ones
+PARTICIPANTS = 20  # of which one that was left over may be any: the first ones may have ended
 
 
 def _quiet(domain: int) -> bool:
-    """Say whether the first participant's port of a domain is free (RTPS: 7400 + 250·domain + 10)."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, suppress(OSError):
-        probe.bind(("", 7410 + 250 * domain))
-        return True
-    return False
-
-
-def _lock_file(path: Path) -> int:
-    """Open a lock file, whoever made it.
-
-    Reading suffices for a lock: another user's file in a sticky folder may be read, but neither written nor opened to be made.
-
-    Raises:
-        OSError: it may not be read, or not be made.
-    """
-    try:
-        return os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
-    except FileNotFoundError:
-        return os.open(path, os.O_RDONLY | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
-
-
-def _locked(lock: int) -> bool:
-    """Take the lock; False if another run holds it."""
+    """Say whether the ports of a domain's first participants are free (RTPS: 7400 + 250·domain + 10 + 2·participant)."""
     with suppress(OSError):
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        for port in range(7410 + 250 * domain, 7410 + 250 * domain + 2 * PARTICIPANTS, 2):
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                probe.bind(("", port))
         return True
     return False
 
@@ -51,19 +33,20 @@ def free_domain() -> Iterator[int]:
     """Hold a domain id: no participant is in it, and no other run of ours takes it meanwhile.
 
     Raises:
-        RefusedError: none is free, or may be locked.
+        RefusedError: none is free.
     """
     for domain in reversed(DOMAINS):
+        lock = FileLock(Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock", blocking=False, thread_local=False)
         try:
-            lock = _lock_file(Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock")
-        except OSError:
-            continue  # another user's, who lets nobody read it
+            lock.acquire()
+        except (OSError, Timeout):  # held, or another user's, whose domain is passed over
+            continue
         try:
-            if _locked(lock) and _quiet(domain):
+            if _quiet(domain):
                 yield domain
                 return
         finally:
-            os.close(lock)
+            lock.release()
     raise RefusedError(f"no free ROS domain among {DOMAINS.start} to {DOMAINS.stop - 1}; end other ROS processes")
 
 
@@ -72,7 +55,7 @@ def own_domain() -> Iterator[int]:
     """Put this process and its children in a domain of their own, on this host.
 
     Raises:
-        RefusedError: none is free, or may be locked.
+        RefusedError: none is free.
     """
     with free_domain() as domain:
         own = {**this_host_only(), "ROS_DOMAIN_ID": str(domain)}
@@ -81,11 +64,9 @@ def own_domain() -> Iterator[int]:
         try:
             yield domain
         finally:
-            for name, value in before.items():
-                if value is None:
-                    os.environ.pop(name, None)
-                else:
-                    os.environ[name] = value
+            for name in own:
+                os.environ.pop(name, None)
+            os.environ.update({name: value for name, value in before.items() if value is not None})
 
 
 def this_host_only(environment: Mapping[str, str] = os.environ) -> dict[str, str]:

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from scenario_gen.base.errors import did_you_mean, InputError, printable
-from scenario_gen.cli.options import configured, ParametersOption, remind, SetOption
+from scenario_gen.cli.options import assigned_all, configured, ParametersOption, remind, SetOption
 from scenario_gen.cli.output import bars, beside, Commands, give, open_page, say, say_rows
 
 commands = Commands("Look at a bag of scenarios")
@@ -123,18 +123,14 @@ def export_scenarios(
 ) -> None:
     """Write scenarios for other software: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware, ScenarioNet."""
     from scenario_gen.bags.storage.config import BagConfig
-    from scenario_gen.base.parameters import assigned
     from scenario_gen.output.exchange.config import ExportConfig
     from scenario_gen.output.exchange.export import export_bag, EXPORTS
 
     if to not in EXPORTS:
         raise InputError(f"--to {to}: choose one of {', '.join(EXPORTS.names())}{did_you_mean(to, EXPORTS.names())}")
-    config, bag_config = ExportConfig(ego=ego, map=road_map), BagConfig()
-    for option in options or []:
-        if option.startswith("bag."):
-            bag_config = assigned(bag_config, option.removeprefix("bag."))
-        else:
-            config = assigned(config, option)
+    of_bag = [option for option in options or [] if option.startswith("bag.")]
+    bag_config = assigned_all(BagConfig(), [option.removeprefix("bag.") for option in of_bag])
+    config = assigned_all(ExportConfig(ego=ego, map=road_map), [option for option in options or [] if option not in of_bag])
     remind(bag)
     folder = out or beside(bag, f"{bag.resolve().name}_{to}")
     with bars() as advance:
@@ -173,8 +169,7 @@ def save_bag(
     target = out or beside(bag, f"{bag.resolve().name}_reindexed")
     result = reindex(bag, target, configured(parameter_file, assignments).bag)
     give(messages=result.messages, bag=target, notes=result.lines())
-    for line in (f"{result.messages} messages: {target}", *result.lines()):
-        say(line)
+    say(f"{result.messages} messages: {target}", *result.lines(), sep="\n")
 
 
 @commands.command("compare")

@@ -6,6 +6,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
@@ -14,7 +15,7 @@ import typer
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.stores import Place, place
 from scenario_gen.cli.options import assigned_all, takes
-from scenario_gen.cli.output import Commands, give, say, say_rows, status
+from scenario_gen.cli.output import bars, Commands, give, say, say_rows
 
 if TYPE_CHECKING:
     from scenario_gen.corpus.tasks import Workers
@@ -32,14 +33,8 @@ def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
     """Give the workers; show the tasks done and the time left."""
     from scenario_gen.corpus.tasks import Workers
 
-    with status() as show:
-        yield Workers(count, scheduler, lambda done, total, left: show(f"{done} of {total} tasks, {left}"))
-
-
-def lines(texts: Sequence[str]) -> None:
-    """Print lines, letter by letter."""
-    for line in texts:
-        say(line)
+    with bars() as advance:
+        yield Workers(count, scheduler, partial(advance, "tasks"))
 
 
 def conclude(failed: Sequence[str], out: Place) -> None:
@@ -75,7 +70,7 @@ def mine(
     with workers_of(workers, scheduler) as who:
         result = mined([place(one) for one in archive], corpus, config, workers=who)
     give(summary=result.lines(), page=corpus / PAGE)
-    lines([*result.lines(), f"page: {corpus / PAGE}"])
+    say(*result.lines(), f"page: {corpus / PAGE}", sep="\n")
     conclude(result.failed, corpus)
 
 
@@ -112,18 +107,8 @@ def batch(options: Batch) -> None:
             templates=options.templates, workers=who,
         )  # fmt: skip
     give(summary=result.lines())
-    lines(result.lines())
+    say(*result.lines(), sep="\n")
     conclude(result.failed, out)
-
-
-def needs_bag(bag: Path | None) -> None:
-    """Refuse a report without a bag.
-
-    Raises:
-        InputError: there is none.
-    """
-    if bag is None:
-        raise InputError("--report needs --bag: the page shows the bag of the scenarios found; give both")
 
 
 def shown(value: object) -> str:
@@ -150,25 +135,25 @@ def find(
     from scenario_gen.corpus import find as finding
     from scenario_gen.output.review.evaluation import write_page
 
-    if report is not None:
-        needs_bag(bag)
+    if report is not None and bag is None:
+        raise InputError("--report needs --bag: the page shows the bag of the scenarios found; give both")
     source = place(batch)
     found = finding.find(source, condition, limit)
     give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
     say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in found.rows], names=3)
-    lines(finding.coverage_lines(found, source))
+    say(*finding.coverage_lines(found, source), sep="\n")
     if again:
         for row in found.rows:
             finding.make_again(source, row)
-        lines([f"{len(found.rows)} scenarios generated again: all byte-identical"])
+        say(f"{len(found.rows)} scenarios generated again: all byte-identical")
     if bag is not None:
         finding.export_hits(source, found.rows, bag)
         give(bag=bag)
-        lines([f"bag: {bag}"])
+        say(f"bag: {bag}")
         if report is not None:
             write_page(bag, report)
             give(report=report)
-            lines([f"report: {report}"])
+            say(f"report: {report}")
 
 
 @commands.command(urls=("corpus",))
@@ -191,5 +176,5 @@ def library(
     with workers_of(workers, scheduler) as who:
         built = build(source, config, most=most, seed=seed, workers=who)
     give(summary=built.lines())
-    lines(built.lines())
+    say(*built.lines(), sep="\n")
     conclude(built.failed, source / "library")

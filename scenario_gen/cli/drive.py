@@ -19,7 +19,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.interrupts import ending
 from scenario_gen.base.ros_domain import own_domain
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.trials import Outcome, Trial
+from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.ros.nodes.traffic_of_trials import drive_trials
 
 PATIENCE = 10.0  # seconds that a planner's node has to end by itself

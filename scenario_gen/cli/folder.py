@@ -110,7 +110,11 @@ def generate_folder(
             )
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
-        unlooking = unlooking_said(cases) if requested.request.ego else []
+        unlooking: list[str] = []
+        if requested.request.ego:
+            from scenario_gen.closed_loop.reacting import unlooking_pass
+
+            unlooking = [sentence for case in cases if (sentence := unlooking_pass(case))]
         for line in (*faults_of(cases), *unlooking):
             tell(line)
         if record is not None:
@@ -163,13 +167,6 @@ def notes_of(readings: Sequence[LogResult]) -> list[str]:
     notes = [f"{log.quality.name}: {note}" for log in readings for note in log.quality.notes]
     more = len(notes) - NOTES
     return notes if more <= 0 else [*notes[:NOTES], f"{more} more notes on the log are in the report"]
-
-
-def unlooking_said(cases: Sequence[GenerationResult]) -> list[str]:
-    """Return a sentence for each set: how many of its scenarios a planner passes that looks at nobody."""
-    from scenario_gen.closed_loop.reacting import unlooking_pass
-
-    return [sentence for case in cases if (sentence := unlooking_pass(case))]
 
 
 def generate_all(

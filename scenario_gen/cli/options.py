@@ -4,7 +4,7 @@
 """What the commands share: options, how a command takes a class of them, and the configuration."""
 
 from collections.abc import Callable
-from dataclasses import fields, MISSING
+from functools import reduce
 import inspect
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints, TYPE_CHECKING, TypeVar
@@ -34,17 +34,9 @@ def takes(options: type[Options]) -> Callable[[Callable[[Options], None]], Calla
         def parsed(**values: Any) -> None:
             command(options(**values))
 
-        hints = get_type_hints(options, include_extras=True)
-        parsed.__name__, parsed.__doc__, parsed.__annotations__ = command.__name__, command.__doc__, hints
-        parsed.__signature__ = inspect.Signature([  # type: ignore[attr-defined]
-            inspect.Parameter(
-                entry.name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=inspect.Parameter.empty if entry.default is MISSING else entry.default,
-                annotation=hints[entry.name],
-            )
-            for entry in fields(options)  # type: ignore[arg-type]
-        ])  # fmt: skip
+        parsed.__name__, parsed.__doc__ = command.__name__, command.__doc__
+        parsed.__annotations__ = get_type_hints(options, include_extras=True)
+        parsed.__signature__ = inspect.signature(options)  # type: ignore[attr-defined]
         return parsed
 
     return of
@@ -58,9 +50,7 @@ def assigned_all(config: Config, assignments: list[str] | None) -> Config:
     """
     from scenario_gen.base.parameters import assigned
 
-    for assignment in assignments or []:
-        config = assigned(config, assignment)
-    return config
+    return reduce(assigned, assignments or [], config)
 
 
 def configured(file: Path | None, assignments: list[str] | None) -> "PipelineConfig":

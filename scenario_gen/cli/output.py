@@ -140,7 +140,7 @@ def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int =
     """Print a table; nothing in it is cut off.
 
     Where standard output is no terminal, fields are separated by tabs. Where the terminal is too narrow, each row becomes a
-    few lines: what it is, then its other fields with their names.
+    text: what it is, then its other fields with their names.
 
     Args:
         columns: their names.
@@ -156,28 +156,15 @@ def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int =
         for row in (columns, *rows) if not _current.quiet else ():
             print("\t".join(printable(" ".join(text.split())) for text in row), file=terminal.file)
         return
-    widths = [max(len(text) for text in column) for column in zip(columns, *rows, strict=True)]
-    if sum(widths) + 2 * len(widths) <= terminal.width:
-        table = Table(*columns, box=None, pad_edge=False)
-        for row in rows:
-            table.add_row(*row)
+    table = Table(*columns, box=None, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    if terminal.measure(table, options=terminal.options.update(width=10_000)).maximum <= terminal.width:
         say(table)
         return
     for row in rows:
-        pairs = [f"{name} {text}" for name, text in zip(columns[names:], row[names:], strict=True) if text]
-        for line in _filled([" ".join(row[:names]), *pairs], terminal.width):
-            say(line, wrap=True)
-
-
-def _filled(fields: Sequence[str], width: int) -> list[str]:
-    """Return fields in as few lines as hold each whole, separated by commas; all lines but the first are indented."""
-    lines = [fields[0]]
-    for text in fields[1:]:
-        if len(lines[-1]) + 2 + len(text) <= width:
-            lines[-1] += f", {text}"
-        else:
-            lines.append(f"  {text}")
-    return lines
+        pairs = [f"{name}\N{NO-BREAK SPACE}{text}" for name, text in zip(columns[names:], row[names:], strict=True) if text]
+        say(", ".join([" ".join(row[:names]), *pairs]), wrap=True)
 
 
 def bars() -> AbstractContextManager[Callable[[str, int, int], None]]:

@@ -38,52 +38,39 @@ def as_files(values: Mapping[str, Any], written: Mapping[str, bool]) -> Iterator
     Raises:
         InputError: a store lets nobody in, or holds something where is to be written.
     """
-    urls = {name: [one for one in _listed(values[name]) if url_of(one)] for name in written}
-    if not any(urls.values()):
-        yield dict(values)
-        return
     uploads: list[tuple[Path, Remote]] = []
     with ExitStack() as stack:
-        local: dict[Path, Path] = {}
-        for name, own in urls.items():
-            for one in own:
-                there = place(one, to_write=written[name])
-                local[one] = there if isinstance(there, Path) else _copy(there, stack, uploads if written[name] else None)
+
+        def local(one: Path, *, to_write: bool) -> Path:
+            """Return the file that stands for what a URL names."""
+            there = place(one, to_write=to_write) if url_of(one) else one
+            if isinstance(there, Path):
+                return there
+            if not to_write:
+                return stack.enter_context(fetched([there]))[0]
+            if there.exists():
+                raise InputError(
+                    f"{there} is there already, and nothing in a store is replaced; name another place, or remove it"
+                )
+            path = stack.enter_context(scratch(temporary())) / there.name
+            stack.enter_context(naming_objects({str(path): there.url}))
+            uploads.append((path, there))
+            return path
+
+        files = dict(values)
+        for name, to_write in written.items():
+            value = values[name]
+            several = [
+                local(one, to_write=to_write) for one in (value if isinstance(value, list) else [value]) if one is not None
+            ]
+            files[name] = several if isinstance(value, list) else several[0] if several else None
+        refused: Exception | None = None
         try:
-            yield {name: _replaced(value, local) if name in written else value for name, value in values.items()}
-        except (typer.Exit, RefusedError):
-            _put(uploads)
-            raise
-        _put(uploads)
-
-
-def _listed(value: Any) -> list[Path]:
-    """Return the paths of a value: one, several or none."""
-    return [] if value is None else list(value) if isinstance(value, list) else [value]
-
-
-def _replaced(value: Any, local: Mapping[Path, Path]) -> Any:
-    """Return a value with files in place of URLs."""
-    return [local.get(one, one) for one in value] if isinstance(value, list) else local.get(value, value)
-
-
-def _copy(there: Remote, stack: ExitStack, uploads: list[tuple[Path, Remote]] | None) -> Path:
-    """Return a copy of what a command reads, or with `uploads` the path where it writes.
-
-    Raises:
-        InputError: there is something already where is to be written.
-    """
-    if uploads is None:
-        return stack.enter_context(fetched([there]))[0]
-    if there.exists():
-        raise InputError(f"{there} is there already, and nothing in a store is replaced; name another place, or remove it")
-    path = stack.enter_context(scratch(temporary())) / there.name
-    stack.enter_context(naming_objects({str(path): there.url}))
-    uploads.append((path, there))
-    return path
-
-
-def _put(uploads: Sequence[tuple[Path, Remote]]) -> None:
-    for path, there in uploads:
-        if path.exists():
-            upload(path, there)
+            yield files
+        except (typer.Exit, RefusedError) as error:
+            refused = error
+        for path, there in uploads:
+            if path.exists():
+                upload(path, there)
+        if refused is not None:
+            raise refused

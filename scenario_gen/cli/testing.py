@@ -15,11 +15,13 @@ from scenario_gen.cli.options import remind, takes
 from scenario_gen.cli.output import bars, Commands, give, say, say_rows
 
 if TYPE_CHECKING:
-    from scenario_gen.closed_loop.command import DriveResult, RunTrials
+    from scenario_gen.closed_loop.command import RunTrials
+    from scenario_gen.closed_loop.results import Drives
     from scenario_gen.output.review.regenerate import Replanned
 
 commands = Commands("Test a planner")
 NAMED = 12  # scenarios that the terminal names
+WORST = 5  # drives that failed, likewise
 
 
 @dataclass(frozen=True)
@@ -78,31 +80,35 @@ def drive(options: Drive) -> None:
             run=_over_dds() if options.ros else processes,
             unlooking=processes if options.unlooking else None,
         )
-    _report(result, planner)
+    _report(result, options.out)
     if result.broken:
         say("bars not met: " + "; ".join(result.broken))
         raise typer.Exit(1)
 
 
-def _report(result: "DriveResult", planner: str) -> None:
-    give(rates=result.found, notes=result.notes, bars_not_met=result.broken, files=result.written)
-    say_rows(("drives", planner), [(name, str(rate)) for name, rate in result.found.items()])
-    for note in result.notes:
-        say(note)
-    if comparison := result.beside.comparison:
+def _report(drives: "Drives", out: Path) -> None:
+    from scenario_gen.closed_loop.bounded import Decisions
+    from scenario_gen.closed_loop.results import JSON, JUNIT, PAGE
+    from scenario_gen.closed_loop.trials import rates
+
+    found, files = rates(drives.outcomes), [out / name for name in (JSON, JUNIT, PAGE)]
+    give(rates=found, notes=drives.notes(), bars_not_met=drives.broken, files=files)
+    say_rows(("drives", drives.planner), [(name, str(rate)) for name, rate in found.items()])
+    say(*drives.notes(), sep="\n")
+    if comparison := drives.comparison:
         for title, names in (("now fail", comparison.now_fail), ("now pass", comparison.now_pass)):
             if names:
                 more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
                 give(**{title.replace(" ", "_"): names})
                 say(f"{title}: {', '.join(names[:NAMED])}{more}")
-    if result.decisions.count:
-        took = result.decisions
+    took = Decisions.all_of([outcome.decisions for outcome in drives.outcomes])
+    if took.count:
         slow = f"{took.slow} of {took.count} slower than decision_time, the longest {took.longest:.3f} s"
         say(f"decisions: {slow} (depends on this machine, so no file has it)")
-    for outcome in result.worst:
+    failed = [drives.outcomes[k] for k in drives.by_severity() if not drives.outcomes[k].verdict.passed]
+    for outcome in failed[:WORST]:
         say(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
-    for path in result.written:
-        say(str(path))
+    say(*map(str, files), sep="\n")
 
 
 def _over_dds() -> "RunTrials":
@@ -205,16 +211,14 @@ def search(options: Search) -> None:
             request, options.out, workers=options.workers, progress=lambda done, total: advance("drives", done, total)
         )
     give(rate=result.estimate.rate, failures=len(result.findings), sentences=result.sentences(), files=result.written)
-    for sentence in result.sentences():
-        say(sentence)
+    say(*result.sentences(), sep="\n")
     if result.findings:
         rows = [
             (kind, str(len(own)), f"drive {own[0].trial.name}: {own[0].outcome.verdict.sentence()}")
             for kind, own in result.kinds.items()
         ]
         say_rows(("kind of failure", "kept", "likeliest"), rows)
-    for path in result.written:
-        say(str(path))
+    say(*map(str, result.written), sep="\n")
     if result.findings:
         again = f"scenario-gen drive {options.out / 'bag'} --planner {options.planner} --ego {request.ego_id()}"
         say(f"as a regression test: {again}")

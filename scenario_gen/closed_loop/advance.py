@@ -10,7 +10,7 @@ from scenario_gen.closed_loop.driver import ACCELERATION, CLOCK, EGO_CLOCK, HELD
 from scenario_gen.closed_loop.others import react
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
-from scenario_gen.numerics.kernels import B, B1, F, F1, F2, I, kernel, OUT2, OUTB1
+from scenario_gen.numerics.kernels import B1, F, F2, I, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
 BESIDE = 1.5  # metres beside that path at which the ego has left it
@@ -29,7 +29,7 @@ def locate(now: float, time: Floats, motion: Floats, body: Floats, before: float
     Args:
         now: seconds.
         time: (T,) of the scenario.
-        motion: (T, 6) of the witness, as in `Certified`.
+        motion: (T, 6) of the witness, as in `World`.
         body: (6,) the ego, as in `EgoState`.
         before: its clock one step ago [s]; it never runs back.
         out: (3,).
@@ -121,22 +121,6 @@ def advance(
         after[i, ACCELERATION] = min(max(after[i, ACCELERATION], -manner.strongest), manner.acceleration)
         begin, end = world.spans[i]
         here[i] = i == ego or (clock >= begin and not (world.leaves[i] and clock >= end))
-
-
-AT = 0.2  # metres before the goal that count as there
-BEYOND = 10.0  # metres beyond it, more than anyone drives in one step
-GOAL_TURN = 1.0  # rad, largest difference of heading at the goal
-
-
-@kernel(F1, F, B, F1)
-def at_goal(goal: Floats, beside: float, stays: bool, pose: Floats) -> bool:
-    """Whether a pose (x, y, yaw, …) has passed the goal (likewise) at most `beside` [m] of it, or, if it `stays`, is near it."""
-    x, y = pose[0] - goal[0], pose[1] - goal[1]
-    if stays:
-        return bool(x * x + y * y <= beside * beside)
-    c, s = np.cos(goal[2]), np.sin(goal[2])
-    turn = (pose[2] - goal[2] + np.pi) % (2.0 * np.pi) - np.pi
-    return bool(-AT <= x * c + y * s <= BEYOND and abs(y * c - x * s) <= beside and abs(turn) <= GOAL_TURN)
 
 
 @kernel(F2, F2, B1, I)

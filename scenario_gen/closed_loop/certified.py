@@ -11,7 +11,6 @@ So `order[i, j]` says how far the clock of i may go for each clock of j, and it 
 Source: priorities in the coordination space, Gregoire, Bonnabel & de La Fortelle 2014, on clocks instead of path lengths.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT3
+from scenario_gen.numerics.plane import unit
 from scenario_gen.template import conflict_of, lag_behind
 from scenario_gen.types import Scenario, tokens, yielders_of
 
@@ -28,51 +28,21 @@ ROOM = 0.05  # metres by which the box of a cell is larger than its ends ask for
 STANDS = 0.5  # m/s; who is slower at the end of a scenario stands there, who is faster leaves the scene
 
 
-@dataclass(frozen=True, eq=False)
-class Certified:
-    """A scenario as the closed loop needs it; N vehicles, T instants, K cells of the clock.
+class World(NamedTuple):
+    """A certified scenario as the closed loop needs it, and the step; N vehicles, T instants, K cells of the clock.
 
     Attributes:
-        scenario: the certified scenario, the witness of the ego among its vehicles.
-        ego: index of the ego's witness.
-        motion: (N, T, 6) x, y [m], yaw [rad], speed [m/s], velocity x, y [m/s] at the scenario's instants.
+        step: time between two decisions [s].
+        time: (T,) the scenario's instants [s].
+        motion: (N, T, 6) x, y [m], yaw [rad], speed [m/s], velocity x, y [m/s] at these.
         half: (N, 2) half lengths and widths [m].
-        cells: (N, K, 8) of each cell of the clock: the box that holds the footprint throughout (centre x, y [m], cos and sin of
-            its yaw, half length, half width [m], radius [m]), and the way driven [m] at its start.
-        order: (N, N, K) `order[i, j, k]`: clock [s] that vehicle i may not pass while the clock of j is in cell k, unless that
-            of j is there, too; inf if nothing is in its way. It holds back who waits for j in the template, too.
         spans: (N, 2) clocks [s] at which each vehicle comes onto the scene and at which its certified motion ends.
         leaves: (N,) whether it leaves the scene then; who stands at the scenario's end stays.
-    """
-
-    scenario: Scenario
-    ego: int
-    motion: Floats
-    half: Floats
-    cells: Floats
-    order: Floats
-    spans: Floats
-    leaves: Bools
-
-    @property
-    def duration(self) -> float:
-        """Length of the scenario [s]."""
-        return float(self.scenario.time[-1])
-
-
-class World(NamedTuple):
-    """What kernels are given of a scenario and a step; arrays as in `Certified`.
-
-    Attributes:
-        step: s.
-        time: (T,) the scenario's instants [s].
-        motion: (N, T, 6).
-        half: (N, 2) [m].
-        spans: (N, 2) [s].
-        leaves: (N,).
-        cells: (N, K, 8).
+        cells: (N, K, 8) of each cell of the clock: the box that holds the footprint throughout (centre x, y [m], cos and sin of
+            its yaw, half length, half width [m], radius [m]), and the way driven [m] at its start.
         cell: length of a cell [s].
-        order: (N, N, K) [s].
+        order: (N, N, K) `order[i, j, k]`: clock [s] that vehicle i may not pass while the clock of j is in cell k, unless that
+            of j is there, too; inf if nothing is in its way. It holds back who waits for j in the template, too.
         ego: index of the ego's witness.
     """
 
@@ -91,8 +61,8 @@ class World(NamedTuple):
 WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I)
 
 
-def certified(scenario: Scenario, ego: int | str) -> Certified:
-    """Prepare a scenario for being driven, with one of its vehicles, by index or id, as the ego's witness.
+def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
+    """Prepare a scenario for being driven in steps [s], with one of its vehicles, by index or id, as the ego's witness.
 
     Raises:
         InputError: it has no such vehicle, or starts at another time than 0.
@@ -108,7 +78,7 @@ def certified(scenario: Scenario, ego: int | str) -> Certified:
     if len(time) < 2 or time[0] != 0.0:
         raise InputError(f"scenario {scenario.index} must start at 0 s and have two samples at least")
     speed, yaw = scenario.speed, scenario.heading
-    velocity = speed[..., None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
+    velocity = speed[..., None] * unit(yaw)
     motion = frozen(np.concatenate([scenario.position, yaw[..., None], speed[..., None], velocity], axis=2))
     half = frozen([vehicle.half for vehicle in scenario.vehicles])
     n, count = len(ids), int(np.ceil(time[-1] / CELL - 1e-9))
@@ -116,12 +86,12 @@ def certified(scenario: Scenario, ego: int | str) -> Certified:
     spans = frozen(time[scenario.present])
     fill_cells(time, motion, half, spans, CELL, cells)
     fill_order(cells, CELL, order)
-    named = scenario.facts.get("reactions", "")
-    for who, whom in yielders_of(named, tokens(ids)) if named else ():
+    reactions = scenario.facts.get("reactions", "")
+    for who, whom in yielders_of(reactions, tokens(ids)) if reactions else ():
         if ego not in (who, whom):
             _keep_waiting(scenario, who, whom, order[who, whom])
     leaves = np.asarray((speed[:, -1] >= STANDS) | (spans[:, 1] < time[-1]))
-    return Certified(scenario, ego, motion, half, frozen(cells), frozen(order), spans, leaves)
+    return World(step, time, motion, half, spans, leaves, frozen(cells), CELL, frozen(order), ego)
 
 
 def _keep_waiting(scenario: Scenario, who: int, whom: int, order: Floats) -> None:
@@ -173,7 +143,7 @@ FAR = 1e15  # metres; where the boxes are of a vehicle that is not on the scene
 
 @kernel(F1, F3, F2, F2, F, OUT3)
 def fill_cells(time: Floats, motion: Floats, half: Floats, spans: Floats, cell: float, out: Floats) -> None:
-    """Fill `out` (N, K, 8) as in `Certified`, from the motion (N, T, 6), half sizes (N, 2) [m], spans and the cells' length [s].
+    """Fill `cells` (N, K, 8) of `World`, from the motion (N, T, 6), half sizes (N, 2) [m], spans and the cells' length [s].
 
     The box stands at the middle pose, is longer and wider by what the ends ask for, by what the turn adds, and by ROOM.
     """
@@ -202,7 +172,7 @@ def fill_cells(time: Floats, motion: Floats, half: Floats, spans: Floats, cell: 
 
 @kernel(F3, F, OUT3)
 def fill_order(cells: Floats, cell: float, out: Floats) -> None:
-    """Fill `out` (N, N, K) with `order` of `Certified`, from the cells (N, K, 8) and their length [s].
+    """Fill `out` (N, N, K) with `order` of `World`, from the cells (N, K, 8) and their length [s].
 
     For each cell k of j the first cell l >= k of i whose boxes meet, at whose start i must wait; then the least over all later k,
     for what j has not passed yet it may still come to. The price of taking cells together is waiting a little farther away.

@@ -5,31 +5,20 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 import os
 from pathlib import Path
 
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.parameters import assigned
-from scenario_gen.closed_loop.bounded import Decisions
 from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.results import Beside, DRIVEN, JSON, JUNIT, notes, PAGE, write_drives
-from scenario_gen.closed_loop.trials import (
-    Bars,
-    broken_bars,
-    origins_of,
-    Outcome,
-    Rate,
-    rates,
-    read_trials,
-    run_trials,
-    Trial,
-    with_origins,
-)
+from scenario_gen.closed_loop.origin import origins_of, Trial
+from scenario_gen.closed_loop.results import DRIVEN, Drives
+from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, rates, read_trials, run_trials, with_origins
 
 Progress = Callable[[int, int], None]  # of drives done, of how many
 RunTrials = Callable[[Sequence[Trial], str, ClosedLoopConfig, Progress], list[Outcome]]
-WORST = 5  # drives that the terminal names
 UNLOOKING = 200  # drives of the planner that looks at nobody, at most
 BLIND = "scenario_gen.closed_loop.planners:Unlooking"
 
@@ -40,29 +29,6 @@ class DriveCommandConfig:
 
     drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
     bars: Bars = field(default_factory=Bars)
-
-
-@dataclass(frozen=True, eq=False)
-class DriveResult:
-    """What a planner came to.
-
-    Attributes:
-        found: rates.
-        broken: the bars that were not kept, and, if it is worse than the planner it is compared with, that.
-        worst: the worst drives that failed.
-        written: the files.
-        notes: what the figures are to be read with.
-        beside: a planner that looks at nobody, and an earlier one.
-        decisions: how long they took here; it is in no file.
-    """
-
-    found: dict[str, Rate]
-    broken: Sequence[str]
-    worst: Sequence[Outcome]
-    written: Sequence[Path]
-    notes: Sequence[str]
-    beside: Beside
-    decisions: Decisions
 
 
 def in_processes(workers: int = 0) -> RunTrials:
@@ -96,10 +62,8 @@ class DriveRequest:
         Raises:
             InputError: a name is unknown, or a value does not suit.
         """
-        config = DriveCommandConfig()
-        for assignment in self.assignments:
-            config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
-        return config
+        named = (one if one.startswith(("bars.", "drive.")) else f"drive.{one}" for one in self.assignments)
+        return reduce(assigned, named, DriveCommandConfig())
 
 
 def drive_bag(
@@ -109,7 +73,7 @@ def drive_bag(
     progress: Progress = lambda *_: None,
     run: RunTrials | None = None,
     unlooking: RunTrials | None = None,
-) -> DriveResult:
+) -> Drives:
     """Drive a planner through the scenarios of a bag and write what it came to.
 
     Args:
@@ -130,22 +94,17 @@ def drive_bag(
         refuse_others(digests, config.drive, earlier)
     with replaced_folder(out, DRIVEN, [request.bag]) as folder:  # before there is work that might not be kept
         outcomes = with_origins((run or in_processes())(trials, planner, config.drive, progress), trials)
-        found = rates(outcomes)
         comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
-        beside = Beside(() if unlooking is None else _unlooking(trials, config.drive, unlooking), comparison)
-        broken = broken_bars(found, config.bars)
+        broken = broken_bars(rates(outcomes), config.bars)
         if comparison is not None and comparison.worse:
             broken.append(comparison.sentence())
-        write_drives(folder, outcomes, trials, planner, config.drive, broken, beside)
-    failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
-    worst = sorted(failed, key=lambda outcome: outcome.verdict.severity, reverse=True)[:WORST]
-    written = tuple(out / name for name in (JSON, JUNIT, PAGE))
-    decisions = Decisions.all_of([outcome.decisions for outcome in outcomes])
-    return DriveResult(found, broken, worst, written, notes(outcomes, beside), beside, decisions)
+        blind = () if unlooking is None else _unlooking(trials, config.drive, unlooking)
+        drives = Drives(outcomes, planner, config.drive, trials, broken, blind, comparison)
+        drives.write(folder)
+    return drives
 
 
 def _unlooking(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:
     """Return the drives of a planner that looks at nobody: in all scenarios, or in UNLOOKING at most, spread over all."""
-    every = max(1, -(-len(trials) // UNLOOKING))
-    chosen = trials[::every]
+    chosen = trials[:: max(1, -(-len(trials) // UNLOOKING))]
     return with_origins(run(chosen, BLIND, config, lambda *_: None), chosen)

@@ -8,14 +8,14 @@ what was certified can be driven by it. The curvature of its way stands for the 
 """
 
 from dataclasses import dataclass
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.kernels import F, F1, kernel, OUT1
+from scenario_gen.numerics.plane import angle_between
 
 
 class EgoState(NamedTuple):
@@ -87,12 +87,7 @@ def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig) 
     if asked is None or not finite:
         fault = "no command" if asked is None else "command is not finite"
         asked = Command(-config.ego_braking, ego.curvature)
-    out = np.empty(6)
-    limits = np.array(
-        (config.ego_acceleration, config.ego_braking, config.ego_speed, config.ego_curvature, config.ego_curvature_rate)
-    )
-    bicycle(np.array(ego), asked.acceleration, asked.curvature, config.step, limits, out)
-    return Moved(EgoState(*out.tolist()), fault)
+    return Moved(_driven(ego, asked, config), fault)
 
 
 def _placed(ego: EgoState, pose: Pose, config: ClosedLoopConfig) -> Moved:
@@ -102,41 +97,27 @@ def _placed(ego: EgoState, pose: Pose, config: ClosedLoopConfig) -> Moved:
         return Moved(EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / config.step), fault)
     way = np.hypot(pose.x - ego.x, pose.y - ego.y)
     far = way > config.ego_speed * config.step + JUMP
-    turn = (pose.yaw - ego.yaw + np.pi) % (2.0 * np.pi) - np.pi  # the yaw stays continuous
+    turn = angle_between(pose.yaw, ego.yaw)  # the yaw stays continuous
     curvature = 0.0 if far or way < 0.01 else turn / way
     acceleration = (pose.speed - ego.speed) / config.step
     state = EgoState(pose.x, pose.y, ego.yaw + turn, max(pose.speed, 0.0), float(curvature), acceleration)
     return Moved(state, f"{JUMPED} {way:.1f} m" if far else "")
 
 
-@kernel(F1, F, F, F, F1, OUT1)
-def bicycle(ego: Floats, acceleration: float, curvature: float, step: float, limits: Floats, out: Floats) -> None:
-    """Write the ego one step later; its way is an arc, along which its speed changes evenly until it stands.
+def _driven(ego: EgoState, asked: Command, config: ClosedLoopConfig) -> EgoState:
+    """Return the ego one step later; its way is an arc, along which its speed changes evenly until it stands.
 
     Source: kinematic bicycle, e.g. Rajamani 2012, section 2.2, with the reference point where there is no slip.
-
-    Args:
-        ego: (6,) as in `EgoState`, SI units.
-        acceleration: asked for, m/s².
-        curvature: asked for, 1/m.
-        step: s.
-        limits: (5,) acceleration, braking, speed, curvature, its rate, as in `ClosedLoopConfig`.
-        out: (6,) likewise.
     """
-    speed = ego[3]
-    a = min(max(acceleration, -limits[1]), limits[0])
-    a = min(a, (limits[2] - speed) / step)
-    change = limits[4] * step
-    k = min(max(curvature, ego[4] - change), ego[4] + change)
-    k = min(max(k, -limits[3]), limits[3])
+    step, speed, change = config.step, ego.speed, config.ego_curvature_rate * config.step
+    a = min(max(float(asked.acceleration), -config.ego_braking), config.ego_acceleration, (config.ego_speed - speed) / step)
+    k = min(max(float(asked.curvature), ego.curvature - change), ego.curvature + change)
+    k = min(max(k, -config.ego_curvature), config.ego_curvature)
     end = speed + a * step
     way = 0.5 * (speed + end) * step
     if end < 0.0:  # it stands before the step is over
-        end = 0.0
-        way = 0.5 * speed * speed / -a
-    turn = k * way
-    middle = ego[2] + 0.5 * turn
-    half = 0.5 * turn
-    chord = way * (np.sin(half) / half if abs(half) > 1e-6 else 1.0 - half * half / 6.0)
-    out[0], out[1] = ego[0] + chord * np.cos(middle), ego[1] + chord * np.sin(middle)
-    out[2], out[3], out[4], out[5] = ego[2] + turn, end, k, (end - speed) / step
+        end, way = 0.0, 0.5 * speed * speed / -a
+    half = 0.5 * k * way
+    chord, middle = way * float(np.sinc(half / np.pi)), ego.yaw + half
+    x, y = ego.x + chord * math.cos(middle), ego.y + chord * math.sin(middle)
+    return EgoState(x, y, ego.yaw + 2.0 * half, end, k, (end - speed) / step)

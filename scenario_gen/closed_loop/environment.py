@@ -24,12 +24,14 @@ import numpy.typing as npt
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.picture import picture
+from scenario_gen.closed_loop.planners import RouteFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.closed_loop.trials import read_trials, Trial
+from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import ahead_and_left, angle_between, unit
 
 OTHERS = 8  # nearest others that are seen
 AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route at which it is seen
@@ -100,8 +102,8 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         if index not in self._loops:
             self._loops[index] = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config)
         self._loop = self._loops[index]
-        task = self._loop.task()
-        self._route = Curve.through(task.route[:, :2]) if len(task.route) > 2 else None
+        self._follower = RouteFollower()
+        self._follower.reset(self._loop.task())
         self._states: list[State] = [self._loop.start()]
         self._station = 0.0
         return self._observed(), {"index": index, "name": trial.name}
@@ -125,7 +127,7 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         state = self._states[-1]
         seen, reward = self._observed(), self._station - before
         info: dict[str, Any] = {"time": state.time}
-        at_goal = loop.at_goal(state.time, state.vehicles[loop.ego])
+        at_goal = loop.at_goal(state)
         off_road = loop.off_road(state)
         hit = loop.hit(state)
         terminated = at_goal or off_road or hit
@@ -145,35 +147,27 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
     def _observed(self) -> Seen:
         state = self._states[-1]
         ego = state.ego
-        c, s = float(np.cos(ego.yaw)), float(np.sin(ego.yaw))
 
         def local(xy: Floats) -> Floats:
             """Positions (..., 2) in the ego's frame."""
-            dx, dy = xy[..., 0] - ego.x, xy[..., 1] - ego.y
-            return np.stack([dx * c + dy * s, dy * c - dx * s], axis=-1)
+            return np.stack(ahead_and_left(xy - ego[:2], ego.yaw), axis=-1)
 
-        route, offset, angle, left = np.zeros((len(AHEAD), 2)), 0.0, 0.0, 0.0
-        if self._route is not None:
-            around = np.linspace(self._station - 2.0, self._station + 8.0, 41)
-            poses = self._route.at(around)
-            self._station = float(around[np.argmin(np.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
-            x, y, yaw = self._route.at(self._station).tolist()
-            offset = (ego.y - y) * float(np.cos(yaw)) - (ego.x - x) * float(np.sin(yaw))
-            angle = (ego.yaw - yaw + np.pi) % (2.0 * np.pi) - np.pi
-            left = self._route.length - self._station
-            route = local(self._route.at(self._station + AHEAD)[:, :2])
+        ahead, offset, angle, left = np.zeros((len(AHEAD), 2)), 0.0, 0.0, 0.0
+        _, self._station = self._follower.steer(ego)
+        if (route := self._follower.route) is not None:
+            pose = route.at(self._station)
+            offset = float(ahead_and_left(ego[:2] - pose[:2], pose[2])[1])
+            angle, left = angle_between(ego.yaw, pose[2]), route.length - self._station
+            ahead = local(route.at(self._station + AHEAD)[:, :2])
         found = self._loop.observe(state)
+        place = local(found.others[:, :2])
+        away = np.hypot(place[:, 0], place[:, 1])
+        nearest = [k for k in np.argsort(away, kind="stable")[:OTHERS] if away[k] <= REACH]
         others = np.zeros((OTHERS, EACH))
-        if len(found.ids):
-            place = local(found.others[:, :2])
-            away = np.hypot(place[:, 0], place[:, 1])
-            for row, k in enumerate(np.argsort(away, kind="stable")[:OTHERS].tolist()):
-                if away[k] <= REACH:
-                    turn = found.others[k, 2] - ego.yaw
-                    speed, length = found.others[k, 3], found.sizes[k, 0]
-                    others[row] = (1.0, *place[k], float(np.cos(turn)), float(np.sin(turn)), speed, length)
+        facts = (np.ones(len(away)), place, unit(found.others[:, 2] - ego.yaw), found.others[:, 3], found.sizes[:, 0])
+        others[: len(nearest)] = np.column_stack(facts)[nearest]
         own = np.array((ego.speed, ego.curvature, offset, angle, left))
-        seen = np.concatenate([own, route.ravel(), others.ravel()]).astype(np.float32)
+        seen = np.concatenate([own, ahead.ravel(), others.ravel()]).astype(np.float32)
         return np.clip(seen, self.observation_space.low, self.observation_space.high)
 
 

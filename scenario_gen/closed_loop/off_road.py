@@ -11,12 +11,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen.closed_loop.simulation import Drive
 from scenario_gen.method.validity import containment as inside
 from scenario_gen.method.validity import control_points
 from scenario_gen.numerics import Bools, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
+from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.roads import clearance_in_cells, distance_transform, to_cells
 from scenario_gen.types import once_per_object, Road, Scenario
 
@@ -59,9 +61,10 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
         return RoadUse(max(float(room), RESOLUTION), 0.0, math.nan)
     deepest, most, begin = 0.0, 0.0, math.nan
     for k in range(len(motion.time) - 1):
-        found = _measured(road, _poses(motion, drive.ego, k, _parts(motion, drive.ego, k)), half, outside=True)
+        parts = np.linspace(0.0, 1.0, _parts(motion, drive.ego, k) + 1)
+        found = _measured(road, poses_in(motion, ego, k, parts)[0], half, outside=True)
         if math.isnan(begin) and (found[:, 0] > 0.0).any() and found[:, 0].max() >= limit:
-            fine = _measured(road, _poses(motion, drive.ego, k, PARTS), half, outside=True)[:, 0]
+            fine = _measured(road, poses_in(motion, ego, k, np.linspace(0.0, 1.0, PARTS + 1))[0], half, outside=True)[:, 0]
             reached = (fine >= limit) & (fine > 0.0)
             part = int(np.argmax(reached)) / PARTS if reached.any() else 1.0
             begin = float(motion.time[k] + part * (motion.time[k + 1] - motion.time[k]))
@@ -71,31 +74,20 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
     return RoadUse(-deepest, most, begin)
 
 
-def between(motion: Scenario, rows: list[int], k: int, u: Floats) -> tuple[Floats, Floats]:
-    """Return positions (R, U, 2) [m] and headings (R, U) [rad] of vehicles at parts `u` (U,) of step k, as `Scenario` says."""
-    step = float(motion.time[k + 1] - motion.time[k])
-    u = u[:, None]
-    v, w = 1.0 - u, 3.0 - 2.0 * u
-    position = []
-    for i in rows:
-        yaw, speed = motion.heading[i, k : k + 2], motion.speed[i, k : k + 2]
-        way = step * speed[:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
-        p, q = motion.position[i, k], motion.position[i, k + 1]
-        position.append((1.0 + 2.0 * u) * v * v * p + u * v * v * way[0] + u * u * w * q - u * u * v * way[1])
-    heading = motion.heading[rows, k, None] + u[:, 0] * (motion.heading[rows, k + 1] - motion.heading[rows, k])[:, None]
-    return np.stack(position), heading
-
-
-def _poses(motion: Scenario, ego: int, k: int, parts: int) -> Floats:
-    """Return the ego's poses (parts + 1, 3) in step k."""
-    position, heading = between(motion, [ego], k, np.linspace(0.0, 1.0, parts + 1))
-    return np.column_stack([position[0], heading[0]])
+def poses_in(motion: Scenario, rows: list[int], k: int, u: Floats) -> Floats:
+    """Return x, y [m], yaw [rad] (R, U, 3) of vehicles at parts `u` (U,) of step k, as `Scenario` says."""
+    time, position, heading, speed = (
+        motion.time[k : k + 2], *(each[rows, k : k + 2] for each in (motion.position, motion.heading, motion.speed))
+    )  # fmt: skip
+    spline = CubicHermiteSpline(time, position, speed[..., None] * unit(heading), axis=1)
+    yaw = heading[:, :1] + u * np.diff(heading, axis=1)
+    return np.concatenate([spline(time[0] + u * (time[1] - time[0])), yaw[..., None]], axis=2)
 
 
 def _parts(motion: Scenario, ego: int, k: int) -> int:
     """Return into how many parts step k is cut."""
-    way = np.hypot(*(motion.position[ego, k + 1] - motion.position[ego, k]))
-    way = max(float(way), float(motion.speed[ego, k : k + 2].max() * (motion.time[k + 1] - motion.time[k])))
+    way = float(edge_lengths(motion.position[ego, k : k + 2])[0])
+    way = max(way, float(motion.speed[ego, k : k + 2].max() * (motion.time[k + 1] - motion.time[k])))
     vehicle = motion.vehicles[ego]
     turn = abs(float(motion.heading[ego, k + 1] - motion.heading[ego, k])) * 0.5 * (vehicle.length + vehicle.width)
     return min(max(math.ceil((way + turn) / APART), 1), PARTS)

@@ -10,7 +10,8 @@ import hashlib
 import numpy as np
 
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import Scenario
+from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.types import Road, Scenario
 
 ALIKE = 0.1  # metres within which all vehicles of two scenarios of one encounter are at the same places, if they are copies
 INSTANTS = 9  # at which that is looked at
@@ -31,33 +32,46 @@ class Origin:
     copy_of: str = ""
 
 
-def origins(
-    names: Sequence[str], scenarios: Sequence[Scenario], egos: Sequence[int | str], encounters: Sequence[str]
-) -> list[Origin]:
-    """Return the origins of scenarios; each copy is named after the first of its kind."""
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One scenario to be driven.
+
+    Attributes:
+        name: for people.
+        scenario: the witness of the ego is in it.
+        ego: index or id of the witness.
+        road: if it is known.
+        encounter: names the recorded encounter that it was made of; "" if that is not known.
+    """
+
+    name: str
+    scenario: Scenario
+    ego: int | str
+    road: Road | None
+    encounter: str = ""
+
+
+def origins_of(trials: Sequence[Trial]) -> list[Origin]:
+    """Return where the scenarios of trials come from; each copy is named after the first of its kind."""
     known: dict[tuple[str, int, int], list[tuple[str, Floats]]] = {}
     result = []
-    for name, scenario, ego, encounter in zip(names, scenarios, egos, encounters, strict=True):
-        number = ego if isinstance(ego, int) else [vehicle.id for vehicle in scenario.vehicles].index(ego)
-        shape = _shape(scenario, number)
-        group = known.setdefault((encounter, len(scenario.vehicles), number), [])
+    for trial in trials:
+        ids = [vehicle.id for vehicle in trial.scenario.vehicles]
+        number = ids.index(trial.ego) if isinstance(trial.ego, str) else trial.ego
+        shape = _shape(trial.scenario, number)
+        group = known.setdefault((trial.encounter, len(ids), number), [])
         same = next((one for one, other in group if np.abs(other - shape).max() <= ALIKE), "")
         if not same:
-            group.append((name, shape))
-        result.append(Origin(encounter, digest_of(scenario, number), same))
+            group.append((trial.name, shape))
+        result.append(Origin(trial.encounter, digest_of(trial.scenario, number), same))
     return result
 
 
 def _shape(scenario: Scenario, ego: int) -> Floats:
     """Return where all are, seen from the ego's start, at some instants, and when that is [s]: two roads give one shape."""
     when = np.linspace(0.0, float(scenario.time[-1]), INSTANTS)
-    start, yaw = scenario.position[ego, 0], float(scenario.heading[ego, 0])
-    c, s = float(np.cos(yaw)), float(np.sin(yaw))
-    away = np.stack(
-        [[np.interp(when, scenario.time, each[:, axis] - start[axis]) for axis in range(2)] for each in scenario.position]
-    )
-    x, y = away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s
-    return np.concatenate([x.ravel(), y.ravel(), when])
+    away = ahead_and_left(scenario.position - scenario.position[ego, 0], float(scenario.heading[ego, 0]))
+    return np.concatenate([*(np.interp(when, scenario.time, each) for part in away for each in part), when])
 
 
 def digest_of(scenario: Scenario, ego: int) -> str:
@@ -73,10 +87,8 @@ def units_of(names: Sequence[str], several: Sequence[Origin]) -> tuple[Ints, int
 
     That is its encounter; where all are of one encounter, those that are no copies of another count by themselves.
     """
-    encounters = sorted({one.encounter for one in several})
+    encounters, unit = np.unique([one.encounter for one in several], return_inverse=True)
     if len(encounters) > 1:
-        place = {name: k for k, name in enumerate(encounters)}
-        return np.array([place[one.encounter] for one in several], dtype=np.int64), len(encounters)
+        return unit, len(encounters)
     place = {name: k for k, name in enumerate(names)}
-    unit = [place.get(one.copy_of, k) for k, one in enumerate(several)]
-    return np.array(unit, dtype=np.int64), len(encounters)
+    return np.array([place.get(one.copy_of, k) for k, one in enumerate(several)], dtype=np.int64), len(encounters)

@@ -37,7 +37,7 @@ from scenario_gen.closed_loop.driver import (
     WAITED,
 )
 from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, FORESEEN, Foreseen, weakest
-from scenario_gen.closed_loop.order import keep_order, limit
+from scenario_gen.closed_loop.order import Clocks, keep_order, limit
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
@@ -226,15 +226,14 @@ def _creep(world: World, now: Now, i: int) -> float:
 @kernel(inline=True)
 def _move(world: World, now: Now, rate: Floats, after: Floats) -> None:
     """Move the clocks as the drivers want, as far as the order lets them."""
-    n, h, drivers = rate.shape[0], world.step, now.drivers
-    clock, before, forced = drivers[:, CLOCK].copy(), drivers[:, RATE].copy(), np.zeros(n)
-    new_clock, new_rate = clock.copy(), rate.copy()
+    n, h, clock, before = rate.shape[0], world.step, now.drivers[:, CLOCK].copy(), now.drivers[:, RATE].copy()
+    clocks = Clocks(now.goes, clock, before, clock.copy(), rate.copy(), np.zeros(n))
     for i in range(n):
         if i != world.ego and now.goes[i] and (now.here[i] or rate[i] > 0.0):
-            new_clock[i] = clock[i] + 0.5 * (before[i] + rate[i]) * h
-    keep_order(world, now.goes, clock, before, new_clock, new_rate, forced)
+            clocks.end[i] = clock[i] + 0.5 * (before[i] + rate[i]) * h
+    keep_order(world, clocks)
     for i in range(n):
         end = max(now.pose[i, 3] + before[i] * now.pose[i, 4] * h, 0.0)
-        after[i, CLOCK] = min(new_clock[i], world.time[-1]) if now.goes[i] else new_clock[i]
-        after[i, RATE], after[i, ACCELERATION] = new_rate[i], (rate[i] * end - before[i] * now.pose[i, 3]) / h
-        after[i, HELD] = 1.0 if new_rate[i] < rate[i] or forced[i] > 0.0 else 0.0
+        after[i, CLOCK] = min(clocks.end[i], world.time[-1]) if now.goes[i] else clocks.end[i]
+        after[i, RATE], after[i, ACCELERATION] = clocks.end_rate[i], (rate[i] * end - before[i] * now.pose[i, 3]) / h
+        after[i, HELD] = 1.0 if clocks.end_rate[i] < rate[i] or clocks.forced[i] > 0.0 else 0.0

@@ -11,6 +11,7 @@ import numpy as np
 from scenario_gen.closed_loop.ego import Command, EgoState, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Task
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import ahead_and_left, place
 
 SPEED_GAIN = 1.0  # 1/s, acceleration per m/s that is missing
 
@@ -32,10 +33,8 @@ class RouteFollower:
         poses = self.route.at(around)
         self._near = float(around[np.argmin(np.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
         ahead = min(max(0.8 * ego.speed, 3.0), 15.0)
-        x, y, _ = self.route.at(self._near + ahead).tolist()
-        dx, dy = x - ego.x, y - ego.y
-        c, s = float(np.cos(ego.yaw)), float(np.sin(ego.yaw))
-        return 2.0 * (dy * c - dx * s) / max(dx * dx + dy * dy, 1e-6), self._near
+        along, left = ahead_and_left(self.route.at(self._near + ahead)[:2] - ego[:2], ego.yaw)
+        return float(2.0 * left / np.maximum(along * along + left * left, 1e-6)), self._near
 
 
 @dataclass
@@ -93,26 +92,21 @@ class IdmFollower(RouteFollower):
         """
         if self.route is None or not len(seen.ids):
             return math.inf, 0.0
-        nearest, speed = math.inf, 0.0
         own = 0.5 * self.task.vehicle.length
-        direction = np.stack([np.cos(seen.others[:, 2]), np.sin(seen.others[:, 2])], axis=1)
         when = np.arange(0.0, self.foresight + 0.01, 0.5)
-        places = seen.others[:, None, :2] + (seen.others[:, None, 3:4] * when[:, None]) * direction[:, None]
+        places = place(seen.others[:, None, :3], seen.others[:, 3:4] * when, 0.0)
         at, aside = self.route.project(places.reshape(-1, 2))
         turn = self.route.at(at)[:, 2].reshape(len(seen.ids), -1) - seen.others[:, 2:3]
         along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
         length, width = 0.5 * seen.sizes[:, 0:1], 0.5 * seen.sizes[:, 1:2]
         gap = at.reshape(along.shape) - station - own - length * along - width * across
         beside = np.abs(aside.reshape(along.shape)) - 0.5 * self.task.vehicle.width - length * across - width * along
-        for k in range(len(seen.ids)):
-            same_way = float(np.cos(turn[k, 0]))
-            for m, time in enumerate(when.tolist()):
-                on = beside[k, m] < self.room and gap[k, m] > -own
-                if on and (m == 0 or (same_way < 0.7 and seen.ego.speed * time < gap[k, m] + 4.0 * own)):
-                    if gap[k, m] < nearest:
-                        nearest, speed = float(gap[k, m]), float(seen.others[k, 3]) * max(same_way, 0.0)
-                    break
-        return max(nearest, 0.0), speed
+        same_way = np.cos(turn[:, 0])
+        comes = (when == 0.0) | ((same_way[:, None] < 0.7) & (seen.ego.speed * when < gap + 4.0 * own))
+        counts = (beside < self.room) & (gap > -own) & comes
+        first = np.where(counts.any(axis=1), gap[np.arange(len(gap)), counts.argmax(axis=1)], math.inf)
+        k = int(first.argmin())
+        return max(float(first[k]), 0.0), float(seen.others[k, 3]) * max(float(same_way[k]), 0.0)
 
 
 @dataclass

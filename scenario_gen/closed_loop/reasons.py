@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template import conflict_of
 
 STANDS = 0.5  # m/s
@@ -49,21 +50,21 @@ class At(NamedTuple):
 def state_at(drive: Drive, vehicle: int, time: float) -> At:
     """Return where a vehicle is at a time [s], linear between two instants."""
     motion = drive.motion
-    x, y = (float(np.interp(time, motion.time, motion.position[vehicle, :, axis])) for axis in range(2))
-    return At(x, y, *(float(np.interp(time, motion.time, each[vehicle])) for each in (motion.heading, motion.speed)))
+    columns = (*motion.position[vehicle].T, motion.heading[vehicle], motion.speed[vehicle])
+    return At(*(float(np.interp(time, motion.time, column)) for column in columns))
 
 
 def reason_of(loop: ClosedLoop, drive: Drive, who: int, time: float, ran: Runner) -> Reason:
     """Say what was behind the contact of the ego with vehicle `who` at a time [s]."""
     ego, other = state_at(drive, drive.ego, time), state_at(drive, who, time)
-    along = float(np.cos(other.yaw - ego.yaw))
+    along = math.cos(other.yaw - ego.yaw)
     if ran is Runner.OTHER and ego.speed < STANDS:
         return Reason.STANDING
     if along > SAME_WAY:
-        ahead = (other.x - ego.x) * float(np.cos(ego.yaw)) + (other.y - ego.y) * float(np.sin(ego.yaw)) > 0.0
+        ahead, _ = ahead_and_left(np.subtract(other[:2], ego[:2]), ego.yaw)
         if _came_in(drive, who, time):
             return Reason.CUT_IN
-        return Reason.REAR_END if ahead and ran is not Runner.OTHER else Reason.OTHER_RAN_INTO_EGO
+        return Reason.REAR_END if ahead > 0.0 and ran is not Runner.OTHER else Reason.OTHER_RAN_INTO_EGO
     conflict = conflict_of(loop.scenario, drive.ego, who)
     if conflict is not None and not conflict.following and conflict.second == drive.ego:
         return Reason.CROSSING_OUT_OF_ORDER
@@ -76,9 +77,7 @@ def _came_in(drive: Drive, who: int, time: float) -> bool:
     """Whether the ego was beside the other's way shortly before, and had been ahead of the other's tail."""
     then = max(time - BEFORE, 0.0)
     ego, other = state_at(drive, drive.ego, then), state_at(drive, who, then)
-    dx, dy = ego.x - other.x, ego.y - other.y
-    c, s = float(np.cos(other.yaw)), float(np.sin(other.yaw))
-    mine, its = drive.motion.vehicles[drive.ego], drive.motion.vehicles[who]
-    turn = ego.yaw - other.yaw
-    wide = 0.5 * (its.width + mine.width * abs(float(np.cos(turn))) + mine.length * abs(float(np.sin(turn))))
-    return abs(dy * c - dx * s) > wide and dx * c + dy * s > -0.5 * its.length and not math.isclose(then, time)
+    ahead, left = ahead_and_left(np.subtract(ego[:2], other[:2]), other.yaw)
+    mine, its, turn = drive.motion.vehicles[drive.ego], drive.motion.vehicles[who], ego.yaw - other.yaw
+    wide = 0.5 * (its.width + mine.width * abs(math.cos(turn)) + mine.length * abs(math.sin(turn)))
+    return bool(abs(left) > wide and ahead > -0.5 * its.length) and not math.isclose(then, time)

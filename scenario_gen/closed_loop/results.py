@@ -18,7 +18,8 @@ from scenario_gen.base.folders import Kind, write_text
 from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.trials import Outcome, passed_of, Rate, rates, Trial
+from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
 from scenario_gen.output.report.html import render_page
 
@@ -29,80 +30,116 @@ MOST_DRAWN = 100
 """Drives that the page replays, the worst first; its table lists all."""
 
 
-@dataclass(frozen=True)
-class Beside:
-    """What stands beside a planner's own drives: how many one that looks at nobody passes, and an earlier planner."""
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """What a planner came to, and what stands beside it.
 
+    Attributes:
+        outcomes: of the drives.
+        planner: its name.
+        config: the parameters of the drives.
+        trials: that were driven; without them there is no page.
+        broken: the bars that were not kept, and, if it is worse than the planner it is compared with, that.
+        unlooking: drives of a planner that looks at nobody.
+        comparison: with an earlier planner.
+    """
+
+    outcomes: Sequence[Outcome]
+    planner: str
+    config: ClosedLoopConfig
+    trials: Sequence[Trial] = ()
+    broken: Sequence[str] = ()
     unlooking: Sequence[Outcome] = ()
     comparison: Comparison | None = None
 
+    def by_severity(self) -> list[int]:
+        """Return the indices of the outcomes, the worst first."""
+        order = range(len(self.outcomes))
+        return sorted(order, key=lambda k: (*(-value for value in self.outcomes[k].verdict.severity), k))
 
-def scores(outcomes: Sequence[Outcome]) -> dict[str, float]:
-    """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""
-    terms = [outcome.verdict.document()["terms"] for outcome in outcomes]
-    return {name: math.fsum(each[name] for each in terms) / len(terms) for name in (terms[0] if terms else ())}
+    def scores(self) -> dict[str, float]:
+        """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""
+        terms = [outcome.verdict.document()["terms"] for outcome in self.outcomes]
+        return {name: math.fsum(each[name] for each in terms) / len(terms) for name in (terms[0] if terms else ())}
 
+    def notes(self) -> list[str]:
+        """Return what the figures are to be read with, in sentences."""
+        encounters = sorted({outcome.origin.encounter for outcome in self.outcomes} - {""})
+        copies = len([outcome for outcome in self.outcomes if outcome.origin.copy_of])
+        messages = []
+        if len(encounters) == 1:
+            messages.append(f"all scenarios are of one encounter ({encounters[0]}): the intervals hold for that encounter only")
+        elif encounters:
+            drawn = f"encounters drawn as these {len(encounters)} were"
+            messages.append(f"intervals are for {drawn}: drives of one encounter are alike")
+        if copies:
+            messages.append(f"{copies} of {len(self.outcomes)} scenarios are copies of another scenario of the same encounter")
+        if self.unlooking:
+            sets = {name: [one for one in self.unlooking if one.origin.encounter == name] for name in encounters}
+            each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
+            parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
+            messages.append(f"a planner that looks at nobody passes {passed_of(self.unlooking)}{parts}")
+        if self.comparison is not None:
+            messages.append(self.comparison.sentence())
+        if found := self.scores():
+            terms = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in found.items() if name not in ("nuplan", "pdms")]
+            scores = f"nuPlan's score {found['nuplan']:.3f}, NAVSIM's PDMS {found['pdms']:.3f}"
+            messages.append(f"{scores} (means; {', '.join(terms)})")
+        return messages
 
-def notes(outcomes: Sequence[Outcome], beside: Beside = Beside()) -> list[str]:
-    """Return what the figures of a set of drives are to be read with, in sentences."""
-    encounters = sorted({outcome.origin.encounter for outcome in outcomes} - {""})
-    copies = len([outcome for outcome in outcomes if outcome.origin.copy_of])
-    messages = []
-    if len(encounters) == 1:
-        messages.append(f"all scenarios are of one encounter ({encounters[0]}): the intervals hold for that encounter only")
-    elif encounters:
-        messages.append(f"intervals are for encounters drawn as these {len(encounters)} were: drives of one encounter are alike")
-    if copies:
-        messages.append(f"{copies} of {len(outcomes)} scenarios are copies of another scenario of the same encounter")
-    if beside.unlooking:
-        sets = {name: [one for one in beside.unlooking if one.origin.encounter == name] for name in encounters}
-        each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
-        parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
-        messages.append(f"a planner that looks at nobody passes {passed_of(beside.unlooking)}{parts}")
-    if beside.comparison is not None:
-        messages.append(beside.comparison.sentence())
-    found = scores(outcomes)
-    if found:
-        parts = ", ".join(
-            f"{name.replace('_', ' ')} {value:.3f}" for name, value in found.items() if name not in ("nuplan", "pdms")
-        )
-        messages.append(f"nuPlan's score {found['nuplan']:.3f}, NAVSIM's PDMS {found['pdms']:.3f} (means; {parts})")
-    return messages
-
-
-def document(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig, beside: Beside = Beside()) -> dict[str, Any]:
-    """Return all verdicts and their summary as JSON's types."""
-    drives = [
-        {
-            "name": outcome.name,
-            "encounter": outcome.origin.encounter,
-            "scenario": outcome.origin.digest,
-            "copy_of": outcome.origin.copy_of or None,
-            **outcome.verdict.document(),
+    def document(self) -> dict[str, Any]:
+        """Return all verdicts and their summary as JSON's types."""
+        drives = [
+            {
+                "name": outcome.name,
+                "encounter": outcome.origin.encounter,
+                "scenario": outcome.origin.digest,
+                "copy_of": outcome.origin.copy_of or None,
+                **outcome.verdict.document(),
+            }
+            for outcome in self.outcomes
+        ]
+        return {
+            "planner": self.planner,
+            "parameters": {name: value for name, (_, value) in flatten(self.config).items()},
+            "summary": {name: rate.document() for name, rate in rates(self.outcomes).items()},
+            "scores": self.scores(),
+            "unlooking_pass": passed_of(self.unlooking).document() if self.unlooking else None,
+            "against": None if self.comparison is None else self.comparison.document(),
+            "notes": self.notes(),
+            "drives": drives,
         }
-        for outcome in outcomes
-    ]
-    return {
-        "planner": planner,
-        "parameters": {name: value for name, (_, value) in flatten(config).items()},
-        "summary": {name: _rate(rate) for name, rate in rates(outcomes).items()},
-        "scores": scores(outcomes),
-        "unlooking_pass": _rate(passed_of(beside.unlooking)) if beside.unlooking else None,
-        "against": None if beside.comparison is None else beside.comparison.document(),
-        "notes": notes(outcomes, beside),
-        "drives": drives,
-    }
 
+    def json(self) -> str:
+        """Return `document` as text; no time of day and no name of a machine is in it."""
+        return json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
-def _rate(rate: Rate) -> dict[str, Any]:
-    share = rate.share
-    shares = {"share": share.value, "low": share.low, "high": share.high}
-    return {"count": rate.count, "of": rate.of, **shares, "encounters": rate.encounters}
+    def page(self) -> str:
+        """Return the page: the summary, all verdicts, the worst first, and replays of the worst."""
+        order = self.by_severity()
+        return render_page(
+            "drives.html.j2",
+            ("scene.js", "drives.js"),
+            drawings(self.outcomes, self.trials, order[:MOST_DRAWN]),
+            planner=self.planner,
+            found=rates(self.outcomes),
+            rows=[(number if number < MOST_DRAWN else None, self.outcomes[k]) for number, k in enumerate(order)],
+            broken=self.broken,
+            notes=self.notes(),
+            comparison=self.comparison,
+            parameters={name: value for name, (_, value) in flatten(self.config).items()},
+        )
 
+    def write(self, folder: Path) -> None:
+        """Write JSON, JUnit's XML and, with the trials, the page to a folder that is there.
 
-def as_json(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig, beside: Beside = Beside()) -> str:
-    """Return `document` as text; no time of day and no name of a machine is in it."""
-    return json.dumps(document(outcomes, planner, config, beside), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        Raises:
+            OSError: the disk is full, or the folder may not be written.
+        """
+        write_text(folder / JSON, self.json())
+        write_text(folder / JUNIT, as_junit(self.outcomes, self.planner))
+        if self.trials:
+            write_text(folder / PAGE, self.page())
 
 
 def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
@@ -126,33 +163,6 @@ def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
         element.attrib.update({name: printable(value) for name, value in element.attrib.items()})
         element.text = printable(element.text) if element.text else None
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, encoding="unicode") + "\n"
-
-
-def as_page(
-    outcomes: Sequence[Outcome],
-    trials: Sequence[Trial],
-    planner: str,
-    config: ClosedLoopConfig,
-    broken: Sequence[str] = (),
-    beside: Beside = Beside(),
-) -> str:
-    """Return the page: the summary, all verdicts, the worst first, and replays of the worst."""
-    order = sorted(range(len(outcomes)), key=lambda k: (*(-value for value in outcomes[k].verdict.severity), k))
-    drawn = order[:MOST_DRAWN]
-    data = drawings(outcomes, trials, drawn)
-    rows = [(number if number < len(drawn) else None, outcomes[k]) for number, k in enumerate(order)]
-    return render_page(
-        "drives.html.j2",
-        ("scene.js", "drives.js"),
-        data,
-        planner=planner,
-        found=rates(outcomes),
-        rows=rows,
-        broken=broken,
-        notes=notes(outcomes, beside),
-        comparison=beside.comparison,
-        parameters={name: value for name, (_, value) in flatten(config).items()},
-    )
 
 
 def drawings(outcomes: Sequence[Outcome], trials: Sequence[Trial], drawn: Sequence[int]) -> dict[str, Any]:
@@ -184,33 +194,3 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
         "spans": [[round(time, 3) for time in span] for span in spans],
         "hit": round(verdict.collision.time, 3) if verdict.collision else None,
     }
-
-
-def write_verdicts(
-    folder: Path, outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig, beside: Beside = Beside()
-) -> None:
-    """Write JSON and JUnit's XML to a folder that is there.
-
-    Raises:
-        OSError: the disk is full, or the folder may not be written.
-    """
-    write_text(folder / JSON, as_json(outcomes, planner, config, beside))
-    write_text(folder / JUNIT, as_junit(outcomes, planner))
-
-
-def write_drives(
-    folder: Path,
-    outcomes: Sequence[Outcome],
-    trials: Sequence[Trial],
-    planner: str,
-    config: ClosedLoopConfig,
-    broken: Sequence[str] = (),
-    beside: Beside = Beside(),
-) -> None:
-    """Write JSON, JUnit's XML and the page to a folder that is there.
-
-    Raises:
-        OSError: the disk is full, or the folder may not be written.
-    """
-    write_verdicts(folder, outcomes, planner, config, beside)
-    write_text(folder / PAGE, as_page(outcomes, trials, planner, config, broken, beside))

@@ -20,11 +20,14 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
+from scipy.signal import savgol_filter
+import shapely
 
 from scenario_gen.closed_loop.reasons import At, state_at
 from scenario_gen.closed_loop.simulation import Drive
-from scenario_gen.method.evaluation import footprint_distance, Motion
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.boxes import corners
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Vehicle
 
 OUTSIDE = 0.3  # m; nuPlan's `max_violation_threshold` of drivable_area_compliance
@@ -65,10 +68,8 @@ class Terms:
     @property
     def pdms(self) -> float:
         """NAVSIM's score."""
-        weighted = math.fsum(weight * float(getattr(self, name)) for name, weight in WEIGHTS.items()) / math.fsum(
-            WEIGHTS.values()
-        )
-        return self.no_at_fault_collision * self.drivable_area * weighted
+        weighted = np.average([getattr(self, name) for name in WEIGHTS], weights=list(WEIGHTS.values()))
+        return self.no_at_fault_collision * self.drivable_area * float(weighted)
 
     @property
     def nuplan(self) -> float:
@@ -99,10 +100,8 @@ def terms(drive: Drive, hit: tuple[int, float] | None, margin: float, progress: 
 def not_behind(drive: Drive, other: int) -> Floats:
     """Return (T,) whether another is not behind the ego: within 150 degrees of its heading."""
     motion, ego = drive.motion, drive.ego
-    away = motion.position[other] - motion.position[ego]
-    yaw = motion.heading[ego]
-    ahead = away[:, 0] * np.cos(yaw) + away[:, 1] * np.sin(yaw)
-    return np.asarray(ahead >= float(np.cos(math.radians(BEHIND))) * np.hypot(away[:, 0], away[:, 1]))
+    ahead, left = ahead_and_left(motion.position[other] - motion.position[ego], motion.heading[ego])
+    return np.asarray(ahead >= math.cos(math.radians(BEHIND)) * np.hypot(ahead, left))
 
 
 def _at_fault(drive: Drive, who: int, time: float, *, off_road: bool) -> bool:
@@ -119,13 +118,10 @@ def _at_fault(drive: Drive, who: int, time: float, *, off_road: bool) -> bool:
 
 
 def _touches_front(ego: At, own: Vehicle, other: At, its: Vehicle) -> bool:
-    """Whether another touches the ego's front bumper: a thin box there."""
-    c, s = float(np.cos(ego.yaw)), float(np.sin(ego.yaw))
-    front = 0.5 * own.length - 0.5 * BUMPER
-    places = np.array([[[ego.x + front * c, ego.y + front * s]], [[other.x, other.y]]])
-    bumper = Vehicle("bumper", BUMPER, own.width)
-    motion = Motion((bumper, its), 1.0, places, np.array([[ego.yaw], [other.yaw]]), np.zeros((2, 1)))
-    return bool(footprint_distance(motion, 0, 1)[0] <= BUMPER)
+    """Whether another touches the ego's front bumper."""
+    front, _, _, right = corners(np.array([ego]), own.length, own.width)[0]
+    body = shapely.Polygon(corners(np.array([other]), its.length, its.width)[0])
+    return bool(shapely.dwithin(shapely.LineString([front, right]), body, 2.0 * BUMPER))
 
 
 def comfortable(drive: Drive) -> bool:
@@ -150,25 +146,11 @@ def comfortable(drive: Drive) -> bool:
 
 
 def smoothed(values: Floats, step: float, side: float, derivative: int) -> Floats:
-    """Return values (T,), or their first or second derivative, by a quadratic fitted to a window around each instant.
+    """Return values (T,), or their first or second derivative, by a quadratic fitted to `side` seconds to each side of each.
 
-    The window has `side` seconds to each side; beyond the ends the line through the last two values goes on.
-    Source: Savitzky & Golay 1964.
+    At the ends it is that of the last window, as in nuPlan. Source: Savitzky & Golay 1964.
     """
-    m = max(round(side / step), 1)
-    if len(values) < 2:
+    if len(values) < 3:
         return np.zeros_like(values) if derivative else values.copy()
-    before = values[0] - np.arange(m, 0, -1) * (values[1] - values[0])
-    after = values[-1] + np.arange(1, m + 1) * (values[-1] - values[-2])
-    padded = np.concatenate([before, values, after])
-    k = np.arange(-m, m + 1, dtype=np.float64)
-    if derivative == 0:
-        weights = 3.0 * (3.0 * m * m + 3.0 * m - 1.0 - 5.0 * k * k) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3))
-    elif derivative == 1:
-        weights = 3.0 * k / (m * (m + 1) * (2 * m + 1) * step)
-    else:
-        weights = 30.0 * (3.0 * k * k - m * (m + 1)) / (m * (m + 1) * (2 * m - 1) * (2 * m + 1) * (2 * m + 3) * step * step)
-    result = np.zeros(len(values))
-    for n, weight in enumerate(weights.tolist()):  # one after the other: the same bits on any CPU
-        result += weight * padded[n : n + len(values)]
-    return result
+    window = min(2 * max(round(side / step), 1) + 1, (len(values) - 1) | 1)
+    return np.asarray(savgol_filter(values, window, 2, deriv=derivative, delta=step))

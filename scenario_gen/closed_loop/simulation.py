@@ -15,12 +15,13 @@ from zlib import crc32
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.closed_loop.advance import advance, at_goal, ego_hits
-from scenario_gen.closed_loop.certified import CELL, Certified, certified, World
+from scenario_gen.closed_loop.advance import advance, ego_hits
+from scenario_gen.closed_loop.certified import world_of
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.driver import Manner
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.roads import footprint_fits
 from scenario_gen.types import Road, Scenario, Vehicle
 
@@ -136,6 +137,9 @@ class Drive:
 
 
 WAITS = 1.0  # metres; a witness that drives no farther waits throughout
+AT = 0.2  # metres before the goal that count as there
+BEYOND = 10.0  # metres beyond it, more than anyone drives in one step
+GOAL_TURN = 1.0  # rad, largest difference of heading at the goal
 
 
 def reaction_time(scenario: Scenario, vehicle: str, mean: float) -> float:
@@ -166,21 +170,9 @@ class ClosedLoop:
         """
         if road is not None and road.frame_id != scenario.frame_id:
             raise InputError(f"scenario {scenario.index} is in frame {scenario.frame_id!r}, its road in {road.frame_id!r}")
-        self.certified: Certified = certified(scenario, ego)
-        self.road, self.config = road, config
-        known = self.certified
-        self._world = World(
-            config.step,
-            scenario.time,
-            known.motion,
-            known.half,
-            known.spans,
-            known.leaves,
-            known.cells,
-            CELL,
-            known.order,
-            known.ego,
-        )
+        self.scenario, self.road, self.config = scenario, road, config
+        self.world = world_of(scenario, ego, config.step)
+        self.ego = self.world.ego
         reactive = config.policy == REACTIVE
         self.reactions = np.array(
             [reaction_time(scenario, vehicle.id, config.reaction * reactive) for vehicle in scenario.vehicles]
@@ -198,44 +190,24 @@ class ClosedLoop:
             np.round(self.reactions / config.step).astype(np.int64),
         )
         self._slowest = int(self._manner.delay.max())
-        self._sizes = 2.0 * self.certified.half
+        self._sizes = 2.0 * self.world.half
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
-        self._others = np.arange(len(self._ids)) != self.certified.ego
-        self.begin, end = self.certified.spans[self.certified.ego].tolist()
+        self._others = np.arange(len(self._ids)) != self.ego
+        self.begin, end = self.world.spans[self.ego].tolist()
         self.duration = end - self.begin
-        self._waits = bool(self.certified.cells[self.certified.ego, -1, 7] < WAITS)
+        self._waits = bool(self.world.cells[self.ego, -1, 7] < WAITS)
         self.last_step = int(np.ceil((self.duration * config.overtime + 5.0) / config.step))
-
-    @property
-    def scenario(self) -> Scenario:
-        """The certified scenario."""
-        return self.certified.scenario
-
-    @property
-    def ego(self) -> int:
-        """Index of the ego."""
-        return self.certified.ego
 
     def task(self) -> Task:
         """Return what a planner is told beforehand."""
-        motion, ego = self.certified.motion, self.ego
-        way = motion[ego, :, :3]
-        moved = np.hypot(*np.diff(way[:, :2], axis=0).T) > 1e-3
-        route = way[np.concatenate([[True], moved])]
-        return Task(
-            self.scenario.vehicles[ego],
-            motion[ego, 0, :4],
-            motion[ego, -1, :4],
-            route,
-            self.road,
-            self.config.step,
-            self.config,
-        )
+        own = self.world.motion[self.ego]
+        route = own[np.concatenate([[True], edge_lengths(own[:, :2]) > 1e-3]), :3]
+        return Task(self.scenario.vehicles[self.ego], own[0, :4], own[-1, :4], route, self.road, self.config.step, self.config)
 
     def start(self) -> State:
         """Return the first instant: where everyone is when the ego's witness comes onto the scene."""
-        known = self.certified
-        first = int(known.scenario.present[self.ego, 0])
+        known = self.world
+        first = int(self.scenario.present[self.ego, 0])
         vehicles = known.motion[:, first, :4].copy()
         n = len(vehicles)
         here = (known.spans[:, 0] <= self.begin) & ~(known.leaves & (known.spans[:, 1] <= self.begin))
@@ -250,12 +222,11 @@ class ClosedLoop:
         ego, n = moved.state, len(self._ids)
         number = state.step + 1
         time = number * config.step
-        before = np.empty((n, 4))
-        before[:, 0], before[:, 1], before[:, 2], before[:, 3] = state.clock, state.rate, state.acceleration, state.waited
+        before = np.column_stack([state.clock, state.rate, state.acceleration, state.waited])
         seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
         seen[0, :6], seen[1:] = ego, state.seen[: len(seen) - 1]
         after, vehicles, here = np.empty((n, 5)), np.empty((n, 4)), np.empty(n, dtype=np.bool_)
-        advance(self._world, self._manner, self.begin + time, before, seen, after, vehicles, here)
+        advance(self.world, self._manner, self.begin + time, before, seen, after, vehicles, here)
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
         return State(number, time, ego, vehicles, here, clock, rate, acceleration, waited, seen, count, note or moved.fault)
@@ -282,15 +253,11 @@ class ClosedLoop:
 
     def over(self, state: State) -> bool:
         """Whether a drive ends: at the goal, when the ego overlaps another, or after the time given."""
-        if state.step >= self.last_step:
-            return True
-        if self.at_goal(state.time, state.vehicles[self.ego]):
-            return True
-        return self.hit(state)
+        return state.step >= self.last_step or self.at_goal(state) or self.hit(state)
 
     def hit(self, state: State) -> bool:
         """Whether the ego overlaps another at this instant."""
-        return bool(ego_hits(state.vehicles, self.certified.half, state.here, self.ego))
+        return bool(ego_hits(state.vehicles, self.world.half, state.here, self.ego))
 
     def off_road(self, state: State) -> bool:
         """Whether the ego's footprint covers a cell that is not drivable at this instant; False if no road is known."""
@@ -298,11 +265,21 @@ class ClosedLoop:
         pose = state.vehicles[self.ego, None, :3]
         return self.road is not None and not bool(footprint_fits(self.road, pose, length, width)[0])
 
-    def at_goal(self, time: float, pose: Floats) -> bool:
-        """Whether an ego at a pose (3,) of x, y [m], yaw [rad] is at its goal; if the witness waits there, only at the end."""
-        if self._waits and time < self.duration - 1e-9:
-            return False
-        return bool(at_goal(self.certified.motion[self.ego, -1], self.config.goal_width, self._waits, pose))
+    def at_goal(self, state: State) -> bool:
+        """Whether the ego is at its goal at this instant."""
+        return bool(self.reached(np.array([state.time]), state.vehicles[self.ego, None])[0])
+
+    def reached(self, time: Floats, poses: Floats) -> Bools:
+        """Return (T,) whether an ego is at its goal, or has passed it, at times (T,) [s] and poses (T, 3+) x, y [m], yaw [rad].
+
+        If the witness waits there, only at the end.
+        """
+        goal, width = self.world.motion[self.ego, -1], self.config.goal_width
+        ahead, left = ahead_and_left(poses[:, :2] - goal[:2], goal[2])
+        if self._waits:
+            return np.asarray((time >= self.duration - 1e-9) & (np.hypot(ahead, left) <= width))
+        turn = np.abs(wrap_angle(poses[:, 2] - goal[2]))
+        return np.asarray((ahead >= -AT) & (ahead <= BEYOND) & (np.abs(left) <= width) & (turn <= GOAL_TURN))
 
     def record(self, states: list[State]) -> Drive:
         """Return the drive of these instants."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from scenario_gen.closed_loop.ego import Command, EgoState
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.plane import ahead_and_left, angle_between
 
 SLOWEST = 0.5  # m/s below which a yaw rate is taken as that of this speed: a car does not turn on the spot
 CATCH_UP = 0.5  # 1/s, speed per metre that the ego is behind
@@ -32,26 +33,18 @@ class Track:
         """Take times (T,) [s] and poses (T, 3) whose yaw need not be continuous."""
         return cls(time, np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]))
 
-    def at(self, time: float) -> tuple[float, float, float]:
-        """Return the pose at a time [s]; before the first and after the last it stays there."""
-        x, y, yaw = (float(np.interp(time, self.time, column)) for column in self.poses.T)
-        return x, y, yaw
+    def at(self, time: float) -> Floats:
+        """Return the pose (3,) at a time [s]; before the first and after the last it stays there."""
+        return np.array([np.interp(time, self.time, column) for column in self.poses.T])
 
     def command(self, ego: EgoState, now: float, step: float) -> Command:
         """Return what keeps the ego on the track: its speed with what it is behind, and a turn towards where it is to be soon."""
-        x, y, yaw = self.at(now + step)
-        ahead = self.at(now + step + 0.1)
-        c, s = float(np.cos(yaw)), float(np.sin(yaw))
-        pace = (ahead[0] - x) * c * 10.0 + (ahead[1] - y) * s * 10.0
-        behind = (x - ego.x) * c + (y - ego.y) * s - ego.speed * step
-        wanted = max(pace + CATCH_UP * behind, 0.0)
-        tx, ty, tyaw = self.at(now + step + LOOK_AHEAD)
-        c, s = float(np.cos(ego.yaw)), float(np.sin(ego.yaw))
-        dx, dy = (tx - ego.x) * c + (ty - ego.y) * s, (ty - ego.y) * c - (tx - ego.x) * s
-        square = dx * dx + dy * dy
-        if square > 1.0:
-            curvature = 2.0 * dy / square
-        else:  # too near to aim at
-            turn = (tyaw - ego.yaw + np.pi) % (2.0 * np.pi) - np.pi
-            curvature = turn / max(ego.speed * LOOK_AHEAD, 1.0)
-        return Command((wanted - ego.speed) / step, float(curvature))
+        place = np.array(ego[:2])
+        pose, soon, target = (self.at(now + step + later) for later in (0.0, 0.1, LOOK_AHEAD))
+        pace, _ = ahead_and_left(soon[:2] - pose[:2], pose[2])
+        behind, _ = ahead_and_left(pose[:2] - place, pose[2])
+        wanted = max(float(10.0 * pace + CATCH_UP * (behind - ego.speed * step)), 0.0)
+        ahead, left = ahead_and_left(target[:2] - place, ego.yaw)
+        square = ahead * ahead + left * left
+        turn = angle_between(target[2], ego.yaw) / max(ego.speed * LOOK_AHEAD, 1.0)  # where it is too near to aim at
+        return Command((wanted - ego.speed) / step, float(2.0 * left / square if square > 1.0 else turn))

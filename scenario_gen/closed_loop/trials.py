@@ -8,11 +8,11 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-import importlib
 import math
 import multiprocessing
 import os
 from pathlib import Path
+import pkgutil
 import sys
 from typing import Any
 
@@ -26,32 +26,13 @@ from scenario_gen.base.interrupts import end_with_parent, starting
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.closed_loop.bounded import bounded, Decisions, Timed, TooLongError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.origin import Origin, origins, units_of
+from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
 from scenario_gen.method.evaluation import clustered_wilson
 from scenario_gen.types import GenerationResult, Interval, join_ego, Road, Scenario, token
 
 MakePlanner = Callable[[], Planner]
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """One scenario to be driven.
-
-    Attributes:
-        name: for people.
-        scenario: the witness of the ego is in it.
-        ego: index or id of the witness.
-        road: if it is known.
-        encounter: names the recorded encounter that it was made of; "" if that is not known.
-    """
-
-    name: str
-    scenario: Scenario
-    ego: int | str
-    road: Road | None
-    encounter: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,19 +76,16 @@ def find_planner(name: str) -> MakePlanner:
         InputError: there is no such module or class.
     """
     module, colon, attribute = name.partition(":")
-    if not colon or not module or not attribute:
+    if not (colon and module and attribute):
         raise InputError(f"--planner {name}: write it as MODULE:CLASS, e.g. scenario_gen.closed_loop.planners:IdmFollower")
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     try:
-        found: Any = importlib.import_module(module)
-        for part in attribute.split("."):
-            found = getattr(found, part)
+        found: Any = pkgutil.resolve_name(name)
     except ImportError as error:
         raise InputError(f"--planner {name}: {error}; run in the folder of the module, or put it on PYTHONPATH") from error
     except AttributeError as error:
-        known = [one for one in vars(importlib.import_module(module)) if one[:1].isupper()]
-        near = did_you_mean(attribute, known)
+        near = did_you_mean(attribute, [one for one in vars(sys.modules[module]) if one[:1].isupper()])
         raise InputError(f"--planner {name}: {error}; name a class of that module{near}") from error
     except (Exception, SystemExit) as error:  # the module runs
         raise InputError(f"--planner {name}: {type(error).__name__}: {error}") from error
@@ -179,6 +157,11 @@ def _encounter_of(entry: ScenarioEntry | None) -> str:
     return f"{values.get('template', '')} {(entry.template_hash or '')[:8] if entry is not None else ''}".strip()
 
 
+def named_vehicle(ids: Sequence[str], name: str) -> str:
+    """Return the id that is a name, or whose token it is; "" if there is none."""
+    return next((one for one in ids if name in (one, token(one))), "")
+
+
 def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     """Return the id of the vehicle in whose place the ego drives.
 
@@ -187,7 +170,7 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     """
     if scenario.witness is not None:
         own = scenario.witness.vehicles[0].id
-        if asked not in ("", own, token(own)):
+        if asked and not named_vehicle([own], asked):
             raise InputError(f"{where}: it was made for ego {own!r}; leave --ego out, or name that one")
         return own
     ids = [vehicle.id for vehicle in scenario.vehicles]
@@ -196,7 +179,7 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
             f"{where}: it was made for ego {slot!r}, whose witness is not in the bag (it was recorded before 0.6, or without "
             f"`{WITNESS}`): make it again, or name another vehicle with --ego; it has {', '.join(ids)}"
         )
-    wanted = ids[0] if not asked else next((one for one in ids if asked in (one, token(one))), "")
+    wanted = named_vehicle(ids, asked or ids[0])
     if not wanted:
         raise InputError(f"{where}: no vehicle {asked!r} to be the ego; it has {', '.join(ids)}{did_you_mean(asked, ids)}")
     return wanted
@@ -205,12 +188,6 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
 def with_origins(outcomes: Sequence[Outcome], trials: Sequence[Trial]) -> list[Outcome]:
     """Return the outcomes with the whole origin of their scenarios: encounter, digest, and which are copies."""
     return [replace(outcome, origin=origin) for outcome, origin in zip(outcomes, origins_of(trials), strict=True)]
-
-
-def origins_of(trials: Sequence[Trial]) -> list[Origin]:
-    """Return where the scenarios of trials come from."""
-    names, encounters = [trial.name for trial in trials], [trial.encounter for trial in trials]
-    return origins(names, [trial.scenario for trial in trials], [trial.ego for trial in trials], encounters)
 
 
 RunTrials = Callable[[Sequence[Trial]], Iterator["Outcome"]]
@@ -326,6 +303,11 @@ class Rate:
     def __str__(self) -> str:
         low, high = 100.0 * self.share.low, 100.0 * self.share.high
         return f"{self.count} of {self.of} ({100.0 * self.share.value:.1f} %, {low:.1f} to {high:.1f} %)"
+
+    def document(self) -> dict[str, Any]:
+        """Return it as JSON's types."""
+        shares = {"share": self.share.value, "low": self.share.low, "high": self.share.high}
+        return {"count": self.count, "of": self.of, **shares, "encounters": self.encounters}
 
 
 def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:

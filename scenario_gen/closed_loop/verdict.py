@@ -3,7 +3,6 @@
 
 """The verdict on one drive: what went wrong, when and by whose doing, and how close it was."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 import math
 from typing import Any
@@ -11,14 +10,15 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.closed_loop.ego import misplaced
-from scenario_gen.closed_loop.off_road import between, PARTS, RESOLUTION, road_use
+from scenario_gen.closed_loop.off_road import PARTS, poses_in, RESOLUTION, road_use
 from scenario_gen.closed_loop.reasons import Reason, reason_of, Runner, STANDS, state_at
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.method.evaluation import footprint_distance, Motion, time_to_collision
 from scenario_gen.method.validity import collision as apart
 from scenario_gen.method.validity import control_points
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.plane import unit
 from scenario_gen.template import find_conflicts
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
@@ -157,17 +157,17 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     """
     motion, ego = drive.motion, drive.ego
     time, n = motion.time, len(motion.vehicles)
-    config, known = loop.config, loop.certified
+    config, known = loop.config, loop.world
     others = [i for i in range(n) if i != ego]
     contacts = {(i, j): _contact(drive, i, j) for i in range(n) for j in range(i)}
     hits = [(contacts[max(ego, i), min(ego, i)], i) for i in others]
     first, who = min(((at, i) for at, i in hits if at is not None), default=(math.nan, -1))
     goal = _goal_time(loop, drive)
-    pieces = [(Motion(motion.vehicles, config.step, motion.position, motion.heading, motion.speed), i) for i in others]
-    seen = [drive.here[i] for i in others]
-    ttc = [np.where(here, time_to_collision(m, ego, i), np.inf).min() for (m, i), here in zip(pieces, seen, strict=True)]
-    close = [float(np.where(not_behind(drive, i) & drive.here[i], time_to_collision(m, ego, i), np.inf).min()) for m, i in pieces]
-    gap = [np.where(here, footprint_distance(m, ego, i), np.inf).min() for (m, i), here in zip(pieces, seen, strict=True)]
+    driven = Motion(motion.vehicles, config.step, motion.position, motion.heading, motion.speed)
+    to_contact = {i: np.where(drive.here[i], time_to_collision(driven, ego, i), np.inf) for i in others}
+    ttc = [float(each.min()) for each in to_contact.values()]
+    close = [float(np.where(not_behind(drive, i), each, np.inf).min()) for i, each in to_contact.items()]
+    gap = [float(np.where(drive.here[i], footprint_distance(driven, ego, i), np.inf).min()) for i in others]
     braking = np.maximum(-drive.accelerations, 0.0)
     way = known.cells[ego, :, 7]
     reached = float(np.interp(drive.clock[ego, -1], np.arange(len(way)) * 0.1, way))
@@ -183,8 +183,8 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         off_road=road.time,
         goal=goal,
         delay=goal - loop.duration,
-        min_ttc=float(min((config.horizon, *ttc))),
-        min_gap=float(min(gap, default=math.nan)),
+        min_ttc=min((config.horizon, *ttc)),
+        min_gap=min(gap, default=math.nan),
         min_pet=_pet(drive),
         hardest_braking=float(braking.max()),
         hard_braking=round(int(np.count_nonzero(braking[1:] >= config.hard_braking)) * config.step, 9),
@@ -216,57 +216,45 @@ def _contact(drive: Drive, i: int, j: int) -> float | None:
     if len(both) < 2:
         return None
     span = slice(both[0], both[-1] + 1)
-    pair = [i, j]
+    pair, vehicles = [i, j], (motion.vehicles[i], motion.vehicles[j])
     time, position = motion.time[span], motion.position[pair][:, span]
     heading, speed = motion.heading[pair][:, span], motion.speed[pair][:, span]
     control, out = np.empty((2, len(time) - 1, 4, 2)), np.empty((1, 3))
     control_points(time, position, heading, speed, control)
-    half = np.array([motion.vehicles[k].half for k in pair])
+    half = np.array([vehicle.half for vehicle in vehicles])
     apart.first_contacts(time, control, heading, half, 0.0, RESOLUTION, out)
-    return (
-        None if out[0, 0] == apart.PROVEN else _first(drive, pair, float(out[0, 1]), lambda m: footprint_distance(m, 0, 1) <= 0.0)
-    )
-
-
-def _first(drive: Drive, rows: list[int], found: float, wrong: Callable[[Motion], Bools]) -> float:
-    """Time [s] at which something begins to be wrong, to a PART of its step; what the proof gives is any instant of it."""
-    motion, step = drive.motion, float(drive.motion.time[1])
+    if out[0, 0] == apart.PROVEN:
+        return None
+    found, step = (
+        float(out[0, 1]),
+        float(motion.time[1]),
+    )  # any instant of the contact
     k = min(int(found / step + 1e-9), len(motion.time) - 2)
     start = float(motion.time[k])
     u = np.linspace(0.0, max(found - start, 0.0) / step, PARTS + 1)
-    position, heading = between(motion, rows, k, u)
-    vehicles = tuple(motion.vehicles[i] for i in rows)
-    flags = wrong(Motion(vehicles, step / PARTS, position, heading, np.zeros_like(heading)))
-    return start + float(u[np.argmax(flags)]) * step if flags.any() else found
+    poses = poses_in(motion, pair, k, u)
+    fine = Motion(vehicles, step / PARTS, poses[..., :2], poses[..., 2], np.zeros(poses.shape[:2]))
+    touch = footprint_distance(fine, 0, 1) <= 0.0  # from when on, to a PART of the step
+    return start + float(u[np.argmax(touch)]) * step if touch.any() else found
 
 
 def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision:
     """Say how fast and by whom: the speeds of both towards each other, along the line of their centres."""
-    motion = drive.motion
-    state = []
-    for i in (drive.ego, who):
-        x, y, yaw, speed = state_at(drive, i, at)
-        state.append((x, y, speed * float(np.cos(yaw)), speed * float(np.sin(yaw))))
-    (x, y, vx, vy), (ox, oy, wx, wy) = state
-    away = max(float(np.hypot(ox - x, oy - y)), 1e-9)
-    dx, dy = (ox - x) / away, (oy - y) / away
-    mine, its = vx * dx + vy * dy, -(wx * dx + wy * dy)
-    if mine > 2.0 * max(its, 0.0):
-        ran = Runner.EGO
-    elif its > 2.0 * max(mine, 0.0):
-        ran = Runner.OTHER
-    else:
-        ran = Runner.BOTH
-    speed = float(np.hypot(vx - wx, vy - wy))
-    return Collision(at, motion.vehicles[who].id, speed, ran, reason_of(loop, drive, who, at, ran))
+    ego, other = (state_at(drive, i, at) for i in (drive.ego, who))
+    velocity, its_velocity = ego.speed * unit(ego.yaw), other.speed * unit(other.yaw)
+    away = np.subtract(other[:2], ego[:2])
+    towards = away / max(math.hypot(*away), 1e-9)
+    mine, its = float(velocity @ towards), float(-its_velocity @ towards)
+    ran = Runner.EGO if mine > 2.0 * max(its, 0.0) else Runner.OTHER if its > 2.0 * max(mine, 0.0) else Runner.BOTH
+    speed = math.hypot(*(velocity - its_velocity))
+    return Collision(at, drive.motion.vehicles[who].id, speed, ran, reason_of(loop, drive, who, at, ran))
 
 
 def _goal_time(loop: ClosedLoop, drive: Drive) -> float:
     """Time [s] of the first instant at which the ego is at its goal, NaN if it never is."""
     motion, ego = drive.motion, drive.ego
-    poses = np.concatenate([motion.position[ego], motion.heading[ego, :, None]], axis=1)
-    times = zip(motion.time.tolist(), poses, strict=True)
-    return next((time for time, pose in times if loop.at_goal(time, pose)), math.nan)
+    reached = loop.reached(motion.time, np.column_stack([motion.position[ego], motion.heading[ego]]))
+    return float(motion.time[np.argmax(reached)]) if reached.any() else math.nan
 
 
 def _pet(drive: Drive) -> float:

@@ -26,8 +26,9 @@ from scenario_gen.base.errors import InputError, needs, RefusedError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.base.stores import each_fetched, Place
-from scenario_gen.corpus.encounters import encounter_of, rows_at, rows_of, tables_of
-from scenario_gen.corpus.tasks import agreed, arriving, check_out, held, spread, undone, Workers
+from scenario_gen.corpus.encounters import encounter_of, tables_of
+from scenario_gen.corpus.tables import rows_at, rows_of, write_table
+from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import at_period, criticality
@@ -72,7 +73,12 @@ class PartTask:
         """The task in messages."""
         return f"part {self.number} on {self.token}"
 
-    def target(self, what: str, ending: str = ".parquet") -> Place:
+    @property
+    def target(self) -> Place:
+        """The table of cases, which is written last."""
+        return self.file("cases")
+
+    def file(self, what: str, ending: str = ".parquet") -> Place:
         """Return where one of the three goes."""
         return self.out / what / f"road={self.token}" / f"part-{self.number:05}{ending}"
 
@@ -148,12 +154,8 @@ def run_batch(
         "parameters": parameter_texts(request.config),
     }
     with held(out), spread(workers) as go:
-        before = agreed(out, BATCH, document, "batch")
-        other = [key for key in document if before.get(key) != document[key]]
-        if other:
-            raise InputError(f"{out} is a batch of other {', '.join(other)}; name another folder, or remove this one")
-        tasks = undone(parts(rows, roads, out, request), lambda task: task.target("cases"))
-        return summary(out, go(generate_part, tasks))
+        agree(out, BATCH, document, "batch")
+        return summary(out, go(generate_part, undone(parts(rows, roads, out, request))))
 
 
 def parts(rows: Sequence[tuple[Place, int]], roads: Sequence[str], out: Place, request: BatchRequest) -> list[PartTask]:
@@ -178,25 +180,23 @@ def seed_of(seed: int, template: str, road: str) -> int:
 
 
 def generate_part(task: PartTask) -> None:
-    """Generate a part's scenarios and write its bag and its two tables; done if the table of cases is there.
+    """Generate a part's scenarios and write its bag and its two tables.
 
     Raises:
         OSError: the disk is full, or fails.
     """
-    if task.target("cases").exists():
-        return
-    cases, results = [], dict[str, GenerationResult]()
+    cases, scenarios, results = [], [], dict[str, GenerationResult]()
     for k, (row, table) in enumerate(_rows(task.templates)):
         case, result = _generate_case(row, table, f"/case_{k}", task)
         cases.append(case)
         if result is not None and len(result.generated.scenarios):
             results[f"/case_{k}"] = result
-    scenarios = [row for name, result in results.items() for row in _scenario_rows(name, result, cases, task)]
+            scenarios += _scenario_rows(case, result, task)
     if results:
-        with arriving(task.target("bags", "")) as part, BagWriter(part) as bag:
+        with arriving(task.file("bags", "")) as part, BagWriter(part) as bag:
             add_results(bag, results)
-    _write(task.target("scenarios"), scenarios, SCENARIO_COLUMNS)
-    _write(task.target("cases"), cases, CASE_COLUMNS)
+    write_table(task.file("scenarios"), scenarios, SCENARIO_COLUMNS)
+    write_table(task.target, cases, CASE_COLUMNS)
 
 
 def _rows(templates: Sequence[tuple[Place, int]]) -> Iterator[tuple[dict[str, Any], Place]]:
@@ -244,17 +244,14 @@ def _cause(text: str) -> str:
     return " ".join(word for word in text.split() if not any(c.isdigit() for c in word))[:80]
 
 
-def _scenario_rows(
-    namespace: str, result: GenerationResult, cases: Sequence[Mapping[str, Any]], task: PartTask
-) -> list[dict[str, Any]]:
+def _scenario_rows(case: Mapping[str, Any], result: GenerationResult, task: PartTask) -> list[dict[str, Any]]:
     """A row for each scenario of a case."""
-    case = next(case for case in cases if case["namespace"] == namespace)
     rows = []
     for scenario in result.generated.scenarios:
         motion = at_period(scenario, task.request.config.evaluation.period)
         measures = criticality(motion, task.request.config.evaluation.ttc_horizon)
         rows.append({
-            "template": case["template"], "kind": case["kind"], "vehicles": case["vehicles"], "namespace": namespace,
+            "template": case["template"], "kind": case["kind"], "vehicles": case["vehicles"], "namespace": case["namespace"],
             "part": task.number, "index": scenario.index, "seed": scenario.seed,
             "sha256": scenario_bytes(scenario, result.encounter)[1], "seconds": float(scenario.time[-1]),
             "distance": measures.min_distance, "ttc": measures.min_ttc, "pet": measures.pet,
@@ -274,18 +271,6 @@ CASE_COLUMNS = {
 }
 
 
-def _write(target: Place, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
-    """Write a table, whole or not at all; NaN becomes null."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    kinds = {"string": pa.string(), "int64": pa.int64(), "double": pa.float64()}
-    schema = pa.schema([(name, kinds[kind]) for name, kind in columns.items()])
-    clean = [{name: None if row[name] != row[name] else row[name] for name in columns} for row in rows]
-    with arriving(target) as part:
-        parquet.write_table(pa.Table.from_pylist(clean, schema=schema), part, compression="zstd")
-
-
 def summary(out: Place, failed: list[str]) -> Batch:
     """Return the figures of the parts that are done."""
     tables: list[Place] = sorted((out / "cases").rglob("*.parquet"), key=str)
@@ -293,11 +278,6 @@ def summary(out: Place, failed: list[str]) -> Batch:
     refused: Counter[str] = Counter()
     for case in cases:
         refused.update(json.loads(case["refused"]))
-    return Batch(
-        cases=len(cases),
-        scenarios=sum(int(case["published"]) for case in cases),
-        requested=sum(int(case["wanted"]) for case in cases),
-        failures=dict(Counter(case["cause"] for case in cases if not case["published"])),
-        refused=dict(refused),
-        failed=failed,
-    )
+    scenarios, requested = (sum(int(case[name]) for case in cases) for name in ("published", "wanted"))
+    failures = Counter(case["cause"] for case in cases if not case["published"])
+    return Batch(len(cases), scenarios, requested, dict(failures), dict(refused), failed)

@@ -6,7 +6,7 @@
 The messages of those who meet are cleaned and smoothed by `logs`, as a log's are; a log of another format is read whole.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 import json
@@ -17,13 +17,13 @@ import numpy as np
 
 from scenario_gen.bags.recordings.tracks import tracks_bytes, tracks_of
 from scenario_gen.base.documents import parse_json, shown
-from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.base.stores import each_fetched, fetched, Place
+from scenario_gen.base.errors import guarded, InputError
+from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label, part_of, read_found
 from scenario_gen.corpus.kinds import kind_of, Motion
 from scenario_gen.corpus.messages import DEGREE
-from scenario_gen.corpus.tasks import arriving
+from scenario_gen.corpus.tables import write_table
 from scenario_gen.logs import encounters_of, NoEncounterError, Observations, RawLog, read_log, Segment, space_time_gap
 from scenario_gen.logs.tables import EPOCH_NS
 from scenario_gen.template import reactions_of
@@ -35,7 +35,13 @@ ROW = {  # what is read of a row, and of which kinds it is
     "tracks": bytes,
     **dict.fromkeys(("lat", "lon"), float | None),
 }
-ROWS = 100  # encounters that are read at a time: a log may hold thousands
+COLUMNS = {  # of a table
+    **dict.fromkeys(("name", "source", "kind", "kinds", "reactions"), "string"),
+    "vehicles": "string[]",
+    **dict.fromkeys(("count", "start_ns"), "int64"),
+    **dict.fromkeys(("seconds", "gap", "distance", "travel", "lat", "lon"), "double"),
+    "tracks": "binary",
+}
 MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
 
 
@@ -61,19 +67,16 @@ class CleanTask:
 
 @dataclass(frozen=True)
 class LogTask:
-    """A log to read, of any format that `read_log` knows, files that readers look for `beside` it, and the table to write."""
+    """A log to read, of any format that `read_log` knows, and the table to write."""
 
     name: str
     paths: tuple[Place, ...]
     target: Place
     config: CorpusConfig
-    beside: tuple[Place, ...] = ()
 
 
 def clean_found(task: CleanTask) -> None:
     """Write the table of a task: a row for each encounter that is whole after cleaning, and why others are not."""
-    if task.target.exists():
-        return
     from pyarrow import parquet
 
     parts = [part_of(task.corpus, number) for number, _, _ in task.found]
@@ -121,11 +124,9 @@ def read_one_log(task: LogTask) -> None:
     Raises:
         InputError: the log cannot be used; the message names file and row.
     """
-    if task.target.exists():
-        return
     try:
-        with fetched([*task.paths, *task.beside]) as here:
-            result = read_log(here[: len(task.paths)], task.config.log)
+        with fetched(task.paths) as here:
+            result = read_log(here, task.config.log)
     except NoEncounterError as error:  # a result: the log is not read again
         write_encounters(task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []})
         return
@@ -141,7 +142,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         both = np.flatnonzero(encounter.there[i] & encounter.there[j])
         if len(both) < 2:
             continue
-        apart = np.sqrt(np.square(encounter.position[i, both] - encounter.position[j, both]).sum(axis=1))
+        apart = np.linalg.norm(encounter.position[i, both] - encounter.position[j, both], axis=1)
         both = both[apart < config.log.proximity] if (apart < config.log.proximity).sum() > 1 else both
         a, b = (Motion(encounter.position[n, both], encounter.heading[n, both], encounter.speed[n, both]) for n in (i, j))
         gap, _, _ = space_time_gap(a.position, b.position, encounter.dt)
@@ -168,23 +169,8 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
 
 
 def write_encounters(target: Place, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]) -> None:
-    """Write a table of encounters, whole or not at all; the account stands in its metadata."""
-    needs("corpus", "pyarrow")
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    text, number = pa.string(), pa.float64()
-    kinds = {
-        **dict.fromkeys(("name", "source", "kind", "kinds", "reactions"), text),
-        "vehicles": pa.list_(text),
-        **dict.fromkeys(("count", "start_ns"), pa.int64()),
-        **dict.fromkeys(("seconds", "gap", "distance", "travel", "lat", "lon"), number),
-        "tracks": pa.binary(),
-    }
-    table = pa.Table.from_pylist(list(rows), schema=pa.schema(list(kinds.items())))
-    with arriving(target) as part:
-        described = table.replace_schema_metadata({"account": json.dumps(account)})
-        parquet.write_table(described, part, row_group_size=ROWS, compression="zstd")
+    """Write a table of encounters; the account stands in its metadata."""
+    write_table(target, rows, COLUMNS, account=account)
 
 
 def tables_of(corpus: Place) -> list[Place]:
@@ -211,41 +197,6 @@ def account_of(table: Path, name: Place) -> dict[str, Any]:
         text = (parquet.read_schema(table).metadata or {}).get(b"account", b"{}").decode()
     account: dict[str, Any] = parse_json(text, f"{name}: account", {"type": "object"})
     return account
-
-
-def rows_of(tables: Sequence[Place], columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
-    """Yield the rows of tables, in their order.
-
-    Raises:
-        InputError: a table is damaged, or lacks a column.
-    """
-    from pyarrow import parquet
-
-    for path, here in each_fetched(tables):
-        with guarded(f"{path} cannot be read as a table"):
-            rows = parquet.read_table(here, columns=list(columns) if columns else None).to_pylist()
-        if rows and (lacking := set(columns or ()) - rows[0].keys()):
-            raise InputError(f"{path} lacks the columns {', '.join(sorted(lacking))}")
-        yield from rows
-
-
-def rows_at(table: Place, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
-    """Yield rows of a table by their numbers, in ascending order; only their row groups are read.
-
-    Raises:
-        InputError: the table is damaged, or has no such row.
-    """
-    from pyarrow import parquet
-
-    with fetched([table]) as (here,), guarded(f"{table} cannot be read as a table"), parquet.ParquetFile(here) as file:
-        first = 0
-        for k in range(file.num_row_groups):
-            last = first + file.metadata.row_group(k).num_rows
-            wanted = [number - first for number in numbers if first <= number < last]
-            yield from file.read_row_group(k).take(wanted).to_pylist() if wanted else ()
-            first = last
-    if numbers and max(numbers) >= first:
-        raise InputError(f"{table} lacks a row; `mine` writes it anew")
 
 
 def encounter_of(row: Mapping[str, Any], table: object = "an encounter's row") -> Encounter:

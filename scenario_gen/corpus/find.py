@@ -5,6 +5,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -71,10 +72,9 @@ def coverage_lines(hits: Hits, batch: Place) -> list[str]:
     roads = sorted({table.parent.name.partition("=")[2] for table in (batch / "cases").rglob("*.parquet")})
     cells = {(kind, road, pet): count for kind, road, pet, count in hits.coverage}
     lines = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
-    for kind in kinds:
-        for road in roads:
-            counts = ", ".join(f"{pet}: {cells[kind, road, pet]}" for pet in classes if (kind, road, pet) in cells)
-            lines.append(f"  {kind} on {road}: {f'PET {counts}' if counts else 'no scenario'}")
+    for kind, road in product(kinds, roads):
+        counts = ", ".join(f"{pet}: {cells[kind, road, pet]}" for pet in classes if (kind, road, pet) in cells)
+        lines.append(f"  {kind} on {road}: {f'PET {counts}' if counts else 'no scenario'}")
     return lines
 
 

@@ -16,13 +16,19 @@ import numpy as np
 
 from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.tasks import arriving
+from scenario_gen.corpus.tables import write_table
 from scenario_gen.logs import Growth, LogConfig
 from scenario_gen.logs import Meeting as Met
 from scenario_gen.numerics import Ints
 
 START = datetime(2004, 1, 1, tzinfo=UTC)
 PARTITION = 5000  # meetings that one task groups, at least
+COLUMNS = {
+    **dict.fromkeys(("name", "kind"), "string"),
+    "devices": "int64[]",
+    **dict.fromkeys(("start", "end", "earliest"), "int64"),
+    **dict.fromkeys(("gap", "distance", "lat", "lon"), "double"),
+}
 
 
 @dataclass(frozen=True, order=True)
@@ -111,9 +117,6 @@ def group(meetings: Sequence[Meeting], config: LogConfig) -> list[Found]:
 
 def group_partition(task: GroupTask) -> None:
     """Write the table of a partition's encounters, in order of time; `earliest` is the start of the first of its meetings."""
-    if task.target.exists():
-        return
-    import pyarrow as pa
     from pyarrow import parquet
 
     names = ("gap", "start", "a", "b", "end", "kind", "distance", "lat", "lon")
@@ -128,11 +131,7 @@ def group_partition(task: GroupTask) -> None:
         }
         for one in group([Meeting(*(row[name] for name in names)) for table in tables for row in table], task.config.log)
     ]  # fmt: skip
-    whole, number = pa.int64(), pa.float64()
-    kinds = {"name": pa.string(), "devices": pa.list_(whole), "start": whole, "end": whole, "kind": pa.string()}
-    kinds |= {**dict.fromkeys(("gap", "distance", "lat", "lon"), number), "earliest": whole}
-    with arriving(task.target) as part:
-        parquet.write_table(pa.Table.from_pylist(rows, schema=pa.schema(list(kinds.items()))), part, compression="zstd")
+    write_table(task.target, rows, COLUMNS)
 
 
 def read_found(table: Path, first: int, last: int) -> list[Found]:

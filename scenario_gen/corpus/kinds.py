@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.numerics.kernels import F1, F2, kernel, OUTB1
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import ahead_and_left, angle_between, edge_lengths, meeting_shares
 
 KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")
 BESIDE, ALIKE = 2.5, np.radians(30.0)  # m, rad: on the same path
@@ -45,10 +46,6 @@ class Motion:
         """Return a part of the samples."""
         return Motion(self.position[own], self.heading[own], self.speed[own])
 
-    def every(self, step: int) -> "Motion":
-        """Return each `step`-th sample."""
-        return Motion(self.position[::step], self.heading[::step], self.speed[::step])
-
 
 def kind_of(a: Motion, b: Motion, dt: float) -> str:
     """Return the kind of what two vehicles do, by the definitions above; the same for (b, a).
@@ -58,7 +55,7 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
         b: (T,) samples at the same times.
         dt: s between two samples.
     """
-    one, other = (motion.every(max(round(EVERY / dt), 1)) for motion in (a, b))
+    one, other = (motion.part(slice(None, None, max(round(EVERY / dt), 1))) for motion in (a, b))
     path, others = path_of(one), path_of(other)
     quarter = max(len(one.speed) // 4, 1)
     early, late = (
@@ -69,13 +66,10 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
         return "following" if early >= MOSTLY else "merging"
     if max(abs(turned(one)), abs(turned(other))) >= TURNS:
         return "turning"
-    if _intersect(one.position, one.heading, other.position, other.heading):
+    if _intersect(one, other):
         return "crossing"
-    apart = np.hypot(*(one.position - other.position).T)
-    nearest = int(apart.argmin())
-    if abs(float(wrap_angle(one.heading[nearest : nearest + 1] - other.heading[nearest : nearest + 1])[0])) >= AGAINST:
-        return "opposing"
-    return "other"
+    nearest = np.hypot(*(one.position - other.position).T).argmin()
+    return "opposing" if abs(angle_between(one.heading[nearest], other.heading[nearest])) >= AGAINST else "other"
 
 
 def turned(motion: Motion) -> float:
@@ -89,64 +83,28 @@ def unwrapped(heading: Floats) -> Floats:
     return np.unwrap(heading) if (np.abs(heading[1:] - heading[:-1]) > np.pi).any() else heading
 
 
-def path_of(motion: Motion) -> tuple[Floats, Floats]:
-    """Return points (P, 2) [m] of a path, 4 m apart, with a straight at both ends, and its heading (P,) [rad] there."""
-    moved = np.concatenate([[True], np.hypot(*np.diff(motion.position, axis=0).T) > 0.0])
-    places = motion.position[moved]
-    driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
-    at = np.arange(0.0, float(driven[-1]) + STEP, STEP)
-    heading = unwrapped(motion.heading[moved])
-    middle = np.stack([np.interp(at, driven, places[:, 0]), np.interp(at, driven, places[:, 1])], axis=1)
-    facing = np.interp(at, driven, heading)
-    out = np.arange(STEP, BEYOND, STEP)[:, None]
-    before = middle[0] - out[::-1] * np.array([np.cos(float(facing[0])), np.sin(float(facing[0]))])
-    after = middle[-1] + out * np.array([np.cos(float(facing[-1])), np.sin(float(facing[-1]))])
-    ends = np.full(len(out), facing[0]), np.full(len(out), facing[-1])
-    return np.vstack([before, middle, after]), np.concatenate([ends[0], facing, ends[1]])
+def path_of(motion: Motion) -> Floats:
+    """Return poses (P, 3) x, y [m], yaw [rad] of a path, 4 m apart, with a straight at both ends."""
+    moved = np.concatenate([[True], edge_lengths(motion.position) > 0.0])
+    curve = Curve(np.column_stack([motion.position[moved], unwrapped(motion.heading[moved])]))
+    return curve.at(np.arange(STEP - BEYOND, curve.length + BEYOND, STEP))
 
 
-def _on_path(motion: Motion, path: tuple[Floats, Floats]) -> Bools:
+def _on_path(motion: Motion, path: Floats) -> Bools:
     """(T,) whether a vehicle is beside no path but on this one, and drives along it."""
-    found = np.zeros(len(motion.heading), dtype=bool)
-    _mark_on_path(motion.position, motion.heading, *path, found)
-    return found
+    away = motion.position[:, None] - path[:, :2]
+    squares = np.square(away).sum(axis=2)
+    nearest = squares.argmin(axis=1)
+    at = np.arange(len(nearest))
+    _, left = ahead_and_left(away[at, nearest], path[nearest, 2])
+    alike = np.abs(wrap_angle(motion.heading - path[nearest, 2])) < ALIKE
+    return np.asarray((np.abs(left) < BESIDE) & alike & (squares[at, nearest] < (STEP + BESIDE) ** 2))
 
 
-@kernel(inline=True)
-def _wrapped(angle: float) -> float:
-    """As `wrap_angle`."""
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
-
-
-@kernel(F2, F1, F2, F1, OUTB1)
-def _mark_on_path(position: Floats, heading: Floats, points: Floats, facing: Floats, found: Bools) -> None:
-    for k in range(len(position)):
-        nearest, least = 0, np.inf
-        for n in range(len(points)):
-            x, y = position[k, 0] - points[n, 0], position[k, 1] - points[n, 1]
-            if x * x + y * y < least:
-                nearest, least = n, x * x + y * y
-        along = facing[nearest]
-        x, y = position[k, 0] - points[nearest, 0], position[k, 1] - points[nearest, 1]
-        beside = abs(y * np.cos(along) - x * np.sin(along)) < BESIDE
-        reach = STEP + BESIDE
-        found[k] = beside and abs(_wrapped(heading[k] - along)) < ALIKE and least < reach * reach
-
-
-@kernel(F2, F1, F2, F1)
-def _intersect(one: Floats, heading: Floats, other: Floats, others: Floats) -> bool:
-    """Whether the ways driven, (T, 2) with headings (T,) and (S, 2) with (S,), cross each other at 30° to 150°."""
-    for i in range(len(one) - 1):
-        rx, ry = one[i + 1, 0] - one[i, 0], one[i + 1, 1] - one[i, 1]
-        for j in range(len(other) - 1):
-            sx, sy = other[j + 1, 0] - other[j, 0], other[j + 1, 1] - other[j, 1]
-            denominator = rx * sy - ry * sx
-            if abs(denominator) < PARALLEL:
-                continue
-            x, y = other[j, 0] - one[i, 0], other[j, 1] - one[i, 1]
-            t, u = (x * sy - y * sx) / denominator, (x * ry - y * rx) / denominator
-            if min(t, u) >= -MEETS and max(t, u) <= 1.0 + MEETS:
-                angle = abs(_wrapped(heading[i] - others[j]))
-                if ALIKE < angle < AGAINST:
-                    return True
-    return False
+def _intersect(one: Motion, other: Motion) -> bool:
+    """Whether the ways driven cross each other at 30° to 150°."""
+    (p, u), (q, v) = ((motion.position[:-1], np.diff(motion.position, axis=0)) for motion in (one, other))
+    t, s, cross = meeting_shares(p[:, None], u[:, None], q, v)
+    meet = (np.abs(cross) >= PARALLEL) & (np.abs(t - 0.5) <= 0.5 + MEETS) & (np.abs(s - 0.5) <= 0.5 + MEETS)
+    angle = np.abs(wrap_angle(one.heading[:-1, None] - other.heading[:-1]))
+    return bool((meet & (angle > ALIKE) & (angle < AGAINST)).any())

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats.contingency import crosstab
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
@@ -28,9 +29,10 @@ from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.base.provenance import parameter_texts
 from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import agreed, arriving, spread, undone, Workers
+from scenario_gen.corpus.tables import rows_of, write_table
+from scenario_gen.corpus.tasks import agree, arriving, spread, undone, Workers
 from scenario_gen.logs import space_time_gap
 from scenario_gen.method.segmentation import (
     assign,
@@ -77,7 +79,6 @@ class Built:
     r_hat: float
     agreement: float
     seeds: float
-    growth: tuple[tuple[int, int], ...]
     limit: int
     failed: tuple[str, ...]
 
@@ -87,7 +88,6 @@ class Built:
             f"{self.primitives} primitives, fitted to {self.fitted} pairs; {self.segments} segments in all {self.assigned} pairs",
             f"convergence: split R̂ at most {self.r_hat:.3f}; two seeds agree to {self.seeds:.2f} (adjusted Rand)",
             f"pairs assigned agree with the fit to {self.agreement:.2f} (adjusted Rand)",
-            "primitives by pairs fitted: " + ", ".join(f"{found} of {count}" for count, found in self.growth),
         ]
         if self.r_hat > USUAL_R_HAT:
             lines.append("R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps")
@@ -152,21 +152,20 @@ def build(
     library, assignments = build_library(sample, config, seed)
     labels = _labels(assignments, sample)
     again = _labels(build_library(sample, config, seed + 1)[1], sample)
-    smaller = [len(sample) // part for part in (8, 4, 2) if len(sample) >= 4 * part]
-    growth = [(count, len(build_library(sample[:count], config, seed)[0].means)) for count in smaller]
     request = {"most": most, "seed": seed, "parameters": parameter_texts(config)}
     request["corpus"] = [sha256_of(here) for _, here in each_fetched(tables)]
     with _replaced(corpus / "library", request) as folder, spread(workers) as go:
         with arriving(folder / NAME) as part:
             library.save(part)
         tasks = [AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config) for table in tables]
-        failed = go(assign_table, undone(tasks, lambda task: task.target))
+        failed = go(assign_table, undone(tasks))
         if isinstance(folder, Path):
             sweep_tree(folder)  # what killed workers left
         segments: list[Place] = sorted((folder / SEGMENTS).glob("*.parquet"), key=str)
         rows = list(rows_of(segments))
         assigned = {row["pair"]: row for row in rows}
-        fresh = np.concatenate([_labels_again(assigned[pair.name], pair) for pair in sample])
+        own = [(assigned[pair.name], pair) for pair in sample]
+        fresh = np.concatenate([labels_of(row["changepoints"], row["primitives"], pair) for row, pair in own])
         built = Built(
             primitives=len(library.means),
             fitted=len(sample),
@@ -175,7 +174,6 @@ def build(
             r_hat=max(one.segmentation.r_hat for one in assignments),
             agreement=adjusted_rand(labels, fresh),
             seeds=adjusted_rand(labels, again),
-            growth=(*growth, (len(sample), len(library.means))),
             limit=config.sampler.states,
             failed=tuple(failed),
         )
@@ -197,14 +195,11 @@ def _replaced(folder: Place, request: Mapping[str, Any]) -> Iterator[Place]:
         with replaced_folder(folder, LIBRARY) as own:
             yield own
         return
-    before = agreed(folder, REQUEST, request, "library")
-    other = [key for key in request if before.get(key) != request[key]]
-    if other:
-        raise InputError(f"{folder} is a library of other {', '.join(other)}; remove it first")
+    agree(folder, REQUEST, request, "library")
     yield folder
 
 
-def labels_of(points: Ints, primitives: Ints, pair: Encounter) -> Ints:
+def labels_of(points: Sequence[int] | Ints, primitives: Sequence[int] | Ints, pair: Encounter) -> Ints:
     """(T,) primitive of each sample, from the changepoints (K,) and the primitive (K + 1,) of each segment."""
     edges = np.array([0, *points, len(pair.time)])
     return np.repeat(np.asarray(primitives, dtype=np.int64), np.diff(edges))
@@ -218,17 +213,8 @@ def _labels(assignments: Sequence[Assignment], pairs: Sequence[Encounter]) -> In
     ])  # fmt: skip
 
 
-def _labels_again(row: Mapping[str, Any], pair: Encounter) -> Ints:
-    return labels_of(np.array(row["changepoints"], dtype=np.int64), np.array(row["primitives"]), pair)
-
-
 def assign_table(task: AssignTask) -> None:
     """Write, for each pair of a table's encounters, its changepoints and the primitive of each segment."""
-    if task.target.exists():
-        return
-    import pyarrow as pa
-    from pyarrow import parquet
-
     with fetched([task.library]) as (here,):
         library = PrimitiveLibrary.load(here)
     rows = []
@@ -240,17 +226,13 @@ def assign_table(task: AssignTask) -> None:
                 "reactions": json.dumps(reactions_of(pair).document([vehicle.id for vehicle in pair.vehicles])),
                 "changepoints": found.segmentation.changepoints.tolist(), "primitives": found.primitives.tolist(),
             })  # fmt: skip
-    ints = pa.list_(pa.int64())
-    kinds: dict[str, Any] = {**dict.fromkeys(("encounter", "kind", "pair", "reactions"), pa.string()), "seconds": pa.float64()}
-    schema = pa.schema([*kinds.items(), ("changepoints", ints), ("primitives", ints)])
-    with arriving(task.target) as part:
-        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), part, compression="zstd")
+    texts, ints = dict.fromkeys(("encounter", "kind", "pair", "reactions"), "string"), "int64[]"
+    write_table(task.target, rows, {**texts, "seconds": "double", "changepoints": ints, "primitives": ints})
 
 
 def adjusted_rand(one: Ints, other: Ints) -> float:
     """Return how far two labellings (T,) agree: 1 the same, 0 as by chance (Hubert & Arabie 1985)."""
-    table = np.zeros((int(one.max()) + 1, int(other.max()) + 1), dtype=np.int64)
-    np.add.at(table, (one, other), 1)
+    table = crosstab(one, other).count
 
     def choices(counts: Ints) -> float:
         return float((counts * (counts - 1) // 2).sum())
@@ -264,37 +246,34 @@ def _write_page(
     path: Path, library: PrimitiveLibrary, rows: Sequence[Mapping[str, Any]], pairs: Mapping[str, Encounter], built: Built
 ) -> None:
     """Write the page of primitives: how frequent, how long, what follows, and examples."""
-    seconds: Counter[int] = Counter()
-    segments: Counter[int] = Counter()
+    segments: dict[int, list[tuple[str, str, int, int]]] = {}  # pair, kind, begin and end of each, by primitive
     follows: Counter[tuple[int, int]] = Counter()
-    kinds: dict[int, Counter[str]] = {}
-    reactions: dict[int, Counter[str]] = {}
-    examples: dict[int, list[tuple[str, tuple[int, int]]]] = {}
     for row in rows:
-        pair = pairs[row["pair"]]
-        found = reactions_of(pair).edges
-        answers = {f"the {('first', 'second')[edge.who]} {VERBS[edge.kind]}" for edge in found} or {"nobody reacts"}
-        edges = [0, *row["changepoints"], len(pair.time)]
-        for primitive, (begin, end) in zip(row["primitives"], pairwise(edges), strict=True):
-            seconds[primitive] += end - begin
-            segments[primitive] += 1
-            kinds.setdefault(primitive, Counter())[row["kind"]] += 1
-            reactions.setdefault(primitive, Counter()).update(answers)
-            if len(examples.setdefault(primitive, [])) < EXAMPLES:
-                examples[primitive].append((row["pair"], (begin, end)))
+        edges = pairwise([0, *row["changepoints"], len(pairs[row["pair"]].time)])
+        for primitive, (begin, end) in zip(row["primitives"], edges, strict=True):
+            segments.setdefault(primitive, []).append((row["pair"], row["kind"], begin, end))
         follows.update(pairwise(row["primitives"]))
     dt = next(iter(pairs.values())).dt
-    total = sum(int(n) for n in seconds.values())
+    total = sum(end - begin for own in segments.values() for _, _, begin, end in own)
     cards = []
-    for k, count in segments.most_common():
+    for k, own in sorted(segments.items(), key=lambda item: -len(item[1])):
+        lasts = sum(end - begin for _, _, begin, end in own)
+        kinds = Counter(kind for _, kind, _, _ in own).most_common(4)
+        answers = Counter(answer for name, *_ in own for answer in _answers(pairs[name])).most_common()
         after = sorted(((n, to) for (start, to), n in follows.items() if start == k), reverse=True)[:3]
         lines = [
-            f"{count} segments, {100.0 * seconds[k] / total:.1f} % of the time, {seconds[k] * dt / count:.1f} s each",
-            "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds[k].most_common(4)),
-            "; ".join(f"{message} in {n} of them" for message, n in reactions[k].most_common()),
+            f"{len(own)} segments, {100.0 * lasts / total:.1f} % of the time, {lasts * dt / len(own):.1f} s each",
+            "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds),
+            "; ".join(f"{message} in {n} of them" for message, n in answers),
             "followed by " + (", ".join(f"{to} ({n} ×)" for n, to in after) or "nothing"),
-            *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, (begin, end) in examples[k]),
+            *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, _, begin, end in own[:EXAMPLES]),
         ]
-        pictures = [sketch(pairs[name], span) for name, span in examples[k]]
+        pictures = [sketch(pairs[name], (begin, end)) for name, _, begin, end in own[:EXAMPLES]]
         cards.append({"title": f"{k}: {library.descriptions[k]}", "lines": lines, "pictures": pictures})
     write_page(path, "Primitives of pairs of vehicles", built.lines()[0], cards, built.lines()[1:])
+
+
+def _answers(pair: Encounter) -> set[str]:
+    """Return who reacts in a pair, and how."""
+    edges = reactions_of(pair).edges
+    return {f"the {('first', 'second')[edge.who]} {VERBS[edge.kind]}" for edge in edges} or {"nobody reacts"}

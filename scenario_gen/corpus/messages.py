@@ -23,10 +23,7 @@ from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs.tables import COLUMNS
 
 HOUR = 3_600_000_000  # µs
-CLOCK = 1500  # ms by which the two clocks of a message may differ
 MOST_WRONG = 0.5  # of a file's rows whose clocks differ: beyond, the second clock is something else and is not used
-UNKNOWN_SECOND = 65_535  # DSecond of a sender that does not know
-LAST_STAMP = 40 * 365 * 24 * HOUR  # from 2004 on
 SMALLER = "see the parameters memory, task_rows and range_size"
 NAMED_DAY = re.compile(r"_(4\d{4})(?:_|\.)")
 DAY_OF_2004 = 37_987  # 2004-01-01 as the names of the files count days
@@ -35,20 +32,17 @@ TYPES = {
     **dict.fromkeys(("Latitude", "Longitude"), "DOUBLE"),
     **dict.fromkeys(("Speed", "Heading"), "FLOAT"),
 }
-CAUSES = {  # in this order; each row is counted under the first that holds
-    "left out: no vehicle": "TxDevice IS NULL",
-    "left out: no stamp, or one outside of 2004 to 2044": f"Gentime IS NULL OR Gentime <= 0 OR Gentime > {LAST_STAMP}",
-    "left out: no position, or (0, 0)": "Latitude IS NULL OR Longitude IS NULL OR (Latitude = 0 AND Longitude = 0)",
-    "left out: position off the globe": "abs(Latitude) > 85 OR abs(Longitude) > 180 OR isnan(Latitude) OR isnan(Longitude)",
-    "left out: no speed or heading": "Speed IS NULL OR Heading IS NULL OR isnan(Speed) OR isnan(Heading)",
-    "left out: no vehicle's speed": "Speed < 0 OR Speed > 100",
-}
-OFF = len(CAUSES) + 1
-DISAGREE = (
-    f"DSecond <> {UNKNOWN_SECOND} AND "
-    f"abs(Gentime * 1e-3 - DSecond - 60000.0 * round((Gentime * 1e-3 - DSecond) / 60000.0)) > {CLOCK}"
+CAUSES = (  # in the order of messages.sql; each row is counted under the first that holds
+    "left out: no vehicle",
+    "left out: no stamp, or one outside of 2004 to 2044",
+    "left out: no position, or (0, 0)",
+    "left out: position off the globe",
+    "left out: no speed or heading",
+    "left out: no vehicle's speed",
+    "left out: its clocks disagree (Gentime, DSecond)",
 )
-IN_ORDER = f"TRY_CAST(t // {HOUR} AS INTEGER), TRY_CAST(device AS INTEGER), TRY_CAST(t % {HOUR} AS UINTEGER)"  # short
+OFF = len(CAUSES)
+ROWS = Path(__file__).with_suffix(".sql").read_text(encoding="utf-8")
 GROUP = 122_880  # rows of a group in a table
 PACKED: dict[str, Any] = {  # how tables of messages are written: differences between rows, of one vehicle and in order of time
     "compression": "zstd",
@@ -59,7 +53,6 @@ PACKED: dict[str, Any] = {  # how tables of messages are written: differences be
 DEGREE = 1e7  # units of latitude and longitude in tables: a ten-millionth of a degree, as messages have them (SAE J2735); 1 cm
 LONGEST_LINE = 65_536  # bytes; a longer one is no row
 MOST_FILES = 65_536  # of a task: their numbers have two bytes
-CLOCKS = "left out: its clocks disagree (Gentime, DSecond)"
 
 
 @dataclass(frozen=True)
@@ -114,8 +107,6 @@ def parse_range(task: RangeTask) -> None:
     Raises:
         InputError: the database fails (no memory, a full disk).
     """
-    if task.target.exists():
-        return
     folder = workplace(task.target.parent.parent)
     folder.mkdir(parents=True, exist_ok=True)
     files = ", ".join(str(path) for path, _, _ in task.pieces)
@@ -165,86 +156,53 @@ def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
 
 
 def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
-    """Parse files (read name -> true name) into one table in order of hours, in each of vehicles and time; return the account.
-
-    The table has device, t, lat, lon [1e-7°], speed, heading, `cause` (0: the row is kept), `file` (which of `names`) and `back`
-    (a stamp before that of the row above, of the same vehicle).
-    """
-    files = [name for name in names if Path(name).stat().st_size]
-    columns = ", ".join(f"'{name}': '{TYPES.get(name, 'VARCHAR')}'" for name in COLUMNS)
-    cause = " ".join(f"WHEN {condition} THEN {k}" for k, condition in enumerate(CAUSES.values(), start=1))
-    one = len(files) == 1
-    if len(files) > 1:
-        base.execute(f"CREATE TYPE read AS ENUM ({quoted(files)})")  # found by hash: a list is searched for each row
-    file = "0" if one else "enum_code(filename::read)"
-    source = (
-        f"read_csv([{quoted(files)}], columns={{{columns}}}, header=false, auto_detect=false, delim=',', quote='', "
-        f"escape='', store_rejects=true, filename={'false' if one else 'true'}, max_line_size={LONGEST_LINE})"
-    )
-    if not files:
-        source = "(SELECT " + ", ".join(f"NULL::{TYPES[name]} AS {name}" for name in TYPES) + ", '' AS filename LIMIT 0)"
-        file = "0"
-    select = (
-        f"SELECT TxDevice AS device, Gentime AS t, TRY_CAST(round(Latitude * {DEGREE}) AS INTEGER) AS lat, "
-        f"TRY_CAST(round(Longitude * {DEGREE}) AS INTEGER) AS lon, Speed AS speed, Heading AS heading, "
-        f"(CASE {cause} WHEN {DISAGREE} THEN {OFF} ELSE 0 END)::UTINYINT AS cause, ({file})::USMALLINT AS file, "
-        "coalesce(TxDevice = lag(TxDevice) OVER () AND Gentime < lag(Gentime) OVER (), false) AS back "
-        f"FROM {source} ORDER BY {IN_ORDER}"
-    )
-    write_messages(base.sql(select).to_arrow_reader(GROUP), target)
-    parsed = f"read_parquet({quoted([str(target)])})"
-    counts = base.execute(
-        f"SELECT file, cause, count(*), count(*) FILTER (back AND cause = 0) FROM {parsed} GROUP BY ALL"
-    ).fetchall()
-    notes = _unchecked(base, parsed, target, files, names, counts)
-    if notes:
-        counts = base.execute(
-            f"SELECT file, cause, count(*), count(*) FILTER (back AND cause = 0) FROM {parsed} GROUP BY ALL"
-        ).fetchall()
-    account: dict[str, Counter[str]] = {name: Counter() for name in names.values()}
-    causes = ["", *CAUSES, CLOCKS]
-    for number, why, count, back in counts:
-        found = account[names[files[number]]]
+    """Parse files (read name -> true name) into one table, as messages.sql says; return the account."""
+    files, true = list(names), list(names.values())
+    columns = {name: TYPES.get(name, "VARCHAR") for name in COLUMNS}
+    for name, value in (("files", files), ("columns", columns), ("line", LONGEST_LINE), ("parsed", str(target))):
+        base.execute(f"SET VARIABLE {name} = ?", [value])
+    base.execute("CREATE TYPE read AS ENUM (SELECT unnest(getvariable('files')))")
+    write_messages(base.sql(ROWS).to_arrow_reader(GROUP), target)
+    base.execute("CREATE VIEW parsed AS FROM read_parquet(getvariable('parsed'))")
+    unchecked = _unchecked(base, target)
+    account: dict[str, Counter[str]] = {name: Counter() for name in true}
+    counts = "SELECT file, cause, count(*), count(*) FILTER (back AND cause = 0) FROM parsed GROUP BY ALL"
+    for file, cause, count, back in base.execute(counts).fetchall():
+        found = account[true[file]]
         found["rows"] += count
         found["said: stamps that run backwards"] += back
-        if why:
-            found[causes[why]] += count
-    for name, count in _rejected(base) if files else ():
+        if cause:
+            found[CAUSES[cause - 1]] += count
+    rejected = (  # those with several faults count once
+        "SELECT file_path, count(DISTINCT line) FROM reject_errors JOIN reject_scans USING (scan_id, file_id) GROUP BY ALL"
+    )
+    for name, count in base.execute(rejected).fetchall():
         account[names[name]]["rows"] += count
         account[names[name]]["left out: no row of 19 fields with numbers"] += count
-    days = f"SELECT file, t // {24 * HOUR}, count(*) FROM {parsed} WHERE cause = 0 GROUP BY ALL"
-    for number, day, count in base.execute(days).fetchall():
-        true = names[files[number]]
-        named = NAMED_DAY.search(Path(true).name)
+    days = f"SELECT file, t // {24 * HOUR}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL"
+    for file, day, count in base.execute(days).fetchall():
+        named = NAMED_DAY.search(Path(true[file]).name)
         if named and abs(day - (int(named[1]) - DAY_OF_2004)) > 1:
-            account[true]["said: stamps of another day"] += count
-    hours = base.execute(f"SELECT t // {HOUR}, count(*) FROM {parsed} WHERE cause = 0 GROUP BY ALL ORDER BY ALL").fetchall()
+            account[true[file]]["said: stamps of another day"] += count
+    hours = base.execute(f"SELECT t // {HOUR}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL ORDER BY ALL").fetchall()
     return {
         "files": {name: {why: n for why, n in sorted(found.items()) if n} for name, found in sorted(account.items())},
         "hours": {str(hour): rows for hour, rows in hours},
-        "notes": notes,
+        "notes": [f"{true[file]}: DSecond disagrees with Gentime in most rows, and is not asked" for file in unchecked],
     }
 
 
-def _unchecked(
-    base: Any, parsed: str, target: Path, files: list[str], names: dict[str, str], counts: list[tuple[int, int, int, int]]
-) -> list[str]:
-    """Keep the rows after all of files in most of which the two clocks disagree; say which."""
-    good, off = Counter[int](), Counter[int]()
-    for number, why, count, _ in counts:
-        good[number] += count * (why == 0)
-        off[number] += count * (why == OFF)
-    most = [number for number in sorted(off) if off[number] > MOST_WRONG * (good[number] + off[number])]
-    if most:
-        again = target.with_name("again.parquet")
-        listed = ", ".join(map(str, most))
-        select = (
-            f"SELECT * REPLACE ((CASE WHEN cause = {OFF} AND file IN ({listed}) THEN 0 ELSE cause END)::UTINYINT AS cause) "
-            f"FROM {parsed}"
-        )
-        write_messages(base.sql(select).to_arrow_reader(GROUP), again)
+def _unchecked(base: Any, target: Path) -> list[int]:
+    """Keep the rows after all of files in most of which the two clocks disagree; return which."""
+    off = f"count(*) FILTER (cause = {OFF})"
+    most = f"SELECT file FROM parsed WHERE cause IN (0, {OFF}) GROUP BY file HAVING {off} > {MOST_WRONG} * count(*) ORDER BY file"
+    files = [file for (file,) in base.execute(most).fetchall()]
+    if files:
+        again, listed = target.with_name("again.parquet"), ", ".join(map(str, files))
+        kept = f"(CASE WHEN cause = {OFF} AND file IN ({listed}) THEN 0 ELSE cause END)::UTINYINT AS cause"
+        write_messages(base.sql(f"SELECT * REPLACE ({kept}) FROM parsed").to_arrow_reader(GROUP), again)
         again.replace(target)
-    return [f"{names[files[number]]}: DSecond disagrees with Gentime in most rows, and is not asked" for number in most]
+    return files
 
 
 def write_messages(batches: Any, target: Path) -> None:
@@ -259,14 +217,6 @@ def write_messages(batches: Any, target: Path) -> None:
     with parquet.ParquetWriter(target, batches.schema, **PACKED) as writer:
         for batch in batches:
             writer.write_batch(batch)
-
-
-def _rejected(base: Any) -> list[tuple[str, int]]:
-    """Rows of each file that are no rows; one with several faults counts once."""
-    found: list[tuple[str, int]] = base.execute(
-        "SELECT file_path, count(DISTINCT line) FROM reject_errors JOIN reject_scans USING (scan_id, file_id) GROUP BY ALL"
-    ).fetchall()
-    return found
 
 
 def quoted(names: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ A file that is there is done, so a run that was killed goes on where it was.
 
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, chain
 import json
@@ -36,16 +36,14 @@ from scenario_gen.corpus.encounters import (
     encounter_of,
     LogTask,
     read_one_log,
-    rows_at,
-    rows_of,
     tables_of,
 )
 from scenario_gen.corpus.grouping import group_partition, GroupTask, partitions
-from scenario_gen.corpus.kinds import KINDS
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import agreed, arriving, check_out, held, spread, undone, Workers
+from scenario_gen.corpus.tables import rows_at, rows_of
+from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.logs import is_bag, is_commonroad, is_nocturne, is_spmd, is_table
 from scenario_gen.numerics import Ints
 from scenario_gen.template import reactions_of
@@ -62,7 +60,7 @@ ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
 }
 LOOSE_BAGS = (".mcap", ".db3", ".bag")  # endings of files that are bags without a folder
 HEAD = 16_384  # bytes of an object by which its format is recognised
-MOST_DRAWN = 120  # encounters on the page
+MOST_DRAWN = 20  # encounters of a kind on the page
 MOST_SHOWN = 20  # failures and files that are named; the corpus holds all
 
 
@@ -130,10 +128,10 @@ def mine(
             LogTask(paths[0].stem, tuple(paths), out / "encounters" / f"log-{k:05}.parquet", config)
             for k, paths in enumerate(logs)
         ]
-        failed = go(read_one_log, undone(log_tasks, _target))
+        failed = go(read_one_log, undone(log_tasks))
         if messages:
             ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
-            lost = go(parse_range, undone(ranged, _target))
+            lost = go(parse_range, undone(ranged))
             lost = lost or go(search_hours, hour_tasks(ranged, out, config))  # of all ranges, for an hour is done only once
             lost = lost or go(group_partition, group_tasks(out, config))
             failed += lost or go(clean_found, clean_tasks(out, config))
@@ -144,11 +142,6 @@ def mine(
         return result
 
 
-def _target(task: LogTask | RangeTask | GroupTask | CleanTask) -> Place:
-    """The file that a task writes."""
-    return task.target
-
-
 @dataclass(frozen=True)
 class _Encounters:
     """What the tables of encounters hold.
@@ -156,7 +149,7 @@ class _Encounters:
     Attributes:
         accounts: of each table.
         kinds: encounters of each kind.
-        drawn: rows for the page: all of a small corpus, of a large one the first ones of each kind.
+        drawn: rows for the page, the first ones of each kind.
     """
 
     accounts: list[dict[str, Any]]
@@ -170,19 +163,15 @@ def _encounters(out: Place) -> _Encounters:
     Raises:
         InputError: a table is damaged.
     """
-    tables: list[Place] = sorted((out / "encounters").glob("*.parquet"), key=str)
-    accounts, kinds = [], Counter[str]()
-    drawn: list[tuple[bool, dict[str, Any]]] = []  # whether it is among the first of its kind
-    for path, here in each_fetched(tables):
-        accounts.append(account_of(here, path))
-        wanted: dict[int, bool] = {}
+    found = _Encounters([], Counter(), [])
+    for path, here in each_fetched(sorted((out / "encounters").glob("*.parquet"), key=str)):
+        found.accounts.append(account_of(here, path))
+        wanted = []
         for k, row in enumerate(rows_of([here], ["kind"])):
-            early = kinds[row["kind"]] < MOST_DRAWN // len(KINDS)
-            if early or kinds.total() < MOST_DRAWN:
-                wanted[k] = early
-            kinds[row["kind"]] += 1
-        drawn += zip(wanted.values(), rows_at(here, list(wanted)), strict=True)
-    return _Encounters(accounts, kinds, [row for early, row in drawn if early or kinds.total() <= MOST_DRAWN])
+            wanted += [k] if found.kinds[row["kind"]] < MOST_DRAWN else []
+            found.kinds[row["kind"]] += 1
+        found.drawn.extend(rows_at(here, wanted))
+    return found
 
 
 def _write_gallery(path: Path, tables: _Encounters, made: Mined) -> None:
@@ -277,18 +266,6 @@ def _parted(paths: Iterable[Path], chosen: Callable[[Path], bool]) -> tuple[list
     return parts
 
 
-def resolved(paths: Iterable[Place]) -> Iterator[str]:
-    """Yield absolute names without links, and URLs; folders are resolved once, for there may be 100,000 files."""
-    folders: dict[Path, Path] = {}
-    for path in paths:
-        if isinstance(path, Remote):
-            yield path.url
-            continue
-        if path.parent not in folders:
-            folders[path.parent] = path.parent.resolve()
-        yield str(path.resolve() if path.is_symlink() else folders[path.parent] / path.name)
-
-
 def _agree(out: Place, messages: Sequence[Place], logs: Sequence[Sequence[Place]], config: CorpusConfig) -> None:
     """Write down what the corpus is of; or see that it is of the same.
 
@@ -296,17 +273,14 @@ def _agree(out: Place, messages: Sequence[Place], logs: Sequence[Sequence[Place]
         InputError: it is of something else.
     """
     files = [*messages, *chain.from_iterable(logs)]
+    names = [path.url if isinstance(path, Remote) else str(path.resolve()) for path in files]
     sizes = [0 if isinstance(path, Path) and path.is_dir() else max(size_of(path), 0) for path in files]
     document = {
         "format": 3,  # of the tables
-        "files": [[name, size] for name, size in zip(resolved(files), sizes, strict=True)],
+        "files": [[name, size] for name, size in zip(names, sizes, strict=True)],
         "parameters": {name: value for name, (_, value) in flatten(config).items() if name not in ("memory", "task_rows")},
     }
-    before = agreed(out, ARCHIVE, document, "corpus")
-    kinds = {"files": "archive, whose files were other ones", "parameters": "set of parameters", "format": "version"}
-    for key, what in kinds.items():
-        if before.get(key) != document[key]:
-            raise InputError(f"{out} is a corpus of another {what}; name another folder, or remove this one")
+    agree(out, ARCHIVE, document, "corpus")
 
 
 def hour_tasks(ranged: Sequence[RangeTask], out: Place, config: CorpusConfig) -> list[HourTask]:
@@ -351,7 +325,7 @@ def group_tasks(out: Place, config: CorpusConfig) -> list[GroupTask]:
         GroupTask(f"partition {k}", out, k, _between(hours, begin // HOUR, (last - 1) // HOUR), begin, last, config)
         for k, (begin, last) in enumerate(partitions(start, end))
     ]
-    return undone(tasks, _target)
+    return undone(tasks)
 
 
 def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
@@ -369,7 +343,7 @@ def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
         near = _between(hours, int(min(earliest[k:last])) // HOUR - 1, int(max(end[k:last])) // HOUR)
         number = k // config.task_encounters
         tasks.append(CleanTask(f"encounters from {k}", out, number, tuple(one for one in own if one[1] < one[2]), near, config))
-    return undone(tasks, _target)
+    return undone(tasks)
 
 
 def _hours(out: Place) -> list[int]:

@@ -7,12 +7,11 @@ A task writes to a temporary name, syncs and renames, so a file that is there is
 distribution, nothing else: it holds no state that a killed run would lose.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import count, islice
 import json
 import logging
 import multiprocessing
@@ -20,9 +19,8 @@ import os
 from pathlib import Path
 import shutil
 import tempfile
-import time
 import traceback
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 from uuid import uuid4
 
 from scenario_gen.base.documents import read_json
@@ -33,16 +31,23 @@ from scenario_gen.base.interrupts import ending, starting
 from scenario_gen.base.stores import create, fetched, Place, Remote, upload
 from scenario_gen.base.stores import temporary as scratch_folder
 
+
+class _Task(Protocol):
+    """What writes one file."""
+
+    @property
+    def target(self) -> Place:
+        """The file."""
+
+
 Task = TypeVar("Task")
-Progress = Callable[[int, int, str], None]
-"""Told how many tasks are done, of how many, and how much time is left, in words."""
+Target = TypeVar("Target", bound=_Task)
+Progress = Callable[[int, int], None]
+"""Called with how many tasks are done, of how many."""
 WORKERS = {  # their environment: one thread each; Dask's own has them return every freed array to the system, a fifth of all CPU
     **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
     "DASK_LOGGING__DISTRIBUTED": "critical",
 }
-
-
-WAVE = 4  # tasks for each worker that the scheduler holds at a time
 
 
 @contextmanager
@@ -80,15 +85,10 @@ def check_out(out: Place, read: Sequence[Place]) -> None:
     """
     if isinstance(out, Path) and out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file; name a folder")
-    for source in read:
-        if _lies_in(out, source):
+    own, *others = (f"{place.resolve() if isinstance(place, Path) else place}/" for place in (out, *read))
+    for source, other in zip(read, others, strict=True):
+        if own.startswith(other):
             raise InputError(f"{out} lies in {source}, of which it would become a part; name a folder outside of it")
-
-
-def _lies_in(out: Place, source: Place) -> bool:
-    if isinstance(out, Path) and isinstance(source, Path):
-        return out.resolve().is_relative_to(source.resolve())
-    return f"{out}/".startswith(f"{source}/")
 
 
 @contextmanager
@@ -109,8 +109,8 @@ def held(out: Place) -> Iterator[None]:
         sweep_tree(out)
 
 
-def agreed(out: Place, name: str, document: Mapping[str, Any], kind: str) -> Mapping[str, Any]:
-    """Write down what results are of, or return what was written there before.
+def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> None:
+    """Write down what results are of, or see that what was written there before is the same.
 
     Args:
         out: folder of the results.
@@ -123,27 +123,24 @@ def agreed(out: Place, name: str, document: Mapping[str, Any], kind: str) -> Map
     """
     place, text = out / name, json.dumps(document, indent=1) + "\n"
     if not place.exists():
-        if _holds_anything(out):
+        if out.exists() if isinstance(out, Remote) else any(not path.name.startswith(".") for path in out.iterdir()):
             raise InputError(f"{out} is not empty and no {kind}; name another folder")
         if isinstance(place, Path):
             with arriving(place) as part:
                 write_text(part, text)
-            return document
+            return
         if create(place, text.encode()):
-            return document
+            return
     with fetched([place]) as (here,):
-        found: dict[str, Any] = read_json(here, {"type": "object"})
-    return found
+        before = read_json(here, {"type": "object"})
+    if other := [key for key in document if before.get(key) != document[key]]:
+        raise InputError(f"{out} is a {kind} of other {', '.join(other)}; name another folder, or remove this one")
 
 
-def _holds_anything(out: Place) -> bool:
-    return out.exists() if isinstance(out, Remote) else any(not path.name.startswith(".") for path in out.iterdir())
-
-
-def undone(tasks: Sequence[Task], target: Callable[[Task], Place]) -> list[Task]:
+def undone(tasks: Sequence[Target]) -> list[Target]:
     """Return the tasks whose file is not there; each folder is listed once."""
-    there = {str(path) for folder in {target(task).parent for task in tasks} for path in folder.glob("*")}
-    return [task for task in tasks if str(target(task)) not in there]
+    there = {str(path) for folder in {task.target.parent for task in tasks} for path in folder.glob("*")}
+    return [task for task in tasks if str(task.target) not in there]
 
 
 @dataclass(frozen=True)
@@ -185,11 +182,10 @@ class Spread:
         Raises:
             InputError: the scheduler was lost.
         """
-        begun, failed = time.monotonic(), []
+        failed = []
         for done, message in enumerate(self._outcomes(function, tasks), start=1):
             failed += [message] if message else []
-            left = (time.monotonic() - begun) / done * (len(tasks) - done)
-            self._told(done, len(tasks), f"{left:.0f} s left" if left < 600.0 else f"{left / 60.0:.0f} min left")
+            self._told(done, len(tasks))
         return sorted(failed)
 
     def _outcomes(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
@@ -198,55 +194,34 @@ class Spread:
             yield from (_guarded(function, task) for task in tasks)
             return
         needs("corpus", "dask", "distributed")
-        with _connected(self._scheduler):
+        try:
             if self._client is None:
                 self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
             yield from self._distributed(function, tasks)
+        except (OSError, TimeoutError, CancelledError) as error:
+            lost = f"{self._scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
+            raise InputError(f"{lost}; the same command goes on where it stopped") from error
 
     def _distributed(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
-        """Yield as `_outcomes` does; the scheduler holds a few tasks for each worker at a time.
+        """Yield as `_outcomes` does.
 
         Tasks whose workers died are run again one at a time at the end, so that only the one that ends them fails.
         """
         from distributed import as_completed
 
-        group, numbers, waiting = uuid4().hex, count(), iter(tasks)  # one group of keys, which Dask queues
-        held: dict[tuple[str, int], Task] = {}
-
-        def submitted(chosen: Iterable[Task]) -> list[Any]:
-            own = {(group, next(numbers)): task for task in chosen}
-            held.update(own)
-            return list(self._client.map(partial(_guarded, function), list(own.values()), key=list(own))) if own else []
-
-        suspects: list[Task] = []
-        alone = False
-        running = as_completed(submitted(islice(waiting, WAVE * max(len(self._client.nthreads()), self._workers))))
-        for future in running:
-            task = held.pop(future.key)
+        group = uuid4().hex  # one group of keys, which Dask queues
+        keys = [(group, k) for k in range(len(tasks))]
+        running = dict(zip(self._client.map(partial(_guarded, function), tasks, key=keys), tasks, strict=True))
+        suspects = []
+        for future in as_completed(running):
             if future.status != "error":
                 yield future.result()
-            elif alone:
-                yield f"{getattr(task, 'name', 'a task')}: {future.exception()}"
+            elif len(tasks) > 1:
+                suspects.append(running[future])
             else:
-                suspects.append(task)
-            running.update(submitted(islice(waiting, 1)))
-            if suspects and not held:
-                alone = True
-                running.update(submitted([suspects.pop()]))
-
-
-@contextmanager
-def _connected(scheduler: str) -> Iterator[None]:
-    """Name the scheduler in what is raised when it is lost.
-
-    Raises:
-        InputError: it was.
-    """
-    try:
-        yield
-    except (OSError, TimeoutError, CancelledError) as error:
-        lost = f"{scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
-        raise InputError(f"{lost}; the same command goes on where it stopped") from error
+                yield f"{getattr(tasks[0], 'name', 'a task')}: {future.exception()}"
+        for task in suspects:
+            yield from self._distributed(function, [task])
 
 
 @contextmanager
@@ -271,40 +246,29 @@ def _guarded(function: Callable[[Any], Any], task: Any) -> str:
 
 @contextmanager
 def _client(workers: int, scheduler: str) -> Iterator[Any]:
-    """A client of a cluster on this machine, or of one that runs."""
-    from distributed import Client
+    """A client of a cluster of processes on this machine, or of one that runs."""
+    import dask
+    from distributed import Client, LocalCluster
 
     for name in ("distributed", "distributed.client"):  # each has a level of its own
         logging.getLogger(name).setLevel(logging.CRITICAL)  # workers that die and a lost scheduler are named here
-    if scheduler:
-        with Client(scheduler) as client:
-            yield client
-        return
     with ExitStack() as stack:
-        place = stack.enter_context(scratch(Path(tempfile.gettempdir())))
-        with starting():
-            cluster = stack.enter_context(_cluster(workers, place))
-            stack.enter_context(ending(partial(_end, cluster)))
+        cluster: Any = scheduler
+        if not scheduler:
+            settings = {
+                "temporary-directory": str(stack.enter_context(scratch(Path(tempfile.gettempdir())))),
+                "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further task
+                "distributed.worker.daemon": True,
+                "distributed.worker.profile.enabled": False,
+                "distributed.admin.tick.interval": "500ms",
+                "distributed.nanny.pre-spawn-environ": WORKERS,
+            }
+            sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
+            stack.enter_context(dask.config.set(settings))
+            with starting():
+                cluster = stack.enter_context(LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0"))
+                stack.enter_context(ending(partial(_end, cluster)))
         yield stack.enter_context(Client(cluster))
-
-
-@contextmanager
-def _cluster(workers: int, place: Path) -> Iterator[Any]:
-    """Processes of this machine, which may write intermediate files to `place`."""
-    import dask
-    from distributed import LocalCluster
-
-    settings = {
-        "temporary-directory": str(place),
-        "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further task
-        "distributed.worker.daemon": True,
-        "distributed.worker.profile.enabled": False,
-        "distributed.admin.tick.interval": "500ms",
-        "distributed.nanny.pre-spawn-environ": WORKERS,
-    }
-    sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
-    with dask.config.set(settings), LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0") as cluster:
-        yield cluster
 
 
 def _end(cluster: Any) -> None:

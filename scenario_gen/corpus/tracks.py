@@ -59,7 +59,7 @@ def tracks_of(rows: dict[str, Any]) -> dict[int, Track]:
     good = np.ones(len(t), dtype=bool)
     wide = LONGITUDE * np.cos(rows["lat"] * (np.pi / 180.0))
     for name, metres in (("lat", METRES), ("lon", wide)):
-        middle = median_of_five(*(rows[name][index] for index in around))
+        middle = np.sort([rows[name][index] for index in around], axis=0)[2]
         good &= np.abs(rows[name] - middle) * metres < OUTLIER + FASTEST * seconds
     heading = np.pi / 2.0 - rows["heading"].astype(np.float64) * (np.pi / 180.0)
     speed = rows["speed"].astype(np.float64)
@@ -71,15 +71,6 @@ def tracks_of(rows: dict[str, Any]) -> dict[int, Track]:
                 int(device[begin]), t[kept], rows["lat"][kept], rows["lon"][kept], speed[kept], heading[kept]
             )
     return found
-
-
-def median_of_five(a: Floats, b: Floats, c: Floats, d: Floats, e: Floats) -> Floats:
-    """Return the medians (M,) of five numbers each (M,), without sorting them."""
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    low2, high2 = np.minimum(c, d), np.maximum(c, d)
-    least, most = np.maximum(low, low2), np.minimum(high, high2)  # neither the smallest nor the largest of four
-    middle: Floats = np.maximum(np.minimum(least, most), np.minimum(np.maximum(least, most), e))
-    return middle
 
 
 def meetings(a: Track, b: Track, span: tuple[int, int], config: CorpusConfig) -> list[dict[str, Any]]:

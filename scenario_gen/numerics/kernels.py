@@ -110,7 +110,7 @@ class Kernel:
         """Declare it; it is compiled, or loaded, when it is called."""
         update_wrapper(self, function)
         self.declared, self.dispatcher = tuple(declared), _compiler(function, cache=True)
-        self._readers = [_reader(kind) for kind in declared]
+        self._readers, self._is_ready = [_reader(kind) for kind in declared], False
 
     @property
     def name(self) -> str:
@@ -130,15 +130,16 @@ class Kernel:
     def compile(self) -> Any:
         """Make or load the compiled form, once, and return numba's function."""
         with _one_at_a_time:
-            if not self.dispatcher.signatures:
+            if not self._is_ready:
                 self.dispatcher.compile(self.declared)
                 self.dispatcher.disable_compile()
                 self.mark.touch()
+                self._is_ready = True
         return self.dispatcher
 
     def __call__(self, *values: Any) -> Any:
         """Call the compiled form."""
-        if not self.dispatcher.signatures:
+        if not self._is_ready:
             if not self.mark.exists():
                 make_ready(registered())
             self.compile()

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks._naturalness_classifier import FEATURES, GROUPS, told_apart, Windows, windows
 from benchmarks._naturalness_cuts import cuts
-from benchmarks._naturalness_motion import displacement, extrema, keeps_turn, roughness, sign_changes, Signals, turns
+from benchmarks._naturalness_motion import keeps_turn, roughness, Signals, turns
 
 
 def drive(speed, turn=0.0, count=2):
@@ -21,13 +21,6 @@ def drive(speed, turn=0.0, count=2):
     return Signals.of(
         {"time": time, "position": position, "heading": np.tile(heading, (count, 1)), "speed": np.tile(speed, (count, 1))}
     )
-
-
-def test_signs_and_extrema_by_hand():
-    assert sign_changes(np.array([0.2, 0.05, -0.05, 0.3, -0.2, -0.05, 0.15]), 0.1) == 2
-    assert extrema(np.array([5.0, 6.0, 5.0, 6.0])) == 2
-    assert extrema(np.array([5.0, 5.2, 5.0, 5.2])) == 0  # within the dead band
-    assert extrema(np.array([0.0, 3.0, 6.0])) == 0
 
 
 def test_roughness_of_a_known_drive():
@@ -48,15 +41,6 @@ def test_a_turn_is_kept_within_25_degrees_and_by_its_kind(other, kept):
     template, sample = drive(speed, 60.0), drive(speed, other)
     assert turns(template) == pytest.approx([60.0, 60.0])
     assert keeps_turn(template, sample).tolist() == [kept, kept]
-
-
-def test_a_stand_is_no_straight_drive():
-    assert not keeps_turn(drive(np.zeros(101)), drive(np.full(101, 8.0))).any()
-
-
-def test_displacement_does_not_see_the_clock():
-    slow, fast = drive(np.full(101, 5.0)), drive(np.full(51, 10.0))  # the same 50 m
-    assert displacement([slow, fast]) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_windows_see_noise_and_nothing_else():

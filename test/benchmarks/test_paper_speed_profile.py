@@ -7,9 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from scipy.optimize import least_squares, LinearConstraint, minimize
 
-from benchmarks._paper_speed_profile import CONSTANCY, SpeedBounds, SpeedProfile, SpeedProfileQP
+from benchmarks._paper_speed_profile import SpeedProfile, SpeedProfileQP
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.speed_profile.knots import best_knot, speed_knots
 
@@ -27,17 +26,7 @@ def driven(speed, clock=CLOCK):
     return np.diff(profile.state(clock)[0])
 
 
-def test_own_lengths_give_the_template_back_where_changepoints_sit_at_its_bends():
-    clock = np.array([0.0, 5.0, 7.0, 8.8, 11.2, 13.0, 15.0, 20.0])
-    knots = speed_knots(clock, np.zeros(7, dtype=bool), [], TIME, dip(), (dip()[0], dip()[-1]))
-    speed, ok = SpeedProfileQP(knots, SamplingConfig()).solve(knots.knot[None], driven(dip(), clock)[None])
-    assert ok[0]
-    profile = SpeedProfile(knots.knot, speed[0])
-    assert np.diff(profile.state(clock)[0]) == pytest.approx(driven(dip(), clock), abs=1e-6)
-    assert np.abs(profile.state(TIME)[1] - dip()).max() < 0.8
-
-
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(st.lists(st.floats(0.85, 1.15), min_size=4, max_size=4), st.floats(0.0, 9.0), st.floats(8.0, 11.0))
 def test_lengths_ends_and_limits_hold(factors, depth, first):
     template, config = dip(depth), SamplingConfig()
@@ -53,47 +42,6 @@ def test_lengths_ends_and_limits_hold(factors, depth, first):
     assert (speed[0] >= 0.0).all()
     assert acceleration.max() <= config.max_acceleration + 1e-5
     assert acceleration.min() >= -config.max_deceleration - 1e-5
-
-
-def joined_lines(speed, knot):
-    """Speeds at the knots of the straight lines, joined there, that fit best, by scipy's general least squares."""
-    start = np.interp(knot, TIME, speed)
-    fit = least_squares(lambda at: np.interp(TIME, knot, at) - speed, start, xtol=1e-12, ftol=1e-12, gtol=1e-12)
-    return fit.x
-
-
-def test_is_the_minimum_of_the_stated_cost():
-    template = dip()
-    knots = speed_knots(CLOCK, NO_DWELL, [], TIME, template, (10.0, 10.0))
-    told = joined_lines(template, knots.knot)
-    natural = np.diff(SpeedProfile(knots.knot, told).state(CLOCK)[0])
-    lengths = natural * np.array([1.05, 0.9, 1.1, 0.97])
-    speed, _ = SpeedProfileQP(knots, SamplingConfig()).solve(knots.knot[None], lengths[None])
-    fine = np.linspace(0.0, 20.0, 4001)
-    scale = (lengths / natural)[np.clip(np.searchsorted(CLOCK, fine, side="right") - 1, 0, 3)]
-    wanted = np.interp(fine, knots.knot, told) * scale
-    ends = np.searchsorted(knots.knot, CLOCK)
-
-    def cost(inner):
-        speeds = np.r_[10.0, inner, 10.0]
-        off = ((np.interp(fine, knots.knot, speeds) - wanted) ** 2)[:-1].sum() * (fine[1] - fine[0])
-        steps = np.diff(knots.knot)
-        mean = np.repeat(np.diff(speeds[ends]) / np.diff(CLOCK), 2)
-        return off + CONSTANCY * (steps * (np.diff(speeds) / steps - mean) ** 2).sum()
-
-    rows = np.zeros((4, len(knots.knot)))
-    for i, g in enumerate(knots.group):
-        rows[g, i : i + 2] += 0.5 * (knots.knot[i + 1] - knots.knot[i])
-    right = lengths - rows[:, 0] * 10.0 - rows[:, -1] * 10.0
-    start = np.linalg.lstsq(rows[:, 1:-1], right, rcond=None)[0]
-    best = minimize(
-        cost,
-        start,
-        constraints=LinearConstraint(rows[:, 1:-1], right, right),
-        method="SLSQP",
-        options={"ftol": 1e-12, "maxiter": 500},
-    )
-    assert cost(speed[0][1:-1]) <= best.fun * (1.0 + 1e-4) + 1e-6
 
 
 def test_constant_acceleration_within_primitives_is_given_back():
@@ -137,17 +85,6 @@ def test_wait_inside_a_primitive_stands_exactly():
     assert profile.state(CLOCK)[0] == pytest.approx([0.0, 35.0, 38.0, 38.0, 58.5], abs=1e-5)
 
 
-def test_a_vehicle_asked_to_roll_where_the_template_stands_comes_to_rest_first():
-    template = np.where(TIME < 6.0, 0.2, 5.0)
-    knots = speed_knots(CLOCK, np.array([True, False, False, False]), [(0.0, 6.0)], TIME, template, (0.3, 5.0))
-    speed, ok = SpeedProfileQP(knots, SamplingConfig()).solve(knots.knot[None], np.array([[12.0, 25.0, 30.0]]))
-    assert ok[0]
-    assert speed[0][0] == 0.3
-    profile = SpeedProfile(knots.knot, speed[0])
-    assert (profile.state(np.linspace(0.5, 6.0, 50))[1] == 0.0).all()
-    assert profile.state(CLOCK)[0][2:] == pytest.approx([12.0, 37.0, 67.0], abs=1e-5)
-
-
 def test_impossible_lengths_are_refused_and_slid():
     knots = speed_knots(CLOCK, NO_DWELL, [], TIME, dip(), (10.0, 10.0))
     qp = SpeedProfileQP(knots, SamplingConfig())
@@ -162,25 +99,9 @@ def test_impossible_lengths_are_refused_and_slid():
     assert not qp.slide(knots.knot[None], 10.0 * wrong[None])[1][0]
 
 
-def test_speed_bounds_hold():
-    knots = speed_knots(CLOCK, NO_DWELL, [], TIME, np.full(201, 10.0), (10.0, 10.0))
-    bounds = SpeedBounds(np.array([3]), np.array([0.5]), np.array([9.5]))
-    speed, ok = SpeedProfileQP(knots, SamplingConfig(), bounds).solve(knots.knot[None], driven(np.full(201, 10.0))[None])
-    assert ok[0]
-    assert 0.5 * (speed[0][3] + speed[0][4]) <= 9.5 + 1e-6
-
-
 def test_knot_is_where_the_template_bends():
     speed = np.where(TIME < 4.3, 10.0, 10.0 - 2.0 * (TIME - 4.3))
     assert best_knot(TIME, speed, 2.0, 8.0) == pytest.approx(4.3, abs=0.11)
-
-
-def test_state_is_the_law():
-    profile = SpeedProfile(np.array([0.0, 2.0, 5.0]), np.array([0.0, 4.0, 1.0]))
-    s, v, a = profile.state(np.array([1.0, 2.0, 3.0, 5.0]))
-    assert s == pytest.approx([1.0, 4.0, 7.5, 11.5])
-    assert v == pytest.approx([2.0, 4.0, 3.0, 1.0])
-    assert a == pytest.approx([2.0, -1.0, -1.0, -1.0])
 
 
 def test_knot_can_be_put_elsewhere_and_keeps_its_distance():

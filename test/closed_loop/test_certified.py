@@ -5,18 +5,13 @@
 
 from dataclasses import replace
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from lengths import LONG
 import numpy as np
 import pytest
 from reaction_scenes import led_crossing, platoon
 
-from benchmarks._driving_worlds import Anything, draw_scenario, Witness
-from scenario_gen.closed_loop.certified import CELL, certified
-from scenario_gen.closed_loop.ego import Command, Pose
+from benchmarks._driving_worlds import Witness
+from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
@@ -25,7 +20,6 @@ from scenario_gen.template.answers import conflict_of, lag_behind, time_gaps
 from scenario_gen.types.ego import join_ego, with_witness
 
 CONFIG = PipelineConfig()
-FAR = Pose(1e4, 1e4, 0.0, 0.0)
 
 
 class Slower:
@@ -91,39 +85,3 @@ def test_followers_among_the_others_keep_their_distance_to_one_that_the_ego_hold
             motion = ClosedLoop(scenario, "1").drive(Slower(share)).motion
             for edge in made.reactions[1:]:
                 assert time_gaps(motion, edge.who, edge.whom).min() > 0.5 * edge.headway[0]
-
-
-def test_only_reactions_among_the_others_hold_back(led):
-    scenario = led[0]
-    free = [certified(replace(scenario, facts={}), ego).order for ego in range(3)]
-    held = [certified(scenario, ego).order for ego in range(3)]
-    assert [np.array_equal(a, b) for a, b in zip(free, held, strict=True)] == [True, True, False]
-    changed = np.argwhere((held[2] != free[2]).any(axis=2)).tolist()
-    assert changed == [[1, 0]]
-    conflict = conflict_of(scenario, 1, 0)
-    before = np.arange(held[2].shape[2]) * CELL < conflict.exit_first
-    assert (held[2][1, 0][before] <= conflict.exit_first).all() and np.array_equal(held[2][1, 0][~before], free[2][1, 0][~before])
-    assert (np.diff(held[2][1, 0][np.isfinite(held[2][1, 0])]) >= 0.0).all(), "a limit never falls"
-
-
-@settings(max_examples=2000 if LONG else 40)
-@given(st.integers(0, 10**9))
-def test_nobody_waits_for_ever_and_nobody_meets_with_reactions_either(seed):
-    """Every second one at a conflict of a drawn scenario yields to the first."""
-    scenario = draw_scenario(seed)
-    ego, ids = seed % len(scenario.vehicles), [vehicle.id for vehicle in scenario.vehicles]
-    found = [conflict_of(scenario, a, b) for b in range(len(ids)) for a in range(b)]
-    names = "; ".join(f"{ids[c.second]} yields to {ids[c.first]}" for c in found if c is not None)
-    loop = ClosedLoop(replace(scenario, facts={"reactions": names}), ego)
-    anything, steps = Anything(seed), len(scenario.time) // 2
-    assert judge(loop, loop.drive(anything, lambda state: state.step >= steps)).among_others == 0
-    state = loop.start()
-    anything.reset(loop.task())
-    for _ in range(40):
-        state = loop.step(state, anything.act(loop.observe(state)))
-    others = [i for i in range(len(ids)) if i != ego]
-    for _ in range(3000):
-        state = loop.step(state, FAR)
-        if (state.clock[others] >= scenario.time[-1]).all():
-            return
-    raise AssertionError(f"clocks {state.clock} stand still at rates {state.rate}")

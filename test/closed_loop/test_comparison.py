@@ -13,14 +13,14 @@ from typer.testing import CliRunner
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
-from scenario_gen.closed_loop.comparison import compared, Earlier, read_drives
+from scenario_gen.closed_loop.comparison import compared, Earlier
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Origin
-from scenario_gen.closed_loop.results import document
+from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.trials import read_trials, run_trials, with_origins
 
 PLANNERS = "scenario_gen.closed_loop.planners"
-PARAMETERS = document([], "", ClosedLoopConfig())["parameters"]
+PARAMETERS = Drives([], "", ClosedLoopConfig()).document()["parameters"]
 
 
 @dataclass
@@ -92,14 +92,6 @@ def test_other_scenarios_or_parameters_are_refused():
     assert not compared(driven(failed, 1), ClosedLoopConfig(decision_time=3.0), known).worse
 
 
-def test_what_is_no_list_of_drives_is_refused(tmp_path):
-    (tmp_path / "drives.json").write_text('{"planner": "p", "drives": [{"name": "1"}]}')
-    with pytest.raises(InputError, match=r"--against .*drives\.json.*required"):
-        read_drives(tmp_path)
-    with pytest.raises(InputError, match="nothing"):
-        read_drives(tmp_path / "nothing.json")
-
-
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
     return write_recording(tmp_path_factory.mktemp("compared") / "bag", hand_made_run())
@@ -119,4 +111,4 @@ def test_the_command_compares_and_says_what_a_planner_that_looks_at_nobody_passe
     assert "Scenarios that changed sides" in said and "failures +0.0 %" in said
     trials = read_trials(bag)
     outcomes = with_origins(run_trials(trials, f"{PLANNERS}:IdmFollower", ClosedLoopConfig(overtime=1.0)), trials)
-    assert document(outcomes, "", ClosedLoopConfig())["drives"][0]["scenario"] == outcomes[0].origin.digest
+    assert Drives(outcomes, "", ClosedLoopConfig()).document()["drives"][0]["scenario"] == outcomes[0].origin.digest

@@ -20,9 +20,8 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
-from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.ego import Pose
 from scenario_gen.closed_loop.results import as_junit
-from scenario_gen.closed_loop.trials import find_planner, read_trials
 
 PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
 
@@ -58,11 +57,6 @@ class Still:
 class Wrong(Still):
     def act(self, seen):
         return (0.0, 0.0)
-
-
-class OfTexts(Still):
-    def act(self, seen):
-        return Command("a", None)
 
 
 class Leaves(Still):
@@ -119,11 +113,10 @@ class Nowhere(Still):
 @pytest.mark.parametrize(
     ("planner", "workers", "said"),
     [
-        ("Wrong", 1, r"scenario 0: a planner's `act` returns Command, Pose or None; it returned tuple"),
-        ("OfTexts", 1, r"scenario 0: a planner's `act` returned a Command that is not of numbers"),
-        ("Leaves", 1, r"scenario 0: the planner failed: SystemExit: 0"),
-        ("NeverMade", 1, r"scenario 0: the planner failed: RuntimeError: no model here"),
-        ("LeavesAtOnce", 2, r"a process that drove the planner has ended after 0 of 2 drives"),
+        ("Wrong", 1, "scenario 0: .* returned tuple"),
+        ("Leaves", 1, "scenario 0: .* SystemExit: 0"),
+        ("NeverMade", 1, "scenario 0: .* RuntimeError: no model here"),
+        ("LeavesAtOnce", 2, "has ended after 0 of 2 drives"),
     ],
 )
 def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, workers, said):
@@ -134,12 +127,13 @@ def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, w
 
 def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
     Hangs.drives = 0
-    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 3 s") as caught:
-        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=3", "overtime=1"])
+    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 1 s") as caught:
+        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=1", "overtime=1"])
         drive_bag(request, tmp_path / "out", run=in_processes(1))
     assert "of the 1 drives before: failures 1, collisions" in str(caught.value) and not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
     with pytest.raises(InputError, match=r"has ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time"):
         request = DriveRequest(bag, f"{__name__}:HangsInCompiledCode", count=2, assignments=["drive_time=0.5"])
@@ -153,46 +147,24 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
         result = drive_bag(
             DriveRequest(bag, f"{__name__}:{planner}", count=1, assignments=sets), tmp_path / planner, run=in_processes(1)
         )
-        known[planner] = json.loads(result.written[0].read_text())
+        known[planner] = json.loads((tmp_path / planner / "drives.json").read_text())
+        assert any(line.startswith("progress: 0.0 %") for line in result.broken)  # who never moves breaks a bar by default
         if planner == "Slow":
-            assert result.decisions.slow >= 1 and result.decisions.longest >= 0.05
+            (outcome,) = result.outcomes
+            assert outcome.decisions.slow >= 1 and outcome.decisions.longest >= 0.05
     assert known["Slow"] | {"planner": ""} == known["Still"] | {"planner": ""}
-
-
-def test_who_never_moves_breaks_a_bar_by_default(bag, tmp_path):
-    result = drive_bag(DriveRequest(bag, f"{__name__}:Still"), tmp_path / "out", run=in_processes(1))
-    assert any(line.startswith("progress: 0.0 %; at least 90.0 %") for line in result.broken)
 
 
 @pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
 def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path, planner):
-    result = drive_bag(DriveRequest(bag, f"{__name__}:{planner}", count=1), tmp_path / "out", run=in_processes(1))
-    (drive,) = json.loads(result.written[0].read_text())["drives"]
+    drive_bag(DriveRequest(bag, f"{__name__}:{planner}", count=1), tmp_path / "out", run=in_processes(1))
+    (drive,) = json.loads((tmp_path / "out" / "drives.json").read_text())["drives"]
     assert drive["faults"] > 0 and not drive["passed"]
 
 
 def test_junit_is_xml_whatever_things_are_called():
     suite = ElementTree.fromstring(as_junit([], "no\x01 name\ufffe"))
     assert suite.get("name") == r"no\x01 name\ufffe" and suite.get("tests") == "0"
-
-
-def test_a_module_that_ends_the_process_is_no_planner(tmp_path, monkeypatch):
-    (tmp_path / "ends.py").write_text("import sys; sys.exit(0)")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(InputError, match="--planner ends:X: SystemExit: 0"):
-        find_planner("ends:X")
-
-
-def test_a_folder_of_somebodys_own_is_refused_before_anything_is_driven(bag, tmp_path):
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(InputError, match=r"holds mine\.txt"):
-        drive_bag(DriveRequest(bag, f"{__name__}:NeverMade"), tmp_path, run=in_processes(1))
-
-
-def test_an_ego_that_is_not_there_is_named(bag):
-    with pytest.raises(InputError, match=r"no vehicle 'nobody' to be the ego; it has "):
-        read_trials(bag, "nobody")
 
 
 BUSY = """
@@ -205,6 +177,7 @@ class Busy:
 """
 
 
+@pytest.mark.long
 def test_processes_of_a_killed_drive_end_with_it_whatever_they_are_at(bag, tmp_path):
     (tmp_path / "busy.py").write_text(BUSY)
     words = [sys.executable, "-m", "scenario_gen", "drive", str(bag), "--planner", "busy:Busy", "--workers", "2", "--out", "out"]

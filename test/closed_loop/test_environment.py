@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import gymnasium
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import SyncVectorEnv
 import numpy as np
 import pytest
 
 from benchmarks._driving_worlds import draw_scenario
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.environment import DriveEnv, ID
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.picture import EGO, SIZE
-from scenario_gen.closed_loop.trials import Trial
 from scenario_gen.types import Road
 
 TRIALS = [Trial(str(seed), draw_scenario(seed), 0, None) for seed in (1, 2, 5)]
@@ -41,11 +40,6 @@ def test_gymnasium_finds_nothing_wrong():
     check_env(env.unwrapped)
 
 
-def test_what_is_seen_keeps_its_bounds():
-    env = DriveEnv(TRIALS)
-    assert all(env.observation_space.contains(row) for row in drive(env, 4)[0])
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_actions_that_are_not_finite_are_refused(bad):
     env = DriveEnv(TRIALS)
@@ -65,7 +59,7 @@ def test_the_picture_shows_road_route_ego_and_others():
         DriveEnv(TRIALS, render_mode="human")
 
 
-@pytest.mark.parametrize("way", ["sync", "async"])
+@pytest.mark.parametrize("way", ["sync", pytest.param("async", marks=pytest.mark.long)])
 def test_vectors_of_it_are_made_by_gymnasium(way):
     many = gymnasium.make_vec(ID, 2, way, trials=TRIALS)
     first, _ = many.reset(seed=3)
@@ -76,17 +70,9 @@ def test_vectors_of_it_are_made_by_gymnasium(way):
 
 
 def test_the_same_seed_gives_the_same_drive():
-    (one, verdict), (other, again) = (drive(DriveEnv(TRIALS), 3) for _ in range(2))
-    assert (one == other).all() and verdict == again and np.isfinite(one).all()
-
-
-def test_many_at_once_and_by_index():
-    many = SyncVectorEnv([lambda: DriveEnv(TRIALS)] * 3)
-    seen, _ = many.reset(seed=1)
-    assert seen.shape == (3, 73)
-    many.step(many.action_space.sample())
-    many.close()
     env = DriveEnv(TRIALS)
+    (one, verdict), (other, again) = (drive(env, 3) for _ in range(2))
+    assert (one == other).all() and verdict == again and all(env.observation_space.contains(row) for row in one)
     assert env.reset(options={"index": 2})[1]["name"] == "5"
     with pytest.raises(InputError, match="no scenario 3; there are 3"):
         env.reset(options={"index": 3})

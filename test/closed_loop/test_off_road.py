@@ -26,7 +26,7 @@ def plain(drivable, res, pose, *, outside):
     return min(nearest.max() if outside else nearest.min(), FARTHEST)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_depth_and_room_are_those_of_points_and_cells(seed):
     rng = np.random.default_rng(seed)
     res = (1.0, 1.5)[seed % 2]

@@ -18,7 +18,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, reaction_time
 
-EXAMPLES = 2000 if LONG else 40
+EXAMPLES = 2000 if LONG else 15
 NEVER = 1e6  # s of patience
 
 
@@ -50,14 +50,6 @@ def test_reaction_times_follow_from_scenario_and_vehicle_alone():
     assert (ClosedLoop(scenario, 0, config=ClosedLoopConfig(reaction=0.0)).reactions == 0.0).all()
 
 
-def test_reaction_times_are_spread_evenly():
-    scenario = following(10.0, 10.0)
-    drawn = np.sort([reaction_time(replace(scenario, index=k), "v0", 1.0) for k in range(4000)])
-    assert drawn[0] >= 0.5 and drawn[-1] < 1.5
-    even = 0.5 + (np.arange(4000) + 0.5) / 4000
-    assert np.abs(drawn - even).max() < 1.63 / np.sqrt(4000)  # Kolmogorov's bound of 1 %
-
-
 @settings(max_examples=EXAMPLES)
 @given(st.integers(0, 10**9), st.integers(1, 40), st.sampled_from([0.05, 0.1]))
 def test_nobody_answers_before_its_reaction_time_is_over(seed, differ, step):
@@ -71,13 +63,6 @@ def test_nobody_answers_before_its_reaction_time_is_over(seed, differ, step):
         assert one[k].clock[1] == two[k].clock[1] and one[k].rate[1] == two[k].rate[1]
 
 
-def test_and_answers_then():
-    loop = ClosedLoop(following(15.0, 8.0), 1)
-    late = round(float(loop.reactions[0]) / 0.1)
-    drive = states(loop, braking_after(10, 8.0), 12 + late)
-    assert drive[10 + late].rate[0] == 1.0 and drive[11 + late].rate[0] < 1.0
-
-
 @settings(max_examples=EXAMPLES)
 @given(st.floats(2.0, 20.0), st.floats(0.5, 9.0), st.floats(0.0, 20.0), st.sampled_from([0.05, 0.1]))
 def test_a_follower_stops_for_the_ego_with_room_for_its_reaction_and_its_foot(speed, braking, spare, step):
@@ -88,17 +73,6 @@ def test_a_follower_stops_for_the_ego_with_room_for_its_reaction_and_its_foot(sp
     late = reaction + config.strongest_braking / config.jerk + 2.0 * step
     loop = ClosedLoop(following(speed, max(need, 0.0) + speed * late + 0.6 + spare), 1, config=config)
     assert not touches(loop, braking_after(1, braking), int(12 / step))
-
-
-def test_the_slower_they_react_the_more_of_them_touch_an_ego_that_brakes_hard():
-    """One second behind an ego that brakes by 9 m/s²."""
-    hits = dict.fromkeys((0.0, 0.5, 1.0, 1.5), 0)
-    for reaction in hits:
-        for speed in np.linspace(6.0, 18.0, 12).tolist():
-            loop = ClosedLoop(following(speed, speed), 1, config=ClosedLoopConfig(reaction=reaction))
-            hits[reaction] += touches(loop, braking_after(5, 9.0), 80)
-    count = list(hits.values())
-    assert count[0] == 0 and count == sorted(count) and count[-1] == 12
 
 
 @settings(max_examples=EXAMPLES)
@@ -126,13 +100,13 @@ def test_acceleration_changes_by_the_jerk_at_most_unless_the_order_forces_it(see
 def test_braking_is_as_sudden_as_that_of_recorded_drivers_whatever_the_ego_does():
     """99 of 100 steps in which somebody brakes, those that the order forced among them, in drawn scenarios."""
     found = []
-    for seed in range(10_000 if LONG else 100):
+    for seed in range(10_000 if LONG else 50):
         scenario = draw_scenario(seed)
         loop = ClosedLoop(scenario, seed % len(scenario.vehicles))
         drive = loop.drive(Anything(seed), lambda state, last=len(scenario.time) // 2: state.step >= last)
         found.append(braking_jerks(scenario, drive))
     jerk = np.concatenate(found)
-    assert len(jerk) > 500 and np.percentile(jerk, 99) <= 10.0
+    assert len(jerk) > 250 and np.percentile(jerk, 99) <= 10.0
 
 
 @settings(max_examples=EXAMPLES)
@@ -178,14 +152,3 @@ def test_a_drive_can_be_branched_anywhere():
         last = drive[-1]
         for name in ("vehicles", "clock", "rate", "acceleration", "waited", "seen"):
             assert (getattr(state, name) == getattr(last, name)).all()
-
-
-def test_nobody_chatters_at_low_speed():
-    """A platoon behind an ego that brakes and goes on: nobody changes more than twice between braking and speeding up."""
-    loop = ClosedLoop(following(14.0, 14.0, 4), 3)
-    drive = states(loop, lambda k: Command(-6.0 if 10 < k < 80 else 2.0 if k >= 80 else 0.0, 0.0), 140)
-    speed = np.array([state.vehicles[:3, 3] for state in drive])
-    change = np.diff(speed, axis=0)
-    for i in range(3):
-        signs = np.sign(change[:, i])[np.abs(change[:, i]) > 0.03]
-        assert np.count_nonzero(np.diff(signs)) <= 2

@@ -28,7 +28,7 @@ class FullThrottle(RouteFollower):
 
 def generated(out, *words):
     quick = ("--set", "evaluation.resamples=10")
-    command = ["generate", str(bundled("b")), "--road", "t_intersection", "--count", "6", "--for-testing", *quick]
+    command = ["generate", str(bundled("b")), "--road", "t_intersection", "--count", "3", "--for-testing", *quick]
     return CliRunner().invoke(app, [*command, *words, "--out", str(out)])
 
 
@@ -36,7 +36,7 @@ def generated(out, *words):
 def bag(tmp_path_factory):
     out = tmp_path_factory.mktemp("testing") / "out"
     done = generated(out, "--ego", "2")
-    assert done.exit_code == 0 and "6/6 valid" in done.output, done.output
+    assert done.exit_code == 0 and "3/3 valid" in done.output, done.output
     said = "synthetic_b on t_intersection: a planner that looks at nobody, in place of 2, passes"
     assert said in " ".join(done.output.split()) and said in (out / "report.html").read_text()
     return out / "bag"
@@ -44,26 +44,26 @@ def bag(tmp_path_factory):
 
 def test_who_looks_at_nobody_fails_and_who_looks_passes(bag):
     trials = read_trials(bag)
-    assert len(trials) == 6
+    assert len(trials) == 3
     failed = {
         name: sum(not one.verdict.passed for one in run_trials(trials, make))
         for name, make in {"slow": partial(ConstantSpeed, speed=7.0), "fast": FullThrottle, "looks": IdmFollower}.items()
     }
-    assert failed["slow"] >= 4 and failed["fast"] >= 4 and failed["looks"] == 0
+    assert failed["slow"] >= 2 and failed["fast"] >= 2 and failed["looks"] == 0
     loops = [ClosedLoop(trial.scenario, trial.ego, trial.road) for trial in trials]
     assert all(judge(loop, loop.drive(WitnessFollower(loop))).passed for loop in loops)
 
 
 def test_such_a_set_is_checked_and_made_again_as_any(bag):
     (found,) = validate_bag(bag)
-    assert (found.scenarios, found.invalid) == (6, 0)
+    assert (found.scenarios, found.invalid) == (3, 0)
     regenerate_scenario(bag, read_trials(bag)[-1].scenario.index)  # raises if it comes out differently
 
 
 def test_what_does_not_need_a_reaction_is_left_out_and_said(tmp_path):
-    done = generated(tmp_path / "none", "--ego", "1", "--count", "2")
+    done = generated(tmp_path / "none", "--ego", "1", "--count", "1")
     said = " ".join(str(done.exception or done.output).split())
-    assert done.exit_code != 0 and "0 of 40 valid scenarios are kept; in the other 40 a planner that looks at nobody" in said
+    assert done.exit_code != 0 and "0 of 20 valid scenarios are kept; in the other 20 a planner that looks at nobody" in said
 
 
 def test_without_an_ego_it_is_refused(tmp_path):

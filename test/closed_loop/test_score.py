@@ -5,11 +5,9 @@
 
 import numpy as np
 import pytest
-from scipy.signal import savgol_filter
 from test_verdict import go_on, straight, verdict_of
 
 from scenario_gen.closed_loop.ego import Command, Pose
-from scenario_gen.closed_loop.score import smoothed
 from scenario_gen.types.road import Road
 
 
@@ -82,10 +80,3 @@ def test_off_the_road_counts_from_a_depth(aside, counted):
     assert np.isfinite(verdict.off_road)
     verdict, _ = verdict_of(motions, go_on, road=road)
     assert verdict.road_margin == pytest.approx(1.1)
-
-
-def test_smoothing_is_savitzky_and_golays():
-    values = np.random.default_rng(0).standard_normal(60).cumsum()
-    for derivative in (0, 1, 2):
-        expected = savgol_filter(values, 15, 2, deriv=derivative, delta=0.1)
-        assert smoothed(values, 0.1, 0.7, derivative)[7:-7] == pytest.approx(expected[7:-7])

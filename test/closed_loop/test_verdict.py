@@ -12,13 +12,13 @@ import pytest
 
 from benchmarks._driving_worlds import as_scenario, PERIOD
 from benchmarks.drive import seen_at
-from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
-from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower
-from scenario_gen.closed_loop.results import as_json, as_junit, as_page
+from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.planners import ConstantSpeed
+from scenario_gen.closed_loop.results import as_junit, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.trials import Bars, broken_bars, find_planner, rates, run_trials, Trial
+from scenario_gen.closed_loop.trials import Bars, broken_bars, rates, run_trials
 from scenario_gen.closed_loop.verdict import judge, Runner
 from scenario_gen.types.road import Road
 
@@ -109,9 +109,9 @@ def trials():
 def test_many_drives_give_the_same_bytes_with_two_workers(trials):
     name, config = "scenario_gen.closed_loop.planners:IdmFollower", ClosedLoopConfig()
     one, two = (run_trials(trials, name, config, workers) for workers in (1, 2))
-    assert as_json(one, name, config) == as_json(two, name, config) and as_junit(one, name) == as_junit(two, name)
-    page = as_page(one, trials, name, config)
-    assert page == as_page(two, trials, name, config) and all(trial.name in page for trial in trials)
+    first, second = (Drives(outcomes, name, config, trials) for outcomes in (one, two))
+    assert first.json() == second.json() and as_junit(one, name) == as_junit(two, name)
+    assert first.page() == second.page() and all(trial.name in first.page() for trial in trials)
     assert [outcome.name for outcome in one] == ["meet", "free", "first"] and all(o.verdict.passed for o in one)
 
 
@@ -123,30 +123,7 @@ def test_json_junit_rates_and_bars(trials):
     suite = ElementTree.fromstring(as_junit(outcomes, "p:C"))
     assert suite.get("tests") == "3" and suite.get("failures") == str(len(failed))
     assert [case.get("name") for case in suite if case.find("failure") is not None] == [f"scenario {o.name}" for o in failed]
-    said = json.loads(as_json(outcomes, "p:C", ClosedLoopConfig()))
+    said = json.loads(Drives(outcomes, "p:C", ClosedLoopConfig()).json())
     assert said["summary"]["collisions"]["count"] == 1 and len(said["drives"]) == 3
     assert [line.split(":")[0] for line in broken_bars(found, Bars())] == ["collisions", "at_fault"]
     assert broken_bars(found, Bars(collisions=0.4, at_fault=0.4, goals=0.9)) == ["goals: 66.7 %; at least 90.0 % is asked"]
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("scenario_gen.closed_loop.planners", "write it as MODULE:CLASS"),
-        ("no_such_module:Planner", "No module named 'no_such_module'"),
-        ("scenario_gen.closed_loop.planners:Nobody", "no attribute 'Nobody'"),
-        ("scenario_gen.closed_loop.planners:SPEED_GAIN", "that is no class"),
-    ],
-)
-def test_a_planner_that_is_not_there_is_named(name, said):
-    with pytest.raises(InputError, match=said):
-        find_planner(name)
-
-
-def test_a_planner_that_fails_names_its_scenario(trials):
-    class Broken(IdmFollower):
-        def act(self, observation):
-            raise KeyError("lane")
-
-    with pytest.raises(InputError, match="scenario meet: the planner failed: KeyError: 'lane'"):
-        run_trials(trials, Broken)

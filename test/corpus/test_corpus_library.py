@@ -8,8 +8,9 @@ import json
 import numpy as np
 import pytest
 
-from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, build, pair_encounters
+from scenario_gen.corpus.tables import rows_of
 from scenario_gen.method.segmentation.library import PrimitiveLibrary
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter, Vehicle
@@ -44,8 +45,8 @@ def test_agreement_is_that_of_scikit_learn():
 
 def test_a_library_of_a_corpus(corpus):
     out, mined = corpus
-    built = build(out, most=12)
-    assert built.fitted == 12 and built.assigned >= mined.encounters and built.primitives >= 2
+    built = build(out, most=8)
+    assert built.fitted == 8 and built.assigned >= mined.encounters and built.primitives >= 2
     library = PrimitiveLibrary.load(out / "library" / "library.json")
     pairs = {pair.name: pair for row in rows_of(tables_of(out)) for pair in pair_encounters(encounter_of(row), 6.0)}
     rows = list(rows_of(sorted((out / "library" / "segments").glob("*.parquet"))))

@@ -17,13 +17,12 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus import grouping
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.grouping import group, label, Meeting, partitions
 from scenario_gen.corpus.kinds import kind_of, Motion
-from scenario_gen.corpus.meetings import _together, in_order, TOGETHER
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import clean_tasks, mine
-from scenario_gen.corpus.tasks import arriving
+from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.template.reactions import reactions_of
 
@@ -55,18 +54,12 @@ def test_every_row_that_is_left_out_is_counted_by_file(archive, corpus):
     assert mined.files and not mined.failed
 
 
-def test_an_encounter_of_the_corpus_is_an_encounter(corpus):
-    for row in rows_of(tables_of(corpus[0])):
-        encounter = encounter_of(row)
-        assert encounter.name == row["name"] and encounter.duration == row["seconds"] and len(encounter.vehicles) == row["count"]
-        assert encounter.origin == (row["lat"], row["lon"])
-
-
 def test_who_reacts_to_whom_stands_in_table_and_page(corpus):
     page, kinds = (corpus[0] / "encounters.html").read_text(), {}
     for row in rows_of(tables_of(corpus[0])):
-        found = json.loads(row["reactions"])
-        assert found["edges"] == [edge.document(row["vehicles"]) for edge in reactions_of(encounter_of(row)).edges]
+        found, encounter = json.loads(row["reactions"]), encounter_of(row)
+        assert (encounter.name, encounter.duration, encounter.origin) == (row["name"], row["seconds"], (row["lat"], row["lon"]))
+        assert found["edges"] == [edge.document(row["vehicles"]) for edge in reactions_of(encounter).edges]
         assert all(sentence in page for sentence in found["sentences"])
         kinds.setdefault(row["kind"], []).append([edge["kind"] for edge in found["edges"]])
     assert ["follow"] in kinds["following"] and not any("follow" in found for found in kinds["opposing"])
@@ -105,7 +98,7 @@ def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     mine([archive], out)
     assert {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")} == before
     assert not list(out.rglob(".scenario_gen-*"))
-    with pytest.raises(InputError, match="another set of parameters"):
+    with pytest.raises(InputError, match="corpus of other parameters"):
         mine([archive], out, CorpusConfig(interaction=5.0))
     for inside in (archive, archive / "corpus"):
         with pytest.raises(InputError, match="of which it would become a part"):
@@ -135,7 +128,7 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
 def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_path):
     """DSecond 20 s off in all rows of one of two files of a range; both of `_p001` and of a day that is not theirs."""
     (tmp_path / "in").mkdir()
-    lines = (archive / sorted(archive.glob("*.csv"))[0].name).read_text().splitlines()[:2000]
+    lines = (archive / sorted(archive.glob("*.csv"))[0].name).read_text().splitlines()[:8000]
     for name, add in (("TripStart_bsmrx_41000_p001.csv", 20_000), ("plain.csv", 0)):
         rows = [line.split(",") for line in lines]
         rows = [[*row[:6], str((int(row[6]) + add) % 60_000), *row[7:]] for row in rows if len(row) == 19]
@@ -143,7 +136,7 @@ def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_p
     mined = mine([tmp_path / "in"], tmp_path / "out")
     assert [note for note in mined.notes if "DSecond" in note and "41000" in note] and not mined.failed
     off, good = (mined.files[str(tmp_path / "in" / name)] for name in ("TripStart_bsmrx_41000_p001.csv", "plain.csv"))
-    assert off["said: stamps of another day"] > 1900 and not [why for why in off if "clocks" in why]
+    assert off["said: stamps of another day"] > 3000 and not [why for why in off if "clocks" in why]
     assert 0 < good["said: stamps that run backwards"] <= off["said: stamps that run backwards"]  # one clock tells less
 
 
@@ -153,13 +146,6 @@ def test_nothing_to_read_is_an_error(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="holds no log that can be read"):
         mine([tmp_path / "empty"], tmp_path / "out")
-
-
-def test_a_task_that_fails_leaves_nothing(tmp_path):
-    with pytest.raises(ZeroDivisionError), arriving(tmp_path / "a") as part:
-        part.write_text("half")
-        raise ZeroDivisionError
-    assert not list(tmp_path.iterdir())
 
 
 def straight(x, y, heading, speed, seconds=12.0):
@@ -187,17 +173,6 @@ def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case
     assert kind_of(a, b, 0.1) == kind == kind_of(b, a, 0.1)
 
 
-def test_messages_are_in_the_same_order_however_they_were_read():
-    random = np.random.default_rng(4)
-    rows = {"device": random.integers(0, 3, 500), "t": random.integers(0, 90, 500)}
-    rows |= {name: random.integers(0, 2, 500).astype(float) for name in ("lat", "lon", "speed", "heading")}
-    mixed = random.permutation(500)
-    one, other = rows, {name: values[mixed] for name, values in rows.items()}
-    first, second = (np.stack([each[name][in_order(each)] for name in each]) for each in (one, other))
-    assert (first == second).all()
-    assert (np.diff(first[0] * 100 + first[1]) >= 0).all()
-
-
 def meeting(a, b, start, end, gap):
     return Meeting(gap, int(start * 1e6), a, b, int(end * 1e6), "following", gap, 42.0, -83.0)
 
@@ -213,28 +188,6 @@ def test_who_is_joined_to_whom():
     brief = [meeting(1, 2, 0, 4, 1.0)]
     assert group(brief, config) == []
     assert label(17 + (2 << 40)) == "17x2"
-
-
-def test_fixes_that_jump_are_not_two_vehicles_at_once():
-    t = np.arange(0, 600_000_000, 100_000)
-    far = np.random.default_rng(0).random(len(t)) < 0.05
-    assert _together(t, far.astype(np.int64)) == 0  # single fixes
-    assert _together(t, (t // 3_000_000) % 2) < TOGETHER  # 3 s here, 3 s there
-    both = np.concatenate([t, t[3000:3100] + 40_000])  # a second vehicle for 10 s
-    assert _together(both, (np.arange(len(both)) >= len(t)).astype(np.int64)) == 20
-    assert _together(np.concatenate([t, t + 40_000]), np.repeat([0, 1], len(t))) == 1200  # for all of the time
-
-
-def test_ranges_hold_as_many_files_as_have_numbers(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenario_gen.corpus.messages.MOST_FILES", 2)
-    files = [tmp_path / f"it's {k}.csv" for k in range(5)]
-    for path in files:
-        path.write_text(",".join(["1"] * 19) + "\n")
-    tasks = ranges(files, tmp_path / "out" / "messages", 1 << 20, 500)
-    assert [len(task.pieces) for task in tasks] == [2, 2, 1]
-    parse_range(tasks[0])
-    accounts = json.loads(tasks[0].target.with_suffix(".json").read_text())["files"]
-    assert {name: one["rows"] for name, one in accounts.items()} == {str(path): 1 for path in files[:2]}
 
 
 @given(

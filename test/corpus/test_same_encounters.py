@@ -8,8 +8,9 @@ import numpy as np
 import pyproj
 import pytest
 
-from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 
 pytestmark = pytest.mark.xdist_group("corpus")
@@ -44,14 +45,14 @@ def both(folder, out):
     )
 
 
-@pytest.mark.parametrize(("behind", "speed"), [(2.0, 33.0), (1.9, 33.0), (2.5, 25.0), (1.2, 38.0)])
+@pytest.mark.parametrize(("behind", "speed"), [(2.0, 33.0), (1.2, 38.0)])
 def test_a_column_of_13(tmp_path, behind, speed):
     mined, read = both(column(tmp_path / "in", 13, behind, speed), tmp_path / "out")
     assert read == mined
     assert {name for names, _, _ in read for name in names} == set(range(1, 14))
 
 
-@pytest.mark.parametrize("seed", [3, 5])
+@pytest.mark.parametrize("seed", [3, pytest.param(5, marks=pytest.mark.long)])
 def test_an_archive(tmp_path, seed):
     config = ArchiveConfig(30_000, 0.2, 12, 4, wrong_times=0.0, damaged=0.0, repeated_ids=0.0)
     planted = read_planted(write_archive(tmp_path / "in", config, seed))

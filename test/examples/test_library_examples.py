@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from benchmarks._driving_worlds import draw_scenario
-from scenario_gen.closed_loop.trials import Trial
+from scenario_gen.closed_loop.origin import Trial
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

@@ -32,21 +32,7 @@ TEXTS = """nan NaN inf -inf 1e308 -1e308 1e-320 -0 0 1 -1 None null NA True fals
 NUMBERS = (*re.split(r"\s+", TEXTS), "", " ", "a\tb", "1" * 400, "x" * 3000)
 WORDS = (
     *(text.encode("utf-8", "surrogatepass") for text in NUMBERS),
-    *(
-        b"\x00",
-        b"\x00" * 8,
-        b"\xff" * 4,
-        b"\xff" * 8,
-        b"\xef\xbb\xbf",
-        b"\xff\xfe",
-        b"\n",
-        b"\r",
-        b"\r\n",
-        b",",
-        b";",
-        b"\t",
-        b"#",
-    ),
+    *(b"\x00", b"\x00" * 8, b"\xff" * 4, b"\xff" * 8, b"\xef\xbb\xbf", b"\xff\xfe", b"\n", b"\r", b"\r\n", b",", b";", b"#"),
     *(struct.pack("<d", value) for value in (math.nan, math.inf, 1e308, -0.0, 5e-324)),
     *(struct.pack("<q", value) for value in (-(2**63), 2**63 - 1, 2**31, 2**32 - 1)),
 )
@@ -117,20 +103,11 @@ def lines_of(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     """Shuffle, repeat, reverse, drop or exchange the lines of a text."""
     lines = data.split(b"\n")
     head, rows = lines[:1], lines[1:]
-    match rng.randrange(6):
-        case 0:
-            rng.shuffle(rows)
-        case 1:
-            rows *= rng.choice((2, 5))
-        case 2:
-            rows.reverse()
-        case 3:
-            rows = rows[:: rng.choice((2, 3, 10, 50))]
-        case 4:
-            head, rows = [], lines
-        case _:
-            rows.insert(rng.randrange(len(rows) + 1), rng.choice(lines))
-    return b"\n".join(head + rows)
+    rng.shuffle(extra := [*rows])
+    more = [*rows, rng.choice(lines)]
+    turned = (rows[::-1], rows[:: rng.choice((2, 3, 10, 50))])
+    ways = (head + extra, head + rows * rng.choice((2, 5)), *(head + each for each in turned), rows, more)
+    return b"\n".join(rng.choice(ways))
 
 
 def cells(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -234,18 +211,15 @@ def sentence(rng: random.Random, base: sqlite3.Connection) -> tuple[str, tuple[o
     )
     name = rng.choice(("id", "data", "x", "timestamp", "name", "type", "topic_id"))
     some = f"rowid * {rng.randrange(1, 97)} % 97 < {rng.choice((1, 10, 97))}"
-    return rng.choice(
+    statement = rng.choice(
         (
-            (f'update "{table}" set "{column}" = ? where {some}', (value,)),
-            (f'update "{table}" set "{column}" = ? where {some}', (value,)),
-            (f'alter table "{table}" rename column "{column}" to "{name}"', ()),
-            (f'alter table "{table}" drop column "{column}"', ()),
-            (f'alter table "{table}" rename to "{name}"', ()),
-            (f'drop table "{table}"', ()),
-            (f'delete from "{table}" where {some}', ()),
-            (f'insert into "{table}" select * from "{table}" limit 3', ()),
+            *[f'update "{table}" set "{column}" = ? where {some}'] * 2,
+            *(f'alter table "{table}" {how}' for how in (f'rename column "{column}" to "{name}"', f'drop column "{column}"')),
+            *(f'alter table "{table}" rename to "{name}"', f'drop table "{table}"', f'delete from "{table}" where {some}'),
+            f'insert into "{table}" select * from "{table}" limit 3',
         )
     )
+    return statement, (value,) * statement.count("?")
 
 
 def header(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:

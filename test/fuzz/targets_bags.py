@@ -10,6 +10,7 @@ import io
 import json
 from pathlib import Path
 import random
+import re
 import tempfile
 
 from bag_examples import hand_made_run
@@ -89,7 +90,7 @@ def ros1(folder: Path) -> list[bytes]:
 
 
 def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Write a bag anew with messages damaged, dropped, twice, at other stamps or under other topics."""
+    """Write a bag anew with messages damaged, at other stamps or under other topics."""
     try:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
@@ -99,22 +100,14 @@ def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
             how = rng.randrange(8)
             with BagWriter(folder / "out", compress=False) as bag:
                 for k, message in enumerate(found):
-                    topic, kind, content, stamp = message.topic, message.type, message.data, message.stamp_ns
                     if k in chosen:
-                        if how == 0:
-                            continue
-                        if how == 1:
-                            topic = rng.choice(found).topic
-                        elif how == 2:
-                            stamp = rng.choice((0, 1, 2**62, stamp + 1, rng.randrange(2**40)))
-                        elif how == 3:
-                            content = rng.choice(found).data
-                        elif how == 4:
-                            kind = rng.choice(found).type
-                        else:
-                            content = rng.choice(BYTES)(rng, content, [message.data for message in found])
-                    bag.add_topic(topic, kind)
-                    bag.write(topic, content, stamp)
+                        other = rng.choice(found)
+                        content = rng.choice(BYTES)(rng, message.data, [message.data for message in found])
+                        stamp = rng.choice((0, 1, 2**62, message.stamp_ns + 1, rng.randrange(2**40)))
+                        changes = ({"topic": other.topic}, {"stamp_ns": stamp}, {"data": other.data}, {"type": other.type})
+                        message = replace(message, **(changes[how] if how < len(changes) else {"data": content}))  # noqa: PLW2901
+                    bag.add_topic(message.topic, message.type)
+                    bag.write(message.topic, message.data, message.stamp_ns)
             return (folder / "out" / "out_0.mcap").read_bytes()
     except (ScenarioGenError, ValueError, IndexError):
         return rng.choice(BYTES)(rng, data, seeds)
@@ -216,21 +209,8 @@ def parameter_files(_folder: Path) -> list[bytes]:
 
 def assignments(_folder: Path) -> list[bytes]:
     """One assignment for each parameter, and values of all kinds."""
-    values = (
-        *TEXTS.split(),
-        "",
-        "'",
-        '"',
-        "[1, 2]",
-        "{a: [}",
-        "!!int ''",
-        "!!bool x",
-        "*a",
-        "&a [*a]",
-        "%YAML 9.9",
-        "...",
-        "2024-99-99",
-    )
+    odd = ["'", '"', "[1, 2]", "{a: [}", "!!int ''", "!!bool x", "*a", "&a [*a]", "%YAML 9.9", "...", "2024-99-99"]
+    values = (*TEXTS.split(), "", *odd)
     names = list(flatten(PipelineConfig()))
     kept = [f"{name}={value}" for name, (_, value) in flatten(PipelineConfig()).items()]
     odd = [f"{names[k * 7 % len(names)]}={value}" for k, value in enumerate(values)]
@@ -291,6 +271,10 @@ def compare_with_itself(path: Path) -> None:
         comparison_table(compare(found, found, rows[-1]))
 
 
+EXTREMES = '[0, -1, 1, 9007199254740992, 9223372036854775808, 1e308, -1e308, 1e-320, 0.5, null, true, "", "x", [], {}, [[]]]'
+DEEP = re.findall(rb"[^|]+", b'[|{a: |- |? |{"a":|&a |*a|!!float |!!binary |!!set |<<: |%TAG ! x\n')
+
+
 def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     """Change a value anywhere in a JSON document: another kind, an extreme, shorter, longer, deeper, gone."""
     try:
@@ -302,27 +286,7 @@ def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
             node = node[place]
         if holder is None:
             return rng.choice(BYTES)(rng, data, seeds)
-        extremes = [
-            0,
-            -1,
-            1,
-            2**53,
-            2**63,
-            2**70,
-            10**400,
-            1e308,
-            -1e308,
-            1e-320,
-            0.5,
-            None,
-            True,
-            "",
-            "x",
-            "é" * 500,
-            [],
-            {},
-            [[]],
-        ]
+        extremes = [*json.loads(EXTREMES), 10**400, "é" * 500]
         more = [float("nan"), float("inf"), [node], {"a": node}, [node] * 3, node[:-1] if isinstance(node, list) else node]
         if rng.random() < 0.15:
             del holder[place]
@@ -335,37 +299,16 @@ def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
 
 def deep(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     """Put brackets, anchors or tags somewhere, few or very many."""
-    words = (
-        b"[",
-        b"{a: ",
-        b"- ",
-        b"? ",
-        b'{"a":',
-        b"&a ",
-        b"*a",
-        b"!!float ",
-        b"!!binary ",
-        b"!!set ",
-        b"<<: ",
-        b"|\n",
-        b"%TAG ! x\n",
-    )
-    at, word = rng.randrange(len(data) + 1), rng.choice((*words, *WORDS))
+    at, word = rng.randrange(len(data) + 1), rng.choice((*DEEP, *WORDS))
     return data[:at] + word * rng.choice((1, 2, 40, 3000)) + data[at:]
 
 
 JSON = (*BYTES, deep, *[values] * 6)
 YAML = (*TEXT, deep, deep)
+SQLITE = partial(bags, StoragePlugin.SQLITE3)
 TARGETS = (
     Target("mcap_reader", runs, in_file("a.mcap", read_bag), BYTES, ("mcap_reader/*", "mcap_zstd*", "reindex_huge*"), "a.mcap"),
-    Target(
-        "sqlite_reader",
-        partial(bags, StoragePlugin.SQLITE3),
-        in_file("a.db3", read_bag),
-        (*BYTES, *[records] * 5),
-        ("sqlite/*",),
-        "a.db3",
-    ),
+    Target("sqlite_reader", SQLITE, in_file("a.db3", read_bag), (*BYTES, *[records] * 5), ("sqlite/*",), "a.db3"),
     Target("ros1_reader", ros1, in_file("a.bag", read_bag), BYTES, named="a.bag"),
     Target("reindex", runs, in_file("a.mcap", save_and_read), BYTES, ("reindex/*", "reindex_*", "mcap_zstd*")),
     Target("validate", runs, in_file("a.mcap", validate_bag), BAG, ("validate/*", "mcap_reader/*")),
@@ -373,13 +316,7 @@ TARGETS = (
     Target("regenerate", generated, in_file("a.mcap", lambda path: regenerate_scenario(path, 1)), BAG),
     Target("metadata", metadata, in_file("metadata.yaml", read_folder), YAML, ("meta/*",), "metadata.yaml"),
     Target("map", maps, read_map, (*BYTES, deep), ("map/*.yaml", "*.yaml")),
-    Target(
-        "parameters",
-        parameter_files,
-        in_file("p.yaml", lambda path: loaded(PipelineConfig(), path)),
-        YAML,
-        ("params/*",),
-    ),
+    Target("parameters", parameter_files, in_file("p.yaml", lambda path: loaded(PipelineConfig(), path)), YAML, ("params/*",)),
     Target("assignment", assignments, assign_one, (*BYTES, deep)),
     Target("library", libraries, in_file("library.json", use_library), JSON, ("library/*",)),
     Target("evaluation_json", evaluations, in_file("evaluation.json", compare_with_itself), JSON, ("result/*",)),

@@ -20,9 +20,10 @@ from test_commonroad import case_of
 
 from scenario_gen.corpus.batch import CASE_COLUMNS, SCENARIO_COLUMNS
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import account_of, encounter_of, row_of, rows_of, tables_of, write_encounters
+from scenario_gen.corpus.encounters import account_of, encounter_of, row_of, tables_of, write_encounters
 from scenario_gen.corpus.find import coverage_lines, find
 from scenario_gen.corpus.messages import parse_range, ranges
+from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.exchange.commonroad import write_commonroad

@@ -14,6 +14,7 @@ from mutators import BYTES, fields
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
+from msg_conventions import diagnostics, ego, frames, odometry, paths, pictures, roads, streams, tracks, trajectory
 from msg_conventions.changepoints import (
     decode_changepoints,
     decode_posterior,
@@ -21,24 +22,11 @@ from msg_conventions.changepoints import (
     encode_posterior,
     POSTERIOR_TYPE,
 )
-from msg_conventions.diagnostics import decode_diagnostics
-from msg_conventions.diagnostics import TYPE as DIAGNOSTICS_TYPE
-from msg_conventions.ego import decode_state, ego_messages
 from msg_conventions.fits import decode_fit
-from msg_conventions.frames import decode_frames, encode_frames
-from msg_conventions.frames import TYPE as TF_TYPE
 from msg_conventions.hashes import decode_hashes, hash_of
-from msg_conventions.odometry import TYPE as ODOMETRY_TYPE
-from msg_conventions.paths import decode_path, decode_route, encode_route
-from msg_conventions.paths import TYPE as PATH_TYPE
-from msg_conventions.pictures import decode_footprint, encode_footprint, FOOTPRINT_TYPE
-from msg_conventions.roads import decode_map, decode_poses, MAP_TYPE, POSES_TYPE
 from msg_conventions.scenario_info import decode_info, ScenarioEntry
 from msg_conventions.scenarios import decode_scenario, encode_scenario
-from msg_conventions.streams import decode_fix, decode_speed, encode_fix, encode_speed
 from msg_conventions.topics import FIX_TYPE, TWIST_TYPE
-from msg_conventions.tracks import decode_tracks, encode_tracks
-from msg_conventions.trajectory import TYPE as TRAJECTORY_TYPE
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.types.encounter import Vehicle
@@ -60,16 +48,14 @@ def of_run(*topics: str) -> list[bytes]:
     return [data for topic, data, _ in result_messages(hand_made_run()) if topic in topics]
 
 
-def ego(topic: str) -> list[bytes]:
-    """A message of the ego slot."""
-    return [
-        data for name, data in ego_messages(EgoSlot(Vehicle("5"), np.zeros(4), np.ones(4)), "map", 7_000_000_000) if name == topic
-    ]
+def ends() -> list[bytes]:
+    """The messages of the ego slot."""
+    return [data for _, data in ego.ego_messages(EgoSlot(Vehicle("5"), np.zeros(4), np.ones(4)), "map", 7_000_000_000)]
 
 
-def diagnostics(data: bytes) -> None:
+def reports(data: bytes) -> None:
     """Decode diagnostics, and all that is read from their texts."""
-    decode_diagnostics(data)
+    diagnostics.decode_diagnostics(data)
     for info in decode_info(data):
         if isinstance(info, ScenarioEntry):
             info.asked()
@@ -91,8 +77,8 @@ def decoder(name: str, kind: str, examples: Callable[[], Sequence[bytes]], decod
 def template_targets() -> tuple[Target, ...]:
     """Return one target per message of a template."""
     messages = {topic: data for topic, data, _ in result_messages(hand_made_run())}
-    kinds = {"tracks": TRAJECTORY_TYPE, "changepoints": TRAJECTORY_TYPE, "fit": TRAJECTORY_TYPE, "map": MAP_TYPE}
-    kinds |= {"vehicle_1/route": PATH_TYPE, "road/entries": POSES_TYPE}
+    kinds = {"tracks": trajectory.TYPE, "changepoints": trajectory.TYPE, "fit": trajectory.TYPE, "map": roads.MAP_TYPE}
+    kinds |= {"vehicle_1/route": paths.TYPE, "road/entries": roads.POSES_TYPE}
     return tuple(
         decoder(f"template_{topic.replace('/', '_')}", kind, partial(of_run, topic), partial(template, messages, topic))
         for topic, kind in kinds.items()
@@ -100,51 +86,43 @@ def template_targets() -> tuple[Target, ...]:
 
 
 TARGETS = (
-    decoder("message_tracks", TRAJECTORY_TYPE, lambda: [encode_tracks(encounter(k)) for k in (1, 2)], decode_tracks),
+    decoder("message_tracks", trajectory.TYPE, lambda: [tracks.encode_tracks(encounter(1))], tracks.decode_tracks),
     decoder(
         "message_changepoints",
-        TRAJECTORY_TYPE,
+        trajectory.TYPE,
         lambda: [encode_changepoints(TEMPLATE, segmentation(k)) for k in (1, 2)],
         lambda data: decode_changepoints(data, TEMPLATE),
     ),
-    decoder(
-        "message_posterior",
-        POSTERIOR_TYPE,
-        lambda: [encode_posterior(TEMPLATE, segmentation(1))],
-        decode_posterior,
-    ),
-    decoder(
-        "message_scenarios",
-        TRAJECTORY_TYPE,
-        lambda: [encode_scenario(scenario(k), 5) for k in (1, 2)],
-        decode_scenario,
-    ),
-    decoder("message_diagnostics", DIAGNOSTICS_TYPE, lambda: of_run("diagnostics", "scenarios/info"), diagnostics),
+    decoder("message_posterior", POSTERIOR_TYPE, lambda: [encode_posterior(TEMPLATE, segmentation(1))], decode_posterior),
+    decoder("message_scenarios", trajectory.TYPE, lambda: [encode_scenario(scenario(k), 5) for k in (1, 2)], decode_scenario),
+    decoder("message_diagnostics", diagnostics.TYPE, lambda: of_run("diagnostics", "scenarios/info"), reports),
     decoder(
         "message_route",
-        PATH_TYPE,
-        lambda: [encode_route(route(k), STAMPS, "map") for k in (1, 2)],
-        lambda data: (decode_path(data), decode_route(data, STAMPS)),
+        paths.TYPE,
+        lambda: [paths.encode_route(route(k), STAMPS, "map") for k in (1, 2)],
+        lambda data: (paths.decode_path(data), paths.decode_route(data, STAMPS)),
     ),
-    decoder("message_belonging", DIAGNOSTICS_TYPE, lambda: of_run("road/info", "fit/info"), lambda d: decode_hashes(d, "info")),
-    decoder("message_map_hash", MAP_TYPE, lambda: of_run("map"), partial(hash_of, "map")),
-    decoder("message_map", MAP_TYPE, lambda: of_run("map"), decode_map),
-    decoder("message_poses", POSES_TYPE, lambda: of_run("road/entries", "road/exits"), decode_poses),
-    decoder("message_odometry", ODOMETRY_TYPE, lambda: ego("ego/start") + ego("ego/goal"), decode_state),
-    decoder("message_fit", TRAJECTORY_TYPE, lambda: of_run("fit"), decode_fit),
-    decoder("message_fix", FIX_TYPE, lambda: [encode_fix(48.1, 11.2, 5, "vehicle_1")], decode_fix),
+    decoder("message_belonging", diagnostics.TYPE, lambda: of_run("road/info", "fit/info"), lambda d: decode_hashes(d, "info")),
+    decoder("message_map_hash", roads.MAP_TYPE, lambda: of_run("map"), partial(hash_of, "map")),
+    decoder("message_map", roads.MAP_TYPE, lambda: of_run("map"), roads.decode_map),
+    decoder("message_poses", roads.POSES_TYPE, lambda: of_run("road/entries", "road/exits"), roads.decode_poses),
+    decoder("message_odometry", odometry.TYPE, ends, ego.decode_state),
+    decoder("message_fit", trajectory.TYPE, lambda: of_run("fit"), decode_fit),
+    decoder("message_fix", FIX_TYPE, lambda: [streams.encode_fix(48.1, 11.2, 5, "vehicle_1")], streams.decode_fix),
     decoder(
         "message_frames",
-        TF_TYPE,
-        lambda: [encode_frames(np.array([[1.0, 2.0, 0.5]] * k), [f"vehicle_{n}" for n in range(k)], "map", 5) for k in (1, 3)],
-        decode_frames,
+        frames.TYPE,
+        lambda: [
+            frames.encode_frames(np.array([[1.0, 2.0, 0.5]] * k), [f"vehicle_{n}" for n in range(k)], "map", 5) for k in (1, 3)
+        ],
+        frames.decode_frames,
     ),
-    decoder("message_speed", TWIST_TYPE, lambda: [encode_speed(8.5, 5, "vehicle_1")], decode_speed),
+    decoder("message_speed", TWIST_TYPE, lambda: [streams.encode_speed(8.5, 5, "vehicle_1")], streams.decode_speed),
     decoder(
         "message_footprint",
-        FOOTPRINT_TYPE,
-        lambda: [encode_footprint(TEMPLATE.vehicles[0], 5, "vehicle_1")],
-        lambda data: np.isfinite(decode_footprint(data)),
+        pictures.FOOTPRINT_TYPE,
+        lambda: [pictures.encode_footprint(TEMPLATE.vehicles[0], 5, "vehicle_1")],
+        lambda data: np.isfinite(pictures.decode_footprint(data)),
     ),
     *template_targets(),
 )

@@ -5,8 +5,6 @@
 
 import os
 import signal
-import tempfile
-import time
 
 import harness
 from harness import fuzz, Target
@@ -72,30 +70,3 @@ def test_it_goes_on_where_it_was(tmp_path):
     again = fuzz(target(fail), tmp_path, executions=5, seconds=600.0)
     assert again.executions == 5
     assert [failure.count for failure in again.failures.values()] == [1]
-
-
-def test_what_is_stopped_keeps_what_it_has_done_and_leaves_no_process(tmp_path, monkeypatch):
-    """Progress is kept after each child, whose time is short here; a child whose parent is killed ends by itself."""
-    monkeypatch.setattr(harness, "SAVED", 0.05)
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    pid = os.fork()
-    if not pid:
-        try:
-            endless = Target("reader", lambda _: [], lambda *_: time.sleep(0.005), [longer])
-            fuzz(endless, tmp_path / "state", 10**9, 600.0, [b"a"])
-        finally:
-            os._exit(1)
-    while harness.load(tmp_path / "state", "reader").executions < 5:
-        time.sleep(0.01)
-    os.kill(pid, signal.SIGKILL)
-    os.waitpid(pid, 0)
-    while list(tmp_path.glob("tmp*")):  # the child's, which removes it at its end
-        time.sleep(0.01)
-    done = harness.load(tmp_path / "state", "reader").executions
-    again = fuzz(target(refuse), tmp_path / "state", executions=done + 3, seconds=600.0)
-    assert again.executions == done + 3 < 10**5
-
-
-def test_inputs_are_the_same_every_time():
-    once, again = ([harness.damaged(target(refuse), [b"a", b"b"], k) for k in range(20)] for _ in range(2))
-    assert once == again

@@ -50,13 +50,6 @@ def read_error(path, scenario):
     return worst
 
 
-def violations(scenario, boundary):
-    """Return how many pairs collide and how many vehicles leave the road."""
-    things = [create_collision_object(obstacle) for obstacle in scenario.dynamic_obstacles]
-    pairs = sum(a.collide(b) for k, a in enumerate(things) for b in things[:k])
-    return pairs, sum(thing.collide(boundary) for thing in things)
-
-
 def planted(path, boundary):
     """Say whether a collision is found where a vehicle drives as another does, and a departure where it drives beside.
 
@@ -90,9 +83,9 @@ def check(folder):
         scenario, _ = CommonRoadFileReader(str(path)).open()
         found["read_error"] = max(found["read_error"], read_error(path, scenario))
         _, boundary = create_road_boundary_obstacle(scenario, method="aligned_triangulation")
-        pairs, off = violations(scenario, boundary)
-        found["collisions"] += [name] * bool(pairs)
-        found["off_road"] += [name] * bool(off)
+        things = [create_collision_object(obstacle) for obstacle in scenario.dynamic_obstacles]
+        found["collisions"] += [name] * any(a.collide(b) for k, a in enumerate(things) for b in things[:k])
+        found["off_road"] += [name] * any(thing.collide(boundary) for thing in things)
         found["not_found"] += [name] * (False in planted(path, boundary))
     return found
 
@@ -161,9 +154,7 @@ def drive(path):
             return "late", step, track_of(planner)
         k = step % config.planning.replanning_frequency
         if planned is None or k == 0:
-            speed = max(
-                planner.x_0.velocity, 0.01
-            )  # at 0.0 it would take the initial speed for the desired one, and stand for ever
+            speed = max(planner.x_0.velocity, 0.01)  # at 0.0 it takes the initial speed for the desired one, and stands for ever
             wanted = min(desired_speed(planner, cruise), following_speed(planner, scenario, step))
             planner.set_desired_velocity(desired_velocity=wanted, current_speed=speed)
             planned, k = planner.plan(), 0

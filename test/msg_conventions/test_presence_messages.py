@@ -6,7 +6,7 @@
 from dataclasses import replace
 import json
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -39,6 +39,7 @@ def presences(draw):
 
 
 @given(presences())
+@settings(max_examples=30)
 def test_a_scenario_comes_back_from_its_messages(present):
     before = scenario(present)
     _, after = decode_scenario(encode_scenario(before, 5), seed=4, index=7)
@@ -49,6 +50,7 @@ def test_a_scenario_comes_back_from_its_messages(present):
 
 
 @given(presences())
+@settings(max_examples=30)
 def test_who_takes_every_message_for_itself_sees_each_vehicle_where_it_is_and_nobody_else(present):
     """A consumer that knows the standard type and nothing of presence."""
     made = scenario(present)

@@ -34,8 +34,8 @@ def results(case: GenerationResult) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def main(count: int, seed: int, pairs: list[str]) -> None:
-    """Print the results of every log on every road."""
+def of_runs(count: int, seed: int, *pairs: str) -> dict[str, Any]:
+    """Return the results of every log on every road."""
     found: dict[str, Any] = {}
     for log, road in zip(pairs[::2], pairs[1::2], strict=True):
         for encounter in read_log([Path(log)], PipelineConfig().log).encounters:
@@ -44,8 +44,8 @@ def main(count: int, seed: int, pairs: list[str]) -> None:
                 found[name] = results(generate(encounter, road, PipelineConfig(), count=count, seed=seed))
             except RefusedError as error:
                 found[name] = {"decided": str(error), "places": []}
-    print(json.dumps(found))
+    return found
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])
+    print(json.dumps(of_runs(int(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:])))

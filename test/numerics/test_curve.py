@@ -40,14 +40,9 @@ def test_the_same_as_over_all_edges(seed, scale, whole):
 
 
 def test_a_long_curve_is_projected_on_piece_by_piece():
-    """Forty kilometres in half metres: over all edges it would be a table of 50 GB."""
-    s = np.arange(0.0, 40_000.0, 0.5)
+    """Ten kilometres in half metres: over all edges it would be a table of 3 GB."""
+    s = np.arange(0.0, 10_000.0, 0.5)
     curve = Curve(np.column_stack((s, 5.0 * np.sin(s / 50.0), np.arctan(0.1 * np.cos(s / 50.0)))))
     station, offset = curve.project(curve.points[:, :2])
     assert station == pytest.approx(curve.station, abs=1e-6)
-    assert np.abs(offset).max() < 1e-9
-
-
-def test_of_no_positions_there_is_nothing():
-    station, offset = Curve(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])).project(np.zeros((0, 2)))
-    assert station.shape == offset.shape == (0,)
+    assert np.abs(offset).max() < 1e-9 and len(curve.project(np.zeros((0, 2)))[0]) == 0

@@ -6,31 +6,29 @@
 The long form takes the settings one by one; `make soak PART=cpu` every recorded encounter on two roads, and numba's target too.
 """
 
-from functools import cache
-
 from cpu_settings import apart, AT_ONCE, MOST_APART_M, results_under, SETTINGS
 from lengths import LONG
 import pytest
+from results_of_a_run import of_runs
 
 from scenario_gen.logs.synthetic import bundled
 
-CASE = (str(bundled("a")), "t_intersection")
+RUN = (8, 7, str(bundled("a")), "t_intersection")
 
 
-@cache
-def found(name: str):
-    """The results under one setting."""
-    return results_under((SETTINGS | AT_ONCE)[name], 8, 7, *CASE)
+@pytest.fixture(scope="module")
+def as_it_is():
+    return next(iter(of_runs(*RUN).values()))
 
 
 @pytest.mark.parametrize("name", list(SETTINGS)[1:] if LONG else AT_ONCE)
-def test_decisions_are_the_same_and_places_within_a_centimetre(name):
-    (one,), (other,) = found("as it is").values(), found(name).values()
-    assert len(one["decided"]["indices"]) == 8
-    assert apart(one, other) < MOST_APART_M
+def test_decisions_are_the_same_and_places_within_a_centimetre(name, as_it_is):
+    (other,) = results_under((SETTINGS | AT_ONCE)[name], *RUN).values()
+    assert len(other["decided"]["indices"]) == 8
+    assert apart(as_it_is, other) < MOST_APART_M
 
 
-def test_what_was_decided_otherwise_is_seen():
-    (one,) = found("as it is").values()
+def test_what_was_decided_otherwise_is_seen(as_it_is):
+    one = as_it_is
     assert apart(one, one | {"decided": one["decided"] | {"candidates": 9}}) == float("inf")
     assert apart(one, one | {"places": [[[1e3] * len(each) for each in group] for group in one["places"]]}) > MOST_APART_M

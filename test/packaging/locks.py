@@ -25,7 +25,7 @@ BEFORE = {  # what is installed before each; ROS's wheels may come from a source
     "ros-test": ("core", "run", "ros", "extras", "test"),
     "bench": ("core", "run", "extras", "test"),
 }  # the others are installed into environments of their own
-OPTIONS = (
+OPTIONS = [
     "--universal",
     "--python-version",
     "3.11",
@@ -34,7 +34,7 @@ OPTIONS = (
     "--generate-hashes",
     "--no-header",
     "--no-annotate",
-)
+]
 
 
 def pins(text: str) -> dict[str, str]:

@@ -30,11 +30,9 @@ def test_every_public_name_is_there():
         _ = scenario_gen.segments
 
 
-def test_importing_the_package_loads_nothing_and_importing_the_pipeline_no_extra():
+def test_importing_the_package_loads_nothing():
     ran = python("-c", "import sys; before = set(sys.modules); import scenario_gen; print(*(set(sys.modules) - before))")
     assert {name.partition(".")[0] for name in ran.stdout.split()} <= {"scenario_gen", *sys.stdlib_module_names}
-    ran = python("-c", "import sys, scenario_gen.pipeline; print(*sys.modules)")
-    assert not {name.partition(".")[0] for name in ran.stdout.split()} & set(EXTRA_MODULES)
 
 
 def test_the_core_works_without_any_extra(tmp_path):

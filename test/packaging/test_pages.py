@@ -4,14 +4,13 @@
 """The code that pages show runs: README, tutorial, and the how-to on data; the table of columns is the code's."""
 
 import doctest
-import os
 import re
-import subprocess
 import sys
 
 import pytest
 from source_files import ROOT
 
+from scenario_gen.cli.commands import main
 from scenario_gen.logs.columns import NAMES, UNITS
 
 FAILS = "my_planner:MyPlanner"  # the tutorial's bad planner: the command's exit code is 1
@@ -22,33 +21,32 @@ def blocks(page):
     return re.findall(r"^```(sh|python)\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
 
 
-def run(command, folder):
-    """Run a command in a folder, with this tree's package and modules of the folder."""
-    paths = os.pathsep.join([str(ROOT), str(folder)])
-    return subprocess.run(
-        command, check=False, cwd=folder, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True
-    )
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A folder with the examples, in which a page's code runs, and modules that it writes are found."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    return tmp_path
 
 
 @pytest.mark.parametrize("page", [pytest.param("docs/tutorial.md", marks=pytest.mark.long), "docs/howto_data.md"])
-def test_commands_of_a_page_run(page, tmp_path):
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+def test_commands_of_a_page_run(page, place, monkeypatch):
     for language, text in blocks(page):
         if language == "python":
-            (tmp_path / text.partition("\n")[0].removeprefix("# ")).write_text(text)
+            (place / text.partition("\n")[0].removeprefix("# ")).write_text(text)
             continue
         for line in text.splitlines():
             if line.startswith("scenario-gen "):
-                done = run([sys.executable, "-m", "scenario_gen", *line.split()[1:]], tmp_path)
-                assert done.returncode == int(FAILS in line), (line, done.stdout, done.stderr)
+                monkeypatch.setattr(sys, "argv", line.split())
+                with pytest.raises(SystemExit) as end:
+                    main()
+                assert int(end.value.code or 0) == int(FAILS in line), line
 
 
-def test_python_of_the_readme_runs(tmp_path):
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    code = "\n".join(text for language, text in blocks("README.md") if language == "python")
-    done = run([sys.executable, "-c", code], tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout
+def test_python_of_the_readme_runs(place, capsys):
+    exec("\n".join(text for language, text in blocks("README.md") if language == "python"), {})
+    assert capsys.readouterr().out
 
 
 def test_the_table_of_columns_is_the_code_s():
@@ -58,10 +56,9 @@ def test_the_table_of_columns_is_the_code_s():
 
 
 @pytest.mark.long
-def test_the_tasks_of_the_library_run_and_are_short(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("place")
+def test_the_tasks_of_the_library_run_and_are_short():
     pytest.importorskip("matplotlib").use("Agg")
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    monkeypatch.chdir(tmp_path)
     found = [text for language, text in blocks("docs/library.md") if language == "python" and text.startswith(">>> ")]
     assert len(found) > 12 and max(text.count(">>> ") for text in found) <= 6
     page = doctest.DocTestParser().get_doctest("\n".join(found), {}, "library.md", None, 0)

@@ -49,9 +49,3 @@ def test_foxglove_shows_topics_of_the_suite_and_every_panel_is_placed():
         return {node} if isinstance(node, str) else placed(node["first"]) | placed(node["second"])
 
     assert placed(layout["layout"]) == set(layout["configById"])
-
-
-def test_the_launch_file_names_a_configuration_that_is_installed():
-    launch = (CONFIG.parent / "launch" / "suite.launch.py").read_text()
-    assert '"config" / "suite.rviz"' in launch
-    assert 'Path("config").glob("*.*")' in (CONFIG.parent / "setup.py").read_text()

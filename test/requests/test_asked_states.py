@@ -11,7 +11,7 @@ from lengths import LONG
 import numpy as np
 import pytest
 
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.nearest import ImpossibleError
 from scenario_gen.numerics.arrays import wrap_angle
 from scenario_gen.types.request import Request
@@ -38,16 +38,11 @@ def state(plain, end, vehicle, ahead=0.0, left=0.0, speed=None):
     return f"{vehicle + 1}: {x:.3f} {y:.3f} {yaw:.6f} {v if speed is None else speed:.3f}"
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"goals": (0, -4.0, 0.0, 11.0)},
-        {"goals": (1, 2.0, 0.2, 3.0)},
-        {"starts": (0, 5.0, 0.0, 9.0)},
-        {"starts": (1, -3.0, 0.0, 12.0), "goals": (0, 3.0, 0.0, 0.0)},
-        {"starts": (0, 0.0, 0.0, 0.2)},
-    ],
-)
+CHANGES = [{"goals": (1, 2.0, 0.2, 3.0)}, {"starts": (1, -3.0, 0.0, 12.0), "goals": (0, 3.0, 0.0, 0.0)}]
+CHANGES += [{"starts": (0, 5.0, 0.0, 9.0)}, {"starts": (0, 0.0, 0.0, 0.2)}]
+
+
+@pytest.mark.parametrize("change", CHANGES)
 def test_what_is_asked_is_met(chain, plain, change):
     ends = {"starts": "start", "goals": "end"}
     texts = {name: state(plain, ends[name], *values) for name, values in change.items()}
@@ -67,14 +62,14 @@ def test_what_is_asked_is_met(chain, plain, change):
 
 
 def refused(chain, **texts):
-    """The error of an impossible request; every suggestion in it has been taken, from its text alone, and works."""
+    """The error of an impossible request; its suggestions (short: the first) are taken, from the text alone, and work."""
     with pytest.raises(ImpossibleError) as caught:
         answer(chain, Request(**texts), count=COUNT)
     error = caught.value
     assert error.suggestions, str(error)
     offers = str(error).partition("Nearest possible: ")[2].split("; or ")
     assert len(offers) == len(error.suggestions)
-    for offer in offers:
+    for offer in offers if LONG else offers[:1]:
         taken = dict(re.findall(r"(starts|goals):='([^']*)'", offer))
         longer = re.search(r"max_stretch:=([0-9.]+)", offer)
         own = chain if longer is None else replace(chain, sampling=replace(chain.sampling, max_stretch=float(longer[1])))
@@ -134,19 +129,15 @@ def test_a_start_too_fast_to_stop(chain, plain):
     assert 25.0 < slower[3] < 38.0 and slower[:2] == error.suggestions[0].request.states("starts")["1"][:2]
 
 
+@pytest.mark.long
 def test_a_speed_above_the_limit(chain, plain):
     error = refused(chain, starts=state(plain, "start", 1, speed=60.0))
     assert "sampling.max_speed is 40" in str(error)
     assert 20.0 < error.suggestions[0].request.states("starts")["2"][3] <= 40.0
 
 
-def test_errors_of_the_caller_are_no_impossible_requests(chain):
-    with pytest.raises(InputError, match="there are: 1, 2"):
-        answer(chain, Request(goals="9: 0 0 0"), count=1)
-    assert issubclass(ImpossibleError, RefusedError)
-
-
 def test_a_cancelled_search_suggests_nothing(chain, plain):
     with pytest.raises(ImpossibleError) as caught:
         answer(chain, Request(goals=state(plain, "end", 1, left=-4.0)), count=COUNT, cancelled=lambda: True)
+    assert issubclass(ImpossibleError, RefusedError)
     assert caught.value.suggestions == ()

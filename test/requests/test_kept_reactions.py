@@ -112,6 +112,5 @@ def test_an_ego_slot_of_who_goes_first_or_waits():
 
 
 def test_asked_states_keep_them_too():
-    result = made(LANE)
-    x, y, yaw, _ = result.fit.requested.start[1].tolist()
+    x, y, yaw, _ = made(LANE, count=1).fit.requested.start[1].tolist()
     assert_kept(made(LANE, Request(starts=f"2: {x + 1.0:.2f} {y:.2f} {yaw:.3f}")), ["2 follows 1"])

@@ -19,12 +19,15 @@ def test_states_are_read_by_vehicle_and_written_back():
     assert again.states("starts") == request.states("starts")
 
 
-@pytest.mark.parametrize(
-    "text", ["1", "1: 2 3", "1: 1 2 3 4 5", "1: a b c", ": 1 2 3", "1: nan 0 0", "1: 0 0 0 -1", "1: 0 0 0; 1: 1 1 1"]
-)
-def test_other_text_is_refused_and_named(text):
-    with pytest.raises(InputError, match="goals"):
-        Request(goals=text)
+STATES = ["1", "1: 2 3", "1: 1 2 3 4 5", "1: a b c", ": 1 2 3", "1: nan 0 0", "1: 0 0 0 -1", "1: 0 0 0; 1: 1 1 1"]
+TARGETS = ["pet", "pet=1", "pet=2..1", "pet=..", "speed=1..2", "pet[1]=1..2", "pet[1,2=1..2", "pet=a..2", "pet=1..2; pet=2..3"]
+
+
+@pytest.mark.parametrize(("name", "texts"), [("goals", STATES), ("target", TARGETS)])
+def test_other_text_is_refused_and_named(name, texts):
+    for text in texts:
+        with pytest.raises(InputError, match=name):
+            Request(**{name: text})
 
 
 def test_vehicles_are_found_by_id_and_by_ros_name_and_unknown_ones_listed(chain):

@@ -6,6 +6,7 @@
 from dataclasses import replace
 
 from given import answer
+from lengths import LONG
 import numpy as np
 import pytest
 
@@ -13,7 +14,7 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation.measures import features, figures_of, measure, MEASURES, most_critical
-from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.directed import TargetError
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.regenerate import regenerate_scenario
@@ -38,14 +39,6 @@ def test_texts_are_read_and_written():
     assert read_targets(f"{one}; {two}") == (one, two)
 
 
-@pytest.mark.parametrize(
-    "text", ["pet", "pet=1", "pet=2..1", "pet=..", "speed=1..2", "pet[1]=1..2", "pet[1,2=1..2", "pet=a..2", "pet=1..2; pet=2..3"]
-)
-def test_other_texts_are_refused_and_named(text):
-    with pytest.raises(InputError, match="target"):
-        Request(target=text)
-
-
 def test_unknown_vehicles_are_named(chain):
     with pytest.raises(InputError, match="target: no vehicle 'x'"):
         answer(chain, Request(target="pet[1,x]=0..1"), count=1)
@@ -61,8 +54,8 @@ def test_all_are_in_the_range_and_have_weights_and_figures(directed):
 
 
 def test_the_weighted_share_agrees_with_natural_sampling(chain, directed):
-    """Against 2,000 natural candidates: the interval of one overlaps that of the other."""
-    natural = answer(chain, Request(), count=1200).generated
+    """Against natural candidates: the interval of one overlaps that of the other."""
+    natural = answer(chain, Request(), count=1200 if LONG else 400).generated
     hits = [LOW <= measure(scenario, "pet") <= HIGH for scenario in natural.scenarios]
     share = sum(hits) / natural.candidates
     half = 1.96 * np.sqrt(share * (1.0 - share) / natural.candidates)
@@ -72,13 +65,6 @@ def test_the_weighted_share_agrees_with_natural_sampling(chain, directed):
 def test_a_range_that_cannot_be_had_is_refused_with_what_can(chain):
     with pytest.raises(TargetError, match=r"pet=90\.\.91.*reachable: pet from"):
         answer(chain, Request(target="pet=90..91"), count=3)
-
-
-def test_without_measures_a_target_is_refused(chain):
-    with pytest.raises(InputError, match="measures"):
-        made = answer(chain, Request(), count=1)
-        plan = Plan(made.encounter, made.segmentation, made.road, made.routes, made.fit.requested, ())
-        draw_scenarios(plan, lambda _: [], count=1, request=Request(target="pet=0..1"))
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
     from rclpy.duration import Duration
     from std_msgs.msg import String
 
-    from msg_conventions.cdr import CdrWriter
+    from msg_conventions.cdr import encode
     from scenario_gen.ros.plumbing.topics import Pace
 
     publisher, told = client.node.create_publisher(String, "/hang", 5), []
@@ -89,7 +89,7 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
 
         def publish() -> None:
             pace.wait(lambda: False)
-            publisher.publish(CdrWriter().string("x").finish())
+            publisher.publish(encode({"data": "string"}, data="x"))
 
         for _ in range(20):
             publish()

@@ -11,7 +11,7 @@ from suite_processes import Processes, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics
 
-pytestmark = [pytest.mark.dds, pytest.mark.slow]
+pytestmark = [pytest.mark.dds, pytest.mark.slow, pytest.mark.long]
 NODES = {
     "log_player": ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"],
     "road_server": ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
@@ -25,7 +25,9 @@ NODES = {
 def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, client):
     def processes(name, nodes):
         (tmp_path / name).mkdir()
-        return Processes(tmp_path / name, domain, {node: NODES[node] for node in nodes})
+        return Processes(
+            tmp_path / name, domain, {node: NODES[node] for node in nodes}, apart=("segmenter", "planner", "gp_sampler")
+        )
 
     client.hear("/scenarios", "/scenarios/info", "/changepoints", "/fit", "/vehicle_1/route", "/report")
     suites = [processes("first", NODES)]

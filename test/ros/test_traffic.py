@@ -15,11 +15,12 @@ from bag_examples import hand_made_run
 import numpy as np
 import pytest
 
-from msg_conventions.cdr import CdrWriter
+from msg_conventions.cdr import encode
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.driving import encode_twist
 from msg_conventions.ego import decode_state
 from msg_conventions.frames import decode_frames
+from msg_conventions.layouts import VELOCITY_STAMPED
 from msg_conventions.odometry import decode_odometry, encode_odometry
 from msg_conventions.paths import encode_path
 from msg_conventions.roads import decode_map
@@ -163,7 +164,8 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
             step(client)
     finally:
         other.destroy_node()
-    stale = CdrWriter().header(FIRST_STAMP, "base_link").pack("d", 3.0, *[0.0] * 5).finish()  # of the drive's begin
+    ahead = (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    stale = encode(VELOCITY_STAMPED, stamp=FIRST_STAMP, frame_id="base_link", twist=ahead)  # of the drive's begin
     said = {"over": False}
     while not said["over"]:
         client.say("ego/cmd_vel_stamped", stale)

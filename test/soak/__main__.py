@@ -15,12 +15,13 @@ from pathlib import Path
 import shutil
 import sys
 import time
+import tomllib
 
-from figures import Figure
+from figures import Figure, ROOT
 from rich.console import Console
 from rich.table import Table
 
-PARTS = ("cpu", "cuts", "fuzz", "kills", "long", "newest", "properties", "recorded", "ros", "search", "tests")
+PARTS = ("cpu", "cuts", "fuzz", "kills", "long", "newest", "properties", "recorded", "ros", "tests")
 OUT = Path("out/soak")
 
 
@@ -54,7 +55,8 @@ def main() -> int:
     parser.add_argument("parts", nargs="*", choices=[[], *PARTS])
     parser.add_argument("--fresh", action="store_true", help="begin again instead of going on where a part was stopped")
     arguments = parser.parse_args()
-    sys.path += [str(folder) for folder in Path(__file__).resolve().parents[1].iterdir() if folder.is_dir()]  # as pytest's
+    words = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]["pythonpath"]
+    sys.path += [str(ROOT / folder) for folder in ("test", *words)]  # as pytest's
     for part in arguments.parts or PARTS:
         if arguments.fresh:
             shutil.rmtree(OUT / part, ignore_errors=True)

@@ -4,15 +4,15 @@
 """Every recorded encounter on two roads, under every setting that another CPU would choose: same decisions, within 1 cm."""
 
 from collections.abc import Iterable, Iterator
-import json
-import os
+from functools import partial
+import itertools
 from pathlib import Path
 from typing import Any
 
-from cpu_settings import apart, CODE, MOST_APART_M, results_under, ROOT, SETTINGS
-from figures import Figure
+from cpu_settings import apart, CODE, MOST_APART_M, results_under, SETTINGS
+from figures import Figure, kept
+from lengths import DATA
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", ROOT.parent / "shared" / "data"))
 ROADS = ("corridor", "t_intersection")
 COUNT, SEED = 30, 7
 
@@ -20,12 +20,9 @@ COUNT, SEED = 30, 7
 def results(setting: dict[str, str], logs: list[Path], state: Path) -> Iterator[tuple[str, Any]]:
     """Yield the results of each log on each road; what lies in `state` already is not run again."""
     state.mkdir(parents=True, exist_ok=True)
-    for log in logs:
-        for road in ROADS:
-            file = state / f"{log.stem} {road}.json"
-            if not file.exists():
-                file.write_text(json.dumps(results_under(setting, COUNT, SEED, str(log), road)))
-            yield from ((f"{log.stem}: {name}", each) for name, each in json.loads(file.read_text()).items())
+    for log, road in itertools.product(logs, ROADS):
+        found = kept(state / f"{log.stem} {road}.json", partial(results_under, setting, COUNT, SEED, str(log), road))
+        yield from ((f"{log.stem}: {name}", each) for name, each in found.items())
 
 
 def run(state: Path) -> Iterable[Figure]:

@@ -24,7 +24,7 @@ import subprocess
 import sys
 import time
 
-from figures import Figure
+from figures import Figure, of_benchmark
 
 from scenario_gen.__main__ import command as main
 from scenario_gen.base.folders.scratch import PREFIX, sweep_beside
@@ -55,22 +55,21 @@ class Target:
         }[self.command]
         return [self.command, *rest, "--out", str(out)]
 
+    def run_here(self, which: int) -> None:
+        """Run in this process, silently."""
+        sys.argv = ["scenario-gen", *self.words(which, self.out)]
+        with redirect_stdout(StringIO()), suppress(SystemExit):
+            main()
+
     def start(self, which: int) -> int:
         """Begin a run in a process of its own, forked from this one, which has all libraries loaded; return its id."""
-        pid = os.fork()
-        if pid:
+        if pid := os.fork():
             return pid
-        code = 1
         try:
-            null = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(null, 1)
-            os.dup2(null, 2)
-            sys.argv = ["scenario-gen", *self.words(which, self.out)]
-            main()
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else 1
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+            self.run_here(which)
         finally:
-            os._exit(code)
+            os._exit(0)
 
     def finish(self, which: int, out: Path | None = None) -> str:
         """Let a run come to its end, as a user starts it; return what is there then."""
@@ -80,32 +79,23 @@ class Target:
             raise RuntimeError(f"{self.command}: {ended.stderr}")
         return digest(out or self.out)
 
-    def settle(self) -> None:
-        """Do what the next command that names the folder does first."""
-        sweep_beside([str(self.out)])
+    def is_alone(self) -> bool:
+        """Say whether nothing is beside the result."""
+        return [path.name for path in self.folder.iterdir()] == ["out"]
+
+    def is_writing(self) -> bool:
+        """Say whether a file of a new result is there."""
+        with suppress(FileNotFoundError):  # it took its place while this looked
+            return any(self.folder.glob(f"{PREFIX}*/new/out/*"))
+        return False
 
 
 def digest(folder: Path) -> str:
-    """Return one SHA-256 of all names and bytes below, "" where there is no folder."""
-    if not folder.is_dir():
-        return ""
+    """Return one SHA-256 of all names and bytes below."""
     found = hashlib.sha256()
     for path in sorted(folder.rglob("*")):
         found.update(f"{path.relative_to(folder)}\0".encode() + (path.read_bytes() if path.is_file() else b""))
     return found.hexdigest()
-
-
-def names(folder: Path) -> list[str]:
-    """Return what is in a folder."""
-    return [path.name for path in folder.iterdir()]
-
-
-def writing(folder: Path) -> bool:
-    """Say whether a file of a new result is there."""
-    try:
-        return any(folder.glob(f"{PREFIX}*/new/out/*"))
-    except FileNotFoundError:  # it took its place while this looked
-        return False
 
 
 def kill_once(target: Target, which: int, duration: float, chance: random.Random) -> str:
@@ -115,36 +105,28 @@ def kill_once(target: Target, which: int, duration: float, chance: random.Random
     if at_any_time:
         time.sleep(chance.uniform(0.0, duration))
     else:
-        while not (ended := os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)) and not writing(target.folder):
+        while not (ended := os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)) and not target.is_writing():
             time.sleep(0.001)
         if not ended:
             time.sleep(chance.uniform(0.0, 0.5 * duration))
     os.kill(pid, signal.SIGKILL)
     if os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) != -signal.SIGKILL:
         return "ended"
-    return "writing" if writing(target.folder) or not at_any_time else "computing"
+    return "writing" if target.is_writing() or not at_any_time else "computing"
 
 
 def prepared(command: str, state: Path) -> tuple[Target, dict[str, int], float]:
     """Return a command's target, its two results by digest, and how long a run takes [s]."""
-    folder = state / command
-    folder.mkdir(parents=True, exist_ok=True)
-    sources = (state / "source_0", state / "source_1")
-    for which, source in enumerate(sources):
+    target = Target(command, state / command, (state / "source_0", state / "source_1"))
+    target.folder.mkdir(parents=True, exist_ok=True)
+    for which, source in enumerate(target.sources):
         if command != "generate" and not (source / "bag").exists():
-            Target("generate", state, sources).finish(which, source)
-    target = Target(command, folder, sources)
-    known: dict[str, int] = {}
-    for which in (0, 1):
-        known[target.finish(which, state / f"{command}_{which}" / "out")] = which
-    duration = 0.0
-    for which in (0, 1):  # twice in this process, so that it has loaded everything
-        sys.argv = ["scenario-gen", *target.words(which, target.out)]
-        started = time.monotonic()
-        with redirect_stdout(StringIO()), suppress(SystemExit):
-            main()
-        duration = time.monotonic() - started
-    return target, known, duration
+            Target("generate", state, target.sources).finish(which, source)
+    known = {target.finish(which, state / f"{command}_{which}" / "out"): which for which in (0, 1)}
+    target.run_here(0)  # so that this process has loaded everything
+    started = time.monotonic()
+    target.run_here(1)
+    return target, known, time.monotonic() - started
 
 
 def kills(command: str, state: Path, count: int, seed: int = 1) -> Counter[str]:
@@ -154,25 +136,24 @@ def kills(command: str, state: Path, count: int, seed: int = 1) -> Counter[str]:
     if seen["kills"] >= count:
         return seen
     target, known, duration = prepared(command, state)
-    target.settle()
-    if not target.out.exists():
-        target.finish(0)
+    sweep_beside([str(target.out)])
     while seen["kills"] < count:
         chance = random.Random(f"{seed} {command} {seen.total()}")
         earlier = known[digest(target.out)]
         when = kill_once(target, 1 - earlier, duration, chance)
-        seen["kills" if when != "ended" else "ended before the kill"] += 1
-        seen[f"while {when}"] += when != "ended"
-        seen["left something"] += names(target.folder) != ["out"]
-        target.settle()  # a kill between the two renames leaves the earlier result beside its place
+        killed = when != "ended"
+        seen["kills" if killed else "ended before the kill"] += 1
+        seen["while writing"] += when == "writing"
+        seen["left something"] += not target.is_alone()
+        sweep_beside([str(target.out)])  # a kill between the two renames leaves the earlier result beside its place
         found = known.get(digest(target.out))
-        seen["whole"] += found is not None and when != "ended"
-        seen["new in place"] += found == 1 - earlier and when != "ended"
         if found is None:
             raise RuntimeError(f"{target.out} is neither the earlier result nor the new one; look at it there")
+        seen["whole"] += killed
+        seen["new in place"] += killed and found != earlier
         if seen["kills"] % 10 == 0:
             target.finish(1 - found)
-        seen["not cleaned"] += names(target.folder) != ["out"] or digest(target.out) not in known
+        seen["not cleaned"] += not target.is_alone() or digest(target.out) not in known
         log.write_text(json.dumps(seen))
     return seen
 
@@ -181,28 +162,12 @@ def run(state: Path) -> Iterable[Figure]:
     """Kill every command COUNT times."""
     for command in COMMANDS:
         seen = kills(command, state, COUNT)
-        yield Figure(
-            f"a kill of `{command} --out` loses nothing",
-            f"{COUNT} kills, one of the two results whole after each",
+        told = (
             f"{seen['whole']} of {seen['kills']} whole ({seen['while writing']} killed while writing, the new one in place after "
-            f"{seen['new in place']})",
-            seen["whole"] == seen["kills"] >= COUNT,
         )
-        yield Figure(
-            f"the next `{command}` removes what a killed one left",
-            "nothing left",
-            f"{seen['left something']} left something, {seen['not cleaned']} still there after the next run",
-            not seen["not cleaned"],
-        )
-    yield from mining(state / "mine.json")
-
-
-def mining(known: Path) -> Iterable[Figure]:
-    """Return the figures of the benchmark `kills`, which is run if they are not there."""
-    if not known.exists():
-        command = [sys.executable, "-m", "benchmarks", "kills", "--json"]
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
-        known.write_text(done.stdout.splitlines()[-1])
-    for row in json.loads(known.read_text())["rows"]:
-        sign = "≥" if row["better"] == "higher" else "≤"
-        yield Figure(f"`mine` in a store: {row['id']}", f"{sign} {row['target']:g}", f"{row['value']:g}", bool(row["met"]))
+        told += f"{seen['new in place']})"
+        asked = f"{COUNT} kills, one of the two results whole after each"
+        yield Figure(f"a kill of `{command} --out` loses nothing", asked, told, seen["whole"] == seen["kills"] >= COUNT)
+        told = f"{seen['left something']} left something, {seen['not cleaned']} still there after the next run"
+        yield Figure(f"the next `{command}` removes what a killed one left", "nothing left", told, not seen["not cleaned"])
+    yield from of_benchmark("kills", state / "mine.json")

@@ -9,14 +9,14 @@ been measured is kept in `state`; a run that was stopped goes on with what is mi
 
 from collections.abc import Iterable, Iterator
 import csv
-import json
 import os
 from pathlib import Path
 import shutil
 import subprocess
 import sys
+from typing import Any
 
-from figures import Figure
+from figures import Figure, kept
 import numpy as np
 
 from scenario_gen.logs.synthetic import bundled
@@ -43,23 +43,22 @@ def platoon(path: Path, vehicles: int, seconds: float) -> Path:
         table = csv.writer(file)
         table.writerow(("time", "id", "x", "y", "speed", "heading"))
         for n in range(vehicles):
-            table.writerows(
-                zip(time, np.full(len(time), n + 1), driven - 12.0 * n, -1.75 + 0.0 * time, speed, 0.0 * time, strict=True)
-            )
+            table.writerows((t, n + 1, x - 12.0 * n, -1.75, v, 0.0) for t, x, v in zip(time, driven, speed, strict=True))
     return path
 
 
 def peak(state: Path, name: str, *arguments: str) -> float | None:
     """Peak memory [GB] of `scenario-gen generate` with these arguments, measured once; None if it failed."""
-    kept = state / f"{name}.json"
-    if not kept.exists():
+
+    def measure() -> dict[str, Any]:
         out = state / name
         command = [sys.executable, "-c", MEASURED, "generate", *arguments, "--out", str(out)]
         run = subprocess.run(command, capture_output=True, text=True, check=False)
         shutil.rmtree(out, ignore_errors=True)
         taken = [line.split()[1] for line in run.stderr.splitlines() if line.startswith("peak ")]
-        kept.write_text(json.dumps({"peak": float(taken[-1]) / 1e6 if run.returncode == 0 else None, "said": run.stderr[-500:]}))
-    found: float | None = json.loads(kept.read_text())["peak"]
+        return {"peak": float(taken[-1]) / 1e6 if run.returncode == 0 else None, "said": run.stderr[-500:]}
+
+    found: float | None = kept(state / f"{name}.json", measure)["peak"]
     return found
 
 
@@ -80,8 +79,7 @@ def run(state: Path) -> Iterable[Figure]:
 
 def _scenarios(state: Path) -> Iterator[Figure]:
     log = str(bundled("c"))
-    taken = [peak(state, f"count_{count}", log, "--road", "straight", "--count", str(count)) for count in (FEW, COUNT)]
-    few, many = taken
+    few, many = (peak(state, f"count_{count}", log, "--road", "straight", "--count", str(count)) for count in (FEW, COUNT))
     if few is None or many is None:
         yield Figure(f"{COUNT:,} scenarios", "finishes", "failed", met=False)
         return

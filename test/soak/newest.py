@@ -10,8 +10,7 @@ import re
 import subprocess
 import sys
 
-from figures import Figure
-from tests import ROOT
+from figures import Figure, ROOT
 
 LISTS = ("core", "run", "extras", "test", "ros", "ros-test")
 SHOWN = ("numpy", "scipy", "numba", "rosbags", "mcap", "pandas", "shapely", "pyproj")
@@ -31,9 +30,8 @@ def run(state: Path) -> Iterator[Figure]:
     """Install, and run all tests once; what they said is in `state`."""
     python = (state / "venv" / "bin" / "python").absolute()
     install(python)
-    frozen = subprocess.run(
-        [python, "-m", "pip", "list", "--format", "freeze"], check=True, stdout=subprocess.PIPE, text=True
-    ).stdout
+    listing = [python, "-m", "pip", "list", "--format", "freeze"]
+    frozen = subprocess.run(listing, check=True, stdout=subprocess.PIPE, text=True).stdout
     versions = dict(line.split("==") for line in frozen.splitlines() if "==" in line)
     with (state / "tests.log").open("w") as log:
         words = [python, "-m", "pytest", *PYTEST, "--deselect", "test/packaging/test_supply_chain.py"]

@@ -8,31 +8,19 @@ from pathlib import Path
 import subprocess
 import sys
 
-from figures import Figure
+from figures import Figure, ROOT
 from lengths import DATA
-from tests import ROOT, run_file
+from tests import run_files
 
-
-def files() -> list[str]:
-    """Return the test files that have such tests."""
-    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", "recorded"]
-    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    return sorted({line.partition("::")[0].partition(": ")[0] for line in said.splitlines() if line.startswith("test/")})
+PROMISE = "recorded data: every test marked `recorded`"
 
 
 def run(state: Path) -> Iterator[Figure]:
-    """Run them file by file; those that have passed are not run again."""
+    """Run the files that have such tests."""
     if not DATA.is_dir():
-        yield Figure("recorded data: every test marked `recorded`", "recorded data", f"none at {DATA}", met=False)
+        yield Figure(PROMISE, "recorded data", f"none at {DATA}", met=False)
         return
-    failed = []
-    chosen = files()
-    for name in chosen:
-        passed = state / f"{name.replace('/', '.')}.passed"
-        if not passed.exists():
-            if run_file(state, name, "-m", "recorded")[1]:
-                passed.touch()
-            else:
-                failed.append(name)
-    seen = f"{len(chosen) - len(failed)} of {len(chosen)}" + (f"; not {', '.join(failed)}" if failed else "")
-    yield Figure("recorded data: every test marked `recorded`", f"{len(chosen)} files", seen, not failed)
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", "recorded"]
+    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    files = {line.partition("::")[0].partition(": ")[0] for line in said.splitlines() if line.startswith("test/")}
+    yield run_files(state, PROMISE, sorted(files), "-m", "recorded")

@@ -3,21 +3,21 @@
 
 """The nodes under storms: 10⁵ scenarios in a request, hostile messages on every input, 8 clients for 30 min, an end at load 16.
 
-Each storm is a module: `ros_many`, `ros_hostile`, `ros_load`.
+Starts and ends are those of `python -m benchmarks start`; each storm is a module: `ros_many`, `ros_hostile`.
 """
 
 from collections.abc import Iterator
 from pathlib import Path
 
-from figures import Figure
+from figures import Figure, of_benchmark
 import ros_hostile
-import ros_load
 import ros_many
 
 
 def run(state: Path) -> Iterator[Figure]:
     """Run one storm after the other; each keeps what it measured in a folder of its own."""
-    for storm in (ros_load, ros_many, ros_hostile):
+    yield from of_benchmark("start", state / "start.json")
+    for storm in (ros_many, ros_hostile):
         folder = state / storm.__name__
         folder.mkdir(parents=True, exist_ok=True)
         yield from storm.run(folder)

@@ -9,18 +9,18 @@ is kept in `state`.
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 import json
 import os
 from pathlib import Path
 import random
-import shutil
 import threading
 import time
 from typing import Any
 
-from figures import Figure
+from figures import Figure, kept
 from mutators import BYTES
 from rosbags.typesys import get_typestore, Stores
 from suite_processes import Client, Processes, RESOURCES
@@ -162,18 +162,17 @@ def storm(suite: Suite, topic: str, rng: random.Random) -> dict[str, Any]:
         slowest = max(slowest, time.monotonic() - began)
         del client.heard["/diagnostics"][:-1000]
     del client.heard[f"/{topic}"][:]
-    try:
+    served = False
+    with suppress(AssertionError):
         suite.serve()
         served = True
-    except AssertionError:
-        served = False
     peaks = {node: memory(pid, "VmHWM") for node, pid in suite.made.pids.items()}
     return {"refused": refused, "silent": silent, "slowest": slowest, "served": served, "peaks": peaks}
 
 
 def _storms(state: Path) -> Iterator[Figure]:
-    kept = state / f"messages_{MESSAGES}.json"
-    found: dict[str, dict[str, Any]] = json.loads(kept.read_text()) if kept.exists() else {}
+    file = state / f"messages_{MESSAGES}.json"
+    found: dict[str, dict[str, Any]] = json.loads(file.read_text()) if file.exists() else {}
     codes = dict.fromkeys(NODES, 0)
     left = [topic for topic in LISTENERS if topic not in found]
     if left:
@@ -181,7 +180,7 @@ def _storms(state: Path) -> Iterator[Figure]:
             suite = Suite(state, domain)
             for topic in left:
                 found[topic] = storm(suite, topic, random.Random(topic))
-                kept.write_text(json.dumps(found, indent=1))
+                file.write_text(json.dumps(found, indent=1))
                 print(topic, found[topic], flush=True)
             codes = suite.end()
     asked = f"named on /diagnostics by every listener; idle within {IDLE:g} s; the next good tracks served"
@@ -227,13 +226,7 @@ def _calls(rng: random.Random, suite: Suite) -> list[tuple[Any, str, Callable[[]
 
 
 def _clients(state: Path) -> Iterator[Figure]:
-    kept = state / f"clients_{MINUTES:g}.json"
-    if not kept.exists():
-        with free_domain() as domain:
-            suite = Suite(state, domain)
-            kept.write_text(json.dumps(_call_all(suite, domain), indent=1))
-            suite.end()
-    found = json.loads(kept.read_text())
+    found = kept(state / f"clients_{MINUTES:g}.json", partial(_call_all, state))
     seen = f"{found['answered']:,} answers, {found['unanswered']} without one"
     yield Figure(f"{CLIENTS} clients for {MINUTES:g} min", "every call is answered", seen, found["unanswered"] == 0)
     growth = {node: found["last"][node] / max(found["warm"][node], 1) - 1.0 for node in NODES}
@@ -251,7 +244,15 @@ def _fill_history(suite: Suite) -> None:
     assert suite.client.call(SetParametersAtomically, "/gp_sampler/generate", request, 600.0).result.successful
 
 
-def _call_all(suite: Suite, domain: int) -> dict[str, Any]:
+def _call_all(state: Path) -> dict[str, Any]:
+    with free_domain() as domain:
+        suite = Suite(state, domain)
+        found = _call_suite(suite, domain)
+        suite.end()
+    return found
+
+
+def _call_suite(suite: Suite, domain: int) -> dict[str, Any]:
     _fill_history(suite)
     began, seconds, count = time.monotonic(), MINUTES * 60.0, {"answered": 0, "unanswered": 0}
 
@@ -285,11 +286,3 @@ def run(state: Path) -> Iterator[Figure]:
     """Measure what has not been measured yet."""
     yield from _storms(state)
     yield from _clients(state)
-
-
-if __name__ == "__main__":  # alone: PYTHONPATH=test/nodes:test/fuzz:test/recordings python test/soak/ros_hostile.py
-    folder = Path("out/soak/ros_hostile")
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    for figure in run(folder):
-        print(figure, flush=True)

@@ -8,7 +8,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-import json
+from functools import partial
 import os
 from pathlib import Path
 import shutil
@@ -18,7 +18,8 @@ import sys
 import time
 from typing import Any
 
-from figures import Figure
+from figures import Figure, kept
+from ros_hostile import memory
 from suite_processes import Client, Processes, RESOURCES
 
 from scenario_gen.bags.storage.bag import bag_topics
@@ -35,14 +36,8 @@ VALUES = {"log_path": RESOURCES / "synthetic_c", "road_name": "straight", "wait_
 def run(state: Path) -> Iterator[Figure]:
     """Do what has not been done yet."""
     for name, count, measure in (("many", COUNT, _processes), ("composed", COMPOSED, _composed)):
-        kept = state / f"{name}_{count}.json"
-        if not kept.exists():
-            folder = state / name
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir(parents=True)
-            kept.write_text(json.dumps(measure(folder, count)))
-            shutil.rmtree(folder)
-        yield from _figures(f"{count:,} scenarios, {name}", json.loads(kept.read_text()))
+        found = kept(state / f"{name}_{count}.json", partial(measure, state / name, count))
+        yield from _figures(f"{count:,} scenarios, {name}", found)
 
 
 def _figures(name: str, found: dict[str, Any]) -> Iterator[Figure]:
@@ -65,7 +60,7 @@ def _processes(folder: Path, count: int) -> dict[str, Any]:
         "road_server": values,
         "log_player": ["-p", f"log_path:={VALUES['log_path']}"],
     }
-    with free_domain() as domain, _client(domain) as client:
+    with free_domain() as domain, _client(domain, folder) as client:
         made = Processes(folder, domain, nodes)
         return _followed(client, folder, count, made.pids, made.end)
 
@@ -74,7 +69,7 @@ def _composed(folder: Path, count: int) -> dict[str, Any]:
     """All nodes in one process."""
     values = VALUES | {"count": count, "recorder:bag": folder / "bag"}
     words = [word for key, value in values.items() for word in ("-p", f"{key}:={value}")]
-    with free_domain() as domain, _client(domain) as client, (folder / "log").open("w") as log:
+    with free_domain() as domain, _client(domain, folder) as client, (folder / "log").open("w") as log:
         suite = subprocess.Popen(
             [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "suite", "--ros-args", *words],
             env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
@@ -90,13 +85,16 @@ def _composed(folder: Path, count: int) -> dict[str, Any]:
 
 
 @contextmanager
-def _client(domain: int) -> Iterator[Client]:
+def _client(domain: int, folder: Path) -> Iterator[Client]:
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     client = Client(domain)
     client.hear("/report", "/diagnostics")
     try:
         yield client
     finally:
         client.close()
+        shutil.rmtree(folder)
 
 
 def _followed(client: Client, folder: Path, count: int, pids: dict[str, int], end: Any) -> dict[str, Any]:
@@ -108,7 +106,7 @@ def _followed(client: Client, folder: Path, count: int, pids: dict[str, int], en
     while not client.heard["/report"] and time.monotonic() < deadline:
         time.sleep(1.0)
     seconds = time.monotonic() - started
-    peak = {node: _peak(pid) for node, pid in pids.items()}
+    peak = {node: memory(pid, "VmHWM") // 1024 for node, pid in pids.items()}
     end()
     rows = [status for data in client.heard["/report"] for status in decode_diagnostics(data)[1]]
     said = {
@@ -121,9 +119,3 @@ def _followed(client: Client, folder: Path, count: int, pids: dict[str, int], en
         "report": f"{rows[-1].values['samples']} samples; {rows[-1].message}" if rows else "none",
         "peak": peak,
     }
-
-
-def _peak(pid: int) -> int:
-    """Peak resident memory of a process, MiB."""
-    (line,) = [line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmHWM")]
-    return int(line.split()[1]) // 1024

@@ -3,7 +3,7 @@
 
 """Every test in its long form: all cases, larger counts, every random example."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import as_completed, ThreadPoolExecutor
 import json
 import os
@@ -11,9 +11,12 @@ from pathlib import Path
 import subprocess
 import sys
 
-from figures import Figure
+from figures import Figure, ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
+
+def test_files() -> list[str]:
+    """Return every file of tests."""
+    return sorted(str(path.relative_to(ROOT)) for path in (ROOT / "test").rglob("test_*.py"))
 
 
 def run_file(state: Path, name: str, *words: str, **variables: str) -> tuple[str, bool, float]:
@@ -28,14 +31,15 @@ def run_file(state: Path, name: str, *words: str, **variables: str) -> tuple[str
     return name, process.returncode in (0, 5), used.ru_utime + used.ru_stime
 
 
-def run(state: Path) -> Iterator[Figure]:
-    """Run every test file, two at a time; those that have passed are not run again."""
-    files = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "test").rglob("test_*.py"))
+def run_files(state: Path, promise: str, files: Sequence[str], *words: str, **variables: str) -> Figure:
+    """Run test files, two at a time; those that have passed are not run again."""
+    state.mkdir(parents=True, exist_ok=True)
     kept = state / "passed.json"
     passed: dict[str, float] = json.loads(kept.read_text()) if kept.exists() else {}
     pool = ThreadPoolExecutor(2)
     try:
-        for done in as_completed([pool.submit(run_file, state, name) for name in files if name not in passed]):
+        left = [pool.submit(run_file, state, name, *words, **variables) for name in files if name not in passed]
+        for done in as_completed(left):
             name, good, seconds = done.result()
             if good:
                 passed[name] = round(seconds, 1)
@@ -43,8 +47,11 @@ def run(state: Path) -> Iterator[Figure]:
     finally:
         pool.shutdown(cancel_futures=True)  # of a Ctrl-C: the two that run hear it, too
     failed = [name for name in files if name not in passed]
-    took = sum(passed.get(name, 0.0) for name in files)
-    seen = f"{len(files) - len(failed)} of {len(files)}, {took / 60:.0f} min of CPU" + (
-        f"; not {', '.join(failed)}" if failed else ""
-    )
-    yield Figure("every test in its long form passes", f"{len(files)} files", seen, not failed)
+    took = sum(passed.get(name, 0.0) for name in files) / 60
+    seen = f"{len(files) - len(failed)} of {len(files)}, {took:.0f} min of CPU"
+    return Figure(promise, f"{len(files)} files", seen + (f"; not {', '.join(failed)}: {state}" if failed else ""), not failed)
+
+
+def run(state: Path) -> Iterator[Figure]:
+    """Run every test file."""
+    yield run_files(state, "every test in its long form passes", test_files())

@@ -3,9 +3,7 @@
 
 """Waits, conflicts and passing orders: known cases, and agreement with shapely on random ones."""
 
-import csv
 from dataclasses import replace
-from pathlib import Path
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -13,7 +11,8 @@ import numpy as np
 import pytest
 import shapely
 
-from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, Wait
+from scenario_gen.logs import read_log
+from scenario_gen.template.interaction import find_conflicts, find_waits, Wait
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 CARS = (Vehicle("a"), Vehicle("b"))
@@ -62,22 +61,14 @@ def test_parallel_lanes_are_no_conflict_and_a_slight_touch_is_one():
 
 
 @pytest.mark.parametrize("leader", [0, 1])
-def test_following_is_ordered_along_the_route(leader):
-    tracks = [straight(0, 0, 0, 10), straight(0, 0, 0, 10)]
-    tracks[leader] = straight(20, 0.3, 0, 9)
+@pytest.mark.parametrize(("ahead", "speed", "beside", "entry"), [(20, 9, 0.3, 15.2), (3, 10, 0.0, None)], ids=["apart", "on top"])
+def test_following_is_ordered_along_the_route(leader, ahead, speed, beside, entry):
+    """Also of cars that were recorded on top of each other."""
+    tracks = [straight(0, 0 if entry else 0.2, 0, 10)] * 2
+    tracks[leader] = straight(ahead, beside, 0, speed)
     (found,) = conflicts(*tracks)
-    assert found.following
-    assert (found.first, found.second, found.entry_first) == (leader, 1 - leader, 0.0)
-    assert found.entry_second == pytest.approx(15.2 / 10, abs=1e-3)
-
-
-@pytest.mark.parametrize("leader", [0, 1])
-def test_cars_recorded_on_top_of_each_other_keep_the_order_along_the_route(leader):
-    tracks = [straight(0, 0, 0, 10), straight(0, 0.2, 0, 10)]
-    tracks[leader] = straight(3, 0, 0, 10)
-    (found,) = conflicts(*tracks)
-    assert found.following
-    assert found.first == leader
+    assert (found.first, found.second, found.following, found.entry_first) == (leader, 1 - leader, True, 0.0)
+    assert entry is None or found.entry_second == pytest.approx(entry / 10, abs=1e-3)
 
 
 def test_a_vehicle_that_stands_in_the_way_is_first():
@@ -105,30 +96,23 @@ def test_a_fast_crossing_between_two_samples_is_seen():
     assert found.entry_first == pytest.approx((120 - 2.4 - 0.95) / 40, abs=0.01)
 
 
-def test_waits_are_slow_for_at_least_a_second():
-    speed = np.full((2, 101), 5.0)
-    speed[0, 20:40] = 0.0
-    speed[0, 60:66] = 0.0  # half a second
-    speed[1] = 0.2
-    assert find_waits(encounter(speed)) == (
-        Wait(0, pytest.approx(2.2), pytest.approx(3.7)),
-        Wait(1, 0.0, 10.0, moves_slowly=True),
-    )
+def speeds(first, second, *changes):
+    """Speeds (2, 101), and changes of them: who, from which sample, to which, how fast."""
+    speed = np.repeat([[first], [second]], 101, axis=1).astype(float)
+    for who, begin, end, value in changes:
+        speed[who, begin:end] = value
+    return encounter(speed)
 
 
-def test_a_wait_creeps_if_it_does_not_stand_for_a_second():
-    speed = np.full((2, 101), 5.0)
-    speed[0, 20:60] = 0.3
-    speed[0, 30:39] = 0.0  # 0.8 s
-    speed[1, 20:60] = 0.3
-    speed[1, 30:41] = 0.05  # 1.0 s
-    assert [wait.moves_slowly for wait in find_waits(encounter(speed))] == [True, False]
+def test_waits_are_slow_for_at_least_a_second_and_not_ended_by_one_noisy_sample():
+    found = find_waits(speeds(5.0, 0.2, (0, 20, 40, 0.0), (0, 60, 66, 0.0)))  # the second time for half a second
+    assert found == (Wait(0, pytest.approx(2.2), pytest.approx(3.7)), Wait(1, 0.0, 10.0, moves_slowly=True))
+    assert find_waits(speeds(0.1, 0.1, (0, 50, 51, 1.4))) == (Wait(0, 0.0, 10.0), Wait(1, 0.0, 10.0))
 
 
-def test_one_noisy_sample_does_not_end_a_wait():
-    speed = np.full((2, 101), 0.1)
-    speed[0, 50] = 1.4
-    assert find_waits(encounter(speed)) == (Wait(0, 0.0, 10.0), Wait(1, 0.0, 10.0))
+def test_who_does_not_stand_for_a_second_moves_slowly():
+    made = speeds(5.0, 5.0, (0, 20, 60, 0.3), (0, 30, 39, 0.0), (1, 20, 60, 0.3), (1, 30, 41, 0.05))
+    assert [wait.moves_slowly for wait in find_waits(made)] == [True, False]
 
 
 PARTS = 8  # of a step in the finest sweep; an even number, so that it has every pose of ours, which halves steps above 1 m
@@ -143,7 +127,7 @@ def boxes_of(vehicle, poses, grow=0.0):
 @given(seed=st.integers(0, 2**32 - 1))
 @example(seed=1485272)  # in whose long steps the halves are met before any sample
 @example(seed=120182612)
-@settings(max_examples=150)
+@settings(max_examples=40)
 def test_existence_and_entry_agree_with_shapely(seed):
     """An entry is no later than into the samples' sweep, which lies in ours, and meets a finer one, in which ours lies.
 
@@ -182,27 +166,14 @@ def test_existence_and_entry_agree_with_shapely(seed):
     assert one.following or one.entry_first <= one.entry_second
 
 
-def read_ngsim(path: Path):
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    ids = sorted({row["vehicle_id"] for row in rows})
-    tracks = [[[float(r[c]) for c in ("x_m", "y_m", "heading_rad")] for r in rows if r["vehicle_id"] == i] for i in ids]
-    common = min(len(track) for track in tracks)
-    columns = np.array([track[:common] for track in tracks])
-    return columns[..., :2], np.unwrap(columns[..., 2], axis=1)
-
-
 @pytest.mark.data
 def test_recorded_left_turner_yields_to_the_oncoming_car(data):
     """The oncoming car passes first, then the left turner; in the opposite-direction case nobody meets."""
-    folder = data / "trajectories" / "ngsim_commonroad"
-    position, heading = read_ngsim(folder / "encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019.csv")
-    time = np.arange(position.shape[1]) * 0.1
-    (found,) = find_conflicts(CARS, time, position, heading)
-    assert isinstance(found, Conflict)
-    assert found.exit_first < found.entry_second
-    position, heading = read_ngsim(folder / "encounter_c_opposite_stop_go_Peach-4_2_134_334.csv")
-    assert find_conflicts(CARS, np.arange(position.shape[1]) * 0.1, position, heading) == ()
+    for pattern, count in (("encounter_b_left_turn_*", 1), ("encounter_c_opposite_*", 0)):
+        (path,) = (data / "trajectories" / "ngsim_commonroad").glob(pattern)
+        (log,) = read_log(path).encounters
+        found = find_conflicts(log.vehicles, log.time, log.position, log.heading)
+        assert len(found) == count and all(one.exit_first < one.entry_second for one in found)
 
 
 def test_who_is_there_only_for_a_time_enters_then():
@@ -216,7 +187,5 @@ def test_who_is_there_only_for_a_time_enters_then():
 
 
 def test_a_vehicle_waits_only_while_it_is_there():
-    speed = np.array([np.full(100, 5.0), np.full(100, 0.2)])
-    made = replace(encounter(speed), present=np.array([[0, 99], [30, 80]]))
-    (wait,) = find_waits(made)
+    (wait,) = find_waits(replace(speeds(5.0, 0.2), present=np.array([[0, 100], [30, 80]])))
     assert (wait.vehicle, wait.start, wait.end) == (1, 3.0, 8.0)

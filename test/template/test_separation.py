@@ -19,9 +19,8 @@ def queue(*places, present=ALWAYS):
     position = np.stack([way + np.array([x, 0.0]) for x in places])
     count = len(places)
     vehicles = tuple(Vehicle(str(n), 4.0, 2.0) for n in range(count))
-    return Encounter(
-        "queue", vehicles, 0, 100_000_000, position, np.zeros((count, 30)), np.full((count, 30), 5.0), present=present
-    )
+    flat = np.zeros((count, 30))
+    return Encounter("queue", vehicles, 0, 100_000_000, position, flat, flat + 5.0, present=present)
 
 
 def test_the_least_gap_of_each_is_to_its_nearest():

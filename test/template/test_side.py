@@ -3,6 +3,8 @@
 
 """On which side a template drives, and its mirror image."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -29,16 +31,8 @@ def test_the_side_is_that_on_which_oncoming_vehicles_pass(side, name):
 
 def test_who_passes_nobody_has_no_side():
     one = oncoming(1.0)
-    same = Encounter(
-        "f",
-        one.vehicles,
-        0,
-        100_000_000,
-        one.position[[0, 0]] + np.array([[[0.0, 0.0]], [[20.0, 0.0]]]),
-        one.heading[[0, 0]],
-        one.speed,
-    )
-    assert traffic_side(same) == ""
+    position = one.position[[0, 0]] + np.array([[[0.0, 0.0]], [[20.0, 0.0]]])
+    assert traffic_side(replace(one, position=position, heading=one.heading[[0, 0]])) == ""
 
 
 def test_a_mirror_image_of_a_mirror_image_is_the_template():

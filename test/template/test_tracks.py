@@ -3,6 +3,8 @@
 
 """Cleaned tracks, path coordinates, separation."""
 
+from dataclasses import replace
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -64,26 +66,18 @@ def test_noise_is_smoothed_and_a_standing_vehicle_is_a_point():
     noisy[:, :2] += rng.normal(0.0, 0.2, (100, 2))
     still = np.tile([20.0, -9.0, 1.0], (100, 1))
     encounter = encounter_of(clean, still)
-    noisy_encounter = Encounter(
-        "noisy", encounter.vehicles, 0, 100_000_000, np.stack((noisy, still))[..., :2], encounter.heading, encounter.speed
-    )
-    moving, standing = clean_tracks(noisy_encounter)
+    moving, standing = clean_tracks(replace(encounter, position=np.stack((noisy, still))[..., :2]))
     error = np.hypot(*(moving.poses[:, :2] - clean[:, :2]).T)
-    assert error.max() < 0.6
-    assert error[5:-5].max() < 0.25
+    assert error.max() < 0.6 and error[5:-5].max() < 0.25
     assert np.abs(moving.poses[5:-5, 2] - clean[5:-5, 2]).max() < 0.12
     assert (np.diff(moving.progress) > 0.0).all()
-    assert standing.still
-    assert standing.travelled == 0.0
+    assert standing.still and standing.travelled == 0.0
     assert standing.poses[0].tolist() == pytest.approx([20.0, -9.0, 1.0])
 
 
 def test_a_junction_turn_is_one_and_a_bend_is_not():
     turner, bender = clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), arc(0.0, 50.0, 0.0, -80.0, 8.0)))
-    assert turner.turns
-    assert turner.turning(30.0) > 0.0
-    assert not turner.makes_u_turn
-    assert not bender.turns
+    assert turner.turns and turner.turning(30.0) > 0.0 and not turner.makes_u_turn and not bender.turns
     (round_, _) = clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 6.0, 2.0), line(0.0, 40.0, 0.0, 5.0)))
     assert round_.makes_u_turn
 
@@ -93,8 +87,7 @@ def test_gaps_survive_when_a_winding_road_is_laid_out_straight():
     encounter = encounter_of(lead[50:350], follow[:300])  # 5 s, 60 m behind
     frenet = to_frenet(clean_tracks(encounter))
     assert np.abs(frenet.station[0] - frenet.station[1] - 60.0).max() < 0.1
-    assert frenet.direction.tolist() == [1, 1]
-    assert frenet.lanes == 1
+    assert frenet.direction.tolist() == [1, 1] and frenet.lanes == 1
 
 
 def test_lanes_and_changes_of_lane_are_told_from_offsets():
@@ -106,8 +99,7 @@ def test_lanes_and_changes_of_lane_are_told_from_offsets():
     frenet = to_frenet(clean_tracks(encounter))
     assert frenet.direction.tolist() in ([1, 1, -1], [-1, -1, 1])
     assert frenet.lane.tolist() == [[0, 1], [1, 1], [0, 0]]
-    assert frenet.change[0, 40] < 0.05
-    assert frenet.change[0, -40] > 0.95
+    assert frenet.change[0, 40] < 0.05 and frenet.change[0, -40] > 0.95
     assert not frenet.change[1:].any()
 
 
@@ -144,8 +136,7 @@ def test_overlapping_vehicles_are_pulled_apart_by_the_least():
     separation = separate(tracks, 0.5, 3.0)
     assert smallest_gaps(separation.tracks)[0, 1] > 0.499
     assert separation.moved.tolist() == pytest.approx([0.45, 0.45], abs=0.01)
-    assert len(separation.notes) == 2
-    assert "0.45 m" in separation.notes[0]
+    assert len(separation.notes) == 2 and "0.45 m" in separation.notes[0]
     with pytest.raises(RefusedError, match="vehicles 1 and 0"):
         separate(tracks, 0.5, 0.3)
 

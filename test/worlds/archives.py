@@ -9,7 +9,7 @@ other rows are vehicles that meet nobody: some drive on streets 60 m apart, whic
 are asynchronous, rows are lost, repeated, stamped wrongly and damaged, ids repeat.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import date
 import json
@@ -107,14 +107,8 @@ class _Draft:
         for drive in drives:
             row = {"radius": 1.0, "turn": 0.0, "dip": 0.0, "dip_at": 0.0, "dip_width": 4.0, "x": 0.0, "y": 0.0, "at": 0.0} | drive
             x, y = row["x"], row["y"]
-            row |= {
-                "x": cos * x - sin * y,
-                "y": sin * x + cos * y,
-                "heading": row["heading"] + turned,
-                "east": east,
-                "north": north,
-            }
-            row |= {name: row[name] + when for name in ("at", "begin", "dip_at")}
+            row |= {"x": cos * x - sin * y, "y": sin * x + cos * y, "heading": row["heading"] + turned}
+            row |= {"east": east, "north": north} | {name: row[name] + when for name in ("at", "begin", "dip_at")}
             self.device += 1
             devices.append(int(row.setdefault("device", self.device)))
             self.rows.append(row)
@@ -198,19 +192,11 @@ def _lone(draft: _Draft, config: ArchiveConfig, rows: float, shared: list[dict[s
         column = k // 2000
         if column and k % 2000 == 0:
             north = -STREET
-        drive = {
-            "heading": np.pi if k % 3 == 0 else 0.0,
-            "speed": draft.between(8.0, 15.0),
-            "begin": begin,
-            "lasts": lasts,
-            "at": begin + 300.0,
-        }
+        drive = {"heading": np.pi if k % 3 == 0 else 0.0, "speed": draft.between(8.0, 15.0), "begin": begin, "lasts": lasts}
+        drive |= {"at": begin + 300.0, "dip_at": begin + 200.0, "dip_width": 20.0}
         if k < len(shared):
             drive |= {"device": shared[k]["device"], "begin": max(shared[k]["begin"] - 300.0, 0.0), "at": shared[k]["begin"]}
-        draft.add(
-            (column * COLUMN, north, 0.0, 0.0),
-            [drive | {"dip": 0.9 * draft.random.random(), "dip_at": begin + 200.0, "dip_width": 20.0}],
-        )
+        draft.add((column * COLUMN, north, 0.0, 0.0), [drive | {"dip": 0.9 * draft.random.random()}])
 
 
 def _recorded(draft: _Draft, low: float = 18.0, high: float = 25.0) -> dict[str, float]:
@@ -263,13 +249,7 @@ def _turning(draft: _Draft) -> list[dict[str, float]]:
     ]
 
 
-_OF_KIND: dict[str, Callable[[_Draft], list[dict[str, float]]]] = {
-    "crossing": _crossing,
-    "opposing": _opposing,
-    "following": _following,
-    "merging": _merging,
-    "turning": _turning,
-}
+_OF_KIND = dict(zip(KINDS, (_crossing, _opposing, _following, _merging, _turning), strict=True))
 
 
 def _at_threshold(draft: _Draft, threshold: str, *, inside: bool) -> tuple[str, list[dict[str, float]]]:
@@ -283,19 +263,16 @@ def _at_threshold(draft: _Draft, threshold: str, *, inside: bool) -> tuple[str, 
         return "following", [{"heading": 0.0, "speed": 38.0, "at": k * apart / 38.0, **times} for k in range(2)]
     if threshold == "duration":  # nearer than 100 m for almost 5 s
         closing = 200.0 / margin(5.0, 0.6)
-        return "opposing", [
-            {"heading": k * np.pi, "speed": closing / 2.0, "y": k * 3.6, "begin": -9.0, "lasts": 18.0} for k in range(2)
-        ]
+        same = {"speed": closing / 2.0, "begin": -9.0, "lasts": 18.0}
+        return "opposing", [same | {"heading": k * np.pi, "y": k * 3.6} for k in range(2)]
     if threshold == "presence":  # the second is recorded for almost 5 s
         lasts = margin(5.0, 0.6)
         first, second = _opposing(draft)
         return "opposing", [first | {"speed": 7.0}, second | {"speed": 7.0, "begin": -lasts / 2.0, "lasts": lasts}]
     if threshold == "travel":  # one stands, the other moves slowly
         speed, times = margin(5.0, 1.2) / 30.0, {"begin": -15.0, "lasts": 30.0}
-        return "following", [
-            {"heading": 0.0, "speed": speed, **times},
-            {"heading": 0.0, "speed": 0.0, "x": 4.8 + 15.0 * speed, **times},
-        ]
+        places = {"speed": speed}, {"speed": 0.0, "x": 4.8 + 15.0 * speed}
+        return "following", [{"heading": 0.0, **times, **each} for each in places]
     if threshold == "beside":  # on two roads side by side
         beside = margin(6.0, -1.3)
         return "opposing", _opposing(draft, (beside, beside))

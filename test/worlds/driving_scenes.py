@@ -24,9 +24,6 @@ def crossing(first_speed=8.0, second_speed=8.0, second_start=-60.0):
     time = np.arange(150) * PERIOD
     zero = np.zeros_like(time)
     west = (np.stack([-30.0 + first_speed * time, zero], axis=1), zero, np.full_like(time, first_speed))
-    south = (
-        np.stack([zero, second_start + second_speed * time], axis=1),
-        np.full_like(time, np.pi / 2),
-        np.full_like(time, second_speed),
-    )
+    place = np.stack([zero, second_start + second_speed * time], axis=1)
+    south = (place, zero + np.pi / 2, zero + second_speed)
     return as_scenario([west, south], len(time))

@@ -10,6 +10,7 @@ top of each other. What is driven: waits, turns, lane changes, stop and go, onco
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+import itertools
 from pathlib import Path
 
 import map_builders
@@ -154,16 +155,9 @@ def waits_at_a_side_road() -> list[Drive]:
 
 def turns_left() -> list[Drive]:
     """One stands in the junction until an oncoming one has passed, then turns left."""
-    waits = drive(
-        "2839",
-        (-11.0, -SIDE, EAST),
-        0.0,
-        Phase(3.4),
-        Phase(2.5, 1.88),
-        legs=[Leg(1.0), quarter(11.5, 1)],
-        length=3.81,
-        width=1.9812,
-    )
+    size = {"length": 3.81, "width": 1.9812}
+    phases = (Phase(3.4), Phase(2.5, 1.88))
+    waits = drive("2839", (-11.0, -SIDE, EAST), 0.0, *phases, legs=[Leg(1.0), quarter(11.5, 1)], **size)
     oncoming = drive("21019", (32.0, SIDE, WEST), 7.0, Phase(4.0, 0.9), Phase(4.0), length=3.3528, width=1.8898)
     return [waits, oncoming]
 
@@ -177,24 +171,19 @@ def two_turn_left() -> list[Drive]:
 
 def stop_and_go() -> list[Drive]:
     """Opposite directions on a street, a lane between; both stop and go."""
-    south = drive(
-        "134", (-SIDE - LANE, 30.0, SOUTH), 0.0, Phase(2.0), Phase(5.0, 1.4), Phase(5.0, -1.1), length=4.8768, width=2.1336
-    )
-    north = drive(
-        "334", (SIDE + LANE, -60.0, NORTH), 0.0, Phase(3.5), Phase(6.0, 1.2), Phase(4.0, -0.9), length=5.6388, width=2.1336
-    )
+    phases = (Phase(2.0), Phase(5.0, 1.4), Phase(5.0, -1.1)), (Phase(3.5), Phase(6.0, 1.2), Phase(4.0, -0.9))
+    south = drive("134", (-SIDE - LANE, 30.0, SOUTH), 0.0, *phases[0], length=4.8768, width=2.1336)
+    north = drive("334", (SIDE + LANE, -60.0, NORTH), 0.0, *phases[1], length=5.6388, width=2.1336)
     return [south, north]
 
 
 def changes_lanes() -> list[Drive]:
     """Four on two lanes; one changes to the other one's lane, where its GPS puts it on top of that."""
-    west = np.pi
-    first = drive(
-        "1", (0.0, 0.0, west), 2.2, Phase(12.0), Phase(16.0, 0.05), Phase(12.0, -0.02), legs=[Leg(20.0), *lane_change(1)]
-    )
-    second = drive("2", (3.0, -3.2, west), 2.2, Phase(12.0), Phase(16.0, 0.05), Phase(12.0, -0.02))
-    third = drive("3", (16.0, -3.2, west), 2.1, Phase(10.0), Phase(18.0, 0.05), Phase(12.0, -0.02))
-    fourth = drive("4", (34.0, 0.0, west), 2.0, Phase(14.0), Phase(12.0, 0.06), Phase(14.0))
+    phases = (Phase(12.0), Phase(16.0, 0.05), Phase(12.0, -0.02))
+    first = drive("1", (0.0, 0.0, WEST), 2.2, *phases, legs=[Leg(20.0), *lane_change(1)])
+    second = drive("2", (3.0, -3.2, WEST), 2.2, *phases)
+    third = drive("3", (16.0, -3.2, WEST), 2.1, Phase(10.0), Phase(18.0, 0.05), Phase(12.0, -0.02))
+    fourth = drive("4", (34.0, 0.0, WEST), 2.0, Phase(14.0), Phase(12.0, 0.06), Phase(14.0))
     return [first, second, third, fourth]
 
 
@@ -223,17 +212,8 @@ def follows() -> list[Drive]:
     return [ahead, behind]
 
 
-MODELS = (
-    "TESLA_MODELX",
-    "TESLA_MODEL3",
-    "TESLA_MODELS",
-    "BMW_I3",
-    "MINI_COOPER",
-    "TOYOTA_RAV4",
-    "JAGUAR_I_PACE",
-    "MERCEDES_GLE",
-    "AUDI_A4",
-)
+MODELS = ["TESLA_MODELX", "TESLA_MODEL3", "TESLA_MODELS", "BMW_I3", "MINI_COOPER"]
+MODELS += ["TOYOTA_RAV4", "JAGUAR_I_PACE", "MERCEDES_GLE", "AUDI_A4"]
 
 
 def platoon(count: int) -> list[Drive]:
@@ -250,14 +230,9 @@ def there_and_back() -> list[Drive]:
     found = []
     for name, x, side, speed in (("2a3c600d", -60.0, -SIDE, 9.0), ("2a3c603c", 70.0, SIDE, 8.4)):
         heading = EAST if side < 0.0 else WEST
-        round_trip = (
-            Leg(220.0),
-            Leg(2.0 * SIDE * np.pi * 3.0, 1.0 / (6.0 * SIDE)),
-            Leg(220.0),
-            Leg(2.0 * SIDE * np.pi * 3.0, 1.0 / (6.0 * SIDE)),
-        )
+        half = (Leg(220.0), Leg(2.0 * SIDE * np.pi * 3.0, 1.0 / (6.0 * SIDE)))
         changes = (Phase(12.0), Phase(6.0, -0.6), Phase(6.0, 0.6)) * 12
-        found.append(drive(name, (x, side * 6.0, heading), speed, *changes, legs=round_trip * 6))
+        found.append(drive(name, (x, side * 6.0, heading), speed, *changes, legs=half * 12))
     return found
 
 
@@ -284,34 +259,35 @@ def street() -> pd.DataFrame:
 
 def tables() -> dict[str, pd.DataFrame]:
     """Every file of trajectories by its name."""
-    lanes, pass_by = changes_lanes(), opposite("2", "4", 8.0)
     over = {"1": (0.0, 1.2), "2": (0.0, -0.4)}
-    cuts = {
-        "ngsim_commonroad/encounter_3plus_two_left_turners_one_opposite_Lanker-2_13": Writing(1, 0.0, 8.0).video(two_turn_left()),
-        "ngsim_commonroad/encounter_a_cross_one_stops_Lanker-2_15_21202_21260": Writing(2, 0.0, 8.0).video(
-            waits_at_a_side_road()
-        ),
-        "ngsim_commonroad/encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019": Writing(3, 0.0, 8.0).video(turns_left()),
-        "ngsim_commonroad/encounter_c_opposite_stop_go_Peach-4_2_134_334": Writing(4, 0.0, 11.5).video(stop_and_go()),
-        "ngsim_commonroad/USA_Peach-4_2_T-1_all_vehicles": street(),
-        "psu_2obu/encounter_c_opposite_approach_then_stop_meet_300-340s": Writing(5, 0.0, 36.0, -300.0).radio(
-            meets_then_stands()
-        ),
-        "psu_2obu/encounter_following_follow_230-270s": Writing(6, 0.0, 40.0, -230.0).radio(follows()),
-        "psu_2obu/psu_meet_full": Writing(7, 0.0, 360.0).radio(
-            there_and_back(), gaps=(0.4, 0.8, 5.0, 0.9, 2.0, 12.0, 3.0, 0.7, 1.5, 4.0, 2.5, 6.0)
-        ),
-        "cats_av_lane_change/encounter_3plus_lane_change_four_vehicles_utc36110": Writing(8, 0.0, 40.0, shift=over).gps(lanes),
-        "cats_av_lane_change/encounter_c_opposite_v2_v4_utc35195": Writing(9, 8.0, 38.0).gps(pass_by),
-        "openacc_zalazone/encounter_3plus_platoon4_openacc_no_ACC_handling_part22_60-100s": Writing(11, 60.0, 100.0).doppler(
-            platoon(4)
-        ),
-        "openacc_zalazone/openacc_no_ACC_handling_part22_first150s": Writing(12, 0.0, 150.0).doppler(platoon(9)),
+    gaps = (0.4, 0.8, 5.0, 0.9, 2.0, 12.0, 3.0, 0.7, 1.5, 4.0, 2.5, 6.0)
+    sources = {
+        "ngsim_commonroad": {
+            "encounter_3plus_two_left_turners_one_opposite_Lanker-2_13": Writing(1, 0.0, 8.0).video(two_turn_left()),
+            "encounter_a_cross_one_stops_Lanker-2_15_21202_21260": Writing(2, 0.0, 8.0).video(waits_at_a_side_road()),
+            "encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019": Writing(3, 0.0, 8.0).video(turns_left()),
+            "encounter_c_opposite_stop_go_Peach-4_2_134_334": Writing(4, 0.0, 11.5).video(stop_and_go()),
+            "USA_Peach-4_2_T-1_all_vehicles": street(),
+        },
+        "psu_2obu": {
+            "encounter_c_opposite_approach_then_stop_meet_300-340s": Writing(5, 0.0, 36.0, -300.0).radio(meets_then_stands()),
+            "encounter_following_follow_230-270s": Writing(6, 0.0, 40.0, -230.0).radio(follows()),
+            "psu_meet_full": Writing(7, 0.0, 360.0).radio(there_and_back(), gaps),
+        },
+        "cats_av_lane_change": {
+            "encounter_3plus_lane_change_four_vehicles_utc36110": Writing(8, 0.0, 40.0, shift=over).gps(changes_lanes()),
+            "encounter_c_opposite_v2_v4_utc35195": Writing(9, 8.0, 38.0).gps(opposite("2", "4", 8.0)),
+            **{
+                f"cats_vehicle{2 + 2 * k}_full": Writing(13 + k, 0.0, 90.0).gps([one]).drop(columns="t_s")
+                for k, one in enumerate(opposite("2", "4", 40.0))
+            },
+        },
+        "openacc_zalazone": {
+            "encounter_3plus_platoon4_openacc_no_ACC_handling_part22_60-100s": Writing(11, 60.0, 100.0).doppler(platoon(4)),
+            "openacc_no_ACC_handling_part22_first150s": Writing(12, 0.0, 150.0).doppler(platoon(9)),
+        },
     }
-    for k, one in enumerate(opposite("2", "4", 40.0)):
-        full = Writing(13 + k, 0.0, 90.0).gps([one]).drop(columns="t_s")
-        cuts[f"cats_av_lane_change/cats_vehicle{2 + 2 * k}_full"] = full
-    return cuts
+    return {f"{folder}/{name}": rows for folder, files in sources.items() for name, rows in files.items()}
 
 
 # --- maps and bags -----------------------------------------------------------------------------------------------------------
@@ -365,27 +341,25 @@ def tagged(x: float, y: float) -> str:
     return f'{node}<tag k="local_x" v="{x!r}"/><tag k="local_y" v="{y!r}"/>'
 
 
+def tags_of(**facts: str) -> str:
+    """Tags of OpenStreetMap."""
+    return "".join(f'<tag k="{key}" v="{value}"/>' for key, value in facts.items())
+
+
 def two_lanes() -> str:
     """A road of two lanes with a dashed line between them that both share, each in two parts, in Lanelet2."""
     nodes, ways, relations = [], [], []
     for row in range(3):
-        for column, x in enumerate((-60.0, 0.0, 60.0)):
-            nodes.append(f'<node id="{1 + 3 * row + column}" {tagged(x, LANE * row)}</node>')
+        nodes += [f'<node id="{1 + 3 * row + k}" {tagged(x, LANE * row)}</node>' for k, x in enumerate((-60.0, 0.0, 60.0))]
         for part in range(2):
             refs = "".join(f'<nd ref="{1 + 3 * row + part + k}"/>' for k in range(2))
-            kind = "dashed" if row == 1 else "solid"
-            ways.append(
-                f'<way id="{100 + 2 * row + part}">{refs}<tag k="type" v="line_thin"/><tag k="subtype" v="{kind}"/></way>'
-            )
-    for lane in range(2):
-        for part in range(2):
-            members = "".join(
-                f'<member type="way" ref="{100 + 2 * (lane + up) + part}" role="{role}"/>'
-                for up, role in ((1, "left"), (0, "right"))
-            )
-            facts = {"type": "lanelet", "subtype": "road", "location": "urban", "one_way": "yes", "speed_limit": "50"}
-            tags = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in facts.items())
-            relations.append(f'<relation id="{200 + 2 * lane + part}">{members}{tags}</relation>')
+            tags = tags_of(type="line_thin", subtype="dashed" if row == 1 else "solid")
+            ways.append(f'<way id="{100 + 2 * row + part}">{refs}{tags}</way>')
+    tags = tags_of(type="lanelet", subtype="road", location="urban", one_way="yes", speed_limit="50")
+    for lane, part in itertools.product(range(2), range(2)):
+        sides = ((lane + 1, "left"), (lane, "right"))
+        members = "".join(f'<member type="way" ref="{100 + 2 * row + part}" role="{role}"/>' for row, role in sides)
+        relations.append(f'<relation id="{200 + 2 * lane + part}">{members}{tags}</relation>')
     return f'<?xml version="1.0"?><osm version="0.6">{"".join(nodes + ways + relations)}</osm>'
 
 

@@ -48,7 +48,7 @@ NO_ENTRY = f"{INFO} has no entry for them (lost with the end of a recording?)"
 TEMPLATE_TOPICS = r"tracks|changepoints|map|fit|road/entries|road/exits|road/lanes|vehicle_\w+/route|ego/(?:start|goal)"
 TEMPLATE = re.compile(TEMPLATE_TOPICS, re.DOTALL)
 READ = re.compile(
-    rf"(?:(?P<namespace>.*?)/)?(?P<topic>{TEMPLATE_TOPICS}|posterior|fit/info|ego/witness|ego/track|scenarios|scenarios/info|diagnostics)",
+    rf"(?:(?P<namespace>.*?)/)?(?P<topic>{TEMPLATE_TOPICS}|posterior|fit/info|ego/witness|scenarios|scenarios/info|diagnostics)",
     re.DOTALL,
 )
 Statuses = Mapping[str, Mapping[str, str]]  # key-values of diagnostics, by subject
@@ -81,14 +81,12 @@ def read_recording(path: Path, config: BagConfig = BagConfig(), topics: Collecti
         topics: names without namespace; none: all topics of the conventions. With scenarios come their witnesses.
 
     Raises:
-        InputError: the bag is missing or damaged, larger than `config` allows, or of a version before 0.6.
+        InputError: the bag is missing or damaged, or larger than `config` allows.
     """
     wanted = {*topics, *((WITNESS,) if SCENARIOS in topics else ())}
 
     def known(name: str) -> re.Match[str] | None:
         match = READ.fullmatch(name)
-        if match and match["topic"] == "ego/track":
-            raise InputError(f"{path} is of a version before 0.6, by its topic {name}; generate its scenarios anew from the log")
         return match if match and (not topics or match["topic"] in wanted) else None
 
     found: dict[str, dict[str, list[BagMessage]]] = {}

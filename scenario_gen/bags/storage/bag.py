@@ -13,7 +13,7 @@ import tempfile
 import zstandard
 
 from scenario_gen.bags.storage.config import Allowance, BagConfig
-from scenario_gen.bags.storage.files import files_of, METADATA
+from scenario_gen.bags.storage.files import BagFiles, files_of, METADATA
 from scenario_gen.bags.storage.mcap import BagTopic, DamagedError, decompressed, McapFile, open_mcap
 from scenario_gen.bags.storage.others import open_ros1, open_sqlite, RosbagsFile
 from scenario_gen.base.documents import shown
@@ -117,15 +117,11 @@ def open_bag(path: Path, config: BagConfig = BagConfig(), bound: str = "bag.most
     Raises:
         InputError: the bag is missing, or a file of it is damaged or was not closed.
     """
-    try:
-        there = path.exists()
-    except (OSError, ValueError) as error:
-        raise InputError(f"{shown(str(path))}: no path of a bag ({error})") from error
-    if not there:
-        raise InputError(f"{path} does not exist; name the folder of a bag, or an .mcap, .db3 or .bag file")
-    found = files_of(path) if path.is_dir() or path.is_file() else None
-    if found is None or not found.files:
-        raise InputError(f"{path} is not a bag; name a folder with .mcap, .db3 or .bag files, or one of these files")
+    with guarded(f"{shown(str(path))}: no path of a bag", OSError, ValueError):
+        found = files_of(path) if path.is_dir() or path.is_file() else BagFiles(())
+    if not found.files:
+        why = "is not a bag" if path.exists() else "does not exist"
+        raise InputError(f"{path} {why}; name a folder with .mcap, .db3 or .bag files, or one of these files")
     allowance = Allowance(config, str(path), sum(file.stat().st_size for file in found.files), bound)
     with ExitStack() as stack:
         files = [(file, _opened(file, found.compression == "file", allowance, stack)) for file in found.files]

@@ -3,6 +3,7 @@
 
 """Which files make up a bag."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,31 +68,21 @@ def _listed(document: Any, metadata: Path) -> tuple[list[str], str]:
     for name in listed:
         if not isinstance(name, str) or not 0 < len(Path(name).name.encode()) < 256 or "\0" in name:
             raise InputError(f"{metadata}: damaged, relative_file_paths holds {shown(name)}, no file's name")
-    mode = info.get("compression_mode") or ""
-    kind = info.get("compression_format") or ""
-    mode = mode.lower() if isinstance(mode, str) else shown(mode)
-    if mode not in ("", "none", "file", "message"):
-        raise InputError(f"{metadata}: compression_mode is {shown(mode)}; file and message are known")
-    if mode in ("file", "message") and kind != "zstd":
-        raise InputError(f"{metadata}: compression_format is {shown(kind)}; zstd is known")
-    return [Path(name).name for name in listed], "" if mode == "none" else mode
+    mode, kind = (shown(info.get(f"compression_{key}") or "") for key in ("mode", "format"))
+    if mode.lower() not in ("", "none", "file", "message") or (mode.lower() in ("file", "message") and kind != "zstd"):
+        raise InputError(f"{metadata}: compression {kind!r} by {mode!r}; zstd by file or message is known")
+    return [Path(name).name for name in listed], mode.lower().replace("none", "")
 
 
 def remarks(path: Path) -> tuple[str, ...]:
     """Return remarks on a bag's folder that is read though its metadata.yaml is missing, or names what was not recorded."""
     if not path.is_dir():
         return ()
-    if (path / METADATA).exists():
-        return tuple(f"not whole, by its recorder: {topic}: {words}" for topic, words in _lost(path / METADATA).items())
-    if not _in_folder(path):
-        return ()
-    return (f"{path} has no metadata.yaml: its files are read in order of their names; `scenario-gen reindex {path}` writes it",)
-
-
-def _lost(metadata: Path) -> dict[str, str]:
-    """Return the recorder's notes on messages that it did not record, by topic."""
-    try:
-        custom = read_yaml(metadata)["rosbag2_bagfile_information"]["custom_data"]
-        return {shown(key[len(LOST) :]): shown(text, 400) for key, text in custom.items() if key.startswith(LOST)}
-    except (InputError, KeyError, TypeError, AttributeError):
-        return {}
+    if not (path / METADATA).exists():
+        words = f"has no metadata.yaml: its files are read in order of their names; `scenario-gen reindex {path}` writes it"
+        return (f"{path} {words}",) if _in_folder(path) else ()
+    with suppress(InputError, KeyError, TypeError, AttributeError):
+        custom = read_yaml(path / METADATA)["rosbag2_bagfile_information"]["custom_data"]
+        notes = {key.removeprefix(LOST): text for key, text in custom.items() if key.startswith(LOST)}
+        return tuple(f"not whole, by its recorder: {shown(topic)}: {shown(text, 400)}" for topic, text in notes.items())
+    return ()

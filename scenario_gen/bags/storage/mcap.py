@@ -3,14 +3,13 @@
 
 """MCAP files by mcap's stream reader, with bounds.
 
-mcap trusts the lengths that a file announces. Here no more is read than is there (`Exact`), and a chunk is decompressed to the
-size that it announces and no more. Damage is a `DamagedError` with its place: an error for the reader of a bag, a gap for
-`reindex`.
+mcap trusts the lengths that a file announces. Here it is given one record at a time, of a size that is there and within bounds,
+and a chunk is decompressed to the size that it announces and no more. Damage is a `DamagedError` with its place: an error for the
+reader of a bag, a gap for `reindex`.
 """
 
 from collections import Counter
 from collections.abc import Collection, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 import heapq
 import io
@@ -20,7 +19,8 @@ from typing import Any, BinaryIO
 import zlib
 
 import lz4.frame
-from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, ChunkIndex, Footer, Header, Message, MessageIndex, Schema, Statistics
 from mcap.stream_reader import StreamReader
 import zstandard
@@ -28,11 +28,12 @@ import zstandard
 from scenario_gen.bags.storage.config import Allowance, FOUND_BYTES
 from scenario_gen.bags.storage.metadata import quality_of
 from scenario_gen.base.documents import shown
-from scenario_gen.base.errors import describe, guarded, InputError, ScenarioGenError
+from scenario_gen.base.errors import describe, InputError, ScenarioGenError
 from scenario_gen.types import Quality
 
 MAGIC = b"\x89MCAP0\r\n"
-FOOTER_BYTES = 29  # of its record, which stands before the last magic
+HEAD_BYTES, FOOTER_BYTES = 9, 29  # of any record's kind and length, and of the footer's record, before the last magic
+OPCODES = frozenset((*range(Opcode.HEADER, Opcode.CHUNK_INDEX + 1), Opcode.STATISTICS))  # of records that matter here
 LATEST = 2**63  # rosbag2's stamps are signed
 SLACK = 1024  # bytes that a record may have beside the content that is bounded
 WINDOW = 128 * 1024**2  # zstd's own default [bytes]
@@ -73,51 +74,23 @@ class Gap:
     messages: int = 0
 
 
-class Exact:
-    """A stream of which a read gives as many bytes as it asks for."""
-
-    def __init__(self, file: BinaryIO, size: int) -> None:
-        """Take a file and its size [bytes]."""
-        self.size, self.seek, self.tell = size, file.seek, file.tell
-        self._read = file.read
-
-    def read(self, length: int) -> bytes:
-        """Return the next bytes; none at the end, where mcap looks for a further record by its first byte.
-
-        Raises:
-            DamagedError: so many are not left.
-        """
-        left = self.size - self.tell()
-        if length > left and (left or length > 1):
-            raise DamagedError(self.tell(), f"{length} bytes are announced where {left} are left")
-        return self._read(length)
-
-
-def records(stream: Exact, most: int, *, magic: bool = False) -> Iterator[tuple[int, Any]]:
-    """Yield the records from where a stream stands up to its end or its footer, each with the place from which it is found.
+def parsed(data: bytes, offset: int) -> Iterator[Any]:
+    """Yield the records in some bytes, which lie at byte `offset` of a file.
 
     Raises:
-        DamagedError: one is damaged, or longer than `most` bytes.
+        DamagedError: one is damaged.
     """
-    reader = StreamReader(stream, skip_magic=not magic, emit_chunks=True, record_size_limit=most + SLACK)
-    found, start = reader.records, stream.tell()
-    while True:
+    stream = io.BytesIO(data)
+    found = StreamReader(stream, skip_magic=True, emit_chunks=True, record_size_limit=len(data)).records
+    while stream.tell() < len(data):
         try:
-            record = next(found)
+            yield next(found)
         except StopIteration:
             return
         except EndOfFile:
-            if stream.tell() != start:
-                raise DamagedError(start, "a record is cut off") from None
-            return
-        except DamagedError:
-            raise
-        except RecordLengthLimitExceeded as error:
-            raise DamagedError(start, f"{error}; bag.most_chunk_bytes is {most}") from error
+            raise DamagedError(offset, "a record is cut off") from None
         except Exception as error:  # mcap fails in any way on damaged bytes
-            raise DamagedError(start, describe(error)) from error
-        yield start, record
-        start = stream.tell()
+            raise DamagedError(offset, describe(error)) from error
 
 
 def unpacked(chunk: Chunk, offset: int, allowance: Allowance) -> bytes:
@@ -133,15 +106,14 @@ def unpacked(chunk: Chunk, offset: int, allowance: Allowance) -> bytes:
     allowance.unpack(size)
     raw = chunk.data
     try:
-        with guarded("a chunk cannot be decompressed"):
-            if chunk.compression == "zstd":
-                raw = decompressed(chunk.data, size)
-            elif chunk.compression == "lz4":
-                raw = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
-            elif chunk.compression:
-                raise ValueError(f"{chunk.compression!r} is unknown; zstd and lz4 are known")
-    except InputError as error:
-        raise DamagedError(offset, str(error)) from error
+        if chunk.compression == "zstd":
+            raw = decompressed(raw, size)
+        elif chunk.compression == "lz4":
+            raw = lz4.frame.LZ4FrameDecompressor().decompress(raw, max_length=size + 1)
+        elif chunk.compression:
+            raise DamagedError(offset, f"compression {shown(chunk.compression, 40)!r} is unknown; zstd and lz4 are known")
+    except (zstandard.ZstdError, RuntimeError, MemoryError, EOFError) as error:
+        raise DamagedError(offset, f"a chunk cannot be decompressed ({describe(error)})") from error
     if len(raw) != size or (chunk.uncompressed_crc and zlib.crc32(raw) != chunk.uncompressed_crc):
         raise DamagedError(offset, f"a chunk has not the {size} bytes or the checksum that it announces")
     return bytes(raw)
@@ -174,8 +146,35 @@ class McapFile:
     closed: bool = False
 
     def __post_init__(self) -> None:
-        self.stream, self.most = Exact(self.file, self.size), self.allowance.config.most_chunk_bytes
         self._lost = False  # whether the last chunk is, whose indexes follow
+
+    def _bytes(self, start: int, size: int) -> bytes:
+        """Return bytes of the file.
+
+        Raises:
+            DamagedError: there are not so many, or they are more than the bounds allow.
+        """
+        left, most = self.size - start, self.allowance.config.most_chunk_bytes
+        if not 0 <= size <= left:
+            raise DamagedError(start, f"{size} bytes are announced where {left} are left")
+        if size > most + SLACK:
+            raise DamagedError(start, f"a record of {size} bytes; bag.most_chunk_bytes is {most}")
+        self.file.seek(start)
+        return self.file.read(size)
+
+    def record(self, offset: int) -> tuple[Any, int]:
+        """Return the record at a place, None if it is of no kind that matters here, and where the next one begins.
+
+        Raises:
+            DamagedError: there is none, or it is damaged or too large.
+        """
+        head = self._bytes(offset, HEAD_BYTES)
+        length, start = int.from_bytes(head[1:], "little"), offset + HEAD_BYTES
+        if head[0] == 0 or length > self.size - start:
+            raise DamagedError(offset, f"{length} bytes are announced where {self.size - start} are left")
+        if head[0] not in OPCODES:
+            return None, start + length
+        return next(parsed(head + self._bytes(start, length), offset), None), start + length
 
     def read_summary(self, footer: Footer) -> bool:
         """Read topics and places from the summary; return whether it has all of them.
@@ -183,9 +182,8 @@ class McapFile:
         Raises:
             DamagedError: it is damaged.
         """
-        statistics = None
-        self.stream.seek(footer.summary_start)
-        for _, record in records(self.stream, self.most) if footer.summary_start else ():
+        statistics, start = None, footer.summary_start
+        for record in parsed(self._bytes(start, self.size - start), start) if start else ():
             if isinstance(record, Statistics):
                 statistics = record
             elif isinstance(record, ChunkIndex):
@@ -202,21 +200,19 @@ class McapFile:
         self.entries.clear()
         self.counts.clear()
         start = 0
-        while start < self.size:
-            self.stream.seek(start)
+        while start < self.size and not self.closed:
             try:
-                for offset, record in records(self.stream, self.most, magic=not start):
-                    start = offset
-                    self._note(offset, record)
-                    start = self.stream.tell()
-                    self.closed = isinstance(record, Footer)
-                return
+                if not start and self._bytes(0, len(MAGIC)) != MAGIC:
+                    raise DamagedError(0, "not the beginning of an MCAP file")
+                record, after = self.record(start or len(MAGIC))
+                self._note(start or len(MAGIC), record, after)
+                self.closed = isinstance(record, Footer) and self._bytes(after, len(MAGIC)) == MAGIC
             except DamagedError as error:
                 after = self._next_chunk(start + 1)
                 self.gaps.append(Gap(start, after - start, error.problem))
-                start, self.closed = after, False
+            start = after
 
-    def _note(self, offset: int, record: Any) -> None:
+    def _note(self, offset: int, record: Any, after: int) -> None:
         """Take a record at the top level of the file, or note that it is lost."""
         try:
             if isinstance(record, Chunk):
@@ -232,7 +228,7 @@ class McapFile:
             else:
                 self._describe(record)
         except (DamagedError, InputError) as error:
-            self.gaps.append(Gap(offset, self.stream.tell() - offset, getattr(error, "problem", str(error))))
+            self.gaps.append(Gap(offset, after - offset, getattr(error, "problem", str(error))))
             self._lost = True
 
     def _describe(self, record: Any) -> None:
@@ -246,13 +242,11 @@ class McapFile:
         """Return where the next whole chunk from byte `start` begins; the size of the file if there is none."""
         with mmap.mmap(self.file.fileno(), self.size, access=mmap.ACCESS_READ) as data:
             for match in CHUNK.finditer(data, start):
-                self.stream.seek(match.start())
                 try:
-                    _, record = next(records(self.stream, self.most), (0, None))
-                    if isinstance(record, Chunk):
-                        self.allowance.unpack(len(record.data))
-                        unpacked(record, match.start(), self.allowance)
-                        return match.start()
+                    record, _ = self.record(match.start())
+                    self.allowance.unpack(len(record.data))
+                    unpacked(record, match.start(), self.allowance)
+                    return match.start()
                 except DamagedError:
                     continue
                 except InputError:
@@ -263,7 +257,7 @@ class McapFile:
         """Yield stamp, offset, number, channel and bytes of the messages of a chunk; learn what it says of topics."""
         raw = unpacked(chunk, offset, self.allowance)
         try:
-            for number, (_, record) in enumerate(records(Exact(io.BytesIO(raw), len(raw)), self.most)):
+            for number, record in enumerate(parsed(raw, offset)):
                 if not isinstance(record, Message):
                     self._describe(record)
                     continue
@@ -310,10 +304,7 @@ class McapFile:
 
     def _at(self, offset: int, wanted: Collection[int] | None) -> Iterator[tuple[int, int, int, int, bytes]]:
         """Yield the messages of the chunk, or the one outside of chunks, at a place, as `_in_chunk` does."""
-        if offset >= self.size:
-            raise DamagedError(offset, "a chunk is announced beyond the end of the file")
-        self.stream.seek(offset)
-        _, record = next(records(self.stream, self.most), (0, None))
+        record, _ = self.record(offset)
         if isinstance(record, Chunk):
             yield from self._in_chunk(record, offset, wanted)
         elif not isinstance(record, Message):
@@ -330,24 +321,26 @@ def _stamp(message: Message, offset: int) -> int:
     return stamp
 
 
-def open_mcap(file: BinaryIO, size: int, allowance: Allowance, wanted: str | None = "ros2") -> McapFile:
-    """Return the content of an MCAP file of `size` bytes, of the profile that is wanted, or of any (None).
+def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
+    """Return the content of an MCAP file of `size` bytes.
 
     Raises:
-        DamagedError: it is damaged, was not closed, or is of another profile.
+        DamagedError: it is damaged, or was not closed.
+        InputError: its messages are of ROS 1.
     """
     found = McapFile(file, size, allowance)
     if size < len(MAGIC) or file.read(len(MAGIC)) != MAGIC:
         raise DamagedError(0, "not the beginning of an MCAP file")
-    _, header = next(records(found.stream, found.most), (0, None))
+    header, _ = found.record(len(MAGIC))
     if not isinstance(header, Header):
         raise DamagedError(len(MAGIC), "no header at the beginning of the file")
-    if wanted is not None and header.profile != wanted:
-        raise DamagedError(len(MAGIC), f"the profile is {header.profile[:40]!r}, not {wanted!r}")
-    end, footer = max(size - FOOTER_BYTES - len(MAGIC), 0), None
-    found.stream.seek(end)
-    with suppress(DamagedError):
-        _, footer = next(records(found.stream, found.most), (0, None))
+    if header.profile == "ros1":
+        raise InputError(f"{file.name}: an MCAP file of profile 'ros1'; name the .bag file that it was made of")
+    end = max(size - FOOTER_BYTES - len(MAGIC), 0)
+    try:
+        footer, _ = found.record(end)
+    except DamagedError:
+        footer = None
     if not isinstance(footer, Footer):
         raise DamagedError(end, "not the end of an MCAP file: its recorder was stopped, or it is cut off")
     if not found.read_summary(footer):

@@ -14,8 +14,11 @@ from scenario_gen.base.documents import parse_yaml
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Quality
 
-TIMES = ("deadline", "lifespan", "liveliness_lease_duration")
-NAMED = ("history", "reliability", "durability", "liveliness")
+ENTRIES = {
+    **dict.fromkeys(("history", "reliability", "durability", "liveliness"), str | int),
+    **dict.fromkeys(("deadline", "lifespan", "liveliness_lease_duration"), dict),
+    **{"depth": int, "avoid_ros_namespace_conventions": bool},
+}
 FOREVER = {"sec": 9223372036, "nsec": 854775807}  # rmw's infinite duration
 
 
@@ -123,13 +126,9 @@ def profiles(text: str) -> list[dict[str, Any]]:
 
 def _is_whole(profile: Any) -> bool:
     """Return whether a profile has the entries that every reader needs."""
-    return (
-        isinstance(profile, dict)
-        and isinstance(profile.get("depth"), int)
-        and all(isinstance(profile.get(key), str | int) for key in NAMED)
-        and all(isinstance(profile.get(key), dict) and {"sec", "nsec"} <= set(profile[key]) for key in TIMES)
-        and isinstance(profile.get("avoid_ros_namespace_conventions"), bool)
-    )
+    if not isinstance(profile, dict) or not all(isinstance(profile.get(key), kind) for key, kind in ENTRIES.items()):
+        return False
+    return all({"sec", "nsec"} <= set(value) for value in profile.values() if isinstance(value, dict))
 
 
 def quality_of(text: str) -> Quality:

@@ -85,18 +85,17 @@ def reindex(folder: Path, target: Path, config: BagConfig = BagConfig()) -> Rein
 
 def _salvaged(paths: list[Path], config: BagConfig, stack: ExitStack) -> list[tuple[Path, McapFile]]:
     """Return what is whole in each file."""
-    found = []
     try:
         sizes = [path.stat().st_size for path in paths]
         first, again = (Allowance(config, str(paths[0].parent), sum(sizes)) for _ in range(2))
-        for path, size in zip(paths, sizes, strict=True):
-            file = McapFile(stack.enter_context(path.open("rb")), size, first)
+        streams = [stack.enter_context(path.open("rb")) for path in paths]
+        found = [McapFile(stream, size, first) for stream, size in zip(streams, sizes, strict=True)]
+        for file in found:
             file.scan()
             file.allowance = again  # for the second reading, which writes
-            found.append((path, file))
     except OSError as error:
         raise InputError(f"{error.filename or paths[0]}: cannot be read ({error.strerror or error})") from error
-    return found
+    return list(zip(paths, found, strict=True))
 
 
 def _write(bag: BagWriter, files: list[tuple[Path, McapFile]]) -> tuple[int, Counter[str]]:

@@ -5,7 +5,8 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from functools import reduce
 import json
 import math
 import os
@@ -19,19 +20,19 @@ from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
 from scenario_gen.base.parameters import assigned, flatten
-from scenario_gen.base.provenance import versions
+from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import as_junit, drawings, JUNIT
 from scenario_gen.closed_loop.search.estimate import Estimate, LEVEL, Search
 from scenario_gen.closed_loop.search.findings import Finding, findings_of
 from scenario_gen.closed_loop.search.objective import Objective
 from scenario_gen.closed_loop.search.problem import DrivenScenarios, open_journal
-from scenario_gen.closed_loop.trials import find_planner, Rate, trial_runner
+from scenario_gen.closed_loop.trials import find_planner, named_vehicle, Rate, trial_runner
 from scenario_gen.method.evaluation import wilson
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.report.html import render_page
-from scenario_gen.types import EgoSlot, GenerationResult, Request, ScenarioSet, token, with_witness
+from scenario_gen.types import EgoSlot, GenerationResult, Interval, Request, ScenarioSet, with_witness
 
 JSON, PAGE, BAG = "search.json", "search.html", "bag"
 SEARCHED = Kind("searched")
@@ -74,8 +75,8 @@ class SearchRequest:
         """
         ids = [vehicle.id for vehicle in self.planned.encounter.vehicles]
         wanted = self.ego or self.request.ego or ids[0]
-        found = next((one for one in ids if wanted in (one, token(one))), None)
-        if found is None:
+        found = named_vehicle(ids, wanted)
+        if not found:
             raise InputError(f"--ego {wanted}: there is no such vehicle; there are {', '.join(ids)}")
         return found
 
@@ -83,17 +84,16 @@ class SearchRequest:
         """Return what the drives hang on; the budget does not change them."""
         make = find_planner(self.planner)
         source = Path(getattr(__import__(make.__module__, fromlist=["_"]), "__file__", None) or "")
-        encounter, config = self.planned.encounter, self.drive_config()
         return {
-            "template": encounter.name,
+            "template": self.planned.encounter.name,
             "road": self.planned.placed()[0].name,
             "scenarios": str(self.planned.seed),
-            "request": {name: str(value) for name, (_, value) in flatten(self.request).items()},
-            "sampling": {name: str(value) for name, (_, value) in flatten(self.sampling).items()},
-            "limits": {name: str(value) for name, (_, value) in flatten(self.limits).items()},
+            "request": parameter_texts(self.request),
+            "sampling": parameter_texts(self.sampling),
+            "limits": parameter_texts(self.limits),
             "planner": self.planner,
             "planner's file": sha256_of(source) if source.is_file() else "",
-            "drive": {name: str(value) for name, (_, value) in flatten(config).items()},
+            "drive": parameter_texts(self.drive_config()),
             "ego": self.ego_id(),
             "objective": str(self.objective),
             "seed": self.seed,
@@ -107,10 +107,7 @@ class SearchRequest:
         Raises:
             InputError: a name is unknown, or a value does not suit.
         """
-        config = ClosedLoopConfig()
-        for assignment in self.assignments:
-            config = assigned(config, assignment)
-        return config
+        return reduce(assigned, self.assignments, ClosedLoopConfig())
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,21 +144,16 @@ class SearchResult:
     def sentences(self) -> list[str]:
         """Return what it came to, in sentences."""
         e, rate = self.estimate, self.estimate.rate
-        messages = []
         if self.worst:
-            messages.append(f"{len(self.findings)} failure(s) kept of {e.drives} drives; a search for the worst gives no rate")
-        elif e.first:
-            messages.append(f"failure rate {_share(rate.value)} (95 % interval {_share(rate.low)} to {_share(rate.high)})")
-            messages.append(f"first failure: drive {e.first} of {e.drives}")
-        else:
-            messages.append(
-                f"no failure in {e.drives} drives; by the natural ones the rate is at most {_share(rate.high)} (95 %)"
-            )
-        if not self.worst:
-            messages.append(f"natural drives alone: {self.plain}")
-        if not math.isnan(self.equal_plain) and not self.worst:
+            return [f"{len(self.findings)} failure(s) kept of {e.drives} drives; a search for the worst gives no rate"]
+        messages = [f"no failure in {e.drives} drives; by the natural ones the rate is at most {_share(rate.high)} (95 %)"]
+        if e.first:
+            interval = f"95 % interval {_share(rate.low)} to {_share(rate.high)}"
+            messages = [f"failure rate {_share(rate.value)} ({interval})", f"first failure: drive {e.first} of {e.drives}"]
+        messages.append(f"natural drives alone: {self.plain}")
+        if not math.isnan(self.equal_plain):
             messages.append(f"plain sampling would need {self.equal_plain:,.0f} drives for an interval as narrow")
-        if not math.isnan(e.unexpected) and not self.worst:
+        if not math.isnan(e.unexpected):
             messages.append(f"of it, where the regression expects no failure: at most {_share(e.unexpected)} (95 %)")
         return messages
 
@@ -227,10 +219,8 @@ def _write(folder: Path, result: SearchResult, request: SearchRequest, identity:
             scenarios = tuple(with_witness(one, ego) for one in scenarios)
         note = f"failures of {request.planner}, found by a search: they are no sample of the natural scenarios"
         drawn = ScenarioSet(len(scenarios), scenarios, len(scenarios), Counter(), (note,), slot)
-        facts = {
-            name: value if isinstance(value, str) else json.dumps(value, ensure_ascii=False) for name, value in identity.items()
-        }
-        provenance = {f"search.{name}": value for name, value in facts.items()} | versions()
+        texts = (value if isinstance(value, str) else json.dumps(value, ensure_ascii=False) for value in identity.values())
+        provenance = dict(zip((f"search.{name}" for name in identity), texts, strict=True)) | versions()
         delivered = replace(request.planned, fit=replace(fit, requested=asked), generated=drawn, provenance=provenance)
         with BagWriter(folder / BAG) as bag:
             add_results(bag, {"": delivered})
@@ -242,11 +232,13 @@ def _document(result: SearchResult, request: SearchRequest, identity: dict[str, 
     def rounded(value: float) -> float | None:
         return None if math.isnan(value) else float(f"{value:.6g}")
 
+    def interval(share: Interval) -> dict[str, float | None]:
+        return {name: rounded(value) for name, value in asdict(share).items()}
+
     plain = result.plain
-    share = {"value": rounded(plain.share.value), "low": rounded(plain.share.low), "high": rounded(plain.share.high)}
     return {
-        "rate": None if request.worst else {name: rounded(getattr(e.rate, name)) for name in ("value", "low", "high")},
-        "plain": {"failures": plain.count, "drives": plain.of, **share},
+        "rate": None if request.worst else interval(e.rate),
+        "plain": {"failures": plain.count, "drives": plain.of, **interval(plain.share)},
         "drives": e.drives,
         "first_failure": e.first or None,
         "plain_drives_for_the_same_interval": None if request.worst else rounded(result.equal_plain),

@@ -16,7 +16,7 @@ Two steps take turns, so that any budget is a prefix of a larger one:
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
-from typing import Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from scipy import special
@@ -109,6 +109,14 @@ class _SpentError(Exception):
     """The budget is spent."""
 
 
+class _Drawn(NamedTuple):
+    """A certified scenario: its numbers (d,), itself, and its features."""
+
+    z: Floats
+    candidate: Any
+    features: tuple[float, ...]
+
+
 @dataclass(eq=False)
 class Search:
     """The account of one search; `run` fills it.
@@ -157,24 +165,29 @@ class Search:
     def _generator(self, *place: int) -> np.random.Generator:
         return np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, 7, *place])))
 
-    def _drive(self, z: Sequence[Floats], candidates: Sequence[object], features: Sequence[tuple[float, ...]]) -> list[int]:
-        """Drive in certified candidates, as many as the budget allows; return the numbers of these drives."""
-        first, count = len(self.z), min(len(z), self.budget - len(self.z))
-        self.responses += self.problem.drive(candidates[:count])
-        self.z += z[:count]
-        self._features += features[:count]
-        return list(range(first, first + count))
+    def _drive(self, drawn: Sequence[_Drawn]) -> list[int]:
+        """Drive in certified scenarios, as many as the budget allows; return the numbers of these drives."""
+        first, driven = len(self.z), drawn[: self.budget - len(self.z)]
+        self.responses += self.problem.drive([one.candidate for one in driven])
+        self.z += [one.z for one in driven]
+        self._features += [one.features for one in driven]
+        return list(range(first, len(self.z)))
 
     def _check_budget(self) -> None:
         if len(self.z) >= self.budget:
             raise _SpentError
 
-    def _certify(self, z: Floats) -> tuple[list[int], list[object], list[tuple[float, ...]]]:
-        """Return which of numbers (S, d) are certified, their scenarios, and the features of these."""
-        candidates = self.problem.candidates(z)
-        rows = [k for k, one in enumerate(candidates) if one is not None]
-        kept = [candidates[k] for k in rows]
-        return rows, kept, [self.problem.features(one) for one in kept]
+    def _certify(self, z: Floats) -> list[_Drawn]:
+        """Return the certified scenarios among those of numbers (S, d)."""
+        pairs = zip(z, self.problem.candidates(z), strict=True)
+        return [_Drawn(row, one, self.problem.features(one)) for row, one in pairs if one is not None]
+
+    def _draw(self, generator: np.random.Generator) -> list[_Drawn]:
+        """Return the certified scenarios of a batch of natural ones."""
+        drawn = self._certify(generator.standard_normal((BATCH, self.problem.size)))
+        self._drawn += BATCH
+        self._certified += len(drawn)
+        return drawn
 
     def _explore(self) -> bool:
         """Run one small subset simulation, towards any failure or by one part; False if nothing is certified."""
@@ -210,14 +223,10 @@ class Search:
         """Drive in `count` certified natural scenarios; none are returned if hardly any can be certified."""
         found: list[int] = []
         while len(found) < count:
-            z = generator.standard_normal((BATCH, self.problem.size))
-            rows, candidates, features = self._certify(z)
-            self._drawn += len(z)
-            self._certified += len(rows)
-            if not rows:
+            drawn = self._draw(generator)
+            if not drawn:
                 return []
-            need = count - len(found)
-            new = self._drive([z[k] for k in rows[:need]], candidates[:need], features[:need])
+            new = self._drive(drawn[: count - len(found)])
             self._natural += new
             found += new
             self._check_budget()
@@ -231,19 +240,15 @@ class Search:
         population, heads, accepted = list(seeds), list(seeds), 0
         for _ in range(SEEDS - 1):
             predict = self._predictor()
-            places: list[int] = []
-            chosen: list[tuple[Floats, object, tuple[float, ...]]] = []
+            chosen: dict[int, _Drawn] = {}
             for place, head in enumerate(heads):
                 noise = generator.standard_normal((MOVES, self.problem.size))
-                z = math.sqrt(1.0 - step * step) * self.z[head] + step * noise
-                rows, candidates, features = self._certify(z)
-                if rows:
-                    predicted = predict(z[rows], features)[0]
-                    best = int(np.argmin(predicted[:, max(towards - 1, 0)] if towards else predicted.min(axis=1)))
-                    places.append(place)
-                    chosen.append((z[rows[best]], candidates[best], features[best]))
-            driven = self._drive([one[0] for one in chosen], [one[1] for one in chosen], [one[2] for one in chosen])
-            for place, k in zip(places, driven, strict=False):
+                drawn = self._certify(math.sqrt(1.0 - step * step) * self.z[head] + step * noise)
+                if drawn:
+                    predicted = predict(drawn)[0]
+                    best = np.argmin(predicted[:, towards - 1] if towards else predicted.min(axis=1))
+                    chosen[place] = drawn[best]
+            for place, k in zip(chosen, self._drive(list(chosen.values())), strict=False):
                 if self._distance(k, towards) <= threshold:
                     heads[place] = k
                     accepted += 1
@@ -256,11 +261,10 @@ class Search:
         """Return what predicts the parts of a drive from what was driven so far."""
         if self._known is not None and len(self.z) < REFIT * self._known[0]:
             return self._known[1]
-        columns = np.column_stack([np.stack(self.z), np.array(self._features)])
+        columns = np.column_stack([self.z, self._features])
         figures = np.array([one.parts or (one.margin,) for one in self.responses])
         failed = np.array([one.failed for one in self.responses])
-        natural = np.zeros(len(failed), dtype=np.bool_)
-        natural[[*self._natural, *self._sampled]] = True
+        natural = np.isin(np.arange(len(failed)), [*self._natural, *self._sampled])
         for part in figures.T:  # a failure is one of the least part
             part[failed & (part == figures.min(axis=1))] = -math.inf
         count = len(self._features[0])
@@ -275,60 +279,55 @@ class Search:
         """
         generator = self._generator(2, self._batches)
         self._batches += 1
-        z = generator.standard_normal((BATCH, self.problem.size))
-        rows, candidates, features = self._certify(z)
-        choosing = generator.random(BATCH)
-        self._drawn += BATCH
-        self._certified += len(rows)
-        if not rows:
+        drawn = self._draw(generator)
+        choosing = generator.random(len(drawn))
+        if not drawn:
             return False
-        frequent = len([k for k in self._natural if self.responses[k].failed]) / len(self._natural)
+        frequent = self._failed(self._natural) / len(self._natural)
         evenly = max(self._evenly, min(OFTEN * frequent, 1.0) if frequent > MOST else 0.0)
-        predicted, error = self._predictor()(z[rows], features)
-        near = 2.0 * special.ndtr(-predicted / (WIDER * error))
-        probability = np.clip(near.max(axis=1), evenly, 1.0)
-        chosen = np.flatnonzero(choosing[rows] < probability)
-        own = [rows[k] for k in chosen]
-        driven = self._drive([z[k] for k in own], [candidates[k] for k in chosen], [features[k] for k in chosen])
+        predicted, error = self._predictor()(drawn)
+        near = np.clip(2.0 * special.ndtr(-predicted / (WIDER * error)).max(axis=1), 0.0, 1.0)
+        probability = np.maximum(near, evenly)
+        chosen = np.flatnonzero(choosing < probability).tolist()
+        driven = self._drive([drawn[place] for place in chosen])
         self._sampled += driven
         if len(driven) == len(chosen):
-            self._seen += len(rows)
+            self._seen += len(drawn)
             calm = probability <= evenly
             self._calm += int(calm.sum())
-            self._floor += [k for place, k in zip(chosen.tolist(), driven, strict=True) if calm[place]]
-            for place, k in zip(chosen.tolist(), driven, strict=True):
+            for place, k in zip(chosen, driven, strict=True):
+                if calm[place]:
+                    self._floor.append(k)
                 if self.responses[k].failed:
                     self.weights[k] = float(1.0 / probability[place])
-            likely = float(near.max(axis=1).clip(0.0, 1.0).mean())
+            likely = float(near.mean())
             self._evenly = min(max(EXPLORING / (1.0 - EXPLORING) * likely, LEAST), MOST)
         self._check_budget()
         return True
 
+    def _failed(self, drives: Sequence[int]) -> int:
+        """Return how many of some drives failed."""
+        return sum(self.responses[k].failed for k in drives)
+
     def _result(self) -> Estimate:
-        failures = [k for k, one in enumerate(self.responses) if one.failed]
-        hits, natural = len([k for k in self._natural if self.responses[k].failed]), len(self._natural)
+        hits, natural = self._failed(self._natural), len(self._natural)
         plain = wilson(hits, natural, LEVEL) if natural else Interval(math.nan, 0.0, 1.0)
         shares: dict[str, float] = {}
         for k, weight in self.weights.items():
             shares[self.responses[k].kind] = shares.get(self.responses[k].kind, 0.0) + weight
-        whole = math.fsum(shares.values())
-        rate = plain if self._seen == 0 else self._rate()
+        unexpected = math.nan
+        if self._floor:
+            unexpected = wilson(self._failed(self._floor), len(self._floor), LEVEL).high * self._calm / self._seen
         return Estimate(
-            rate,
-            (hits, natural),
-            len(self.z),
-            failures[0] + 1 if failures else 0,
-            self._seen,
-            self._certified / max(self._drawn, 1),
-            self._unexpected(),
-            {kind: part / whole for kind, part in shares.items()},
+            rate=self._rate() if self._seen else plain,
+            plain=(hits, natural),
+            drives=len(self.z),
+            first=next((k for k, one in enumerate(self.responses, start=1) if one.failed), 0),
+            seen=self._seen,
+            valid=self._certified / max(self._drawn, 1),
+            unexpected=unexpected,
+            shares={kind: part / math.fsum(shares.values()) for kind, part in shares.items()},
         )
-
-    def _unexpected(self) -> float:
-        if not self._floor:
-            return math.nan
-        hits = len([k for k in self._floor if self.responses[k].failed])
-        return wilson(hits, len(self._floor), LEVEL).high * self._calm / self._seen
 
     def deviation(self, k: int) -> float:
         """Return how far a drive's scenario is from the mean, in standard deviations along what the regression goes by."""
@@ -362,8 +361,8 @@ class _Predictor:
 
     surrogates: list[Surrogate]
 
-    def __call__(self, z: Floats, features: Sequence[tuple[float, ...]]) -> tuple[Floats, Floats]:
-        """Return predictions (S, parts) and their errors (parts,) for numbers (S, d) and features."""
-        columns = np.column_stack([z, np.array(features)])
+    def __call__(self, drawn: Sequence[_Drawn]) -> tuple[Floats, Floats]:
+        """Return predictions (S, parts) and their errors (parts,) for scenarios (S,)."""
+        columns = np.column_stack([[one.z for one in drawn], [one.features for one in drawn]])
         predicted = np.column_stack([one.predict(columns) for one in self.surrogates])
         return predicted, np.array([one.error for one in self.surrogates])

@@ -3,6 +3,7 @@
 
 """The failures that a search found: certified scenarios, sorted into kinds, the likeliest of each kind first."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.planners import WitnessFollower
 from scenario_gen.closed_loop.search.estimate import Search
 from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.trials import Outcome, Trial
+from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.types import Scenario
 
 SHOWN = 100  # failures that are kept as scenarios, at most
@@ -69,12 +72,11 @@ def findings_of(search: Search, problem: DrivenScenarios, config: ClosedLoopConf
     failures = [k for k, one in enumerate(search.responses) if one.failed]
     deviation = {k: search.deviation(k) for k in failures}
     order = {k: search.responses[k].margin if search.worst else deviation[k] for k in failures}
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     chosen: list[int] = []
     for k in sorted(failures, key=lambda k: (order[k], k)):
-        kind = search.responses[k].kind
-        counts[kind] = counts.get(kind, 0) + 1
-        if counts[kind] <= OF_ONE_KIND and len(chosen) < SHOWN:
+        counts[search.responses[k].kind] += 1
+        if counts[search.responses[k].kind] <= OF_ONE_KIND and len(chosen) < SHOWN:
             chosen.append(k)
     scenarios = problem.natural.scenarios(np.stack([search.z[k] for k in chosen])) if chosen else []
     trials = [problem.trial(k, one) for k, one in zip(chosen, scenarios, strict=True) if one is not None]
@@ -96,8 +98,7 @@ def _station(outcome: Outcome) -> float:
     """Return how far [m] the ego had come when it failed."""
     drive, verdict = outcome.drive, outcome.verdict
     times = [verdict.collision.time if verdict.collision else np.nan, verdict.off_road, float(drive.motion.time[-1])]
-    position = drive.motion.position[drive.ego]
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(position, axis=0).T))])
+    way = np.concatenate([[0.0], np.cumsum(edge_lengths(drive.motion.position[drive.ego]))])
     return float(np.interp(np.nanmin(times), drive.motion.time, way))
 
 
@@ -105,14 +106,10 @@ def _kinds(kinds: Sequence[str], places: Sequence[float]) -> list[str]:
     """Return the kinds with their places: those of one kind are split where SAME_PLACE of the way lie between two."""
     result = list(kinds)
     for kind in set(kinds):
-        rows = sorted((place, k) for k, place in enumerate(places) if kinds[k] == kind)
-        group: list[tuple[float, int]] = []
-        for row in [*rows, (np.inf, -1)]:
-            if group and row[0] - group[-1][0] > SAME_PLACE:
-                low, high = round(group[0][0]), round(group[-1][0])
-                where = f"{low} m" if low == high else f"{low} to {high} m"
-                for _, k in group:
-                    result[k] = f"{kind}, {where} after its start"
-                group = []
-            group.append(row)
+        rows = np.array(sorted((k for k, each in enumerate(kinds) if each == kind), key=lambda k: places[k]))
+        for group in np.split(rows, np.flatnonzero(np.diff(np.array(places)[rows]) > SAME_PLACE) + 1):
+            low, high = (round(places[k]) for k in group[[0, -1]])
+            where = f"{low} m" if low == high else f"{low} to {high} m"
+            for k in group:
+                result[k] = f"{kind}, {where} after its start"
     return result

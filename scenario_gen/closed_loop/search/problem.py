@@ -5,39 +5,39 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import json
 from pathlib import Path
 from typing import Any, TextIO
 
 from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.folders import write_text
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.closed_loop.search.objective import Objective
-from scenario_gen.closed_loop.trials import RunTrials, Trial
+from scenario_gen.closed_loop.trials import RunTrials
 from scenario_gen.method.sampling import NaturalScenarios
 from scenario_gen.numerics import Floats
 from scenario_gen.types import mask, Road, Scenario
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Journal:
     """The drives of a search in a file, one line each, written as they end; a search that goes on reads them again.
 
     Attributes:
         known: responses of the drives that the file had.
-        file: where further ones go; None: nowhere.
+        file: where further ones go.
     """
 
-    known: list[Response] = field(default_factory=list)
-    file: TextIO | None = None
+    known: list[Response]
+    file: TextIO
 
     def add(self, response: Response) -> None:
         """Write one drive."""
-        if self.file is not None:
-            self.file.write(json.dumps([response.margin, response.parts, response.kind], ensure_ascii=False) + "\n")
-            self.file.flush()
+        self.file.write(json.dumps([response.margin, response.parts, response.kind], ensure_ascii=False) + "\n")
+        self.file.flush()
 
 
 @contextmanager
@@ -52,7 +52,12 @@ def open_journal(path: Path, identity: Mapping[str, Any]) -> Iterator[Journal]:
         lines = path.read_text().splitlines(keepends=True) if path.exists() else []
         whole = [line for line in lines if line.endswith("\n")]  # the last one may have been cut off
         if whole:
-            _same(path, json.loads(whole[0]), json.loads(head))
+            before, now = json.loads(whole[0]), json.loads(head)
+            differ = [name for name in now if not isinstance(before, dict) or before.get(name) != now[name]]
+            if differ:
+                raise InputError(
+                    f"{path} has the drives of another search ({', '.join(differ)} differ); move it away, or give another --out"
+                )
         known = [Response(float(margin), tuple(parts), kind) for margin, parts, kind in map(json.loads, whole[1:])]
     except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{path} is no journal of a search ({error}); move it away, or give another --out") from error
@@ -67,14 +72,6 @@ def open_journal(path: Path, identity: Mapping[str, Any]) -> Iterator[Journal]:
         raise of_system(error, path, "; give another --out") from error
     with file:
         yield Journal(known, file)
-
-
-def _same(path: Path, there: Any, own: Mapping[str, Any]) -> None:
-    if there != own:
-        differ = [name for name in own if not isinstance(there, dict) or there.get(name) != own[name]]
-        raise InputError(
-            f"{path} has the drives of another search ({', '.join(differ)} differ); move it away, or give another --out"
-        )
 
 
 @dataclass(eq=False)

@@ -53,17 +53,15 @@ class Surrogate:
         x = (x - mean) / scale
         level = float(y.mean())
         kernel = x @ x.T
-        best: tuple[float, Floats] | None = None
+        near = counted[: max(int(NEAR * len(counted)), 1)]  # the rows are in ascending order
+        fits: list[tuple[float, Floats]] = []
         for ridge in RIDGES:
             inverse = np.linalg.inv(kernel + ridge * np.eye(len(x)))
             dual = inverse @ (y - level)
-            left_out = dual / np.diag(inverse)  # error of the prediction from all others
-            near = left_out[counted][: max(int(NEAR * len(counted)), 1)]  # the rows are in ascending order
-            error = float(np.sqrt(np.square(near).mean()))
-            if best is None or error < best[0]:
-                best = error, dual
-        assert best is not None
-        return cls(mean, scale, x.T @ best[1], level, max(best[0], 1e-9))
+            left_out = (dual / np.diag(inverse))[near]  # error of the prediction from all others
+            fits.append((float(np.sqrt(np.square(left_out).mean())), dual))
+        error, dual = min(fits, key=lambda fit: fit[0])
+        return cls(mean, scale, x.T @ dual, level, max(error, 1e-9))
 
     def predict(self, columns: Floats) -> Floats:
         """Return the figure (S,), in its own unit, for columns (S, q) in any unit."""

@@ -74,7 +74,7 @@ def _messages(path: Path, config: LogConfig) -> Iterator[Any]:
     check_size(str(path), size, 0, config)
     allowance = Allowance(BagConfig(most_bytes=config.size_limit << 20), str(path), size, "log.size_limit")
     with path.open("rb") as stream, _whole(path):
-        file = open_mcap(stream, size, allowance, None)
+        file = open_mcap(stream, size, allowance)
         channel = _channel(file, path, config)
         for k, (_, _, data) in enumerate(file.in_order([channel])):
             allowance.hold(len(data))

@@ -40,8 +40,9 @@ def index_of(level: int, candidate: int) -> int:
 
 
 def searched_index(numbers: Floats) -> int:
-    """Return the index of a scenario whose numbers (d,) a search chose: made of their SHA-256."""
-    page, within = divmod(int.from_bytes(hashlib.sha256(numbers.tobytes()).digest()[:5]), LEVEL_SIZE)
+    """Return the index of a scenario whose numbers (d,) a search chose: made of their SHA-256, to a millionth as on any CPU."""
+    rounded = np.round(numbers * 1e6).astype(np.int64)
+    page, within = divmod(int.from_bytes(hashlib.sha256(rounded.tobytes()).digest()[:5]), LEVEL_SIZE)
     return (page * LEVEL_SLOTS + SEARCHED) * LEVEL_SIZE + within
 
 

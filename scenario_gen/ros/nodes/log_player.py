@@ -14,8 +14,8 @@ import time
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from msg_conventions.cdr import CdrWriter
 from msg_conventions.diagnostics import Level
+from msg_conventions.driving import encode_clock
 from msg_conventions.streams import encode_fix, encode_speed
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import encode_tracks
@@ -86,7 +86,7 @@ class LogPlayer(StageNode):
             if cancelled() or not self.context.ok():
                 break
             stamp = encounter.start_ns + k * encounter.dt_ns
-            self.outputs.publish(clock, CdrWriter().stamp(stamp).finish())
+            self.outputs.publish(clock, encode_clock(stamp))
             for i, name in enumerate(names):
                 frame, (latitude, longitude) = f"vehicle_{name}", places[i, k].tolist()
                 self.outputs.send(vehicle_topic(name, "fix"), encode_fix(latitude, longitude, stamp, frame))

@@ -31,8 +31,8 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from msg_conventions.cdr import CdrWriter
 from msg_conventions.diagnostics import Level
+from msg_conventions.driving import encode_clock
 from msg_conventions.frames import decode_frames, encode_frames
 from msg_conventions.pictures import encode_footprint
 from msg_conventions.topics import vehicle_topic
@@ -313,7 +313,7 @@ class Player(Node):  # type: ignore[misc]
 
     def _publish_clock(self, stamp_ns: int) -> None:
         if self._clock_publisher is not None:
-            publish(self, self._clock_publisher, CdrWriter().stamp(stamp_ns).finish())
+            publish(self, self._clock_publisher, encode_clock(stamp_ns))
 
     def _set_running(self, response: Trigger.Response, *, running: bool) -> Trigger.Response:
         response.success = running != self._running.is_set()

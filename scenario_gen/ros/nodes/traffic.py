@@ -31,9 +31,10 @@ from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.arriving import TOPICS
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.closed_loop.ego import Command, Pose
-from scenario_gen.closed_loop.results import write_verdicts
+from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial
+from scenario_gen.closed_loop.trials import Outcome, read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.driving import (
@@ -213,7 +214,7 @@ class Traffic(Node):  # type: ignore[misc]
         self.get_logger().info(f"scenario {trial.name}: {self._verdict}")
         if self.config.results:
             Path(self.config.results).mkdir(parents=True, exist_ok=True)
-            write_verdicts(Path(self.config.results), self.outcomes, f"{self.get_name()} over ROS 2", self.config.drive)
+            Drives(self.outcomes, f"{self.get_name()} over ROS 2", self.config.drive).write(Path(self.config.results))
         if self._at + 1 < len(self._trials):
             if not self.config.follow_on:
                 self.get_logger().info(f"the next scenario waits for a call of {self.get_fully_qualified_name()}/next")

@@ -12,8 +12,9 @@ from rclpy.signals import SignalHandlerOptions
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import State
-from scenario_gen.closed_loop.trials import Outcome, Trial
+from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.ros.nodes.traffic import Traffic
 from scenario_gen.ros.plumbing.driving import INPUTS
 from scenario_gen.ros.plumbing.node_parameters import TrafficParameters

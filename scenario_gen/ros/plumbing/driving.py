@@ -24,9 +24,10 @@ from scenario_gen.bags.recordings.arriving import ArrivingScenarios
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.local_map import local_map
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.tracking import of_twist, Track
-from scenario_gen.closed_loop.trials import Outcome, Trial, trial_of
+from scenario_gen.closed_loop.trials import Outcome, trial_of
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Road
 
@@ -173,16 +174,15 @@ def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
         loop: the drive.
         states: its last two, or its first alone.
     """
-    state, known = states[-1], loop.certified
+    state, known = states[-1], loop.world
     others = [i for i in np.flatnonzero(state.here).tolist() if i != loop.ego]
     ahead = np.arange(0.0, HORIZON_NS + 1.0, STEP_NS) * 1e-9
-    time = known.scenario.time
     paths = []
     for i in others:
         at = np.minimum(state.clock[i] + state.rate[i] * ahead, known.spans[i, 1])
-        paths.append(np.column_stack([np.interp(at, time, known.motion[i, :, c]) for c in range(3)]))
-    objects = [known.scenario.vehicles[i] for i in others]
-    return encode_predicted_objects(objects, _rates(loop, states)[others], paths, known.scenario.frame_id, stamp_of(state))
+        paths.append(np.column_stack([np.interp(at, known.time, known.motion[i, :, c]) for c in range(3)]))
+    objects = [loop.scenario.vehicles[i] for i in others]
+    return encode_predicted_objects(objects, _rates(loop, states)[others], paths, loop.scenario.frame_id, stamp_of(state))
 
 
 def encode_ego(loop: ClosedLoop, states: Sequence[State]) -> bytes:

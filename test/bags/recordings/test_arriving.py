@@ -3,7 +3,7 @@
 
 """Live scenarios are whole in whatever order their messages come, and only then."""
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from message_examples import scenario
 import numpy as np
@@ -40,6 +40,7 @@ MADE, MESSAGES = set_of(2)
 
 
 @given(st.permutations(range(len(MESSAGES))))
+@settings(max_examples=25)
 def test_whatever_comes_first(order):
     arriving = ArrivingScenarios()
     found = [one for k in order for one in arriving.take(*MESSAGES[k])]

@@ -286,14 +286,3 @@ def test_what_holds_no_result_cannot_be_loaded(run, tmp_path):
         load(folder)
     with pytest.raises(InputError, match="no namespace has any"):
         load(bundled("a"))
-
-
-def test_a_bag_of_a_version_before_0_6_is_refused_in_one_line(run, tmp_path):
-    now = write_recording(tmp_path / "now", run)
-    with BagWriter(tmp_path / "former") as bag:
-        for message in read_messages(now):
-            bag.add_topic(message.topic, message.type)
-            bag.write(message.topic, message.data, message.stamp_ns)
-        bag.add_topic("/ego/track", "trajectory_msgs/msg/MultiDOFJointTrajectory")
-    with pytest.raises(InputError, match=r"before 0\.6.*ego/track"):
-        read_recording(tmp_path / "former")

@@ -46,7 +46,7 @@ def test_what_is_saved_of_a_cut_bag_opens_everywhere(bag, tmp_path):
     whole, messages = bag.read_bytes(), told(bag)
     ends = chunk_ends(whole)
     rng = random.Random(5)
-    for cut in (0, 1, 8, len(whole) - 1, *(rng.randrange(len(whole)) for _ in range(20))):
+    for cut in (0, 1, 8, len(whole) - 1, *(rng.randrange(len(whole)) for _ in range(8))):
         (tmp_path / "cut.mcap").write_bytes(whole[:cut])
         expected = max((count for end, count in ends if end <= cut), default=0)
         shutil.rmtree(tmp_path / "saved", ignore_errors=True)
@@ -65,7 +65,7 @@ def test_what_is_saved_of_a_cut_bag_opens_everywhere(bag, tmp_path):
             assert sum(1 for _ in make_reader(stream).iter_messages()) == expected
 
 
-@pytest.mark.parametrize("what", ["content", "length", "opcode", "nothing left"])
+@pytest.mark.parametrize("what", ["content", "length", "opcode", "nothing left", "zeros"])
 def test_a_damaged_chunk_costs_no_other(bag, tmp_path, what):
     whole, messages = bag.read_bytes(), told(bag)
     ends = chunk_ends(whole)
@@ -84,7 +84,7 @@ def test_a_damaged_chunk_costs_no_other(bag, tmp_path, what):
         elif what == "opcode":
             broken[start] = 0
         else:
-            broken[start:end] = b"\xff" * (end - start)
+            broken[start:end] = (b"\xff" if what == "nothing left" else b"\0") * (end - start)
         lost = range(ends[k - 1][1] if k else 0, ends[k][1])
         kept = [(stamp, data) for n, (_, _, stamp, data) in enumerate(messages) if n not in lost]
         found = salvaged(bytes(broken), tmp_path / "broken.mcap")

@@ -28,6 +28,7 @@ from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
 
 LOG, ROAD = bundled("b"), "t_intersection"
+BUDGET = 60
 
 
 class Blind(IdmFollower):
@@ -66,14 +67,14 @@ def bag(tmp_path_factory):
 
 def request_of(bag, planner, **further):
     source = replanned(bag)
-    known = {"ego": "2", "objective": Objective("collision"), "budget": 60} | further
+    known = {"ego": "2", "objective": Objective("collision"), "budget": BUDGET} | further
     return SearchRequest(source.planned, source.request, source.sampling, source.limits, f"{__name__}:{planner}", **known)
 
 
 @pytest.fixture(scope="module")
 def found(bag, tmp_path_factory):
     out = tmp_path_factory.mktemp("found") / "out"
-    return search_failures(request_of(bag, "Blind", budget=150), out, workers=1), out
+    return search_failures(request_of(bag, "Blind"), out, workers=1), out
 
 
 def test_every_finding_is_certified_and_its_witness_passes(found):
@@ -94,7 +95,7 @@ def test_the_bag_of_failures_fails_again(found):
 def test_files_say_what_was_found(found):
     result, out = found
     document = json.loads((out / "search.json").read_text())
-    assert document["drives"] == 150 and document["rate"]["low"] <= document["rate"]["value"] <= document["rate"]["high"]
+    assert document["drives"] == BUDGET and document["rate"]["low"] <= document["rate"]["value"] <= document["rate"]["high"]
     assert len(document["findings"]) == len(result.findings) and document["kinds"]
     suite = ElementTree.parse(out / "junit.xml").getroot()
     assert int(suite.get("failures")) == len(result.findings)
@@ -103,24 +104,18 @@ def test_files_say_what_was_found(found):
 
 
 def test_a_stopped_search_goes_on_with_the_same_bytes(bag, found, tmp_path):
-    """A smaller budget first, its last line cut off, then the whole one, in two processes."""
-    search_failures(request_of(bag, "Blind", budget=70), tmp_path / "out", workers=1)
-    journal = tmp_path / f"out{JOURNAL}"
-    whole = journal.read_bytes()
-    assert whole.count(b"\n") == 71
-    journal.write_bytes(whole[:-7])
-    search_failures(request_of(bag, "Blind", budget=150), tmp_path / "out", workers=2)
+    """A part of the journal first, its last line cut off; another search refuses that journal."""
+    journal, kept = tmp_path / f"out{JOURNAL}", found[1].with_name(f"out{JOURNAL}").read_bytes()
+    assert kept.count(b"\n") == BUDGET + 1
+    journal.write_bytes(b"".join(kept.splitlines(keepends=True)[: BUDGET // 2])[:-7])
+    search_failures(request_of(bag, "Blind"), tmp_path / "out", workers=1)
     for name in ("search.json", "search.html", "junit.xml", "bag/bag_0.mcap"):
         assert (tmp_path / "out" / name).read_bytes() == (found[1] / name).read_bytes()
-
-
-def test_the_journal_of_another_search_is_refused(bag, tmp_path):
-    search_failures(request_of(bag, "Blind", budget=30), tmp_path / "out", workers=1)
-    with pytest.raises(InputError, match="drives of another search \\(objective differ"):
-        search_failures(request_of(bag, "Blind", budget=30, objective=Objective("goal")), tmp_path / "out", workers=1)
-    (tmp_path / f"out{JOURNAL}").write_text("nothing\n")
+    with pytest.raises(InputError, match="of another search \\(objective differ"):
+        search_failures(request_of(bag, "Blind", objective=Objective("goal")), tmp_path / "out", workers=1)
+    journal.write_text("nothing\n")
     with pytest.raises(InputError, match="is no journal of a search"):
-        search_failures(request_of(bag, "Blind", budget=30), tmp_path / "out", workers=1)
+        search_failures(request_of(bag, "Blind"), tmp_path / "out", workers=1)
 
 
 def test_a_planner_that_fails_is_named_and_its_drives_are_kept(bag, tmp_path):
@@ -130,29 +125,25 @@ def test_a_planner_that_fails_is_named_and_its_drives_are_kept(bag, tmp_path):
 
 
 def test_a_planner_that_stands_misses_every_goal(bag, tmp_path):
-    result = search_failures(request_of(bag, "Stands", objective=Objective("goal"), budget=40), tmp_path / "out", workers=1)
-    assert result.estimate.first == 1 and result.estimate.rate.high == 1.0
-    assert result.estimate.rate.low > 0.7
+    result = search_failures(
+        request_of(bag, "Stands", objective=Objective("goal"), budget=12, assignments=["overtime=1.0"]),
+        tmp_path / "out",
+        workers=1,
+    )
+    assert result.estimate.first == 1 and result.estimate.rate.high == 1.0 and result.estimate.rate.low > 0.7
 
 
-@pytest.mark.parametrize(
-    ("further", "message"),
-    [({"ego": "9"}, "--ego 9: there is no such vehicle; there are 1, 2"), ({"budget": 0}, "--budget 0: at least one drive")],
-)
+@pytest.mark.parametrize(("further", "message"), [({"ego": "9"}, "--ego 9: .* there are 1, 2"), ({"budget": 0}, "--budget 0")])
 def test_bad_requests_are_refused(bag, tmp_path, further, message):
     with pytest.raises(InputError, match=message):
         search_failures(request_of(bag, "Blind", **further), tmp_path / "out")
 
 
-@pytest.mark.parametrize("text", ["speed", "ttc", "ttc<", "ttc<-1", "pet<1s", ""])
-def test_unknown_objectives_are_refused(text):
-    with pytest.raises(InputError, match="is not known; take at_fault"):
-        Objective.parsed(text)
-
-
-@pytest.mark.parametrize(("text", "name", "limit"), [("ttc<1.5", "ttc", 1.5), (" pet < 1 ", "pet", 1.0), ("goal", "goal", 0.0)])
-def test_objectives_are_read(text, name, limit):
-    assert Objective.parsed(text) == Objective(name, limit)
+def test_objectives():
+    assert Objective.parsed(" pet < 1 ") == Objective("pet", 1.0) and Objective.parsed("goal") == Objective("goal")
+    for text in ("speed", "ttc", "ttc<", "ttc<-1", "pet<1s", ""):
+        with pytest.raises(InputError, match="take at_fault"):
+            Objective.parsed(text)
 
 
 def test_margins_are_zero_or_less_in_failures_alone(bag):
@@ -170,31 +161,16 @@ def test_margins_are_zero_or_less_in_failures_alone(bag):
             }[text.split("<")[0]]
             assert response.failed == failed and bool(response.kind) == failed
             assert len(response.parts) == (1 if text in ("at_fault", "collision") else 0)
-
-
-def test_the_margin_of_leaving_the_road_is_its_depth(bag):
-    objective = Objective("off_road")
     for planner in ("Strays", "Blind"):
-        for outcome in run_trials(read_trials(bag, "2"), f"{__name__}:{planner}"):
-            response, verdict = objective.response(outcome), outcome.verdict
-            assert response.margin == verdict.road_margin + 0.1 and response.failed == (not math.isnan(verdict.off_road))
-            assert response.failed == (planner == "Strays")
+        (outcome, *_) = run_trials(read_trials(bag, "2", 1), f"{__name__}:{planner}")
+        response = Objective("off_road").response(outcome)
+        assert response.margin == outcome.verdict.road_margin + 0.1 and response.failed == (planner == "Strays")
 
 
-def test_the_command_says_what_it_found(bag, tmp_path):
-    words = ["search", str(bag), "--planner", f"{__name__}:Blind", "--ego", "2", "--budget", "40", "--workers", "1"]
-    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out"), "--max-rate", "0.0", "--objective", "collision"])
+def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
+    words = f"search {LOG} --road {ROAD} --planner {__name__}:Blind --ego 2 --budget 12 --workers 1 --out {tmp_path}/out".split()
+    done = CliRunner().invoke(app, [*words, "--max-rate", "0.0", "--objective", "collision"])
     assert done.exit_code == 1 and "the failure rate may be above 0" in done.output, done.output
-    assert "natural drives alone" in done.output and str(tmp_path / "out" / "search.html") in done.output
-
-
-def test_a_log_and_a_road_are_searched_as_the_bag_made_of_them(bag, tmp_path):
-    words = ["--planner", f"{__name__}:Blind", "--ego", "2", "--budget", "30", "--workers", "1"]
-    runner = CliRunner()
-    done = runner.invoke(app, ["search", str(LOG), "--road", ROAD, *words, "--out", str(tmp_path / "log")])
-    assert done.exit_code == 0, done.output
-    assert json.loads((tmp_path / "log" / "search.json").read_text())["drives"] == 30
-    refused = runner.invoke(
-        app, ["search", str(LOG), "--road", ROAD, "--encounter", "none", *words, "--out", str(tmp_path / "b")]
-    )
+    assert "natural drives alone" in done.output and json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 12
+    refused = CliRunner().invoke(app, [*words, "--encounter", "none"])
     assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(refused.exception)

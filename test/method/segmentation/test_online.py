@@ -31,7 +31,7 @@ def test_steady_noise_gives_nothing(encounter_of):
 
 def test_memory_is_bounded():
     online = OnlineSegmenter(2, 0.1)
-    for t in range(2000):
+    for t in range(700):
         online.push(np.array([[t * 0.8, 0.0], [0.0, 5.0]]), np.array([8.0, 0.0]))
     assert len(online._samples) <= 300
 

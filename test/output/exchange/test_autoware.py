@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from small_scenarios import crossing, one_vehicle
 
-from msg_conventions.autoware import AutowareEncoder, encode_predicted_objects
 from scenario_gen.bags.recordings.autoware import autoware_messages, TYPES
 from scenario_gen.bags.storage.definitions import definition, PREDICTED, TRACKED, type_store
 
@@ -59,25 +58,6 @@ def test_every_message_is_what_the_scenario_says():
             assert np.allclose([[p.position.x, p.position.y] for p in path.path], ahead, atol=1e-12)
     ids = {tuple(bytes(thing.object_id.uuid) for thing in message.objects) for _, message in found[OBJECTS] + found[TRACKS]}
     assert len(ids) == 1 and len(set(*ids)) == len(scenario.vehicles)
-
-
-def test_objects_of_a_drive_are_the_same_messages():
-    """What `traffic` says of one instant is what a bag says of it: one writer for both."""
-    scenario = crossing()
-    encoder = AutowareEncoder(scenario)
-    for k in (0, 17, len(scenario.time) - 1):
-        states = np.column_stack(
-            [
-                scenario.position[:, k],
-                scenario.heading[:, k],
-                scenario.speed[:, k],
-                scenario.acceleration[:, k],
-                encoder.yaw_rate[:, k],
-            ]
-        )
-        whole = range(k, min(k + 101, len(scenario.time)), 5)
-        paths = [np.column_stack([scenario.position[n, whole], scenario.heading[n, whole]]) for n in range(len(states))]
-        assert encode_predicted_objects(scenario.vehicles, states, paths, scenario.frame_id, 9) == encoder.predicted_objects(k, 9)
 
 
 def test_the_ego_is_at_its_rear_axle():

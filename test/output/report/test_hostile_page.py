@@ -11,6 +11,7 @@ import re
 
 from browser_tab import DESKTOP, Tab
 from evaluation_worlds import report_case
+from lengths import LONG
 import pytest
 
 from benchmarks._paper_measure import run_case
@@ -21,6 +22,7 @@ from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.types.generation import UNIFORM
 
 RUNS = "top.ran=1"
+PAGES = ("report.html", pytest.param("paper.html", marks=pytest.mark.long))
 HOSTILE = (
     f"</script><script>{RUNS}</script>",
     f'</script><img src=x onerror="{RUNS}">',
@@ -107,13 +109,15 @@ def hostile_report():
 def pages(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hostile")
     write_report(folder / "report.html", hostile_report())
+    if not LONG:
+        return folder
     case = run_case(read_log([bundled("c")]).encounters[0], count=2, seed=7)
     case = replace(case, encounter=replace(case.encounter, name=HOSTILE[0]), refused={name: name for name in HOSTILE})
     write_page(folder, [case], quality=HOSTILE, provenance={name: name for name in HOSTILE})
     return folder
 
 
-@pytest.mark.parametrize("name", ["report.html", "paper.html"])
+@pytest.mark.parametrize("name", PAGES)
 def test_the_policy_names_each_script_and_allows_no_other(pages, name):
     found = Elements((pages / name).read_text(encoding="utf-8"))
     ours = [text for kind, text in found.scripts if not kind]
@@ -142,7 +146,7 @@ class Watched(Tab):
         return self.page.evaluate("'ran' in window") or bool(self.dialogs)
 
 
-@pytest.mark.parametrize("name", ["report.html", "paper.html"])
+@pytest.mark.parametrize("name", PAGES)
 def test_hostile_names_run_nothing_and_the_page_works(browser, pages, name):
     tab = Watched(browser, pages / name, DESKTOP)
     tab.page.on("dialog", lambda dialog: (tab.dialogs.append(dialog.message), dialog.dismiss()))

@@ -224,7 +224,7 @@ def test_a_scenario_is_downloaded_and_its_command_copied(browser, tmp_path):
     tab.page.close()
 
 
-@pytest.mark.parametrize(("scheme", "size"), [("light", DESKTOP), ("dark", PHONE)], ids=["light desktop", "dark phone"])
+@pytest.mark.parametrize(("scheme", "size"), [("dark", PHONE), pytest.param("light", DESKTOP, marks=pytest.mark.long)])
 def test_axe_finds_nothing_wrong(browser, report, scheme, size):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
     context = browser.new_context(bypass_csp=True, color_scheme=scheme, viewport=size)  # axe runs in the page
