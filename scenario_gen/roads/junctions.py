@@ -7,7 +7,7 @@ Each arm has its dividing line and lanes where the recorded vehicles were, to th
 with the template's own curvature, is swept into the road, so there is room for it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -27,6 +27,12 @@ from scenario_gen.types import Encounter, Road
 
 _RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
 _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
+_NEAR_RING = 4.0  # metres beyond the middle of its lane within which a vehicle's speed is one on the ring
+_EVERY = 1.0  # metres between the poses of a path by which a ring is found
+_WIDEST_RING = 60.0  # metres of its radius, in the template
+_LEAST_ARC = 15.0  # metres that are driven about it
+_OFF_RING = 2.5  # metres to its lane
+_FLARED = np.radians(15.0)  # by which those who come or go turn away from it
 _RING_ROOM = 0.5  # metres that a roundabout's lane is wider on each side
 _SAME_ARM = np.radians(30.0)  # directions that differ by less are those of one arm
 _MERGED = np.radians(45.0)  # and by so much if the road has too few arms otherwise
@@ -91,7 +97,7 @@ def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> R
     Raises:
         RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
     """
-    directions = _directions(name, tracks)
+    directions = _directions(name, tracks, junction_centre(tracks))
     longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
     turn = np.pi - longest.yaw  # the longest arm leads west
     lane_of: dict[tuple[int, bool], tuple[int, int]] = {}  # arm and lane of each end
@@ -125,26 +131,27 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     Raises:
         RefusedError: the template drives too fast for it, side by side, or by more than four arms.
     """
-    fastest, length, wide = 6.0, 5.0, 2.0
+    radius, fastest, length, wide = _RING[0], 0.0, 5.0, 2.0
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
-        fastest = max(float(track.speed[track.present[0] : track.present[1] + 1].max()) for track in tracks)
+        centre, driven = _ring_driven(tracks, config)
+        radius, fastest = _ring(tracks, centre, driven)
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
-        directions = _directions(name, tracks)
-    radius = float(np.clip(np.square(fastest) / _RING_LATERAL, *_RING))
+        directions = _directions(name, tracks, centre, radius + _NEAR_RING)
     if fastest > np.sqrt(_RING_FASTEST * radius):
         possible = float(np.sqrt(_RING_FASTEST * _RING[1]))
         raise RefusedError(
-            f"road roundabout: the template drives up to {fastest:.1f} m/s, and the largest one ({_RING[1]:g} m) allows "
+            f"road roundabout: the template drives up to {fastest:.1f} m/s there, and the largest one ({_RING[1]:g} m) allows "
             f"{possible:.1f} m/s; choose four_way or curve"
         )
     turn = np.pi - directions[0].yaw
     sketch, arms, width = Sketch(), [], config.lane_width
     for direction in directions:
-        most = max(_lanes(direction, config)[1].values(), default=0)
+        straight = replace(direction, members=[end for end in direction.members if end.steady >= 2.0 * _SURE])
+        most = max(_lanes(straight, config)[1].values(), default=0)
         if most > 0 and len({end.inward for end in direction.members}) < 2:
             raise RefusedError(f"road roundabout has one lane, and the template drives in {most + 1} beside each other")
         reach = config.arm_length or max(direction.reach(tracks) + ROOM + 2.0 * SLACK, radius + SHORTEST)
@@ -165,12 +172,51 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     return sketch.road(name, Plan(arms, ring=radius), config)
 
 
+def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float]:
+    """Centre (2,) and radius [m] of the circle about which those drive who bend to the other side before or after.
+
+    The junction's centre and the smallest radius, where nobody does.
+    """
+    sign, points = 1.0 if config.traffic_side == "right" else -1.0, np.zeros((0, 2))
+    for track in tracks:
+        poses = track.curve.at(np.arange(0.0, track.travelled, _EVERY))
+        turned = sign * np.gradient(np.convolve(poses[:, 2], np.full(5, 0.2), "same")) if len(poses) > 9 else np.zeros(len(poses))
+        turned[:3] = turned[-3:] = 0.0
+        about = turned > _EVERY / _WIDEST_RING
+        if -turned[turned < 0.0].sum() > _FLARED:
+            points = np.concatenate((points, poses[about, :2]))
+    for _ in range(3):
+        if len(points) < _LEAST_ARC / _EVERY:
+            break
+        rows = np.column_stack((2.0 * points, np.ones(len(points))))
+        x, y, rest = np.linalg.lstsq(rows, np.square(points).sum(axis=1), rcond=None)[0]
+        centre, radius = np.array([x, y]), float(np.sqrt(rest + x * x + y * y))
+        near = np.abs(np.hypot(*(points - centre).T) - radius) < _OFF_RING
+        if near.all() and radius < _WIDEST_RING:
+            return centre, radius
+        points = points[near]
+    return junction_centre(tracks), _RING[0]
+
+
+def _ring(tracks: tuple[Track, ...], centre: Floats, least: float) -> tuple[float, float]:
+    """The radius [m] of a roundabout's lane that suits the template's speeds on it, not on its arms; the fastest [m/s] there."""
+    there = [slice(track.present[0], track.present[1] + 1) for track in tracks]
+    speed = np.concatenate([track.speed[own] for track, own in zip(tracks, there, strict=True)])
+    place = np.concatenate([track.poses[own, :2] for track, own in zip(tracks, there, strict=True)])
+    away = np.hypot(*(place - centre).T)
+    for radius in np.append(np.arange(max(least, _RING[0]), _RING[1], 0.25), _RING[1]):
+        fastest = float(speed[away < radius + _NEAR_RING].max(initial=0.0))
+        if np.square(fastest) <= _RING_LATERAL * radius:
+            break
+    return float(radius), fastest
+
+
 def _sweep(sketch: Sketch, way: Curve, length: float, width: float) -> None:
     """Add a footprint's way through the junction, with room beside it."""
     sketch.sweep(way.cut(length / 2.0, way.length - length / 2.0), length, width + 2.0 * _SWEPT)
 
 
-def _ends(i: int, track: Track, centre: Floats) -> list[_End]:
+def _ends(i: int, track: Track, centre: Floats, ring: float) -> list[_End]:
     s = np.arange(0.0, max(track.travelled, 0.5) + 0.25, 0.5)
     poses = track.curve.at(s) - np.array([*centre, 0.0])
     ends = []
@@ -182,18 +228,20 @@ def _ends(i: int, track: Track, centre: Floats) -> list[_End]:
         nearest = int(np.argmin(np.square(along[:, :2]).sum(axis=1)))
         last = min(int(turning[0]) if len(turning) else len(along) - 1, nearest)  # not beyond the junction
         yaw = float(np.median(along[: last + 1, 2])) + (np.pi if inward else 0.0)
+        if ring and last * 0.5 < 2.0 * _SURE:  # still bending: arms lead straight to the middle
+            yaw = float(np.arctan2(*along[0, 1::-1]))
         away = float((along[0, :2] * unit(yaw)).sum())
-        at = along[nearest if abs(turn) < _THROUGH else last, :2]
+        at = along[nearest if abs(turn) < _THROUGH and not ring else last, :2]
         ends.append(_End(i, inward, yaw, at, away, last * 0.5, goes_on * (-1.0 if inward else 1.0)))
     if track.still:
         return [max(ends, key=lambda end: end.away)]  # it stands on the arm on which it is
     return ends
 
 
-def _directions(name: str, tracks: tuple[Track, ...]) -> list[_Direction]:
-    """Directions of the arms with their members, as many as the road has."""
-    count, centre = ARM_COUNT[name], junction_centre(tracks)
-    ends = [end for i, track in enumerate(tracks) for end in _ends(i, track, centre)]
+def _directions(name: str, tracks: tuple[Track, ...], centre: Floats, ring: float = 0.0) -> list[_Direction]:
+    """Directions of the arms about a centre (2,) [m] with their members, as many as the road has; ends on a ring are on no arm."""
+    count = ARM_COUNT[name]
+    ends = [end for i, track in enumerate(tracks) for end in _ends(i, track, centre, ring) if not ring or end.away > ring]
     directions: list[_Direction] = []
     reached = [end for end in ends if end.away > 0.0]
     for end in sorted(reached, key=lambda end: (-min(end.steady, 20.0), end.vehicle, end.inward)):

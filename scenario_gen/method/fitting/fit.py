@@ -4,6 +4,7 @@
 """One door to the fitting: which way of placing a template is tried on which road."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 import math
 
@@ -111,6 +112,9 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         return own
     else:
         order = ("search",)
+    if road.lanes is not None and road.lanes.turns_back:  # as one piece first: rings are drawn as large as those recorded
+        with suppress(RefusedError):
+            return place_on_lanes(tracks, road, config)
     for name in order:
         try:
             return ways[name](tracks, road, config)

@@ -99,7 +99,8 @@ def placements(
         return
     named = [*broken_rules.most_common(1), *reasons.most_common(2)]
     why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in named)
-    raise NoPlaceError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
+    what = "road" if network.drawn else "map"
+    raise NoPlaceError(f"the template fits no place on {what} {network.name}: {why or 'it has no lanes of its directions'}")
 
 
 class _Judged:
