@@ -239,7 +239,7 @@ def _ends(i: int, track: Track, centre: Floats, ring: float) -> list[_End]:
 
 
 def _directions(name: str, tracks: tuple[Track, ...], centre: Floats, ring: float = 0.0) -> list[_Direction]:
-    """Directions of the arms about a centre (2,) [m] with their members, as many as the road has; ends on a ring are on no arm."""
+    """Directions of the arms about a centre (2,) [m] with their members, as many as the road has; an end on a ring is on none."""
     count = ARM_COUNT[name]
     ends = [end for i, track in enumerate(tracks) for end in _ends(i, track, centre, ring) if not ring or end.away > ring]
     directions: list[_Direction] = []

@@ -10,6 +10,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road
+from scenario_gen.roads.ways import draw_ring_route
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.segmentation import Segmentation
 
@@ -114,6 +115,24 @@ def test_a_roundabout_is_sized_to_the_speed_and_gone_about():
             assert abs(vehicle.turned[1]) < np.radians(25.0)
     with pytest.raises(RefusedError, match=r"drives up to 18\.0 m/s"):
         build_road("roundabout", made(motion(line(0.0), 18.0, 20.0), motion(line(0.0), 18.0)))
+
+
+def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_driven_fast():
+    poses, speeds = [], []
+    for come, leave in ((np.pi, 0.0), (-np.pi / 2.0, np.pi / 2.0)):
+        out = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in (come, leave)]
+        beside = [1.75 * np.array([-y, x]) for x, y in out]
+        start, goal = np.array([*(90.0 * out[0] + beside[0]), come + np.pi]), np.array([*(90.0 * out[1] - beside[1]), leave])
+        way = draw_ring_route(start, goal, np.zeros(2), 16.0, lambda _: True)
+        away = np.maximum(np.hypot(*way.points[:, :2].T) - 19.0, 0.0)
+        speed = np.minimum(np.sqrt(36.0 + 4.0 * away), 14.0)
+        time = np.concatenate(([0.0], np.cumsum(2.0 * np.diff(way.station) / (speed[1:] + speed[:-1]))))
+        station = np.interp(0.1 * np.arange(T), time, way.station)
+        poses.append(way.at(station))
+        speeds.append(np.interp(station, way.station, speed))
+    road, fit = fitted(made(*zip(poses, speeds, strict=True)), "roundabout")
+    assert ring_of(road)[1] == pytest.approx(16.0, abs=0.3)
+    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and fit.lost == ()
 
 
 def test_roads_without_a_template_are_of_their_kind():

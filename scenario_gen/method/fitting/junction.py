@@ -126,7 +126,8 @@ def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[Way]]:
 def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool, sharpness: float | None = None) -> list[Way]:
     fits = partial(has_room, road, vehicle)
     everything: list[Way] = []
-    through = ways_through(road)
+    ring = road.lanes is not None and road.lanes.turns_back
+    through = ways_through(road) if ring else {}  # elsewhere a vehicle bends as it did in the template
     for e, entry in enumerate(road.entries):
         for x, leave in enumerate(road.exits):
             way = through.get((e, x))
