@@ -270,6 +270,7 @@ def _directions(name: str, tracks: tuple[Track, ...], centre: Floats, ring: floa
                 nearest.members.append(end)
             elif len(directions) < count and not any(abs(angle_between(other.yaw, end.yaw)) < _MERGED for other in directions):
                 directions.append(_Direction(end.yaw, [end]))
+    directions = directions or [_Direction(0.0, [])]  # all ends are on the ring
     while len(directions) < count:
         yaws = [direction.yaw + k * np.pi / 2.0 for direction in directions for k in (2, 1, 3)]
         free = [min(abs(angle_between(yaw, direction.yaw)) for direction in directions) for yaw in yaws]
