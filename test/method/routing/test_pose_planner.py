@@ -16,7 +16,7 @@ from benchmarks._planning_obstructed import obstructed
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing import plan, plan_routes, PlanningConfig
 from scenario_gen.method.routing.distance import distances_to_line, farthest
-from scenario_gen.method.routing.search.dubins import shortest_into
+from scenario_gen.method.routing.search.dubins import Pose, shortest_curve
 from scenario_gen.method.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError
 from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, PoseSearchConfig, Wishes
 from scenario_gen.method.routing.search.sweep import sweep_is_free
@@ -72,20 +72,17 @@ def footprint(at, size=CAR):
 
 @given(pose, pose, st.floats(0.3, 5.0))
 def test_a_dubins_curve_ends_where_it_should(start, end, radius):
-    out = np.empty(7)
-    shortest_into(*start, *end, radius, out)
-    np.testing.assert_allclose(out[4:6], end[:2], atol=1e-6)
-    np.testing.assert_allclose((out[6] - end[2] + np.pi) % (2 * np.pi) - np.pi, 0.0, atol=1e-6)
-    assert out[1:4].sum() >= np.hypot(end[0] - start[0], end[1] - start[1]) - 1e-9
+    curve, reached = shortest_curve(Pose(*start), Pose(*end), radius)
+    np.testing.assert_allclose(reached[:2], end[:2], atol=1e-6)
+    np.testing.assert_allclose((reached[2] - end[2] + np.pi) % (2 * np.pi) - np.pi, 0.0, atol=1e-6)
+    assert sum(curve[1:]) >= np.hypot(end[0] - start[0], end[1] - start[1]) - 1e-9
 
 
 def test_a_dubins_curve_is_as_long_driven_backwards():
-    rng = np.random.default_rng(0)
-    there, back = np.empty(7), np.empty(7)
-    for start, end in rng.uniform((-5.0, -5.0, -4.0), (5.0, 5.0, 4.0), (200, 2, 3)):
-        shortest_into(*start, *end, 1.7, there)
-        shortest_into(*end[:2], end[2] + np.pi, *start[:2], start[2] + np.pi, 1.7, back)  # by a car that was turned round
-        np.testing.assert_allclose(back[1:4].sum(), there[1:4].sum(), atol=1e-6)
+    for start, end in np.random.default_rng(0).uniform((-5.0, -5.0, -4.0), (5.0, 5.0, 4.0), (200, 2, 3)):
+        there, _ = shortest_curve(Pose(*start), Pose(*end), 1.7)
+        back, _ = shortest_curve(*(Pose(*each[:2], each[2] + np.pi) for each in (end, start)), 1.7)  # a car that was turned round
+        assert sum(back[1:]) == pytest.approx(sum(there[1:]), abs=1e-6)
 
 
 @settings(max_examples=60)

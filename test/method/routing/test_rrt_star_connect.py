@@ -20,8 +20,9 @@ from scenario_gen.method.routing.search.planner import (
     plan_with_retry,
     Query,
 )
-from scenario_gen.method.routing.search.rrt_star_connect import _Trees, LARGE, PAPER, RrtStarConnect, RrtStarConnectConfig
-from scenario_gen.method.routing.search.tree_nodes import CHUNK, COST, EDGE, ITERATION, NODES_A, NODES_B, PARENT
+from scenario_gen.method.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig, straight_path
+from scenario_gen.method.routing.search.tree import CHUNK, COST, EDGE, PARENT
+from scenario_gen.method.routing.search.two_trees import LARGE
 from scenario_gen.roads.clearance import clearance_in_cells, segments_free
 from scenario_gen.roads.connectivity import common_component
 
@@ -113,15 +114,15 @@ def test_the_paper_preset_goes_on_improving_after_the_first_meeting():
 
 def grown(road, ends, config, iterations):
     """Both trees after so many iterations, and the ids of all their nodes."""
-    search = _Trees(road, Query(*ends), 1, config, 2)
-    while search.counter[ITERATION] < iterations:
-        search.grow(iterations - int(search.counter[ITERATION]))
+    search = RrtStarConnect(config).search(road, Query(*ends), 1, 2)
+    while search.iteration < iterations:
+        search.grow(iterations - search.iteration)
     found = []
-    for first in search.head[search.head >= 0]:
+    for first in search.tree.head[search.tree.head >= 0]:
         k = first
         while k >= 0:
-            found.append(k * CHUNK + np.arange(search.chunk[k, 1]))
-            k = search.chunk[k, 0]
+            found.append(k * CHUNK + np.arange(search.tree.chunk[k, 1]))
+            k = search.tree.chunk[k, 0]
     return search, np.concatenate(found)
 
 
@@ -130,15 +131,15 @@ def grown(road, ends, config, iterations):
 def test_large_trees_are_whole(config, case):
     road, ends = case()
     search, m = grown(road, ends, config, 60_000)
-    assert len(m) == len(np.unique(m)) == search.counter[NODES_A] + search.counter[NODES_B]
+    assert len(m) == len(np.unique(m)) == search.state["nodes"].sum()
     assert len(search.drawn) > 0 or len(m) <= LARGE
-    m = m[search.link[m, PARENT] >= 0]
-    parent = search.link[m, PARENT]
-    edge = np.hypot(*(search.node[m, :2] - search.node[parent, :2]).T)
-    np.testing.assert_allclose(search.node[m, EDGE], edge, atol=1e-9)
-    np.testing.assert_allclose(search.node[m, COST], search.node[parent, COST] + edge, atol=1e-7)
-    assert segments_free(road, search.node[parent, :2], search.node[m, :2], 0.0).all()
-    path = search.path()
+    m = m[search.tree.link[m, PARENT] >= 0]
+    parent = search.tree.link[m, PARENT]
+    edge = np.hypot(*(search.tree.node[m, :2] - search.tree.node[parent, :2]).T)
+    np.testing.assert_allclose(search.tree.node[m, EDGE], edge, atol=1e-9)
+    np.testing.assert_allclose(search.tree.node[m, COST], search.tree.node[parent, COST] + edge, atol=1e-7)
+    assert segments_free(road, search.tree.node[parent, :2], search.tree.node[m, :2], 0.0).all()
+    path = straight_path(search)
     assert path_length(path) == pytest.approx(search.best)
     np.testing.assert_array_equal(path[[0, -1]], ends)
 
@@ -146,7 +147,7 @@ def test_large_trees_are_whole(config, case):
 def test_many_nodes_on_a_small_map():
     road, ends = road_of("small", np.ones((8, 30), dtype=bool)), np.array([[1.5, 1.5], [28.5, 6.5]])
     search, m = grown(road, ends, PAPER, 40_000)
-    assert len(m) == search.counter[NODES_A] + search.counter[NODES_B] > LARGE
+    assert len(m) == search.state["nodes"].sum() > LARGE
     assert search.best == pytest.approx(np.hypot(*(ends[1] - ends[0])))
 
 
@@ -156,7 +157,7 @@ def test_only_an_informed_search_leaves_out_what_cannot_help():
     road, ends = road_of("open", drivable), np.array([[80.5, 100.5], [120.5, 100.5]])
     for config, everywhere in ((PAPER, True), (RrtStarConnectConfig(greedy=False, pull=False), False)):
         search, m = grown(road, ends, config, 4_000)
-        place = search.node[m, :2]
+        place = search.tree.node[m, :2]
         by_way_of = np.hypot(*(place - ends[0]).T) + np.hypot(*(place - ends[1]).T)
         assert (np.mean(by_way_of > 2.0 * search.best) > 0.3) == everywhere
 
