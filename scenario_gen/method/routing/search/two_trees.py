@@ -97,10 +97,10 @@ class Search:
         return np.array(ours[::-1]), np.array(theirs)
 
     def _upwards(self, m: int) -> list[int]:
-        chain = []
+        chain, parent = [], self.tree.link[:, PARENT].item
         while m >= 0:
             chain.append(m)
-            m = int(self.tree.link[m, PARENT])
+            m = parent(m)
         return chain
 
     def batch(self, size: int, limit: int | None, budget: Budget) -> int:
