@@ -20,7 +20,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import Budget
 from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
-from scenario_gen.method.routing.search.steering import edge_cost
+from scenario_gen.method.routing.search.steering import curve_cost
 from scenario_gen.method.routing.search.sweep import car_scene
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.clearance import footprint_fits, to_cells
@@ -82,7 +82,7 @@ def rrt_connect(case: Obstructed, seconds: float, reach: float = REACH, *, simpl
     information = base.SpaceInformation(space)
 
     def free(a: Any, b: Any) -> bool:
-        return edge_cost(Pose(a.getX(), a.getY(), a.getYaw()), Pose(b.getX(), b.getY(), b.getYaw()), scene) < np.inf
+        return curve_cost(Pose(a.getX(), a.getY(), a.getYaw()), Pose(b.getX(), b.getY(), b.getYaw()), scene) < np.inf
 
     def valid(_: Any) -> bool:
         return True  # the sweep of a motion says so of all its poses
@@ -125,7 +125,7 @@ def dubins_length(case: Obstructed, path: Floats) -> float:
     """Length [m] of a chain of Dubins curves (P, 3) in cells, infinity if it is not free: judged by the same sweep for all."""
     road, query = case.road, case.query
     scene = car_scene(road, (query.length, query.width), query.curvature)
-    return road.resolution * float(np.sum([edge_cost(Pose(*a), Pose(*b), scene) for a, b in pairwise(path.tolist())]))
+    return road.resolution * float(np.sum([curve_cost(Pose(*a), Pose(*b), scene) for a, b in pairwise(path.tolist())]))
 
 
 def first_path(case: Obstructed, seconds: float, seed: int) -> tuple[float, float] | None:

@@ -13,14 +13,16 @@ import numpy as np
 
 from scenario_gen.method.routing.search.dubins import Curve, length_of, piece, Pose
 from scenario_gen.method.routing.search.steering import end_of_first, price, steer, surely_free
-from scenario_gen.method.routing.search.sweep import SCENE, Scene
+from scenario_gen.method.routing.search.sweep import CAR_SCENE, DISC_SCENE, Scene
 from scenario_gen.method.routing.search.tree import (  # fmt: skip
     adopt,
     COST,
     EDGE,
     insert,
+    LINE,
     near_nodes,
     nearest_node,
+    next_sample,
     PARENT,
     PARTNER,
     pose_of,
@@ -30,7 +32,7 @@ from scenario_gen.method.routing.search.tree import (  # fmt: skip
     TREE,
     Tree,
 )
-from scenario_gen.method.routing.search.tree_samples import apart, detour, next_sample, RULES, Rules
+from scenario_gen.method.routing.search.tree_samples import apart, detour, RULES, Rules
 from scenario_gen.numerics.kernels import I, kernel
 
 TRAPPED, ADVANCED, REACHED = 0, 1, 2
@@ -54,7 +56,7 @@ def _grow_greedily(root: int, target: Pose, scene: Scene, rules: Rules, tree: Tr
     length = length_of(edge)
     if length < SAME:
         return REACHED, m
-    free = surely_free(here, target, scene)
+    free = surely_free(here, target, scene.body, scene)
     status, gone = TRAPPED, 0.0
     while gone < length and _has_room(tree):
         to = gone + rules.step
@@ -62,7 +64,7 @@ def _grow_greedily(root: int, target: Pose, scene: Scene, rules: Rules, tree: Tr
             to = length
         first = piece(edge, gone, to)
         there = end_of_first(here, target, first, length - gone, scene.body) if to < length else target
-        cost = length_of(first) if to < free else np.inf if free > 0.0 else price(here, there, first, scene)
+        cost = length_of(first) if to < free else np.inf if free > 0.0 else price(here, there, first, scene.body, scene)
         if cost == np.inf:
             break
         new = insert(root, there, tree)
@@ -92,20 +94,22 @@ def _cheapest_parent(
         start = pose_of(m, node)
         other = steer(start, pose, scene.body)
         if node[m, COST] + length_of(other) < best - GAIN:
-            paid = price(start, pose, other, scene)
+            paid = price(start, pose, other, scene.body, scene)
             if node[m, COST] + paid < best - GAIN:
                 best, parent, edge, cost = node[m, COST] + paid, m, other, paid
 
 
 @kernel(inline=True, forced=True)
-def _visible_ancestor(parent: int, pose: Pose, edge: Curve, cost: float, scene: Scene, tree: Tree) -> tuple[int, Curve, float]:
+def _visible_ancestor(
+    parent: int, pose: Pose, edge: Curve, cost: float, scene: Scene, tree: Tree
+) -> tuple[int, Curve, float]:  # fmt: skip
     """The farthest of the parent's ancestors, one after the other, that still sees a pose: as Quick-RRT* (Jeong et al. 2019)."""
     node, link = tree.node, tree.link
     above = int(np.int64(link[parent, PARENT]))
     while above >= 0:
         start = pose_of(above, node)
         other = steer(start, pose, scene.body)
-        paid = price(start, pose, other, scene)
+        paid = price(start, pose, other, scene.body, scene)
         if paid == np.inf:
             break
         parent, edge, cost = above, other, paid
@@ -126,7 +130,7 @@ def _rewire(new: int, count: int, skip: bool, scene: Scene, tree: Tree) -> None:
         edge = steer(pose, there, scene.body)
         if total + length_of(edge) >= node[m, COST] - GAIN:
             continue
-        cost = price(pose, there, edge, scene)
+        cost = price(pose, there, edge, scene.body, scene)
         if total + cost >= node[m, COST] - GAIN:
             continue
         above = new
@@ -144,11 +148,12 @@ def _extend(root: int, target: Pose, nearest: int, scene: Scene, rules: Rules, t
     `nearest` is the tree's node nearest to the pose where that is known, else -1.
     """
     state, far = tree.state[0], rules.goal if root == 0 else rules.start
+    curved = tree.node.shape[1] > LINE
     density = float(max(state.nodes[root], 2))
     density = np.sqrt(np.log(density) / density)  # eq 10 with exponent 1/d: d = 2, or 4 of poses (Karaman & Frazzoli 2013)
-    reach = min(rules.gamma * (np.sqrt(density) if scene.body.turn > 0.0 else density), rules.zeta)
+    reach = min(rules.gamma * (np.sqrt(density) if curved else density), rules.zeta)
     count, m = 0, nearest
-    if m < 0 and reach <= rules.step and scene.body.turn == 0.0:  # nearly always the nearest node is near: one search for both
+    if m < 0 and reach <= rules.step and not curved:  # nearly always the nearest node is near: one search for both
         count, k = near_nodes(root, target, reach, tree), 0
         for other in range(1, count):
             k = other if tree.near[other].gap < tree.near[k].gap else k
@@ -165,7 +170,7 @@ def _extend(root: int, target: Pose, nearest: int, scene: Scene, rules: Rules, t
         pose = end_of_first(here, target, edge, length, scene.body)
     if detour(rules.start, rules.goal, pose) >= state.bound:
         return TRAPPED, -1
-    cost = price(here, pose, edge, scene)
+    cost = price(here, pose, edge, scene.body, scene)
     if cost == np.inf:
         return TRAPPED, -1
     if count == 0:
@@ -206,8 +211,8 @@ def _plant(rules: Rules, tree: Tree) -> None:
         tree.node[m, COST], tree.node[m, EDGE] = 0.0, 0.0
 
 
-@kernel(I, SCENE, RULES, TREE)
-def grow(iterations: int, scene: Scene, rules: Rules, tree: Tree) -> None:
+@kernel(inline=True)
+def _grow(iterations: int, scene: Scene, rules: Rules, tree: Tree) -> None:
     """Algorithm 1 for at most `iterations`; returns early at the first path, and when the pool is full.
 
     The very first sample is the other tree's root: the direct edge first.
@@ -244,3 +249,15 @@ def grow(iterations: int, scene: Scene, rules: Rules, tree: Tree) -> None:
                 state.bound = min(state.bound, state.best)
             if known == np.inf:
                 return
+
+
+@kernel(I, DISC_SCENE, RULES, TREE)
+def grow_lines(iterations: int, scene: Scene, rules: Rules, tree: Tree) -> None:
+    """Grow with straight lines, as in the paper."""
+    _grow(iterations, scene, rules, tree)
+
+
+@kernel(I, CAR_SCENE, RULES, TREE)
+def grow_curves(iterations: int, scene: Scene, rules: Rules, tree: Tree) -> None:
+    """Grow with a car's curves."""
+    _grow(iterations, scene, rules, tree)

@@ -7,9 +7,9 @@ import numpy as np
 
 from scenario_gen.method.routing.search.dubins import Curve, length_of, LSL, onward, part_of, Pose, REVERSED, RSR, shortest, TURNS
 from scenario_gen.method.routing.search.growth import SAME
-from scenario_gen.method.routing.search.sweep import follow, SCENE, Scene
-from scenario_gen.method.routing.search.tree import edge_to, pose_of, STATES, States
-from scenario_gen.method.routing.search.tree_samples import uniform
+from scenario_gen.method.routing.search.sweep import CAR_SCENE, follow, Scene
+from scenario_gen.method.routing.search.tree import edge_to, pose_of
+from scenario_gen.method.routing.search.tree_samples import STATES, States, uniform
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F, F2, I, I1, kernel, OUT2
 
@@ -74,7 +74,7 @@ def _price_pieces(path: Floats, first: int, last: int, scene: Scene, paid: Float
     for k in range(first, last):
         word = RSR if path[k, 3] < 0.0 else LSL
         a, b = (0.0, path[k, 4]) if path[k, 3] == 0.0 else (path[k, 4], 0.0)
-        _, paid[k] = follow(_at(path, k - 1), Curve(word, a, b, 0.0), scene)
+        _, paid[k] = follow(_at(path, k - 1), Curve(word, a, b, 0.0), scene.body, scene)
 
 
 @kernel(inline=True)
@@ -88,7 +88,7 @@ def _shift(rows: Floats, first: int, last: int, by: int) -> None:
             rows[k + by] = rows[k]
 
 
-@kernel(I, I, F, SCENE, STATES, OUT2)
+@kernel(I, I, F, CAR_SCENE, STATES, OUT2)
 def shorten(n: int, tries: int, spacing: float, scene: Scene, state: States, path: Floats) -> tuple[int, float]:
     """Put shorter curves between poses of a path, chosen at random; string pulling for cars.
 
@@ -119,7 +119,7 @@ def shorten(n: int, tries: int, spacing: float, scene: Scene, state: States, pat
         edge = shortest(_at(path, i), _at(path, j), radius)
         if length_of(edge) >= old - WORTHWHILE:
             continue
-        free, cost = follow(_at(path, i), edge, scene)
+        free, cost = follow(_at(path, i), edge, scene.body, scene)
         if not free or cost >= old - WORTHWHILE:
             continue
         count = _lay(_at(path, i), edge, radius, spacing, fresh, 0)

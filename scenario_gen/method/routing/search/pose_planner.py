@@ -244,7 +244,7 @@ class PoseRrtStarConnect:
             cells = np.flatnonzero(road.drivable)
         about = wishes.about if len(wishes.about) else along(to_metres(road, taut), PIECE)
         # Karaman & Frazzoli 2013; a ball of radius r holds poses r ahead, r² / 2R aside, r / R in heading
-        volume = len(cells) * 2.0 * math.pi * search.scene.body.turn**2
+        volume = len(cells) * 2.0 * math.pi * (1.0 / (query.curvature * road.resolution)) ** 2
         root = ((1.0 + 1.0 / DIMENSIONS) * volume) ** (1.0 / DIMENSIONS)
         gamma = self.config.gamma_factor * 2.0 * root
         search.rules = search.rules._replace(cells=cells, about=_in_cells(road, about), gamma=gamma)
@@ -255,7 +255,7 @@ def _shortened(search: Search, shortcuts: int) -> tuple[Floats, float]:
     (ours, theirs), spacing, room = search.chains(), PIECE / search.road.resolution, 256
     while True:
         path = np.empty((room, 5))
-        count = trace(ours, theirs, search.tree.node, search.scene.body.turn, spacing, path)
+        count = trace(np.array(ours), np.array(theirs), search.tree.node, search.scene.body.turn, spacing, path)
         if count < room // 2:
             break
         room *= 2

@@ -12,7 +12,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import Budget, check_query, path_length, Plan, Query
 from scenario_gen.method.routing.search.shortcut import pull_string
-from scenario_gen.method.routing.search.sweep import Body, NO_PRICES, NOWHERE, Scene
+from scenario_gen.method.routing.search.sweep import Disc, NO_PRICES, NOWHERE, Scene
 from scenario_gen.method.routing.search.tree_samples import Rules
 from scenario_gen.method.routing.search.two_trees import Search
 from scenario_gen.numerics import Floats, sealed
@@ -56,9 +56,9 @@ class RrtStarConnect:
 
     def search(self, road: Road, query: Query, label: int, seed: int) -> Search:
         """The trees of a query, with no more than their roots; `label` is that of the component to sample from."""
-        config, disc = self.config, query.radius / road.resolution
+        config = self.config
         scene = Scene(
-            clearance_in_cells(road), NO_GRID, NOWHERE, Body(0.0, disc, disc, 1.0), NO_PRICES, NO_ROWS
+            clearance_in_cells(road), NO_GRID, NOWHERE, Disc(query.radius / road.resolution), NO_PRICES, NO_ROWS
         )  # fmt: skip
         start, goal = (Pose(x, y, 0.0) for x, y in to_cells(road, np.array((query.start, query.goal))).tolist())
         cells, corners = component_cells(road, query.radius, label)
@@ -97,7 +97,7 @@ class RrtStarConnect:
 def straight_path(search: Search) -> Floats:
     """The trees' best path (P, 2), start to goal, in cells."""
     ours, theirs = search.chains()
-    return search.tree.node[np.concatenate((ours, theirs[1:])), :2]
+    return search.tree.node[ours + theirs[1:], :2]
 
 
 def string_pulled(clearance: Floats, path: Floats, radius: float, passes: int = 30) -> Floats:

@@ -7,7 +7,7 @@ Between two near poses the convex hull of both footprints, widened by what an ar
 cells: the swept area lies in it, so nothing slips between two poses. Lengths are in cells, in kernels.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,13 +23,19 @@ FAR = 1e9  # [cells] room where nothing is near
 LONGEST = 64.0  # [cells] no two near poses are farther apart
 
 
-class Body(NamedTuple):
-    """What moves.
+class Disc(NamedTuple):
+    """What moves along straight lines, as in the paper; its headings mean nothing."""
+
+    radius: float
+
+
+class Car(NamedTuple):
+    """What moves along Dubins curves.
 
     Attributes:
-        turn: radius of its arcs; 0: it turns on the spot and is a disc, so that its ways are straight lines.
+        turn: radius of its arcs.
         half_length: of the footprint.
-        half_width: likewise; a disc's radius.
+        half_width: likewise.
         sweep: largest distance between two poses that are looked at.
     """
 
@@ -66,7 +72,7 @@ class Scene(NamedTuple):
         clearance: (H, W).
         blocked: (H, W + 1) from `blocked_before`; of a disc, none.
         guide: (G, 3) poses of the line to keep to; none: no side is dearer.
-        body: what moves.
+        body: what moves, a `Disc` or a `Car`: it says what an edge is, see `steering`.
         prices: what is dear.
         rows: (2, R) scratch for as many rows of cells as the footprint is long across, and more; of a disc, none.
     """
@@ -74,12 +80,14 @@ class Scene(NamedTuple):
     clearance: Floats
     blocked: Counts
     guide: Floats
-    body: Body
+    body: Any
     prices: Prices
     rows: Floats
 
 
-SCENE = named(Scene, F2, N2, F2, named(Body, F, F, F, F), named(Prices, F, F, F, F, F, F), OUT2)
+PRICES = named(Prices, F, F, F, F, F, F)
+CAR_SCENE = named(Scene, F2, N2, F2, named(Car, F, F, F, F), PRICES, OUT2)
+DISC_SCENE = named(Scene, F2, N2, F2, named(Disc, F), PRICES, OUT2)
 NOWHERE = sealed(np.empty((0, 3)))
 NO_PRICES = Prices(0.0, 0.0, 0.0, 0.0, np.inf, np.inf)
 
@@ -109,7 +117,7 @@ def _spread(ax: float, ay: float, bx: float, by: float, first: int, low: Floats,
 
 
 @kernel(inline=True)
-def _swept_free(blocked: Counts, here: _Stance, there: _Stance, body: Body, bulge: float, rows: Floats) -> bool:
+def _swept_free(blocked: Counts, here: _Stance, there: _Stance, body: Car, bulge: float, rows: Floats) -> bool:
     """Whether the hull of the footprints at two near stances covers drivable cells only; `bulge` is added on every side."""
     a, b = body.half_length + bulge, body.half_width + bulge
     reach0, reach1 = a * abs(here.sin) + b * abs(here.cos), a * abs(there.sin) + b * abs(there.cos)
@@ -140,7 +148,7 @@ def _swept_free(blocked: Counts, here: _Stance, there: _Stance, body: Body, bulg
 
 
 @kernel(inline=True)
-def _room_beside(clearance: Floats, at: _Stance, body: Body) -> tuple[float, float]:
+def _room_beside(clearance: Floats, at: _Stance, body: Car) -> tuple[float, float]:
     """What a footprint surely has around it, and about what it has beside it; -FAR if it is blocked.
 
     The first is proven by discs that cover the footprint: below 0 it says nothing.
@@ -177,20 +185,19 @@ def _offset_from(x: float, y: float, guide: Floats) -> float:
 
 
 @kernel(inline=True)
-def pose_is_free(pose: Pose, scene: Scene) -> bool:
+def pose_is_free(pose: Pose, body: Car, scene: Scene) -> bool:
     """Whether the footprint at a pose is free."""
     at = _Stance(pose.x, pose.y, np.cos(pose.yaw), np.sin(pose.yaw))
-    return bool(_swept_free(scene.blocked, at, at, scene.body, 0.0, scene.rows))
+    return bool(_swept_free(scene.blocked, at, at, body, 0.0, scene.rows))
 
 
 @kernel(inline=True)
-def follow(pose: Pose, curve: Curve, scene: Scene) -> tuple[bool, float]:
+def follow(pose: Pose, curve: Curve, body: Car, scene: Scene) -> tuple[bool, float]:
     """Whether a footprint can follow a Dubins curve from a free pose on, and what that costs, or the way to where it cannot.
 
     The cost is the length, more where there is less room beside the footprint than wished for, and away from the guide.
     """
-    body, prices = scene.body, scene.prices
-    radius = body.turn
+    prices, radius = scene.prices, body.turn
     cost, since, dear = 0.0, np.inf, 0.0
     at = _Stance(pose.x, pose.y, np.cos(pose.yaw), np.sin(pose.yaw))
     for part in range(3):
@@ -231,7 +238,7 @@ def check_sweep(clearance: Floats, blocked: Counts, poses: Floats, half_length: 
 
     Writes `out` (M, 2): 1 where the way to the pose (for the first: the pose itself) is free, else 0; and about the room beside.
     """
-    body = Body(0.0, half_length, half_width, LONGEST)
+    body = Car(0.0, half_length, half_width, LONGEST)
     rows = int(2.0 * np.sqrt(half_length * half_length + half_width * half_width) + LONGEST) + 8
     scratch = np.empty((2, rows))
     for m in range(poses.shape[0]):
@@ -276,6 +283,6 @@ def car_scene(
 ) -> Scene:
     """The scene of a car of some length and width [m] that turns within a curvature [1/m]; prices and guide in cells."""
     half_length, half_width = (0.5 * extent / road.resolution for extent in size)
-    body = Body(1.0 / (curvature * road.resolution), half_length, half_width, SWEEP / road.resolution)
+    body = Car(1.0 / (curvature * road.resolution), half_length, half_width, SWEEP / road.resolution)
     rows = int(2.0 * np.hypot(half_length, half_width) + body.sweep) + 8
     return Scene(clearance_in_cells(road), blocked_before(road), guide, body, prices, np.empty((2, rows)))

@@ -16,36 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenario_gen.method.routing.search.dubins import Curve, length_of, Pose
-from scenario_gen.method.routing.search.steering import steer
-from scenario_gen.method.routing.search.sweep import Body
+from scenario_gen.method.routing.search.steering import sample, steer
+from scenario_gen.method.routing.search.sweep import Car, Disc, Scene
+from scenario_gen.method.routing.search.tree_samples import Rules, STATES, States
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F, I, kernel, named, OUT2, OUTI2
 
 CHUNK = 32
+AHEAD = 8  # so many nodes per sample drawn ahead: the trees' density hardly changes within a batch
 NEAR = 2048  # scratch for a near set; what exceeds it is left out
 LINE, CURVE = 4, 9  # columns of nodes that straight lines join, or curves
 X, Y, COST, EDGE, YAW, WORD, PART_A, PART_B, PART_C = 0, 1, 2, 3, 4, 5, 6, 7, 8
 PARENT, CHILD, NEXT, PREVIOUS, PARTNER = 0, 1, 2, 3, 4
 
-STATE = np.dtype(
-    [
-        ("nodes", np.int64, 2),  # of either tree
-        ("chunks", np.int64),  # in use
-        ("active", np.int64),  # the tree to extend next
-        ("iteration", np.int64),
-        ("connection", np.int64),  # the node at which the best path joins both trees, or -1
-        ("root", np.int64),  # the start's
-        ("drawn", np.int64),  # samples drawn ahead
-        ("used", np.int64),  # how many of them are used
-        ("best", np.float64),  # cost of the trees' best path
-        ("bound", np.float64),  # what a path must better to count: infinite unless informed
-        ("random", np.uint64),  # the generator's state
-    ]
-)
 NEIGHBOUR = np.dtype([("id", np.int64), ("gap", np.float64), ("least", np.float64)])  # distance; least cost as parent
 
 Links = NDArray[np.int32]
-States = NDArray[np.void]
 
 
 class Tree(NamedTuple):
@@ -69,12 +55,12 @@ class Tree(NamedTuple):
     head: Ints
     state: States
     drawn: Floats
-    near: States
+    near: NDArray[np.void]
     side: float
     columns: int
 
 
-STATES, NEIGHBOURS = (types.Array(from_dtype(each), 1, "C") for each in (STATE, NEIGHBOUR))
+NEIGHBOURS = types.Array(from_dtype(NEIGHBOUR), 1, "C")
 TREE = named(Tree, OUT2, types.Array(types.int32, 2, "C"), OUTI2, OUTI2, STATES, OUT2, NEIGHBOURS, F, I)
 
 
@@ -94,7 +80,7 @@ def edge_to(m: int, node: Floats) -> Curve:
 
 
 @kernel(inline=True, forced=True)
-def nearest_node(root: int, pose: Pose, body: Body, tree: Tree) -> int:
+def nearest_node(root: int, pose: Pose, body: Disc | Car, tree: Tree) -> int:
     """The node of a tree with the shortest edge to a pose: rings of buckets outward, until no nearer one is possible."""
     node, chunk, head, side, columns = tree.node, tree.chunk, tree.head, tree.side, tree.columns
     rows = head.shape[1] // columns
@@ -113,7 +99,7 @@ def nearest_node(root: int, pose: Pose, body: Body, tree: Tree) -> int:
                     for m in range(k * CHUNK, k * CHUNK + chunk[k, 1]):
                         dx, dy = node[m, X] - pose.x, node[m, Y] - pose.y
                         square = dx * dx + dy * dy
-                        if square < best and body.turn > 0.0:  # no curve is shorter than the straight line
+                        if square < best and node.shape[1] > LINE:  # no curve is shorter than the straight line
                             square = length_of(steer(pose_of(m, node), pose, body)) ** 2
                         if square < best:
                             best, nearest = square, m
@@ -251,3 +237,39 @@ def transplant(old: Tree, tree: Tree) -> None:
     state.root = moved[state.root]
     if state.connection >= 0:
         state.connection = moved[state.connection]
+
+
+@kernel(inline=True)
+def _draw_ahead(scene: Scene, rules: Rules, tree: Tree) -> None:
+    """Fill `tree.drawn`, or a part of it, bucket by bucket.
+
+    The same samples in another order: one after the other they need the same neighbours, which the processor's cache still has.
+    """
+    drawn, side = tree.drawn, tree.side
+    state = tree.state[0]
+    batch = min((state.nodes[0] + state.nodes[1]) // AHEAD, drawn.shape[0])
+    fresh = np.empty((batch, 3))
+    begin = np.zeros(tree.head.shape[1] + 1, dtype=np.int64)
+    for k in range(batch):
+        fresh[k, 0], fresh[k, 1], fresh[k, 2] = sample(scene.body, scene, rules, tree.state)
+        begin[int(fresh[k, 1] / side) * tree.columns + int(fresh[k, 0] / side) + 1] += 1
+    for b in range(begin.size - 1):
+        begin[b + 1] += begin[b]
+    for k in range(batch):
+        b = int(fresh[k, 1] / side) * tree.columns + int(fresh[k, 0] / side)
+        drawn[begin[b]] = fresh[k]
+        begin[b] += 1
+    state.drawn, state.used = batch, 0
+
+
+@kernel(inline=True, forced=True)
+def next_sample(scene: Scene, rules: Rules, tree: Tree) -> Pose:
+    """The next pose to grow to."""
+    drawn, state = tree.drawn, tree.state[0]
+    if drawn.shape[0] == 0:
+        return sample(scene.body, scene, rules, tree.state)
+    while state.used == state.drawn:
+        _draw_ahead(scene, rules, tree)
+    k = state.used
+    state.used += 1
+    return Pose(drawn[k, 0], drawn[k, 1], drawn[k, 2])

@@ -1,23 +1,37 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where the trees grow to: random poses of the component, later only where a better path can lie.
-
-Large trees draw their samples ahead and take them bucket by bucket: the same samples in another order, but one after the
-other they need the same neighbours, which are then still in the processor's cache.
-"""
+"""Where the trees grow to: random poses of the component, later only where a better path can lie."""
 
 from typing import NamedTuple
 
+from numba import from_dtype, types
 import numpy as np
+from numpy.typing import NDArray
 
 from scenario_gen.method.routing.search.dubins import POSE, Pose
-from scenario_gen.method.routing.search.sweep import pose_is_free, Scene
-from scenario_gen.method.routing.search.tree import States, Tree
+from scenario_gen.method.routing.search.sweep import Car, pose_is_free, Scene
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import B, F, F2, I1, kernel, named
 
-AHEAD = 8  # so many nodes per sample drawn ahead: the trees' density hardly changes within a batch
+STATE = np.dtype(
+    [
+        ("nodes", np.int64, 2),  # of either tree
+        ("chunks", np.int64),  # in use
+        ("active", np.int64),  # the tree to extend next
+        ("iteration", np.int64),
+        ("connection", np.int64),  # the node at which the best path joins both trees, or -1
+        ("root", np.int64),  # the start's
+        ("drawn", np.int64),  # samples drawn ahead
+        ("used", np.int64),  # how many of them are used
+        ("best", np.float64),  # cost of the trees' best path
+        ("bound", np.float64),  # what a path must better to count: infinite unless informed
+        ("random", np.uint64),  # the generator's state
+    ]
+)
+
+States = NDArray[np.void]
+STATES = types.Array(from_dtype(STATE), 1, "C")
 FINER = np.array([1.0, 0.5, 0.25, 0.125])  # shares of the spread: narrow gaps need samples that are near to the path
 TRIES = 20  # to draw a sample that serves
 
@@ -100,7 +114,7 @@ def detour(start: Pose, goal: Pose, pose: Pose) -> float:
 
 
 @kernel(inline=True, forced=True)
-def _pose(scene: Scene, rules: Rules, state: States) -> Pose:
+def sample_pose(body: Car, scene: Scene, rules: Rules, state: States) -> Pose:
     """A free pose: about a known path, or anywhere that a better path can lie."""
     about, pose = rules.about, rules.goal
     for _ in range(TRIES):
@@ -114,13 +128,13 @@ def _pose(scene: Scene, rules: Rules, state: States) -> Pose:
         else:
             x, y = _in_cell(rules.cells, scene.clearance.shape[1], state)
             pose = Pose(x, y, 2.0 * np.pi * uniform(state))
-        if detour(rules.start, rules.goal, pose) < state[0].bound and pose_is_free(pose, scene):
+        if detour(rules.start, rules.goal, pose) < state[0].bound and pose_is_free(pose, body, scene):
             break
     return pose
 
 
 @kernel(inline=True, forced=True)
-def _point(clearance: Floats, rules: Rules, state: States) -> Pose:
+def sample_point(clearance: Floats, rules: Rules, state: States) -> Pose:
     """A point of the component, uniformly; once a path is known, of the ellipse that can better it.
 
     From then on a share of the samples lies in the cells diagonally before obstacles' convex corners: where shortest paths bend.
@@ -153,44 +167,3 @@ def _point(clearance: Floats, rules: Rules, state: States) -> Pose:
             if detour(start, goal, pose) < bound:
                 break
     return pose
-
-
-@kernel(inline=True, forced=True)
-def _sample(scene: Scene, rules: Rules, state: States) -> Pose:
-    """A sample for what moves."""
-    if scene.body.turn > 0.0:
-        return _pose(scene, rules, state)
-    return _point(scene.clearance, rules, state)
-
-
-@kernel(inline=True)
-def _draw_ahead(scene: Scene, rules: Rules, tree: Tree) -> None:
-    """Fill `tree.drawn`, or a part of it, bucket by bucket."""
-    drawn, side = tree.drawn, tree.side
-    state = tree.state[0]
-    batch = min((state.nodes[0] + state.nodes[1]) // AHEAD, drawn.shape[0])
-    fresh = np.empty((batch, 3))
-    begin = np.zeros(tree.head.shape[1] + 1, dtype=np.int64)
-    for k in range(batch):
-        fresh[k, 0], fresh[k, 1], fresh[k, 2] = _sample(scene, rules, tree.state)
-        begin[int(fresh[k, 1] / side) * tree.columns + int(fresh[k, 0] / side) + 1] += 1
-    for b in range(begin.size - 1):
-        begin[b + 1] += begin[b]
-    for k in range(batch):
-        b = int(fresh[k, 1] / side) * tree.columns + int(fresh[k, 0] / side)
-        drawn[begin[b]] = fresh[k]
-        begin[b] += 1
-    state.drawn, state.used = batch, 0
-
-
-@kernel(inline=True, forced=True)
-def next_sample(scene: Scene, rules: Rules, tree: Tree) -> Pose:
-    """The next pose to grow to."""
-    drawn, state = tree.drawn, tree.state[0]
-    if drawn.shape[0] == 0:
-        return _sample(scene, rules, tree.state)
-    while state.used == state.drawn:
-        _draw_ahead(scene, rules, tree)
-    k = state.used
-    state.used += 1
-    return Pose(drawn[k, 0], drawn[k, 1], drawn[k, 2])

@@ -8,9 +8,9 @@ from time import thread_time
 
 import numpy as np
 
-from scenario_gen.method.routing.search.growth import grow
+from scenario_gen.method.routing.search.growth import grow_curves, grow_lines
 from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError
-from scenario_gen.method.routing.search.sweep import Scene
+from scenario_gen.method.routing.search.sweep import Car, Scene
 from scenario_gen.method.routing.search.tree import (  # fmt: skip
     CHUNK,
     CURVE,
@@ -19,12 +19,11 @@ from scenario_gen.method.routing.search.tree import (  # fmt: skip
     NEIGHBOUR,
     PARENT,
     PARTNER,
-    STATE,
     transplant,
     Tree,
 )
-from scenario_gen.method.routing.search.tree_samples import Rules
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.method.routing.search.tree_samples import Rules, STATE
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Road
 
 OCCUPANCY = 32  # nodes per bucket at which its side is halved
@@ -55,7 +54,7 @@ class Search:
         rows, columns = (math.ceil(extent / side) for extent in self.scene.clearance.shape)
         nodes = ROOM * int(self.state["nodes"].sum())
         chunks = 256 + nodes // CHUNK + min(nodes, 2 * rows * columns)
-        node = np.empty((chunks * CHUNK, CURVE if self.scene.body.turn > 0.0 else LINE))
+        node = np.empty((chunks * CHUNK, CURVE if isinstance(self.scene.body, Car) else LINE))
         link, chunk = np.empty((len(node), 5), dtype=np.int32), np.empty((chunks, 2), dtype=np.int64)
         head = np.full((2, rows * columns), -1)
         return Tree(node, link, chunk, head, self.state, self.drawn, self.near, side, columns)
@@ -63,6 +62,7 @@ class Search:
     def grow(self, iterations: int) -> None:
         """Make so many iterations, or fewer where the first path is found; give the trees room as they need it."""
         goal = self.iteration + iterations
+        grow = grow_curves if isinstance(self.scene.body, Car) else grow_lines
         had_path = self.best < np.inf
         while self.iteration < goal and (had_path or self.best == np.inf):
             grow(goal - self.iteration, self.scene, self.rules, self.tree)
@@ -89,12 +89,12 @@ class Search:
         """Cost of the trees' best path."""
         return float(self.state["best"][0])
 
-    def chains(self) -> tuple[Ints, Ints]:
+    def chains(self) -> tuple[list[int], list[int]]:
         """The nodes of the trees' best path: ids from the start's root to where the trees meet, and from there to the goal's."""
         meeting = int(self.state["connection"][0])
         found = [self._upwards(m) for m in (meeting, int(self.tree.link[meeting, PARTNER]))]
         ours, theirs = found if found[0][-1] == self.state["root"][0] else found[::-1]
-        return np.array(ours[::-1]), np.array(theirs)
+        return ours[::-1], theirs
 
     def _upwards(self, m: int) -> list[int]:
         chain, parent = [], self.tree.link[:, PARENT].item
