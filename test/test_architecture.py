@@ -50,7 +50,6 @@ CONCEPTS = {
     "object stores": ("base/stores.py", r"(?:import|from) fsspec"),
     "files of bags": ("bags/storage/", r"(?:import|from) (?:rosbags|mcap)\b"),
 }
-SECOND_HOMES: dict[str, set[str]] = {}  # that are there still; it may only shrink
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
 
 
@@ -104,7 +103,7 @@ def test_every_concept_has_one_home():
         for concept, (home, pattern) in CONCEPTS.items():
             if not name.startswith(home) and re.search(pattern, text):
                 homes.setdefault(concept, set()).add(name)
-    assert not {concept: more for concept, names in homes.items() if (more := names - SECOND_HOMES.get(concept, set()))}
+    assert not homes
 
 
 def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():
