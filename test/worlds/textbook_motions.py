@@ -32,7 +32,11 @@ class Labelled:
 
 def line(*points: tuple[float, float]) -> Curve:
     """A way through points, its corners rounded."""
-    xy = Curve.through(np.array(points, dtype=float)).cut(0.0, float(np.hypot(*np.diff(points, axis=0).T).sum()), 0.5).points[:, :2]
+    xy = (
+        Curve.through(np.array(points, dtype=float))
+        .cut(0.0, float(np.hypot(*np.diff(points, axis=0).T).sum()), 0.5)
+        .points[:, :2]
+    )
     return Curve.through(ndimage.gaussian_filter1d(xy, 6.0, axis=0, mode="nearest"))
 
 
@@ -78,7 +82,9 @@ RING = Curve.through(_RING)
 ENTRY = Curve.through(np.concatenate([[(2.0, -90.0), (2.0, -40.0), (3.0, -25.0)], _RING[30:]]))
 
 
-def yields(rng: np.random.Generator, first: Curve, second: Curve, low: float, *, merges: bool = False, cruise: bool = False) -> Drive:
+def yields(
+    rng: np.random.Generator, first: Curve, second: Curve, low: float, *, merges: bool = False, cruise: bool = False
+) -> Drive:
     """The second one slows to `low` [m/s] and enters behind the first."""
     count = int(rng.integers(110, 220))
     speed, clear = rng.uniform(6.0, 14.0), rng.uniform(0.45, 0.65) * count * DT
@@ -89,7 +95,7 @@ def yields(rng: np.random.Generator, first: Curve, second: Curve, low: float, *,
     if merges:
         front = second.at(enters + 0.5 * LENGTH)[None, :2]
         leaves = float(first.project(front)[0][0]) + 0.5 * LENGTH
-    gap = rng.uniform(0.4, 2.5) if low > 1.5 or merges else rng.uniform(0.6, 3.0)
+    gap = rng.uniform(0.4, 2.5) if low > 1.5 or merges else rng.uniform(0.6, 4.5)
     v0, v1 = rng.uniform(7.0, 13.0), speed if merges else rng.uniform(5.0, 10.0)
     go = clear + gap - (rng.uniform(0.3, 1.5) if low > 1.5 else rng.uniform(0.8, 2.2))
     slow = go - (0.0 if low > 1.5 else rng.uniform(1.0, 4.0))
@@ -122,7 +128,7 @@ def follows(rng: np.random.Generator, leader: np.ndarray, gap: float, own: float
 
 def _steady(rng: np.random.Generator) -> Drive:
     v = rng.uniform(7.0, 14.0)
-    return follows(rng, wander(rng, int(rng.integers(80, 200)), v, rng.uniform(0.2, 1.5)), v * rng.uniform(0.9, 2.2) + 2.5, v)
+    return follows(rng, wander(rng, int(rng.integers(80, 200)), v, rng.uniform(0.2, 1.5)), v * rng.uniform(0.9, 3.5) + 2.5, v)
 
 
 def _stops(rng: np.random.Generator) -> Drive:
@@ -147,18 +153,19 @@ def _cut_in(rng: np.random.Generator) -> Drive:
 
 def _stands_in_the_way(rng: np.random.Generator) -> Drive:
     """The first one backs out of a side road, stands, drives off; the other waits for it, then comes behind."""
-    begin, back, stand = rng.uniform(0.0, 2.0), rng.uniform(3.5, 5.0), rng.uniform(0.5, 2.0)
-    out = ramps(160, (0.0, 0.0), (begin, 0.0), (begin + 1.5, 1.6), (begin + back - 1.0, 1.6), (begin + back, 0.0))
+    begin, back, stand = rng.uniform(0.0, 2.0), rng.uniform(5.5, 7.0), rng.uniform(0.5, 2.0)
+    out = ramps(160, (0.0, 0.0), (begin, 0.0), (begin + 1.5, 1.6), (begin + back - 1.0, 1.6), (begin + back, 0.0))  # 8.5 m
     off = begin + back + stand
     on = ramps(160, (0.0, 0.0), (off, 0.0), (off + 6.0, 9.0))
-    poses = Curve.through(np.array([(0.0, -9.0), (-0.2, -5.0), (-1.5, -2.0), (-4.5, 0.0)])).at(np.cumsum(DT * out))
-    poses[:, 2] = np.linspace(0.0, 1.0, 160).clip(0.0, 1.0)
-    turned = np.clip(np.cumsum(DT * out) / 8.5, 0.0, 1.0)
-    poses[:, 2] = -0.5 * np.pi * (1.0 - turned)
+    share = np.cumsum(out) / out.sum()
+    path = Curve.through(np.array([(0.0, -9.0), (-0.2, -5.0), (-1.5, -2.0), (-4.5, 0.0)]))
+    poses = path.at(path.length * share)
+    poses[:, 2] = -0.5 * np.pi * (1.0 - share)
     poses[:, 0] += np.cumsum(DT * on)
-    poses[turned >= 1.0, 1] = 0.0
     place = rng.uniform(-22.0, -14.0)
-    own = ramps(160, (0.0, 9.0), (begin + 1.0, 9.0), (begin + 1.0 + 9.0 / 2.0, 0.0), (off + rng.uniform(0.8, 2.0), 0.0), (off + 7.0, 8.0))
+    own = ramps(
+        160, (0.0, 9.0), (begin + 1.0, 9.0), (begin + 1.0 + 9.0 / 2.0, 0.0), (off + rng.uniform(0.8, 2.0), 0.0), (off + 7.0, 8.0)
+    )
     return (poses, out + on), driven(EAST, own, off, 150.0 + place)
 
 
@@ -185,11 +192,20 @@ def _far_behind(rng: np.random.Generator) -> Drive:
     return driven(EAST, wander(rng, count, v + 0.5), 0.0, 60.0 + gap), driven(EAST, wander(rng, count, v - 0.5), 0.0, 60.0)
 
 
+def _by_chance(rng: np.random.Generator) -> Drive:
+    """In one lane, each at its own speed, some seconds apart."""
+    v, count = rng.uniform(8.0, 13.0), 100
+    gap = v * rng.uniform(2.0, 6.0)
+    return driven(EAST, wander(rng, count, v + 0.2), 0.0, 60.0 + gap), driven(EAST, wander(rng, count, v - 0.2), 0.0, 60.0)
+
+
 def _beside(rng: np.random.Generator) -> Drive:
     """In two lanes, both stop at the same line, or both drive."""
     v, stop = rng.uniform(8.0, 13.0), rng.uniform(6.0, 9.0)
     same = rng.random() < 0.5
-    own, other = (ramps(140, (0.0, v), (stop + off - v / 2.0, v), (stop + off, 0.0)) if same else wander(rng, 140, v) for off in (0.0, 0.8))
+    own, other = (
+        ramps(140, (0.0, v), (stop + off - v / 2.0, v), (stop + off, 0.0)) if same else wander(rng, 140, v) for off in (0.0, 0.8)
+    )
     return driven(EAST, own, 0.0, 80.0 + rng.uniform(5.0, 30.0)), driven(line((-150.0, -3.5), (150.0, -3.5)), other, 0.0, 80.0)
 
 
@@ -225,10 +241,17 @@ NOTHING: dict[str, Callable[[np.random.Generator], Drive]] = {
     "left turn long after": _apart(WEST, LEFT, 3.0, (6.5, 13.0)),
     "stop sign": _apart(EAST, NORTH, 0.0, (7.0, 13.0)),
     "crossing, some time after": _apart(EAST, NORTH, 9.0, (4.5, 8.0)),
+    "crossing, by chance": _apart(EAST, NORTH, 9.0, (0.5, 9.0)),
+    "left turn, by chance": _apart(WEST, LEFT, 3.0, (0.5, 9.0)),
+    "in a lane, by chance": _by_chance,
     "far behind": _far_behind,
     "beside": _beside,
     "oncoming": _oncoming,
 }
+
+
+CHANCE = ("crossing, by chance", "left turn, by chance", "in a lane, by chance")
+"""Near each other, though neither knows of the other: what confidence is not 1 for."""
 
 
 def labelled(kind: str, seed: int) -> Labelled:
