@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How a reaction shows in a motion, recorded or generated: when one passes behind another, how far behind its leader one drives."""
+"""How a reaction shows in a motion, recorded or generated: when one passes behind another, how near one drives behind another."""
 
+from itertools import permutations
 from typing import Protocol
 
 import numpy as np
@@ -134,11 +135,20 @@ def bumper_gaps(motion: Motion, who: int, whom: int) -> Floats:
     return np.asarray(apart - 0.5 * (motion.vehicles[who].length + motion.vehicles[whom].length))
 
 
+@once_per_object
+def lane_gaps(motion: Motion) -> dict[tuple[int, int], tuple[Floats, Floats]]:
+    """Return (who, whom): speeds (k,) [m/s] and gaps (k,) [m], bumper to bumper, of all who drive behind another one."""
+    found = {}
+    for who, whom in permutations(range(len(motion.vehicles)), 2):
+        alike = np.abs(wrap_angle(motion.heading[who] - motion.heading[whom])) < ALIKE
+        at = alike & is_behind(motion, who, whom) if alike.any() else alike
+        if at.any():
+            found[who, whom] = motion.speed[who, at], bumper_gaps(motion, who, whom)[at]
+    return found
+
+
 def time_gaps(motion: Motion, who: int, whom: int) -> Floats:
     """Return the time gaps (k,) [s], bumper to bumper, of a vehicle that drives (2 m/s or more) behind another one."""
-    at = together(motion.present, who, whom)
-    speed = motion.speed[who, at]
-    between = motion.position[whom, at] - motion.position[who, at]
-    along, _ = ahead_and_left(between, motion.heading[who, at])
-    drives = (speed > SLOWEST) & (along > 0.5 * np.sqrt(np.square(between).sum(axis=1)))
-    return np.asarray((bumper_gaps(motion, who, whom)[at] / np.maximum(speed, SLOWEST))[drives])
+    speed, gap = lane_gaps(motion).get((who, whom), (np.zeros(0), np.zeros(0)))
+    drives = speed > SLOWEST
+    return np.asarray(gap[drives] / speed[drives])

@@ -84,7 +84,8 @@ def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
     if nearest is None or nearest.apart == math.inf:
         return "none drives behind another one in its lane, or crosses its way"
     who, whom = (encounter.vehicles[n].id for n in (nearest.who, nearest.whom))
-    return f"the nearest are vehicle {who} and vehicle {whom}, and they are never within {math.floor(10.0 * nearest.apart) / 10.0:.1f} s of each other"
+    least = math.floor(10.0 * nearest.apart) / 10.0
+    return f"the nearest are vehicle {who} and vehicle {whom}, and they are never within {least:.1f} s of each other"
 
 
 def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:
@@ -163,7 +164,7 @@ def _nearest_leaders(encounter: Encounter) -> tuple[list[_Seen], list[Reaction]]
 
 
 def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, gaps: Floats) -> _Seen | None:
-    """What is seen of a vehicle that drives `behind` (T,) another one with `gaps` (T,) [m] between them; None if it is not long."""
+    """What is seen of a vehicle that drives `behind` (T,) another one with `gaps` (T,) [m]; None if it does so for too short."""
     dt, time = encounter.dt, encounter.time
     rows = np.flatnonzero(behind)
     own, other = _smoothed(encounter.speed[who], dt), _smoothed(encounter.speed[whom], dt)
@@ -252,7 +253,7 @@ def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
     who, whom = conflict.second, conflict.first
     aside = _from_aside(encounter, conflict)
     k = max(int(np.searchsorted(encounter.time, conflict.entry_second)) - 1, 0)
-    if k <= encounter.present[who, 0] or not aside and (conflict.following or is_behind(encounter, who, whom)[k]):
+    if k <= encounter.present[who, 0] or (not aside and (conflict.following or is_behind(encounter, who, whom)[k])):
         return None
     clears, enters = passing(encounter, conflict, merges=conflict.following)
     gap = enters - clears

@@ -260,12 +260,14 @@ def labelled(kind: str, seed: int) -> Labelled:
     drives = (REACTIONS.get(kind) or NOTHING[kind])(rng)
     swap = bool(rng.random() < 0.5)
     rows = []
-    for poses, speed in reversed(drives) if swap else drives:
-        count = len(speed)
+    for poses, driven_at in reversed(drives) if swap else drives:
+        count = len(driven_at)
         noise = rng.choice([0.0, 0.1, 0.3])
         xy = poses[:, :2] + noise * ndimage.gaussian_filter1d(rng.standard_normal((count, 2)), 10.0, axis=0) * 4.0
-        speed = np.maximum(speed + rng.choice([0.0, 0.1]) * ndimage.gaussian_filter1d(rng.standard_normal(count), 2.0) * 2.0, 0.0)
-        speed = np.where(speed < 0.05, 0.0, speed)
+        speed = np.maximum(
+            driven_at + rng.choice([0.0, 0.1]) * ndimage.gaussian_filter1d(rng.standard_normal(count), 2.0) * 2.0, 0.0
+        )
+        speed[speed < 0.05] = 0.0
         if rng.random() < 0.3:  # a dropout, filled in
             first = int(rng.integers(5, count - 25))
             last = first + int(rng.integers(5, 15))
