@@ -7,6 +7,7 @@ from itertools import permutations
 from typing import Protocol
 
 import numpy as np
+from scipy.spatial import distance
 
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
@@ -122,7 +123,7 @@ def is_behind(motion: Motion, who: int, whom: int) -> Bools:
     now = np.arange(len(a))
     for mine, yaw, path, path_yaw, sign in ((a, yaw_a, b, yaw_b, -1), (b, yaw_b, a, yaw_a, 1)):
         rows = np.arange(0, len(path), step)  # where the other was before; where this one will be
-        square = np.square(mine[:, None] - path[None, rows]).sum(axis=-1)
+        square = distance.cdist(mine, path[rows], "sqeuclidean")
         nearest = np.argmin(square, axis=1)
         near = (np.sqrt(square[now, nearest]) < LANE) & (np.abs(wrap_angle(path_yaw[rows[nearest]] - yaw)) < ALIKE)
         behind = behind | (near & (sign * (rows[nearest] - now) > step))

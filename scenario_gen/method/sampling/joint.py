@@ -95,7 +95,8 @@ class Mixing:
             equations = [
                 equation for edge in edges for equation in _equations(edge, models, nominal, scale) if equation[0][n].any()
             ]
-            clock = None if models[n].freedom is None else models[n].freedom.clock
+            freedom = models[n].freedom
+            clock = freedom.clock if freedom else None
             begin = first[n] + models[n].lateral_root.shape[1] + models[n].speed.size
             free = slice(begin, begin + (clock.size if clock else 0))
             into, out = _solved(n, equations, first)
