@@ -69,7 +69,7 @@ def tailgaters(scenario: Scenario, recorded: LaneGaps, limits: Limits) -> Iterat
                 f"vehicle {scenario.vehicles[who].id}: comes within {gap[k]:.2f} m of vehicle {scenario.vehicles[whom].id} "
                 f"ahead of it, at {speed[k]:.1f} m/s; its driver keeps {floor[k]:.2f} m"
             )
-            yield Violation(Cause.REACTION, 0.0, (whom, who), message)
+            yield Violation(Cause.REACTION, 0.0, (who, whom), message)
 
 
 def least_gaps(speed: Floats, recorded: Floats, gap: Floats, limits: Limits) -> Floats:
