@@ -129,6 +129,6 @@ def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path
     assert sentence.startswith(f"{NOT_KEPT}: vehicle 2: comes within ") and made.generated.reactions == ()
     page, figures = written(made, tmp_path)
     text = printed(made)
-    assert sentence in text and "1.1 s bumper to bumper, and answers its speed after 1.2 s: the scenarios are not held to it" in text
+    assert sentence in text and "and answers its speed after 1.2 s: the scenarios are not held to it" in text
     assert page.count(str(escape(sentence))) > 1 and "are not held to it" in page  # beside the reaction, and in accounts
     assert figures["adaptations"] == list(made.generated.adaptations)
