@@ -10,9 +10,9 @@ import numpy as np
 from scipy.spatial import distance
 
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
+from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template.interaction import Conflict, find_conflicts, WAIT_SPEED
-from scenario_gen.template.separation import footprint_gap
 from scenario_gen.types import once_per_object, together, Vehicle
 
 FAR = 60.0  # m, within which one follows
@@ -101,7 +101,7 @@ def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float,
     first, second = conflict.first, conflict.second
     poses, place = (np.column_stack([motion.position[n], motion.heading[n]]) for n in (first, second))
     place = np.repeat([[np.interp(enters, motion.time, column) for column in place.T]], len(poses), axis=0)
-    gap, _ = footprint_gap(motion.vehicles[first], poses, motion.vehicles[second], place)
+    gap, _ = footprint_gaps(motion.vehicles[first].half, poses, motion.vehicles[second].half, place)
     came, goes = motion.present[first].tolist()
     near = came + np.flatnonzero(gap[came : goes + 1] < max(_LEFT, float(gap[came : goes + 1].min()) + 1e-9))
     k, last = int(near[-1]), min(int(near[-1]) + 1, goes)

@@ -18,9 +18,9 @@ import numpy as np
 from scipy import ndimage
 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.template.answers import ALIKE, bumper_gaps, is_behind, LANE, passing, SLOWEST
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, WAIT_SPEED
-from scenario_gen.template.separation import footprint_gap
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, ReactionGraph, YIELD
 
@@ -133,7 +133,7 @@ def _need(encounter: Encounter, who: int, whom: int) -> float:
     gap = np.full(len(poses), np.inf)
     for off in (-_MARGIN, 0.0, _MARGIN):
         at = np.clip(later + round(off / one.dt), rows[0], rows[-1]).ravel()
-        gap = np.minimum(gap, footprint_gap(one.vehicle, poses, other.vehicle, other.poses[at])[0])
+        gap = np.minimum(gap, footprint_gaps(one.vehicle.half, poses, other.vehicle.half, other.poses[at])[0])
     meets = (gap.reshape(later.shape) < _APART) & (later <= rows[-1])
     first = np.argmax(meets, axis=1)
     each = np.arange(len(begins))
