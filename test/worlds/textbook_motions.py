@@ -13,8 +13,8 @@ from functools import lru_cache
 import numpy as np
 from scipy import ndimage, spatial
 
-from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.boxes import corners
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 DT, LENGTH, WIDTH = 0.1, 4.6, 1.85
