@@ -23,7 +23,6 @@ AROUND = 0.5  # metres by which a lane goes on beyond its footprints at least
 ACROSS = 0.6  # rad by which a vehicle in a lane may be turned in it
 CUT = 5.0  # metres of a path that may lie across all lanes, as where a corner is cut
 SAME_LANE, SAME_WAY = 1.0, 0.35  # metres and rad within which a path lies in another one's lane
-HALF_DIAGONAL = 0.7072  # of a cell, in sides: so far outside of a drawn lane the road's cells may reach
 NEAR = 3  # points of a lane on both sides over which it keeps its widest
 
 
@@ -43,7 +42,7 @@ def lane_map_of(road: Road | None, scenarios: Sequence[Scenario], lane_width: fl
         return derived_lanes(scenarios, road, lane_width, run_out)
     drawn = road.lanes.drawn
     network = with_run_out(road.lanes, run_out) if drawn else road.lanes
-    missing = _not_kept(network, scenarios, HALF_DIAGONAL * road.resolution if drawn else 0.0)
+    missing = _not_kept(network, scenarios)
     added = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
     origin = f"the true lanes of {network.name}" if drawn else f"the lanes of map {network.name}"
     if missing:
@@ -80,9 +79,9 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
     return LaneMap(LaneNetwork("derived", tuple(derived)), len(derived), origin)
 
 
-def _not_kept(network: LaneNetwork, scenarios: Sequence[Scenario], slack: float) -> dict[str, Curve]:
-    """Return the paths, by id, of vehicles that leave the lanes by more than `slack` [m] or drive across them."""
-    area = union_all(make_valid([Polygon(lane.outline) for lane in network.lanes])).buffer(slack)
+def _not_kept(network: LaneNetwork, scenarios: Sequence[Scenario]) -> dict[str, Curve]:
+    """Return the paths, by id, of vehicles that leave the lanes or drive across them."""
+    area = union_all(make_valid([Polygon(lane.outline) for lane in network.lanes]))
     prepare(area)
     missing: dict[str, Curve] = {}
     for scenario in scenarios:
