@@ -15,12 +15,15 @@ from filelock import FileLock, Timeout
 from scenario_gen.base.errors import RefusedError
 
 DOMAINS = range(1, 102)  # above, the ports would be ephemeral ones
+PARTICIPANTS = 20  # of which one that was left over may be any: the first ones may have ended
 
 
 def _quiet(domain: int) -> bool:
-    """Say whether the first participant's port of a domain is free (RTPS: 7400 + 250·domain + 10)."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, suppress(OSError):
-        probe.bind(("", 7410 + 250 * domain))
+    """Say whether the ports of a domain's first participants are free (RTPS: 7400 + 250·domain + 10 + 2·participant)."""
+    with suppress(OSError):
+        for port in range(7410 + 250 * domain, 7410 + 250 * domain + 2 * PARTICIPANTS, 2):
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                probe.bind(("", port))
         return True
     return False
 

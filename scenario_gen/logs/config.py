@@ -10,17 +10,7 @@ from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
 
 FORMATS = (
-    "auto",
-    "spmd",
-    "table",
-    "bag",
-    "argoverse2",
-    "interaction",
-    "ind",
-    "highd",
-    "commonroad",
-    "nocturne",
-    "osi",
+    *("auto", "spmd", "table", "bag", "argoverse2", "interaction", "ind", "highd", "commonroad", "nocturne", "osi"),
     "omega_prime",
 )
 

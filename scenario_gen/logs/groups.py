@@ -20,6 +20,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.gap import INTERACTS_M, space_time_gap
 from scenario_gen.logs.growing import Group, Growth, Meeting, SHARED, Span
+from scenario_gen.logs.raw import natural
 from scenario_gen.numerics import Floats, runs
 
 MOST = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
@@ -113,6 +114,13 @@ def find_groups(pieces: Sequence[Piece], config: LogConfig) -> tuple[tuple[Group
         groups += whole
         notes += [*group.notes, *left] if whole else []
     groups.sort(key=lambda group: (group.start, group.end, sorted(group.spans)))
+    shared, until = set[str](), dict[int, int]()
+    for group in groups:
+        shared |= {pieces[m].track.id for m in group.spans if until.get(m, group.start) > group.start}
+        until |= {m: max(until.get(m, group.end), group.end) for m in group.spans}
+    if shared:
+        names = ", ".join(sorted(shared, key=natural))
+        notes.append(f"in several encounters at a time, for each holds who meets half of its vehicles: vehicle {names}")
     return tuple(groups), tuple(notes)
 
 

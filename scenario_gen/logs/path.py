@@ -127,12 +127,14 @@ def fit_path(
     for order, floor, moving, power in ((2, CURVATURE, LATERAL, 3), (3, STEERING, LATERAL_JERK, 5)):
         centre = low + step * (np.arange(count - order) + (order - 2) / 2.0)
         v = np.interp(centre, place, speed)
-        penalise(band, order, step ** (1 - 2 * order) * (1.0 / floor + v**power / moving))
+        weight = step ** (1 - 2 * order) * (1.0 / floor + v**power / moving)
+        for axis in (0, 1):
+            observe(band, right, 2 * np.arange(count - order) + axis, differences(count, order), 2, weight, np.zeros(len(v)))
     return tabulate(BSpline(knots, linalg.solveh_banded(band, right, lower=True).reshape(-1, 2), 3), low, high)
 
 
 def observe(band: Floats, right: Floats, start: Ints, entries: Floats, stride: int, weight: Floats, target: Floats) -> None:
-    """Add Σ weight · (entries · c - target)² to a lower band matrix (8, n) and its right side (n,).
+    """Add Σ weight · (entries · c - target)² to a lower band matrix (B, n) and its right side (n,).
 
     Args:
         band: the matrix.
@@ -149,13 +151,10 @@ def observe(band: Floats, right: Floats, start: Ints, entries: Floats, stride: i
             np.add.at(band[stride * (i - j)], start + stride * j, weight * entries[:, i] * entries[:, j])
 
 
-def penalise(band: Floats, order: int, weight: Floats) -> None:
-    """Add Σ weight (n - order,) · |differences of that order|² of n points to a lower band matrix (8, 2 n) of x and y in turn."""
-    stencil = np.array({2: [1.0, -2.0, 1.0], 3: [-1.0, 3.0, -3.0, 1.0]}[order])
-    both = np.repeat(weight, 2)
-    for i in range(order + 1):
-        for j in range(i + 1):
-            band[2 * (i - j), 2 * j : 2 * j + len(both)] += both * stencil[i] * stencil[j]
+def differences(count: int, order: int) -> Floats:
+    """Return the rows (count - order, order + 1) of the differences of an order of `count` values."""
+    stencil = ((-1.0, 1.0), (1.0, -2.0, 1.0), (-1.0, 3.0, -3.0, 1.0))[order - 1]
+    return np.tile(stencil, (count - order, 1))
 
 
 def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:

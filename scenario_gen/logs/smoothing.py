@@ -21,7 +21,7 @@ from scipy.ndimage import median_filter
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.path import fit_path, Headings, headings_of, MOVES, Path, straight_path
+from scenario_gen.logs.path import differences, fit_path, Headings, headings_of, MOVES, observe, Path, straight_path
 from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Bools, Floats, Ints, runs, wrap_angle
 
@@ -53,7 +53,9 @@ class Motion:
         self.size = int(self.variable[-1]) + 1
         first, second, third = (self._differences(order) for order in (1, 2, 3))
         speed, change = (first[0], first[1] * (1.0 / dt)), (second[0], second[1] * (1.0 / np.square(dt)))
-        self.prior = self._squared(third[0], third[1] * (np.sqrt(dt) / (config.jerk * dt**3)))
+        self.prior = np.zeros((4, self.size + 3))
+        weight = np.full(len(third[0]), dt / (config.jerk * dt**3) ** 2)
+        observe(self.prior, np.zeros(self.size + 3), *third, 1, weight, np.zeros(len(weight)))
         blocks = (speed[0], -speed[1]), change, (change[0], -change[1])
         self.bounds = np.repeat([0.0, config.acceleration_limit, config.braking_limit], [len(block[0]) for block in blocks])
         above = np.cumsum([0, *(len(block[0]) for block in blocks)])
@@ -73,18 +75,8 @@ class Motion:
 
     def _differences(self, order: int) -> tuple[Ints, Floats]:
         """Return differences of the coefficients over the merged variables, as rows like those of `_merged`."""
-        stencil = {1: [-1.0, 1.0], 2: [1.0, -2.0, 1.0], 3: [-1.0, 3.0, -3.0, 1.0]}[order]
         tick = np.arange(len(self.variable) - order)
-        return self._merged(tick, np.tile(stencil, (len(tick), 1)))
-
-    def _squared(self, first: Ints, rows: Floats, weight: Floats | float = 1.0) -> Floats:
-        """Σ weight · row rowᵀ: its diagonal and the three above it, (4, n), by row."""
-        band = np.zeros((4, self.size + 3))
-        weighted = (rows.T * weight).T
-        for above in range(rows.shape[1]):
-            at = first[:, None] + np.arange(rows.shape[1] - above)
-            np.add.at(band[above], at, weighted[:, : at.shape[1]] * rows[:, above:])
-        return band
+        return self._merged(tick, differences(len(self.variable), order))
 
     def _weights(self, seconds: Floats, *, speed: bool = False) -> tuple[Ints, tuple[Floats, Floats, Floats]]:
         """The first of the three coefficients that count at any times (F,), and the weights (F,) of each: place or speed."""
@@ -103,21 +95,16 @@ class Motion:
         Raises:
             InputError: the solver finds no solution.
         """
-        quadratic, linear = self.prior, np.zeros(self.size + 3)
+        quadratic, linear = self.prior.copy(), np.zeros(self.size + 3)
         for seconds, values, deviation, speed in observed:
             tick, weights = self._weights(seconds, speed=speed)
-            first, rows = self._merged(tick, np.column_stack(weights))
-            weight = 1.0 / np.square(deviation)
-            quadratic = quadratic + self._squared(first, rows, weight)
-            pull = np.zeros(len(linear))
-            np.add.at(pull, first[:, None] + np.arange(3), (rows.T * weight * values).T)
-            linear = linear - pull
+            observe(quadratic, linear, *self._merged(tick, np.column_stack(weights)), 1, 1.0 / np.square(deviation), values)
         upper = sparse.dia_array((quadratic[:, : self.size], -np.arange(4)), (self.size, self.size)).T.tocsc()
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
         cones = [clarabel.NonnegativeConeT(len(self.bounds))]
-        solution = clarabel.DefaultSolver(upper, linear[: self.size], self.constraints, self.bounds, cones, settings).solve()
+        solution = clarabel.DefaultSolver(upper, -linear[: self.size], self.constraints, self.bounds, cones, settings).solve()
         if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
             raise InputError(f"speeds and positions cannot be reconciled ({solution.status}); check their units")
         merged = np.maximum.accumulate(np.asarray(solution.x))  # within the solver's tolerance it may run backwards

@@ -35,7 +35,7 @@ I = types.int64  # noqa: E741 - the field's letter for integers
 B = types.boolean
 F1, F2, F3, F4 = (_array(F, n, readonly=True) for n in (1, 2, 3, 4))
 I1, I2 = (_array(I, n, readonly=True) for n in (1, 2))
-N2, OUTN2 = (_array(types.int32, 2, readonly=each) for each in (True, False))  # counts of cells
+N2 = _array(types.int32, 2, readonly=True)  # counts of cells
 B1, B2 = (_array(B, n, readonly=True) for n in (1, 2))
 OUT1, OUT2, OUT3, OUT4 = (_array(F, n, readonly=False) for n in (1, 2, 3, 4))
 OUTI1, OUTI2 = (_array(I, n, readonly=False) for n in (1, 2))

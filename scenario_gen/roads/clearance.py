@@ -6,7 +6,7 @@
 import numpy as np
 
 from scenario_gen.numerics import Bools, Counts, Floats, sealed
-from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1, OUTN2
+from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1
 from scenario_gen.types import once_per_object, Road
 
 CONTACT = 1e-9  # [cells] what lies nearer than this touches
@@ -35,22 +35,7 @@ def clearance_in_cells(road: Road) -> Floats:
 @once_per_object
 def blocked_before(road: Road) -> Counts:
     """(H, W + 1): how many cells left of each column are not drivable: any run of a row is looked up in one step; cached."""
-    height, width = road.drivable.shape
-    counts = np.empty((height, width + 1), dtype=np.int32)
-    _count_blocked(road.drivable, counts)
-    return sealed(counts)
-
-
-@kernel(B2, OUTN2)
-def _count_blocked(drivable: Bools, out: Counts) -> None:
-    """Fill `out` (H, W + 1) for `blocked_before`."""
-    height, width = drivable.shape
-    for i in range(height):
-        count = 0
-        for j in range(width):
-            out[i, j] = count
-            count += not drivable[i, j]
-        out[i, width] = count
+    return sealed(np.pad(np.cumsum(~road.drivable, axis=1, dtype=np.int32), ((0, 0), (1, 0))))
 
 
 def to_cells(road: Road, xy: Floats) -> Floats:

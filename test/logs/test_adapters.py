@@ -11,10 +11,8 @@ import pandas as pd
 from pyarrow import parquet
 import pytest
 
-from scenario_gen.base.errors import InputError, UnforeseenError
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs import config, LogConfig, read, read_log
-from scenario_gen.logs.adapters import tracks
-from scenario_gen.logs.adapters.formats import FORMATS
 
 SIZES = {"7": (4.5, 1.8), "8": (12.0, 2.5)}
 T = np.arange(0.0, 8.0, 0.1)
@@ -276,12 +274,6 @@ def test_what_was_written_is_read(tmp_path, name):
         assert np.allclose(encounter.heading[n], heading, atol=0.05)
 
 
-def test_every_column_has_a_factor_and_every_format_its_source():
-    for name, known in FORMATS.items():
-        assert known.source and all(0.0 < column.factor < np.inf for column in known.columns.values())
-        assert LogConfig(format=name).format == name
-
-
 def test_what_is_missing_is_named(tmp_path):
     path, _ = ind(tmp_path)
     (tmp_path / "00_recordingMeta.csv").unlink()
@@ -307,14 +299,6 @@ def test_pedestrians_of_no_known_kind_are_counted_too(tmp_path):
     tracks_file.write_text(tracks_file.read_text() + "99,1,100,tram,0,0,0,1,0,30,2.5\n")
     (note,) = [note for note in read_log(folder).quality.notes if "left out" in note]
     assert note.endswith("1 × 1.5, 1 × tram")
-
-
-def test_what_nobody_foresaw_names_the_file(tmp_path, monkeypatch):
-    """A reader that fails in a way of its own is an error of ours all the same, which the fuzzing counts as a finding."""
-    path, _ = argoverse2(tmp_path)
-    monkeypatch.setattr(tracks, "to_numbers", lambda *_: {}["gone"])
-    with pytest.raises(UnforeseenError, match=r"scenario_s1\.parquet cannot be read: KeyError 'gone'"):
-        read_log(path)
 
 
 def test_two_recordings_are_refused(tmp_path):

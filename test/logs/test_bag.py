@@ -182,11 +182,6 @@ def test_a_channel_without_schema_or_of_another_kind_breaks_nothing(tmp_path):
         list(read_messages(tmp_path / "a.mcap", lambda name: name == "/bare"))
 
 
-def test_any_namespace_names_the_vehicle(tmp_path):
-    (encounter,) = read_log(write(tmp_path / "bag", streams(crossing(), prefix="/fleet"))).encounters
-    assert [vehicle.id for vehicle in encounter.vehicles] == ["a", "b"]
-
-
 def test_without_header_stamps_the_reception_counts_and_is_said(tmp_path, plain):
     result = read_log(write(tmp_path / "bag", streams(crossing(), stamped=False)))
     assert any("no header stamps" in line for line in result.quality.lines())
@@ -295,28 +290,6 @@ def test_a_damaged_message_is_named(tmp_path):
     lines[8].data = lines[8].data[:20]
     with pytest.raises(InputError, match=rf"topic /vehicle_a/fix, message 3: not a {FIX}"):
         read_log(write(tmp_path / "bag", lines))
-
-
-@pytest.mark.parametrize("plugin", StoragePlugin, ids=lambda plugin: plugin.value)
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
-def test_truncated_bags(tmp_path, plugin, share):
-    bag = write(tmp_path / "bag", streams(crossing()), plugin)
-    (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
-    whole = file.read_bytes()
-    file.write_bytes(whole[: int(len(whole) * share)])
-    for path in (bag, file):
-        with pytest.raises(InputError, match=file.name):
-            read_log(path)
-
-
-def test_missing_files_and_metadata(tmp_path):
-    bag = write(tmp_path / "bag", streams(crossing()))
-    (bag / "bag.mcap").rename(tmp_path / "elsewhere.mcap")
-    with pytest.raises(InputError, match=r"metadata\.yaml lists bag\.mcap, which is not there"):
-        read_log(bag)
-    (bag / "metadata.yaml").write_text("- nonsense")
-    with pytest.raises(InputError, match=r"metadata\.yaml: damaged"):
-        read_log(bag)
 
 
 def test_genuine_bags_without_vehicles_are_refused_by_their_topics(data):

@@ -45,11 +45,6 @@ def test_files_that_broke_a_reader(crashes, pattern, reading):
         refused_or_read(path, READINGS[reading])
 
 
-def test_the_spmd_reader_takes_any_text(crashes):
-    for path in sorted(crashes.glob("table/*.csv")):
-        refused_or_read(path, LogConfig(format="spmd"))
-
-
 def test_a_stamp_of_another_age_is_named_before_the_clock_is_made(tmp_path):
     rows = crossing()
     rows.loc[40, "t_s"] += 3e8
@@ -221,16 +216,6 @@ def test_text_that_is_no_table(tmp_path, change, said):
     with pytest.raises(InputError, match=said) as error:
         read_log(path)
     assert "log.csv" in str(error.value) and len(str(error.value)) <= LONGEST
-
-
-def test_truth_values_are_no_positions(tmp_path):
-    with pytest.raises(InputError, match=r"column 'x_m' \(x\): true or false is no x"):
-        read_log(save(crossing().assign(x_m=True), tmp_path))
-
-
-def test_the_time_cannot_be_left_out(tmp_path):
-    with pytest.raises(InputError, match="no column for time"):
-        read_log(save(crossing(), tmp_path), LogConfig(columns="time=none"))
 
 
 @pytest.mark.parametrize("value", [1e300, -1e300, 1e308, 3e8])

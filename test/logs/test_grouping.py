@@ -12,8 +12,6 @@ import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.groups import part_of
-from scenario_gen.logs.growing import Group
 
 
 def car(name, begin, end, x, y, vx=0.0, vy=0.0):
@@ -82,16 +80,6 @@ def test_nobody_is_left_out_in_silence(tmp_path):
     once = pd.DataFrame({"t_s": [0.0], "vehicle_id": "once", "x_m": 0.0, "y_m": 0.0, "speed_mps": 1.0})
     _, result = presence(tmp_path, *cars, once)
     assert "fewer than two usable positions: vehicle once" in result.quality.notes
-
-
-def test_a_part_of_a_group_keeps_who_is_there_for_long_enough():
-    group = Group(0, 300, {3: (0, 300), 5: (0, 120), 8: (95, 300)})
-    part, left = part_of(group, 0, 100, LogConfig())
-    assert part == Group(0, 100, {3: (0, 100), 5: (0, 100)})
-    assert left == [(8, (95, 100))]
-    part, left = part_of(group, 90, 300, LogConfig())
-    assert part == Group(90, 300, {3: (90, 300), 8: (95, 300)})
-    assert left == [(5, (90, 120))]
 
 
 @given(st.lists(st.tuples(st.integers(0, 8), st.integers(1, 20), st.integers(-60, 60)), min_size=2, max_size=6))
@@ -172,3 +160,9 @@ def test_a_reversal_cuts_the_track(tmp_path):
     found, quality = groups(tmp_path, there, stand, back, car("2", 0, 25, 5, 5))
     assert quality.vehicles[0].reversals == 1
     assert [name for name, _ in found] == ["1,2", "1,2"]
+
+
+def test_a_column_of_13_is_encounters_of_three_and_who_is_in_two_is_named(tmp_path):
+    found, quality = groups(tmp_path, *(car(str(k + 1), 0, 19.9, -66 * k, 0, 33) for k in range(13)))
+    assert [names for names, _ in found] == [f"{k},{k + 1},{k + 2}" for k in range(1, 13, 2)]
+    assert [note for note in quality.notes if note.endswith("vehicle 3, 5, 7, 9, 11")]

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 
 from scenario_gen.logs import LogConfig
 from scenario_gen.logs.encounters import pieces_of
-from scenario_gen.logs.path import fit_path, Headings, headings_of, straight_path
+from scenario_gen.logs.path import fit_path, headings_of, straight_path
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import Motion, smooth_piece, standing, white_equivalent
 
@@ -125,36 +125,6 @@ def test_coloured_noise_counts_for_more_than_white():
     assert white_equivalent(white) == pytest.approx(1.0, rel=0.03)
     coloured = np.convolve(white, np.ones(5) / np.sqrt(5.0), mode="same")  # autocorrelation time 5
     assert white_equivalent(coloured) == pytest.approx(np.sqrt(5.0), rel=0.08)
-
-
-def test_the_normal_equations_are_those_of_their_rows():
-    """The banded matrix of fixes, headings and penalties against a dense least-squares solution."""
-    from scipy.interpolate import BSpline
-
-    rng = np.random.Generator(np.random.PCG64(6))
-    place = np.sort(rng.uniform(0.0, 12.0, 40))
-    points = np.column_stack((place, np.sin(place / 4.0))) + rng.normal(0.0, 0.05, (40, 2))
-    heading, speed = np.arctan(np.cos(place / 4.0) / 4.0), np.full(40, 3.0)
-    weight = 1.0 / np.square(np.radians(2.0)) * np.ones(40)
-    path = fit_path(place, points, np.ones(40), 0.2, speed, Headings(heading, weight))
-    knots, n = path.curve.t, len(path.curve.c)
-    step, spread = knots[1] - knots[0], np.gradient(place)
-    fixes = BSpline.design_matrix(place, knots, 3).toarray() * np.sqrt(np.clip(spread / 0.2, 0.005, 1.0))[:, None] / 0.2
-    slope = BSpline(knots, np.eye(n), 3)(place, 1) * np.sqrt(weight * np.clip(spread, 0.02, 1.0))[:, None]
-    blocks, right = [], []
-    for axis, across in ((0, -np.sin(heading)), (1, np.cos(heading))):
-        own = [np.zeros_like(fixes), np.zeros_like(fixes)]
-        own[axis] = fixes
-        bent = [np.sqrt(step**-3 * (10.0 + 27.0 / 12.0)) * np.diff(np.eye(n), 2, axis=0)]
-        bent.append(np.sqrt(step**-5 * (500.0 + 243.0)) * np.diff(np.eye(n), 3, axis=0))
-        zeros = [np.zeros_like(rows) for rows in bent]
-        blocks.append(np.vstack([*own, across[:, None] * slope, *(bent + zeros if axis == 0 else zeros + bent)]))
-        right.append(points[:, axis] * np.sqrt(np.clip(spread / 0.2, 0.005, 1.0)) / 0.2)
-    rows = np.hstack(blocks)
-    target = np.zeros(len(rows))
-    target[:80] = np.concatenate(right)
-    best = np.linalg.lstsq(rows, target, rcond=None)[0]
-    np.testing.assert_allclose(path.curve.c.T.ravel(), best, atol=1e-6)
 
 
 def test_noise_of_the_fixes_is_no_lateral_acceleration():

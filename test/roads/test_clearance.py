@@ -13,9 +13,7 @@ from shapely.ops import unary_union
 
 from scenario_gen.roads.clearance import (
     clearance_field,
-    clearance_in_cells,
     footprint_fits,
-    free_length,
     nearest_pose_with_room,
     segments_free,
 )
@@ -63,12 +61,6 @@ def test_field_is_the_distance_to_the_nearest_blocked_square(seed, density):
     np.testing.assert_allclose(clearance_field(road), expected, atol=1e-12)
 
 
-def test_field_is_cached_and_read_only():
-    road = road_of(np.ones((4, 4)))
-    assert clearance_field(road) is clearance_field(road)
-    assert not clearance_field(road).flags.writeable
-
-
 @pytest.mark.parametrize("radius", [0.0, 0.3, 0.9])
 def test_segments_against_shapely(radius):
     rng = np.random.default_rng(3)
@@ -86,26 +78,6 @@ def test_segments_against_shapely(radius):
                 assert free == (gap > radius)
                 seen.add(bool(free))
     assert seen == {True, False}
-
-
-@pytest.mark.parametrize("radius", [0.0, 0.7])
-def test_the_free_length_is_free_and_ends_within_a_cell_of_what_is_not(radius):
-    rng = np.random.default_rng(int(10 * radius) + 3)
-    stopped = 0
-    for _ in range(100):
-        road = random_road(rng, (12, 15), 0.1, 1.0, (0.0, 0.0))
-        for start, end in rng.uniform(0.5, (14.5, 11.5), (10, 2, 2)):
-            length = float(np.hypot(*(end - start)))
-            ahead = (end - start) / length
-            free = free_length(clearance_in_cells(road), *start, *end, radius)
-            assert (free == np.inf) == segments_free(road, start[None], end[None], radius)[0]
-            if free in (np.inf, 0.0):
-                continue
-            stopped += 1
-            beyond = min(free + 1.0 + 1e-9, length)
-            assert segments_free(road, start[None], (start + free * ahead)[None], radius)[0]
-            assert not segments_free(road, start[None], (start + beyond * ahead)[None], radius)[0]
-    assert stopped > 30
 
 
 def test_a_segment_may_not_slip_between_two_squares_that_touch_at_a_corner():
@@ -183,11 +155,3 @@ def test_repair_finds_the_nearest_pose(seed, yaw):
     assert repaired[2] == pose[2]
     assert moved == pytest.approx(np.hypot(*(repaired - pose)[:2]))
     assert moved <= nearest + play
-
-
-def test_a_pose_with_room_stays_where_it_is():
-    road = road_of(np.ones((40, 40)), 0.2)
-    pose, moved = nearest_pose_with_room(road, np.array([4.0, 4.0, 1.0]), 4.0, 1.8)
-    assert moved == 0.0
-    np.testing.assert_array_equal(pose, [4.0, 4.0, 1.0])
-    assert nearest_pose_with_room(road, np.array([-9.0, 4.0, 1.0]), 4.0, 1.8) is None

@@ -152,15 +152,6 @@ def test_images_of_other_formats_are_refused_by_name(tmp_path):
         build_road(write(tmp_path, image="map.tga"), None)
 
 
-def test_blocks_of_a_large_image_are_put_together_as_they_lay(tmp_path, monkeypatch):
-    pixels = np.random.default_rng(3).integers(0, 255, (50, 7))
-    path = write(tmp_path, pixels)
-    whole = build_road(path, None).drivable
-    monkeypatch.setattr("scenario_gen.roads.nav2._BLOCK", 20)
-    assert (build_road(path, None).drivable == whole).all()
-    assert (whole == (1.0 - pixels[::-1] / 255.0 < 0.25)).all()
-
-
 def test_more_lanes_than_any_road_has_are_refused(tmp_path):
     with pytest.raises(InputError, match="1000 lanes"):
         find_openings(np.ones((500, 500), dtype=bool), 5.0, np.zeros(2), RoadConfig())

@@ -32,7 +32,7 @@ def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(turn, 
     assert way.points[0] == pytest.approx([0.0, 0.0, yaw], abs=1e-6)
     assert way.points[-1] == pytest.approx(leave, abs=1e-4)
     bend = np.diff(way.points[:, 2]) / np.diff(way.station)
-    if 1.5 * abs(turn) / sharpness < 60.0:  # there is room for it
+    if 1.5 * abs(turn) / sharpness < 50.0:  # there is room for it
         assert np.abs(bend).max() == pytest.approx(sharpness, rel=0.05)
     assert np.abs(np.diff(bend)).max() < 0.5 * np.abs(bend).max()  # the shortest transition has three samples
 

@@ -3,8 +3,8 @@
 
 """A client of the action: python action_client.py GOALS, a JSON list; it prints a JSON list of how each went.
 
-A goal is {"parameters": {…}, "wait": s, "cancel": s after which it is cancelled, "then": a node to activate when it waits for
-tracks}; all are sent at once. Seconds count from then.
+A goal is {"parameters": {…}, "wait": s, "cancel": …, "then": a node to activate when it waits for tracks}; all are sent at once.
+"cancel" is how many scenarios it has found, which position in the queue it has, and which others have ended when it is cancelled.
 It is a program of its own, for the libraries of an interface package are looked for where LD_LIBRARY_PATH said at the start.
 """
 
@@ -40,6 +40,9 @@ def main(goals: list[dict]) -> list[dict]:
     assert client.wait_for_server(60.0)
     ended, begun = [], time.monotonic()
 
+    def ended_ones() -> set[int]:
+        return {one["goal"] for one in ended}
+
     def activate(name: str) -> None:
         change = node.create_client(ChangeState, f"{name}/change_state")
         assert change.wait_for_service(60.0)
@@ -53,19 +56,16 @@ def main(goals: list[dict]) -> list[dict]:
             one = message.feedback
             row = [time.monotonic() - begun, list(one.waiting_for), one.position, one.wanted, one.found, one.candidates]
             told["feedback"].append(row)
+            found, position, after = goal.get("cancel", [0, 0, [k]])
+            if "handle" in told and one.found >= found and one.position >= position and ended_ones().issuperset(after):
+                goal["cancel"] = [0, 0, [k]]
+                told["handle"].cancel_goal_async()
             if "tracks" in row[1] and "then" in goal:
                 activate(goal.pop("then"))
 
         def accepted(future) -> None:
-            handle = future.result()
-            handle.get_result_async().add_done_callback(done)
-            if "cancel" in goal:
-                timer = node.create_timer(goal["cancel"], lambda: cancel(timer, handle))
-
-        def cancel(timer, handle) -> None:
-            timer.cancel()
-            told["cancelled"] = time.monotonic() - begun
-            handle.cancel_goal_async()
+            told["handle"] = future.result()
+            told["handle"].get_result_async().add_done_callback(done)
 
         def done(future) -> None:
             answer = future.result()
@@ -78,7 +78,7 @@ def main(goals: list[dict]) -> list[dict]:
                 "account": {one.key: one.value for one in result.account},
                 "seconds": time.monotonic() - begun,
             }
-            ended.append({"goal": k, **words, **more, **told})
+            ended.append({"goal": k, **words, **more, "feedback": told["feedback"]})
 
         given = [Parameter(name, value=value).to_parameter_msg() for name, value in goal.get("parameters", {}).items()]
         message = Generate.Goal(parameters=given, wait=float(goal.get("wait", 60.0)))

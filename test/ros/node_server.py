@@ -71,6 +71,17 @@ def start_nodes(*arguments: str, log: Path | None = None, **environment: str) ->
     return Forked(list(arguments), os.environ | environment, log)
 
 
+def process(target, args) -> multiprocessing.Process:
+    """A process of the server in which `target` finds the environment of now."""
+    return CONTEXT.Process(target=_in_environment, args=(dict(os.environ), target, args))
+
+
+def _in_environment(environment: dict[str, str], target, args) -> None:
+    os.environ.clear()
+    os.environ.update(environment)
+    target(*args)
+
+
 def _become(arguments: list[str], folder: str, environment: dict[str, str], log: str) -> None:
     """Turn this process into what `python -m` would have made of it."""
     from scenario_gen.base.interrupts import end_with_parent

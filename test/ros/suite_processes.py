@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 
-from node_server import start_nodes
+from node_server import Forked, start_nodes
 
 from scenario_gen.base.ros_domain import this_host_only
 
@@ -22,24 +22,41 @@ os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 os.environ.update(this_host_only())
 
 
+APART = ("recorder", "player")
+
+
 class Processes:
-    """Nodes as forked processes, as the demo runs them, by name with their ROS arguments; `namespaces` of those that have any."""
+    """Nodes by name with their ROS arguments, as the demo runs them: the recorder, and a player, in processes of their own.
+
+    The others are a composed suite, but for those that are `apart`, of which some may have `namespaces`.
+    """
 
     def __init__(
-        self, folder: Path, domain: int, nodes: dict[str, list[str]], namespaces: dict[str, tuple[str, ...]] | None = None
+        self,
+        folder: Path,
+        domain: int,
+        nodes: dict[str, list[str]],
+        namespaces: dict[str, tuple[str, ...]] | None = None,
+        *,
+        apart: Iterable[str] = (),
     ):
-        self.folder = folder
-        spaces = {node: [w for name in (namespaces or {}).get(node, ()) for w in ("--namespace", name)] for node in nodes}
-        environment = {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)}
-        self.processes = {
-            node: start_nodes(node, *spaces[node], "--ros-args", *arguments, log=folder / f"{node}.log", **environment)
-            for node, arguments in nodes.items()
-        }
+        self.folder, self.processes = folder, {}
+        self.environment = {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)}
+        together = [node for node in nodes if node not in (*apart, *APART)]
+        if together:
+            own = [word if word == "-p" else f"{node}:{word}" for node in together for word in nodes[node]]
+            self.processes = dict.fromkeys(together, self._start("suite", "--nodes", ",".join(together), "--ros-args", *own))
+        for node in nodes.keys() - set(together):
+            spaces = [word for name in (namespaces or {}).get(node, ()) for word in ("--namespace", name)]
+            self.processes[node] = self._start(node, *spaces, "--ros-args", *nodes[node])
         self.pids = {node: process.pid for node, process in self.processes.items()}
+
+    def _start(self, name: str, *words: str) -> Forked:
+        return start_nodes(name, *words, log=self.folder / f"{name}.log", **self.environment)
 
     def end(self) -> dict[str, int]:
         """End all nodes as Ctrl-C does; return their exit codes."""
-        for process in self.processes.values():
+        for process in dict.fromkeys(self.processes.values()):
             process.send_signal(signal.SIGINT)
         return {node: process.wait(180.0) for node, process in self.processes.items()}
 
@@ -49,7 +66,7 @@ class Processes:
             process.kill()
 
     def log(self, node: str) -> str:
-        return (self.folder / f"{node}.log").read_text()
+        return self.processes[node].output()
 
 
 class Client:
@@ -156,13 +173,13 @@ class Client:
         self.context.try_shutdown()
 
 
-def whole_chain(folder: Path, domain: int, nodes: Iterable[str], *, count: int) -> Iterator[Processes]:
+def whole_chain(folder: Path, domain: int, nodes: Iterable[str], *, count: int, apart: Iterable[str] = ()) -> Iterator[Processes]:
     """Run nodes on one log, with sets of `count` scenarios and a bag in `folder`; a test that has not ended them has failed."""
     arguments: dict[str, list[str]] = {node: [] for node in nodes}
     arguments["log_player"] = ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"]
     arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
     arguments["gp_sampler"] = ["-p", f"count:={count}", "-p", "seed:=7"]
     arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
-    made = Processes(folder, domain, arguments)
+    made = Processes(folder, domain, arguments, apart=apart)
     yield made
     made.kill()

@@ -9,7 +9,7 @@ import time
 import pytest
 from suite_processes import Client
 
-from msg_conventions.diagnostics import decode_diagnostics, Level, of_template, Status, template_of
+from msg_conventions.diagnostics import decode_diagnostics, Level, Status, template_of
 from scenario_gen.ros.plumbing.diagnostics import bounded, family, LARGEST, MOST
 
 pytestmark = pytest.mark.dds
@@ -128,10 +128,3 @@ def test_a_status_is_bounded():
     assert sum(map(len, large.values.values())) < LARGEST + 100
     assert large.values["left_out"].startswith("935 values")
     assert family("/a/planner: fit of 7") == family("/a/planner: fit") == "/a/planner: fit"
-
-
-def test_a_template_is_told_by_stamps_of_any_age():
-    for stamp in (0, 1, 999_999_999, 10**9, 1_795_311_199_103_000_000):
-        assert template_of(of_template(Status("", Level.OK, ""), stamp), 7) == stamp
-    for text in ("", "1", "1.5", "x.000000001", "1.00000000x", "-1.000000000"):
-        assert template_of(Status("", Level.OK, "", {"template_stamp": text}), 7) == 7

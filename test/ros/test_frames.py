@@ -6,7 +6,6 @@
 import signal
 
 from bag_examples import hand_made_run
-from node_server import start_nodes
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
@@ -42,14 +41,12 @@ def test_bytes_are_those_of_rosbags_and_are_read_back():
 
 
 @pytest.mark.dds
-def test_without_tf2_msgs_the_rest_is_played_and_that_is_said(domain, client, bag):
+def test_without_tf2_msgs_the_rest_is_played_and_that_is_said(start, client, bag):
     from std_srvs.srv import Trigger
 
     client.hear("scenarios")
-    nodes = {"player": ("-p", f"bag:={bag}", "-p", "rate:=100.0", "-p", "paused:=true"), "preview": (), "traffic": ()}
-    started = {
-        node: start_nodes(node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain), WITHOUT_TF2="1") for node, words in nodes.items()
-    }
+    nodes = {"player": {"bag": bag, "rate": 100.0, "paused": "true"}, "preview": {}, "traffic": {}}
+    started = {node: start(node, without_tf2=True, **parameters) for node, parameters in nodes.items()}
     client.until(lambda: client.node.count_publishers("scenarios") == 1, "a publisher of scenarios")
     assert client.call(Trigger, "/player/resume", Trigger.Request()).success
     client.wait("scenarios", 5)

@@ -24,7 +24,7 @@ CHAIN = ("log_player", "segmenter", "planner", "gp_sampler", "road_server", "eva
 @pytest.fixture(scope="module")
 def suite(tmp_path_factory, domain):
     """All nodes, at work on one log; ended as Ctrl-C does, and then looked at."""
-    yield from whole_chain(tmp_path_factory.mktemp("suite"), domain, CHAIN, count=4)
+    yield from whole_chain(tmp_path_factory.mktemp("suite"), domain, CHAIN, count=4, apart=CHAIN)
 
 
 def test_a_late_joiner_gets_everything(suite, client):
@@ -40,17 +40,6 @@ def test_a_late_joiner_gets_everything(suite, client):
         assert math.isfinite(float(rows["/evaluator: with changepoints"]["e_position"]))
     finally:
         late.close()
-
-
-def test_the_origin_of_the_tracks_frame_is_said(suite, client):
-    client.hear("/diagnostics")
-
-    def origins():
-        return {status.values["origin"] for status in client.statuses() if status.name == "/log_player: encounter"}
-
-    client.until(origins, "the log player's word on its encounter")
-    (encounter,) = read_log(LOG).encounters
-    assert origins() == {"{!r},{!r}".format(*encounter.origin)}
 
 
 def test_in_process_gives_the_same_bytes(suite, client):

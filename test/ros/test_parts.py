@@ -22,10 +22,8 @@ from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.ros.nodes.road_server import road_of_url
 from scenario_gen.ros.plumbing.ros_parameters import descriptor, with_values
 from scenario_gen.ros.plumbing.stage_node import Inputs
-from scenario_gen.ros.plumbing.start import node_class
 from scenario_gen.ros.plumbing.suite import Job, parameters
 
-STAGE_NODES = ("segmenter", "planner", "gp_sampler", "log_player", "road_server", "evaluator")
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -113,18 +111,6 @@ def test_a_waiting_job_is_replaced_and_a_running_one_cancelled():
     worker.close()
 
 
-def test_cancelled_jobs_still_answer():
-    answers, gate, started = [], threading.Event(), threading.Event()
-    worker = Worker(lambda *_: None)
-    worker.submit("first", lambda _: (started.set(), gate.wait(60.0)))
-    assert started.wait(60.0)
-    worker.submit("second", lambda cancelled: answers.append(cancelled()))
-    assert worker.cancel() == ["first", "second"]
-    gate.set()
-    worker.close(60.0)
-    assert answers == [True]
-
-
 def test_every_parameter_has_a_descriptor_with_its_range():
     for name, (entry, _value) in flatten(PipelineConfig()).items():
         made = descriptor(entry)
@@ -166,9 +152,3 @@ def test_default_yaml_holds_the_defaults():
     flat = {f"{head}.{name}": value for head, body in nested.items() for name, value in body.items()}
     assert flat == {name: value for name, (_, value) in flatten(PipelineConfig()).items()}
     assert text == default_yaml(), "run: python -m scenario_gen.cli.default_yaml > config/default.yaml"
-
-
-def test_the_kernels_of_a_node_are_those_of_packages_that_are_there():
-    for name in STAGE_NODES:
-        for stage in node_class(name).STAGES:
-            assert ROOT.joinpath("scenario_gen", *stage.split(".")).is_dir(), f"{name}: {stage}"

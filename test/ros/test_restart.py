@@ -25,7 +25,9 @@ NODES = {
 def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, client):
     def processes(name, nodes):
         (tmp_path / name).mkdir()
-        return Processes(tmp_path / name, domain, {node: NODES[node] for node in nodes})
+        return Processes(
+            tmp_path / name, domain, {node: NODES[node] for node in nodes}, apart=("segmenter", "planner", "gp_sampler")
+        )
 
     client.hear("/scenarios", "/scenarios/info", "/changepoints", "/fit", "/vehicle_1/route", "/report")
     suites = [processes("first", NODES)]

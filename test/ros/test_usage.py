@@ -10,7 +10,6 @@ import sys
 
 import pytest
 
-from scenario_gen.ros.plumbing.process import asks_for_help
 from scenario_gen.ros.plumbing.ros_parameters import help_of
 from scenario_gen.ros.plumbing.start import node_class, NODES
 
@@ -32,8 +31,3 @@ def test_every_node_lists_all_of_its_parameters(name):
     text = help_of(name, (node_class(name),))
     for entry in fields(module.Config):
         assert f"  {entry.name} := " in text or f"  {entry.name}." in text
-
-
-def test_help_behind_ros_args_is_not_ours():
-    assert asks_for_help(["player", "--help"]) and asks_for_help(["player", "-h", "--ros-args", "-p", "bag:=x"])
-    assert not asks_for_help(["player", "--ros-args", "-p", "bag:=x"])

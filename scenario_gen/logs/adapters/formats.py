@@ -53,93 +53,56 @@ class Format:
         return self.needed | {column.name for column in self.columns.values()}
 
 
+def _columns(names: str, **scaled: tuple[str, float]) -> dict[str, Column]:
+    """Return columns by quantity, of a text `x=xCenter y=yCenter`; those with a factor to our unit are given by themselves."""
+    plain = (part.split("=") for part in names.split())
+    return {quantity: Column(name) for quantity, name in plain} | {key: Column(*column) for key, column in scaled.items()}
+
+
 OSI_TYPES = dict(enumerate(("unknown", "other", "vehicle", "pedestrian", "animal")))
-OSI_VEHICLES = dict(
-    enumerate(
-        (
-            *(
-                "vehicle",
-                "vehicle",
-                "small car",
-                "compact car",
-                "car",
-                "luxury car",
-                "delivery van",
-                "heavy truck",
-                "semitrailer",
-            ),
-            *("trailer", "motorbike", "bicycle", "bus", "tram", "train", "wheelchair", "semitractor", "standup scooter"),
-            *("micromobility device", "work machine", "watercraft", "aircraft", "land vehicle"),
-        )
-    )
-)  # 0 and 1 are unknown and other: a vehicle, no more is said
+_OSI_NAMES = (  # 0 and 1 are unknown and other: a vehicle, no more is said
+    *("vehicle", "vehicle", "small car", "compact car", "car", "luxury car", "delivery van", "heavy truck", "semitrailer"),
+    *("trailer", "motorbike", "bicycle", "bus", "tram", "train", "wheelchair", "semitractor", "standup scooter"),
+    *("micromobility device", "work machine", "watercraft", "aircraft", "land vehicle"),
+)
+OSI_VEHICLES = dict(enumerate(_OSI_NAMES))
 _LEVELX = ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv")  # their times are frames
 
 FORMATS = {
     "argoverse2": Format(
         title="Argoverse 2 motion forecasting",
         source="av2-api: av2.datasets.motion_forecasting.data_schema (Track, ObjectState), columns of Parquet; steps are 0.1 s",
-        columns={
-            "vehicle": Column("track_id"),
-            "time": Column("timestep", 0.1),
-            "x": Column("position_x"),
-            "y": Column("position_y"),
-            "vx": Column("velocity_x"),
-            "vy": Column("velocity_y"),
-            "heading": Column("heading"),
-            "kind": Column("object_type"),
-        },
+        columns=_columns(
+            "vehicle=track_id x=position_x y=position_y vx=velocity_x vy=velocity_y heading=heading kind=object_type",
+            time=("timestep", 0.1),
+        ),
         kinds=("vehicle", "bus"),
         signs=("scenario_id",),
     ),
     "interaction": Format(
         title="INTERACTION",
         source="INTERACTION: vehicle_tracks_*.csv and pedestrian_tracks_*.csv (Zhan et al. 2019, and the README of its tools)",
-        columns={
-            "vehicle": Column("track_id"),
-            "time": Column("timestamp_ms", 1e-3),
-            "x": Column("x"),
-            "y": Column("y"),
-            "vx": Column("vx"),
-            "vy": Column("vy"),
-            "heading": Column("psi_rad"),
-            "length": Column("length"),
-            "width": Column("width"),
-            "kind": Column("agent_type"),
-        },
+        columns=_columns(
+            "vehicle=track_id x=x y=y vx=vx vy=vy heading=psi_rad length=length width=width kind=agent_type",
+            time=("timestamp_ms", 1e-3),
+        ),
         kinds=("car", "truck", "bus", "van"),
         signs=("frame_id",),
     ),
     "ind": Format(
         title="inD, rounD",
         source="inD, rounD: format pages of the data sets (Bock et al. 2020, Krajewski et al. 2020); frame rate in recordingMeta",
-        columns={
-            "vehicle": Column("trackId"),
-            "time": Column("frame"),
-            "x": Column("xCenter"),
-            "y": Column("yCenter"),
-            "vx": Column("xVelocity"),
-            "vy": Column("yVelocity"),
-            "heading": Column("heading", math.pi / 180.0),
-            "length": Column("length"),
-            "width": Column("width"),
-        },
+        columns=_columns(
+            "vehicle=trackId time=frame x=xCenter y=yCenter vx=xVelocity vy=yVelocity length=length width=width",
+            heading=("heading", math.pi / 180.0),
+        ),
         kinds=("car", "truck", "van", "bus", "truck_bus", "trailer"),
         companions=_LEVELX,
     ),
     "highd": Format(
         title="highD",
         source="highD: format page (Krajewski et al. 2018): x, y the upper left corner, y down, width along the road",
-        columns={
-            "vehicle": Column("id"),
-            "time": Column("frame"),
-            "x": Column("x"),
-            "y": Column("y"),
-            "vx": Column("xVelocity"),
-            "vy": Column("yVelocity"),
-            "length": Column("width"),
-            "width": Column("height"),
-        },
+        columns=_columns("vehicle=id time=frame x=x y=y vx=xVelocity vy=yVelocity length=width width=height"),
         kinds=("car", "truck"),
         companions=_LEVELX,
         image=True,
@@ -148,19 +111,10 @@ FORMATS = {
     "omega_prime": Format(
         title="omega-prime",
         source="omega-prime 0.3.7: omega_prime.schemas, columns of CSV and Parquet; numbers of types: OSI 3.8, MovingObject",
-        columns={
-            "vehicle": Column("idx"),
-            "time": Column("total_nanos", 1e-9),
-            "x": Column("x"),
-            "y": Column("y"),
-            "vx": Column("vel_x"),
-            "vy": Column("vel_y"),
-            "heading": Column("yaw"),
-            "length": Column("length"),
-            "width": Column("width"),
-            "kind": Column("type"),
-            "subkind": Column("subtype"),
-        },
+        columns=_columns(
+            "vehicle=idx x=x y=y vx=vel_x vy=vel_y heading=yaw length=length width=width kind=type subkind=subtype",
+            time=("total_nanos", 1e-9),
+        ),
         kinds=(
             *("vehicle", "small car", "compact car", "car", "luxury car", "delivery van", "heavy truck", "semitractor"),
             *("bus", "land vehicle"),

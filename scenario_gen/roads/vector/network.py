@@ -10,6 +10,8 @@ import math
 import re
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 import shapely
 
 from scenario_gen.base.errors import InputError
@@ -248,30 +250,20 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
 
     They are numbered 1, 2, … in the order of their first lanes.
     """
-    lanes = network.lanes
-    root = list(range(len(lanes)))
-
-    def find(k: int) -> int:
-        while root[k] != k:
-            root[k] = root[root[k]]
-            k = root[k]
-        return k
-
-    crossing: set[int] = set()
-    for a, b in crossing_lanes(network):
-        crossing |= {a, b}
-        root[find(b)] = find(a)
+    pairs = list(crossing_lanes(network))
+    crossing = {k for pair in pairs for k in pair}
     for before in network.lanes:  # who parts from a lane that crosses others turns at the same junction
         inner = [k for k in before.successors if k in crossing]
-        for k in before.successors if inner else ():
-            if k not in crossing:
-                crossing.add(k)
-                root[find(k)] = find(inner[0])
+        pairs += [(inner[0], k) for k in before.successors if inner and k not in crossing]
+    joined = {k for pair in pairs for k in pair}
+    ends = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    count = len(network.lanes)
+    _, part = connected_components(coo_array((np.ones(len(pairs)), tuple(ends)), (count, count)), directed=False)
     first: dict[int, str] = {}
-    named = []
-    for k, lane in enumerate(lanes):
-        name = first.setdefault(find(k), str(len(first) + 1)) if k in crossing else ""
-        named.append(replace(lane, junction=name))
+    named = [
+        replace(lane, junction=first.setdefault(int(part[k]), str(len(first) + 1)) if k in joined else "")
+        for k, lane in enumerate(network.lanes)
+    ]
     return replace(network, lanes=tuple(named))
 
 

@@ -19,7 +19,7 @@ from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.method.sampling import Cancelled
 from scenario_gen.ros.plumbing.goals import action_type, Goals
-from scenario_gen.ros.plumbing.sampling_requests import Answer, answer_request, Channel, Config, OpenRequest, OpenRequests
+from scenario_gen.ros.plumbing.sampling_requests import Answer, answer_request, Config, OpenRequest, OpenRequests
 from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
 from scenario_gen.ros.plumbing.topics import unacknowledged
 from scenario_gen.types import tokens
@@ -114,7 +114,7 @@ class GpSampler(StageNode):
             self._requests.begin(request)
             node, send = self.get_fully_qualified_name(), partial(self.outputs.send_paced, stop=stop)
             with self.outputs.paced(self.OUTPUTS[:2], config.patience, partial(self._report_pace, request.name)):
-                result, summary = answer_request(messages, config, Channel(request, node, stop, send, self._turn))
+                result, summary = answer_request(messages, config, request, node, stop, send, self._turn)
             words = summary.status.message
             if summary.cancelled:
                 words = f"{self.given_up(messages, cancelled)}: {words}"

@@ -17,8 +17,8 @@ from msg_conventions.fits import decode_fit
 from msg_conventions.frames import encode_frames
 from msg_conventions.markers import CUBE, DELETE_ALL, Marker, TEXT
 from msg_conventions.pictures import COLOURS, encode_markers
-from msg_conventions.scenario_info import decode_info, INFO, ScenarioEntry
-from msg_conventions.scenarios import decode_scenario, digest
+from msg_conventions.scenario_info import ScenarioEntry
+from scenario_gen.bags.recordings.arriving import ArrivingScenarios, TOPICS
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.plumbing.stage_node import StageNode
@@ -26,7 +26,6 @@ from scenario_gen.ros.plumbing.topics import create_frames_publisher
 from scenario_gen.template import find_conflicts
 from scenario_gen.types import Scenario, tokens
 
-HELD = 1000  # messages of scenarios whose entry has not come yet
 HIGH = 1.2  # metres of a letter
 
 
@@ -54,14 +53,14 @@ class Shown:
 class Preview(StageNode):
     """Shows the newest scenario."""
 
-    INPUTS = ("fit", "scenarios", INFO)
+    INPUTS = ("fit", *TOPICS)
     OUTPUTS = ("preview",)
     STAGES = ("template",)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("preview", Config(), namespace)
         self._tf = create_frames_publisher(self, "/tf")
-        self._messages: dict[str, bytes] = {}  # by SHA-256, oldest first
+        self._arriving = ArrivingScenarios()
         self._newest: tuple[Scenario, ScenarioEntry] | None = None
         self._shown: Shown | None = None
         self._anchors = np.zeros((0, 0, 3))
@@ -69,29 +68,16 @@ class Preview(StageNode):
 
     def stopped(self) -> None:
         """Forget what was shown."""
-        self._messages.clear()
+        self._arriving = ArrivingScenarios()
         self._newest = self._shown = None
 
     def received(self, topic: str, data: bytes) -> None:
-        """Take changepoints, and each scenario once its entry has come."""
+        """Take changepoints, and each scenario once all of its messages have come."""
         if topic == "fit":
             self._anchors = decode_fit(data)[3]
-        elif topic == "scenarios":
-            self._messages[digest(data)] = data
-            if len(self._messages) > HELD:
-                del self._messages[next(iter(self._messages))]
-        else:
-            for info in decode_info(data, topic):
-                if isinstance(info, ScenarioEntry):
-                    self._take(info)
-
-    def _take(self, entry: ScenarioEntry) -> None:
-        """Keep the scenario of an entry; one whose messages were lost is left out."""
-        if self._messages.keys() >= set(entry.messages):
-            data = b"".join(self._messages[sha256] for sha256 in entry.messages)
-            self._newest = decode_scenario(data, seed=entry.seed, index=entry.index)[1], entry
-            for sha256 in set(entry.messages):
-                del self._messages[sha256]
+            return
+        for entry, _, scenario in self._arriving.take(topic, data):
+            self._newest = scenario, entry
 
     def _tick(self) -> None:
         """Publish where everybody is."""

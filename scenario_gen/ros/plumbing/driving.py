@@ -165,19 +165,6 @@ def encode_odometries(states: Sequence[State], children: Sequence[str], period: 
         yield i, encode_odometry(state.vehicles[i], float(turned[i]), children[i], frame, stamp_of(state))
 
 
-def encode_poses(state: State, children: Sequence[str], frame: str) -> bytes:
-    """Return the CDR bytes of the frames of all vehicles that are there; `children` has everyone's."""
-    here = np.flatnonzero(state.here).tolist()
-    poses: Floats = state.vehicles[here, :3]
-    return encode_frames(poses, [children[i] for i in here], frame, stamp_of(state))
-
-
-def encode_surroundings(loop: ClosedLoop, state: State) -> bytes:
-    """Return the CDR bytes of the local map about the ego."""
-    grid, frame = local_map(loop, state), loop.scenario.frame_id
-    return driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp_of(state))
-
-
 def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
     """Return the others that are there as the CDR bytes of PredictedObjects.
 
@@ -243,13 +230,15 @@ def surroundings(
     own = odometries.pop(loop.ego)
     for i, data in odometries.items():
         yield vehicle_topic(names[i], "odom"), data
-    yield "/tf", encode_poses(state, children, frame)
+    here = np.flatnonzero(state.here)
+    yield "/tf", encode_frames(state.vehicles[here, :3], [children[i] for i in here.tolist()], frame, stamp)
     if heard("traffic/markers"):
         vehicles = loop.scenario.vehicles
         yield "traffic/markers", vehicle_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
     every = max(round(GRID_EVERY / loop.config.step), 1)
     if state.step % every == 0 and loop.road is not None and heard("traffic/local_map"):
-        yield "traffic/local_map", encode_surroundings(loop, state)
+        grid = local_map(loop, state)
+        yield "traffic/local_map", driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp)
     for topic in autoware:
         yield topic, (encode_predictions if topic == OBJECTS else encode_ego)(loop, states)
     yield vehicle_topic(names[loop.ego], "odom"), own

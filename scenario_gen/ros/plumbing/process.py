@@ -66,12 +66,20 @@ def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str
     code = 0
     try:
         rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
-        executor = SingleThreadedExecutor()
+        executor, requested = SingleThreadedExecutor(), threading.Event()
+
+        def end() -> None:
+            if not requested.is_set():
+                leave_within(max((getattr(node, "ENDING", ENDING) for node in nodes), default=ENDING))
+            requested.set()
+            executor.create_task(lambda: None)  # so that it looks up
+
+        end_orderly(end)  # from now on, for whoever sees one of the nodes may end it
         for namespace in spaces:
             for make in makers:
                 nodes.append(make(namespace))
                 executor.add_node(nodes[-1])
-        code = _spin(executor, nodes)
+        code = _spin(executor, nodes, requested)
     except ExternalShutdownException:
         pass
     except (ScenarioGenError, OSError) as error:
@@ -84,13 +92,13 @@ def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str
     for node in nodes:
         getattr(node, "cancel", list)()  # all at once, so that no node waits for the end of another
     for step in ("close", "destroy_node"):
-        for node in nodes:
+        for node in nodes:  # each has its time, for on a busy machine many take longer than one may
+            leave_within(getattr(node, "ENDING", ENDING))
             try:
                 getattr(node, step, list)()
             except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
                 code = print_error(error)
         _flush()
-        leave_within(ENDING)  # nothing is lost from here on
     return code
 
 
@@ -140,17 +148,8 @@ def _print_progress() -> Progress:
     return report
 
 
-def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any]) -> int:
-    """Start the nodes, once their kernels are there, and spin them; return the exit code."""
-    requested = threading.Event()
-
-    def end() -> None:
-        if not requested.is_set():
-            leave_within(max(getattr(node, "ENDING", ENDING) for node in nodes))
-        requested.set()
-        executor.create_task(lambda: None)  # so that it looks up
-
-    end_orderly(end)
+def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any], requested: threading.Event) -> int:
+    """Start the nodes, once their kernels are there, and spin them until their end is `requested`; return the exit code."""
     stages = dict.fromkeys(stage for node in nodes for stage in getattr(node, "STAGES", ()))
     loading = ThreadPoolExecutor(1).submit(kernels_ready, stages, _print_progress())
     while not requested.is_set() and not loading.done():

@@ -328,49 +328,41 @@ def _named(parameters: Sequence[Any]) -> tuple[list[Any], str]:
     return [parameter for parameter in parameters if parameter.name != "request"], str(names[0]) if names else ""
 
 
-@dataclass(frozen=True)
-class Channel:
-    """Where the answer to a request goes.
-
-    Attributes:
-        request: what is told how far it is.
-        node: the node's full name.
-        cancelled: whether to stop early; what was published by then stays, and the summary says so.
-        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
-        turn: held while a scenario's messages, or those of the end, are sent, so that requests at the same time do not mix them.
-    """
-
-    request: OpenRequest
-    node: str
-    cancelled: Callable[[], bool]
-    send: Send
-    turn: AbstractContextManager[object]
-
-
-def answer_request(messages: Mapping[str, bytes], config: Config, channel: Channel) -> Answer:
+def answer_request(
+    messages: Mapping[str, bytes],
+    config: Config,
+    request: OpenRequest,
+    node: str,
+    cancelled: Callable[[], bool],
+    send: Send,
+    turn: AbstractContextManager[object],
+) -> Answer:
     """Sample, check and publish; fit and plan anew if start or end states are requested.
 
     Args:
         messages: of the template, by topic.
         config: the values of this request.
-        channel: where they go.
+        request: what is told how far it is.
+        node: the node's full name.
+        cancelled: whether to stop early; what was published by then stays, and the summary says so.
+        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
+        turn: held while a scenario's messages, or those of the end, are sent, so that requests at the same time do not mix them.
 
     Raises:
         InputError: a message is damaged, or a vehicle that is named does not exist.
         RefusedError: the request is impossible; the message says why, and which similar request is possible.
     """
-    request, node, cancelled = channel.request.name, channel.node, channel.cancelled
     template = decode_template(messages)
     encounter, segmentation, (road, _) = template.encounter, template.segmentation, template.placed()
 
     def advance(done: int, _total: int, candidates: int) -> None:
-        channel.request.progress(done, candidates, encounter.start_ns)
+        request.progress(done, candidates, encounter.start_ns)
 
     hashes = template_hashes(messages)
-    sender = RequestSender(RequestMessages(encounter, request, node, hashes), road.frame_id, channel.send)
+    sender = RequestSender(RequestMessages(encounter, request.name, node, hashes), road.frame_id, send)
 
     def in_turn(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
-        with channel.turn:
+        with turn:
             sender.scenario(scenario, requested, ego)
 
     callbacks = Callbacks(advance, cancelled, in_turn)
@@ -385,7 +377,7 @@ def answer_request(messages: Mapping[str, bytes], config: Config, channel: Chann
     result = outcome.generated
     provenance = parameter_texts(config) | versions() | hashes
     stopped = cancelled() and len(result.scenarios) < result.requested
-    summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=outcome.reacting)
-    with channel.turn:
+    summary = request_summary(result, request.name, node, config.seed, provenance, cancelled=stopped, reactions=outcome.reacting)
+    with turn:
         sender.close(result, summary)
     return outcome, summary

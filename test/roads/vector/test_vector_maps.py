@@ -80,11 +80,6 @@ def test_latitude_and_longitude_are_in_the_local_frame(tmp_path):
     assert "48.5000000, 9.2500000" in network.notes[0]
 
 
-def test_a_geo_reference_is_stated(tmp_path):
-    network = read_network(write(tmp_path, ".xodr", opendrive("+proj=utm +zone=32")))
-    assert "+proj=utm +zone=32 is stated, not applied" in network.notes[0]
-
-
 def test_a_lanelet_for_both_directions_is_two_lanes_and_others_are_left_out(tmp_path):
     both = lanelet2(tags="").replace('<tag k="one_way" v="yes"/>', '<tag k="one_way" v="no"/>', 1)
     assert len(read_network(write(tmp_path, ".osm", both)).lanes) == 21
@@ -228,12 +223,6 @@ def test_a_broken_map_is_refused_with_its_name_and_place(tmp_path, suffix, text,
     with pytest.raises(InputError, match=said) as error:
         build_road(str(path))
     assert path.stem in str(error.value)
-
-
-def test_too_many_elements_are_refused(monkeypatch):
-    monkeypatch.setattr("scenario_gen.base.markup.MOST_ELEMENTS", 50)
-    with pytest.raises(InputError, match="more than 50 elements"):
-        parse_xml(b"<a>" + b"<b/>" * 60 + b"</a>", "map")
 
 
 STACKED = (  # a ring of one lanelet over and over: each follows all
