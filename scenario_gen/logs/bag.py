@@ -6,7 +6,6 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-import math
 from pathlib import Path
 
 import numpy as np
@@ -239,6 +238,6 @@ def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
         notes.append(f"the parameter topics can choose {', '.join(others)}")
     found = []
     for vehicle, rows in vehicles.items():
-        length, width = (value if value > 0.0 else math.nan for value in np.median(np.array(sizes[vehicle]), axis=0).tolist())
+        length, width = np.median(np.array(sizes[vehicle]), axis=0).tolist()
         found.append(replace(rows.observations(vehicle), length=length, width=width))
     return RawLog(name, False, tuple(found), len(topic.data), (topic.segment(0),), tuple(notes))

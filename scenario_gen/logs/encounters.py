@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, select, SLOWEST
+from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, JUMP_SPEED, RELOCATED, select, SLOWEST
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
@@ -55,8 +55,7 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     seconds = np.diff(track.fix_ns) * 1e-9
     usual = float(np.median(seconds))
     longest = longest_bridge(seconds, config)
-    step = np.hypot(*np.diff(track.fix, axis=0).T)
-    gaps = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
+    gaps = (seconds > longest) | abrupt(seconds, np.hypot(*np.diff(track.fix, axis=0).T))
     back = reversals(track, config)
     cuts = gaps | back | laps(track, config)
     bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
@@ -110,6 +109,21 @@ def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple
     cuts = np.zeros(len(part.fix_ns) - 1, dtype=bool)
     cuts[np.clip(np.searchsorted(part.fix_ns, at), 1, len(cuts)) - 1] = True
     return [leaf for half in parts(part, cuts) for leaf in steered(half, origin_ns, config)]
+
+
+def abrupt(seconds: Floats, step: Floats) -> Bools:
+    """Return which steps (F-1,) [m] no vehicle drives, or none that is as fast as this one is just before and after.
+
+    Args:
+        seconds: (F-1,) that each step takes.
+        step: (F-1,) [m].
+    """
+    rate = np.pad(step / seconds, 2, mode="edge")
+    around = (
+        np.max([rate[:-4], rate[1:-3], rate[3:-1], rate[4:]], axis=0) if len(step) >= RELOCATED else np.full(len(step), np.inf)
+    )
+    far: Bools = step > JUMP_SLACK + np.minimum(1.5 * around + JUMP_SPEED, FASTEST) * seconds
+    return far
 
 
 def laps(track: Observations, config: LogConfig) -> Bools:

@@ -22,6 +22,7 @@ from scenario_gen.base.stores import local
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
+from scenario_gen.logs.clock import retimed
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
@@ -39,6 +40,7 @@ MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
 OSI = (b"net.asam.osi", b"osi3.", b"ground_truth")  # what is near the beginning or the end of a trace of OSI
 NEAR = 65_536  # bytes
 FAR_M = 200_000.0  # from an origin that is given: there distances are 0.02 % too long
+MUCH = 0.02  # of the rows: if more are left out, people are told at once
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
 
 
@@ -85,7 +87,9 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     """
     if log.encounters:
         return as_recorded(log, config)
+    log, notes = retimed(log, config)
     tracks, drops = clean(log, config)
+    notes = (*notes, *drops.notes, *notes_on_drops(log, drops))
     if len({track.id for track in tracks}) < 2:
         raise InputError(explain_few_vehicles(log, [track.id for track in tracks], drops))
     tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
@@ -100,7 +104,8 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
             raise InputError(f"{log.segments[0].label}, vehicle {track.id}: {error}") from error
         pieces += own
         vehicles.append(quality)
-    groups, notes = find_groups(pieces, config)
+    groups, remarks = find_groups(pieces, config)
+    notes += remarks
     if not groups:
         raise NoEncounterError(explain_no_encounter(log, pieces, config))
     notes += notes_on_origin(tracks, config)
@@ -128,6 +133,13 @@ def unusable(log: RawLog, tracks: Sequence[Observations], config: LogConfig) -> 
     """Return the vehicles of a log of which fewer than two positions were left."""
     requested = picked([vehicle.id for vehicle in log.vehicles], config, log.name)
     return sorted(set(requested) - {track.id for track in tracks}, key=natural)
+
+
+def notes_on_drops(log: RawLog, drops: Drops) -> tuple[str, ...]:
+    """Return a note if more than `MUCH` of the rows were left out, with the causes."""
+    if sum(drops.count.values()) <= MUCH * log.rows:
+        return ()
+    return (f"of {log.rows} rows there are left out, or sorted: {'; '.join(map(str, drops.of(log)))}",)
 
 
 def notes_on_origin(tracks: Sequence[Observations], config: LogConfig) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import guarded, InputError, needs
+from scenario_gen.logs.cleaning import LONGEST_M
 from scenario_gen.logs.columns import Column, find_columns, notes_on
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
@@ -22,7 +23,6 @@ from scenario_gen.numerics import Floats, Ints
 PARQUET = (".parquet", ".pq")
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 LONGEST_NUMBER = 300  # characters
-LARGEST = 100.0  # m: no vehicle is longer
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
     *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
@@ -231,7 +231,9 @@ def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> O
 
     def median(quantity: str) -> float:
         values = column(quantity)
-        values = values[np.isfinite(values) & (values > 0.0) & (values < LARGEST)]
+        values = values[np.isfinite(values)]
+        usual = values[(values > 0.0) & (values < LONGEST_M)]
+        values = usual if len(usual) else values  # what is no size is replaced later, and said
         return float(np.median(values)) if len(values) else math.nan
 
     states = np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")])
