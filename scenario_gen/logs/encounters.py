@@ -3,13 +3,13 @@
 
 """From clean tracks to smooth pieces: tracks are cut at long gaps, relocations and reversals."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, JUMP_SPEED, RELOCATED, select, SLOWEST
-from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.config import ahead_of_point, LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
@@ -61,7 +61,8 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
     whole = parts(track, cuts)
     smoothed = [leaf for part in whole for leaf in steered(part, origin_ns, config)]
-    pieces = [Piece(part, smooth) for part, smooth in smoothed if smooth is not None]
+    ahead = ahead_of_point(config) * track.length
+    pieces = [Piece(part, moved_ahead(smooth, ahead) if ahead else smooth) for part, smooth in smoothed if smooth is not None]
     smooths = [piece.smooth for piece in pieces]
 
     def joined(name: str) -> Floats:
@@ -92,6 +93,12 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
         headings=float(used.mean()) if len(used) else np.nan,
     )
     return pieces, quality
+
+
+def moved_ahead(smooth: Smooth, metres: float) -> Smooth:
+    """Return the motion of a point so far ahead; a vehicle of unknown heading faces east."""
+    heading = np.nan_to_num(smooth.heading)
+    return replace(smooth, position=smooth.position + metres * np.stack([np.cos(heading), np.sin(heading)], axis=-1))
 
 
 def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple[Observations, Smooth | None]]:

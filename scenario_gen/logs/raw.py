@@ -176,6 +176,6 @@ def check_vehicles(where: str, count: int, config: LogConfig) -> None:
     """
     if count > config.vehicle_limit:
         raise InputError(
-            f"{where}: {count} vehicles, at most {config.vehicle_limit} are read; check the vehicle column (--set log.columns=…), "
+            f"{where}: {count} vehicles, at most {config.vehicle_limit} are read; check --set log.columns=vehicle=…, "
             "or raise --set log.vehicle_limit=…"
         )
