@@ -49,7 +49,8 @@ SPEEDS = {
 }
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "sec": 1.0, "ns": 1e-9, "us": 1e-6, "ms": 1e-3, "min": 60.0, "h": 3600.0, "d": 86400.0},
-    **dict.fromkeys(("vehicle", "kind"), {}),
+    "vehicle": {},
+    "kind": {},
     **dict.fromkeys(("lat", "lon"), DEGREES),
     **dict.fromkeys(("x", "y"), PLACES),
     **dict.fromkeys(("length", "width"), SIZES),
@@ -84,16 +85,14 @@ class Column:
     minutes: bool = False
 
 
-def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Column]:
-    """Return the column of each quantity: as the parameter `columns` says, else by name.
+def named(header: Sequence[str], path: Path, option: str) -> dict[str, Column | None]:
+    """Return the columns that the parameter `columns` names, None of quantities that are not to be read.
 
     Raises:
-        InputError: a required column is missing, or the parameter names a column that is not there.
+        InputError: it names a column that is not there, or a unit or quantity that is not known.
     """
-    names = {normal(name): name for name in header}
-    spelled = {name.strip().lower(): name for name in header} | names  # as it stands in the file, or as its alias
-    columns: dict[str, Column] = {}
-    without: set[str] = set()
+    spelled = {name.strip().lower(): name for name in header} | {normal(name): name for name in header}
+    columns: dict[str, Column | None] = {}
     for part in listed(option):
         quantity, _, name = (p.strip() for p in part.partition("="))
         if quantity == "point":
@@ -101,18 +100,31 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
         if quantity not in NAMES:
             raise InputError(f"parameter columns: write quantity=column, …; {quantity!r} is none of {', '.join(NAMES)}, point")
         if name == "none":
-            without.add(quantity)
+            columns[quantity] = None
             continue
         flipped = name.startswith("-") and name.lower() not in spelled
-        column_name, unit = name[flipped:].strip(), ""
-        if column_name.lower() not in spelled and ":" in column_name:
-            column_name, _, unit = (p.strip() for p in column_name.rpartition(":"))
-        if column_name.lower() not in spelled:
-            raise InputError(f"{path} has no column {name!r} (asked for as {quantity}); it has {', '.join(names.values())}")
+        own, unit = name[flipped:].strip(), ""
+        if own.lower() not in spelled and ":" in own:
+            own, _, unit = (p.strip() for p in own.rpartition(":"))
+        if own.lower() not in spelled:
+            raise InputError(f"{path} has no column {name!r} (asked for as {quantity}); it has {', '.join(header)}")
         if unit and unit not in UNITS[quantity] and not (quantity == "time" and FRAMES.fullmatch(unit)):
             raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
-        column = as_column(quantity, spelled[column_name.lower()], unit)
+        column = as_column(quantity, spelled[own.lower()], unit)
         columns[quantity] = replace(column, factor=-column.factor) if flipped else column
+    return columns
+
+
+def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Column]:
+    """Return the column of each quantity: as the parameter `columns` says, else by name.
+
+    Raises:
+        InputError: a required column is missing, or the parameter names a column that is not there.
+    """
+    names = {normal(name): name for name in header}
+    asked = named(header, path, option)
+    columns = {quantity: column for quantity, column in asked.items() if column is not None}
+    without = asked.keys() - columns.keys()
     if NGSIM["x"][0] in names and NGSIM["speed"][0] in names:
         for quantity, (name, unit) in NGSIM.items():
             if name in names and quantity not in without:

@@ -28,7 +28,7 @@ class LogConfig(Parameters):
     )
     columns: str = parameter(
         "",
-        "columns of a table, e.g. vehicle=who,speed=v:kmh; y=-y flips an axis; point=front, rear or rear_axle: what x, y is of",
+        "columns of a table, e.g. vehicle=who,speed=v:kmh; y=-y flips an axis; point=front, rear or rear_axle of a vehicle",
     )
     topics: str = parameter("", "topics of a bag to read, separated by commas; empty: all that can be used")
     vehicles: str = parameter("", "vehicles to keep, separated by commas; empty: all")
