@@ -137,7 +137,7 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
         raise InputError(
             f"{log.segments[0].label} holds no usable position among {log.rows} rows"
             + (f" ({causes})" if causes else "")
-            + ("; lat and lon may be swapped: --set log.columns=lat=…,lon=…" if log.geographic else "")
+            + looks_like(log)
             + "; check the columns and their units, or name them with --set log.columns=…"
         )
     first, last = min(int(s.min()) for s in stamps), max(int(s.max()) for s in stamps)
@@ -146,6 +146,24 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
     if config.start * 1e9 > last - first:
         raise InputError(f"parameter start is {config.start:g} s, but {log.name} is only {(last - first) * 1e-9:.1f} s long")
     return first + round(config.start * 1e9), first + round(config.end * 1e9) if config.end else last
+
+
+def looks_like(log: RawLog) -> str:
+    """Return what positions of which none can be used look like, "" if like nothing that is known."""
+    fix = np.concatenate([vehicle.fix for vehicle in log.vehicles] or [np.zeros((0, 2))])
+    fix = np.abs(fix[np.isfinite(fix).all(axis=1)])
+    if not log.geographic:
+        return ""
+    if not len(fix):
+        return "; the receivers had no fix, or the fields are empty"
+    latitude, longitude = np.median(fix, axis=0)
+    for unit, what, whole in (
+        ("ddmm", "degrees and minutes, as of NMEA", (9_000.0, 18_000.0)),
+        ("e7", "1e-7 degrees", (9e8, 1.8e9)),
+    ):
+        if max(latitude, longitude / 2.0) > 90.0 and latitude <= whole[0] and longitude <= whole[1]:
+            return f"; they look like {what}: --set log.columns=lat=…:{unit},lon=…:{unit}"
+    return "; lat and lon may be swapped: --set log.columns=lat=…,lon=…" if longitude <= 90.0 and latitude <= 180.0 else ""
 
 
 def within(vehicle: Observations, first: int, last: int) -> Observations:

@@ -16,6 +16,7 @@ SHARE = 75.0  # per cent of the headings that are no farther off: one vehicle of
 FITS = np.radians(5.0)  # so far off are headings that fit
 NEAR = 0.03  # of a ratio of speeds
 DIFFERS = 1.2  # a ratio of speeds, or its inverse, that is no error of a sensor
+ENOUGH = 5  # samples of a moving vehicle
 DRIVEN_M = 2.0  # by its measured speeds or its positions: less does not tell a ratio
 RATIOS = {  # of measured speeds to those of the positions, and what makes them
     **{"km/h (name the column speed_kmh)": 3.6, "mph (speed_mph)": 1 / 0.44704, "ft/s (speed_fps)": 1 / 0.3048},
@@ -35,7 +36,7 @@ def remarks_on_units(pieces: Sequence[Piece], origin_ns: int, config: LogConfig)
         config: names the clock's period.
     """
     recorded, along = [np.zeros(0)], [np.zeros(0)]
-    driven: dict[str, Floats] = {}  # of each vehicle: by its speeds; by its positions, and those with the axes swapped
+    driven: dict[str, Floats] = {}  # (T, 3) of each vehicle: by its speeds; by its positions, and those with the axes swapped
     for piece in pieces:
         ticks = (piece.smooth.first + np.arange(len(piece.smooth.speed))) * config.period
         seconds = (piece.track.fix_ns - origin_ns) * 1e-9
@@ -46,11 +47,15 @@ def remarks_on_units(pieces: Sequence[Piece], origin_ns: int, config: LogConfig)
         stamps = (piece.track.speed_ns - origin_ns) * 1e-9
         if len(stamps) > 1:
             step = np.diff(piece.smooth.position, axis=0)
-            measured = float(np.interp(ticks, stamps, piece.track.speed)[1:].sum()) * config.period
-            metres = measured, float(np.hypot(*step.T).sum()), float(np.hypot(*(step * _swapped(piece.track.origin)).T).sum())
-            driven[piece.track.id] = driven.get(piece.track.id, np.zeros(3)) + metres
+            own = np.column_stack([np.interp(ticks, stamps, piece.track.speed)[1:] * config.period, np.hypot(*step.T)])
+            rolls = own[:, 1] > MOVES * config.period  # else all of it: its speeds may be wrong by so much that it never does
+            own = np.column_stack([own, np.hypot(*(step * _swapped(piece.track.origin)).T)])
+            own = own[rolls] if rolls.sum() >= ENOUGH else own
+            driven[piece.track.id] = np.concatenate([driven.get(piece.track.id, np.zeros((0, 3))), own])
     geographic = any(piece.track.origin for piece in pieces)
-    totals = np.array([metres for metres in driven.values() if metres[:2].max() > DRIVEN_M]).reshape(-1, 3)
+    sums = {name: own.sum(axis=0) for name, own in driven.items()}
+    middle = {name: np.median(own[:, 0] / np.maximum(own[:, 1], 1e-6)) for name, own in driven.items()}
+    totals = np.array([(*total, middle[name]) for name, total in sums.items() if total[:2].max() > DRIVEN_M]).reshape(-1, 4)
     found = (_of_headings(np.concatenate(recorded), np.concatenate(along), geographic=geographic), _of_speeds(totals, geographic))
     return tuple(sentence for sentence in found if sentence)
 
@@ -88,10 +93,11 @@ def _of_speeds(totals: Floats, geographic: bool) -> str:
     """Return a sentence on measured speeds; "" if they fit.
 
     Args:
-        totals: (V, 3) metres driven by each vehicle: by its speeds, by its positions, and by these with the axes swapped.
+        totals: (V, 4) metres driven by each vehicle: by its speeds, by its positions, and by these with the axes swapped; and
+            the median ratio of its speeds to those of the positions.
         geographic: whether positions were latitudes and longitudes.
     """
-    ratios = totals[:, 0] / np.maximum(totals[:, 1], 1e-3)
+    ratios = totals[:, 3]
     off = np.maximum(ratios, 1.0 / np.maximum(ratios, 1e-9))
     if not len(totals) or (off > DIFFERS).sum() < len(totals) / 2.0:
         return ""
