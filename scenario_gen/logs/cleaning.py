@@ -161,9 +161,9 @@ def looks_like(log: RawLog) -> str:
         ("ddmm", "degrees and minutes, as of NMEA", (9_000.0, 18_000.0)),
         ("e7", "1e-7 degrees", (9e8, 1.8e9)),
     ):
-        if max(latitude, longitude / 2.0) > 90.0 and latitude <= whole[0] and longitude <= whole[1]:
+        if max(latitude, longitude) > 180.0 and latitude <= whole[0] and longitude <= whole[1]:
             return f"; they look like {what}: --set log.columns=lat=…:{unit},lon=…:{unit}"
-    return "; lat and lon may be swapped: --set log.columns=lat=…,lon=…" if longitude <= 90.0 and latitude <= 180.0 else ""
+    return "; lat and lon may be swapped: --set log.columns=lat=…,lon=…" if 90.0 < latitude <= 180.0 else ""
 
 
 def within(vehicle: Observations, first: int, last: int) -> Observations:

@@ -18,7 +18,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, needs, reading
 from scenario_gen.base.registry import Registry
-from scenario_gen.base.stores import local
+from scenario_gen.base.stores import local, renamed
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
@@ -28,6 +28,7 @@ from scenario_gen.logs.encounters import Piece, pieces_of
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
 from scenario_gen.logs.groups import distances, driven, find_groups, ticks
 from scenario_gen.logs.growing import Group, Meeting
+from scenario_gen.logs.packed import unpacked, without_packing
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
@@ -332,8 +333,8 @@ def is_spmd(path: Path) -> bool:
 
 
 def is_table(path: Path) -> bool:
-    """Return whether the name is that of a table."""
-    return path.suffix.lower() in TABLES
+    """Return whether the name is that of a table, also of a packed one."""
+    return without_packing(path).suffix.lower() in TABLES
 
 
 def is_known(path: Path, name: str) -> bool:
@@ -406,14 +407,22 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
         InputError: nothing is there, no reader accepts it, or the one that does cannot read it.
     """
     with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
-        files = [file for path in paths for file in present(path)]
+        found = [file for path in paths for file in present(path)]
+    with unpacked(found, config) as files:
+        log = _read_files([file for path in files for file in present(path)], config)
+        return replace(log, segments=tuple(replace(one, label=renamed(one.label)) for one in log.segments))
+
+
+def _read_files(files: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read one log from files as `read_raw` does."""
+    with guarded(str(files[0]), OSError):
         if config.format == "auto":
             known = next((known for known in FORMATS.values() if all(map(known.accepts, files))), None)
         else:
             known = FORMATS[config.format]
     if known is None:
         raise InputError(
-            f"{paths[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
+            f"{files[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
             "CommonRoad scenarios, scenes of Nocturne and GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3, .bag. "
             "If its name misleads: --set log.format=table"
         )
@@ -439,4 +448,5 @@ def present(path: Path) -> list[Path]:
         raise InputError(f"{path} is empty (0 bytes); copy it again")
     if path.is_file() or is_bag(path):
         return [path]
-    return sorted(file for file in path.iterdir() if is_table(file) and file.stat().st_size) or [path]
+    tables = {file for file in path.iterdir() if is_table(file) and file.stat().st_size}
+    return sorted(file for file in tables if without_packing(file) == file or without_packing(file) not in tables) or [path]

@@ -48,16 +48,21 @@ def remarks_on_units(pieces: Sequence[Piece], origin_ns: int, config: LogConfig)
         if len(stamps) > 1:
             step = np.diff(piece.smooth.position, axis=0)
             own = np.column_stack([np.interp(ticks, stamps, piece.track.speed)[1:] * config.period, np.hypot(*step.T)])
-            rolls = own[:, 1] > MOVES * config.period  # else all of it: its speeds may be wrong by so much that it never does
             own = np.column_stack([own, np.hypot(*(step * _swapped(piece.track.origin)).T)])
-            own = own[rolls] if rolls.sum() >= ENOUGH else own
             driven[piece.track.id] = np.concatenate([driven.get(piece.track.id, np.zeros((0, 3))), own])
     geographic = any(piece.track.origin for piece in pieces)
-    sums = {name: own.sum(axis=0) for name, own in driven.items()}
-    middle = {name: np.median(own[:, 0] / np.maximum(own[:, 1], 1e-6)) for name, own in driven.items()}
-    totals = np.array([(*total, middle[name]) for name, total in sums.items() if total[:2].max() > DRIVEN_M]).reshape(-1, 4)
+    least = MOVES * config.period
+    totals = np.array([_totals(own, least) for own in driven.values() if own.sum(axis=0)[:2].max() > DRIVEN_M]).reshape(-1, 4)
     found = (_of_headings(np.concatenate(recorded), np.concatenate(along), geographic=geographic), _of_speeds(totals, geographic))
     return tuple(sentence for sentence in found if sentence)
+
+
+def _totals(steps: Floats, least: float) -> list[float]:
+    """Return the sums of steps (T, 3) [m], and the median ratio of the first to the second where that is above `least`."""
+    rolls = steps[steps[:, 1] > least]
+    by_speed, by_place, swapped = steps.sum(axis=0)
+    ratio = np.median(rolls[:, 0] / rolls[:, 1]) if len(rolls) >= ENOUGH else by_speed / max(by_place, 1e-3)
+    return [by_speed, by_place, swapped, float(ratio)]
 
 
 def _swapped(origin: tuple[float, float] | None) -> Floats:
@@ -101,16 +106,19 @@ def _of_speeds(totals: Floats, geographic: bool) -> str:
     off = np.maximum(ratios, 1.0 / np.maximum(ratios, 1e-9))
     if not len(totals) or (off > DIFFERS).sum() < len(totals) / 2.0:
         return ""
-    ratio = float(np.median(ratios))
+    whole = totals[:, 0] / np.maximum(totals[:, 1], 1e-3)
+    far, unit, ratio = min(_nearest(float(np.median(own)), geographic) for own in (ratios, whole))
     swapped = totals[:, 0] / np.maximum(totals[:, 2], 1e-3)
-    said = (
-        f"the recorded speeds are {ratio:.2f} times those of the positions in {(off > DIFFERS).sum()} of {len(totals)} vehicles"
-    )
+    count = f"{(off > DIFFERS).sum()} of {len(totals)} vehicles"
+    said = f"the recorded speeds are {ratio:.2f} times those of the positions in {count}"
     if geographic and (np.abs(np.log(np.maximum(swapped, 1e-9))) < 0.5 * np.log(DIFFERS)).all():
         return f"{said}; they would fit if lat and lon were swapped (log.columns=lat=LON,lon=LAT, each the other column)"
     if max(ratio, 1.0 / max(ratio, 1e-9)) <= DIFFERS:
         return ""
-    units = [
-        words for words, factor in RATIOS.items() if abs(ratio / factor - 1.0) < NEAR and not (geographic and "x, y" in words)
-    ]
-    return f"{said}; they look like {units[0]}" if units else f"{said}: check the time and the unit of x, y and of the speeds"
+    return f"{said}; they look like {unit}" if far < NEAR else f"{said}: check the time and the unit of x, y and of the speeds"
+
+
+def _nearest(ratio: float, geographic: bool) -> tuple[float, str, float]:
+    """Return how far a ratio of speeds is from one that a unit makes, as a share of it; that unit; and the ratio."""
+    units = [(abs(ratio / factor - 1.0), words) for words, factor in RATIOS.items() if not (geographic and "x, y" in words)]
+    return *min(units), ratio
