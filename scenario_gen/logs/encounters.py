@@ -12,7 +12,7 @@ from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, JUMP_SPEED, RELOCATE
 from scenario_gen.logs.config import ahead_of_point, LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
-from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
+from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing, UnreconciledError
 from scenario_gen.numerics import Bools, Floats, runs
 
 TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
@@ -60,7 +60,14 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     cuts = gaps | back | laps(track, config)
     bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
     whole = parts(track, cuts)
-    smoothed = [leaf for part in whole for leaf in steered(part, origin_ns, config)]
+    smoothed: list[tuple[Observations, Smooth | None]] = []
+    lost = 0.0
+    for part in whole:
+        try:
+            smoothed += steered(part, origin_ns, config)
+        except UnreconciledError:
+            smoothed.append((part, None))
+            lost += float(part.fix_ns[-1] - part.fix_ns[0]) * 1e-9
     ahead = ahead_of_point(config) * track.length
     pieces = [Piece(part, moved_ahead(smooth, ahead) if ahead else smooth) for part, smooth in smoothed if smooth is not None]
     smooths = [piece.smooth for piece in pieces]
@@ -91,6 +98,7 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
         noise=max((smooth.noise for smooth in smooths), default=np.nan),
         turned=float(np.median(turned)) if len(turned) else np.nan,
         headings=float(used.mean()) if len(used) else np.nan,
+        lost=lost,
     )
     return pieces, quality
 

@@ -99,12 +99,11 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     pieces: list[Piece] = []
     vehicles = []
     for track in tracks:
-        try:
-            own, quality = pieces_of(track, origin_ns, config)
-        except InputError as error:
-            raise InputError(f"{log.segments[0].label}, vehicle {track.id}: {error}") from error
+        own, quality = pieces_of(track, origin_ns, config)
         pieces += own
         vehicles.append(quality)
+    if not pieces and any(vehicle.lost for vehicle in vehicles):
+        raise InputError(f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units")
     groups, remarks = find_groups(pieces, config)
     notes += remarks
     if not groups:
@@ -167,6 +166,9 @@ def notes_on_vehicles(
         notes = [f"vehicle {v.id} is in no encounter; it was recorded for {v.seconds:.1f} s" for v in left]
     if without_positions:
         notes.append(f"fewer than two usable positions: vehicle {', '.join(without_positions)}")
+    notes += [
+        f"vehicle {v.id}: {v.lost:.1f} s are left out, for no motion of a car fits its positions" for v in vehicles if v.lost
+    ]
     return (*notes, *(f"vehicle {name}: its measured speeds contradict its positions and are not used" for name in doubted))
 
 
