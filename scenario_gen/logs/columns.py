@@ -11,6 +11,7 @@ import re
 
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.logs.config import listed
+from scenario_gen.logs.raw import UnknownFormatError
 
 # Column names of each quantity, the preferred first. Clocks that all files share come before those that start with the file.
 NAMES: dict[str, tuple[str, ...]] = {
@@ -182,7 +183,7 @@ def complete(columns: dict[str, Column], path: Path, names: dict[str, str]) -> d
         what, remedy, quantities = missing
         aliases = {alias for quantity in quantities if quantity not in columns for alias in NAMES[quantity]}
         near = nearest(names.values(), aliases)
-        raise InputError(
+        raise UnknownFormatError(
             f"{path} has no column for {what}; it has {', '.join(names.values())}. "
             f"Rename it, or name it with --set log.columns={remedy}{near}"
         )

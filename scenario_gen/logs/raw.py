@@ -18,6 +18,10 @@ from scenario_gen.types import Encounter
 LONGEST_HEADER = 65_536  # characters of a table's first line
 
 
+class UnknownFormatError(InputError):
+    """A file is of no format of logs, or has not the columns of one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Observations:
     """Observations of one vehicle, in the order of the log; values may still be NaN, stamps unordered.

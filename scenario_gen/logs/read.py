@@ -30,7 +30,7 @@ from scenario_gen.logs.groups import distances, driven, find_groups, ticks
 from scenario_gen.logs.growing import Group, Meeting
 from scenario_gen.logs.packed import unpacked, without_packing
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
-from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
+from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog, UnknownFormatError
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.logs.units import remarks_on_units
 from scenario_gen.numerics import runs
@@ -41,6 +41,7 @@ MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
 OSI = (b"net.asam.osi", b"osi3.", b"ground_truth")  # what is near the beginning or the end of a trace of OSI
 NEAR = 65_536  # bytes
 FAR_M = 200_000.0  # from an origin that is given: there distances are 0.02 % too long
+BSM_ENDINGS = (".json", ".jsonl", ".ndjson", ".txt")
 MUCH = 0.02  # of the rows: if more are left out, people are told at once
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
 
@@ -76,15 +77,15 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
 
 
 class NoEncounterError(InputError):
-    """A log can be read and holds no encounter; the message says how near to one it comes."""
+    """A log can be read and holds no encounter, or one vehicle alone; the message says how near to one it comes."""
 
 
 def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     """Cut a raw log, from files or streams, into encounters, as `read_log` does.
 
     Raises:
-        NoEncounterError: there is no encounter in it; the message says why.
-        InputError: fewer than two vehicles have usable positions.
+        NoEncounterError: there is no encounter in it, or one vehicle alone; the message says why.
+        InputError: the log cannot be used.
     """
     if log.encounters:
         return as_recorded(log, config)
@@ -92,7 +93,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     tracks, drops = clean(log, config)
     notes = (*notes, *drops.notes, *notes_on_drops(log, drops))
     if len({track.id for track in tracks}) < 2:
-        raise InputError(explain_few_vehicles(log, [track.id for track in tracks], drops))
+        raise NoEncounterError(explain_few_vehicles(log, [track.id for track in tracks], drops))
     tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
     dt_ns = round(config.period * 1e9)
     origin_ns = min(int(track.fix_ns[0]) for track in tracks) // dt_ns * dt_ns
@@ -334,6 +335,22 @@ def is_spmd(path: Path) -> bool:
         return False
 
 
+def is_bsm(path: Path) -> bool:
+    """Return whether a file is of basic safety messages in JSON, by its name and beginning."""
+    return path.suffix.lower() in BSM_ENDINGS and path.is_file() and b'"coreData"' in beginning(path)
+
+
+def is_fcd(path: Path) -> bool:
+    """Return whether a file is floating-car data of SUMO, by its name and beginning."""
+    return path.suffix.lower() == ".xml" and path.is_file() and b"<fcd-export" in beginning(path)
+
+
+def beginning(path: Path) -> bytes:
+    """Return the first bytes of a file."""
+    with path.open("rb") as file:
+        return file.read(NEAR)
+
+
 def is_table(path: Path) -> bool:
     """Return whether the name is that of a table, also of a packed one."""
     return without_packing(path).suffix.lower() in TABLES
@@ -389,6 +406,8 @@ FORMATS = Registry[LogFormat](
         "osi": LogFormat(is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))),
         "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
         "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
+        "bsm": LogFormat(is_bsm, late("adapters.bsm")),
+        "fcd": LogFormat(is_fcd, late("adapters.fcd")),
         "nocturne": LogFormat(is_nocturne, late("adapters.nocturne")),
         "spmd": LogFormat(is_spmd, late("tables", spmd=True)),
         **{
@@ -423,9 +442,10 @@ def _read_files(files: Sequence[Path], config: LogConfig) -> RawLog:
         else:
             known = FORMATS[config.format]
     if known is None:
-        raise InputError(
+        raise UnknownFormatError(
             f"{files[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad scenarios, scenes of Nocturne and GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3, .bag. "
+            "CommonRoad scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and GPUDrive (.json), "
+            "rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
             "If its name misleads: --set log.format=table"
         )
     with reading(files[0]):

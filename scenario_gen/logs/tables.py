@@ -96,7 +96,7 @@ def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -
         layout = layout_of(path)
         notes += layout.notes
         form = {"encoding": layout.encoding, "sep": layout.separator, "decimal": layout.decimal, "skiprows": layout.above}
-        header = [str(name) for name in read_text(path, before, config, **form, nrows=1).columns]
+        header = [str(name) for name in read_text(path, before, config, **form, nrows=0).columns]
         columns = find_columns(header, path, config.columns)
         texts = {columns[quantity].name: object for quantity in ("vehicle", "kind") if quantity in columns}
         frame = read_text(path, before, config, **form, dtype=texts)  # a number of 64 bits, or in hexadecimal, is no float64
@@ -151,7 +151,7 @@ def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.
         except UnicodeDecodeError as error:
             raise InputError(f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
     check_size(str(path), 0, before + len(frame), config)
-    if frame.empty:
+    if frame.empty and options.get("nrows") != 0:
         raise InputError(f"{path} has a header but no rows")
     if not isinstance(frame.index, pd.RangeIndex):
         raise InputError(f"{path}: the rows have more fields than the header; name every column, and write 0.5, not 0,5")
