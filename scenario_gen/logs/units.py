@@ -107,7 +107,8 @@ def _of_speeds(totals: Floats, geographic: bool) -> str:
     if not len(totals) or (off > DIFFERS).sum() < len(totals) / 2.0:
         return ""
     whole = totals[:, 0] / np.maximum(totals[:, 1], 1e-3)
-    far, unit, ratio = min(_nearest(float(np.median(own)), geographic) for own in (ratios, whole))
+    all_in_all = totals[:, 0].sum() / max(totals[:, 1].sum(), 1e-3)
+    far, unit, ratio = min(_nearest(float(own), geographic) for own in (np.median(ratios), np.median(whole), all_in_all))
     swapped = totals[:, 0] / np.maximum(totals[:, 2], 1e-3)
     count = f"{(off > DIFFERS).sum()} of {len(totals)} vehicles"
     said = f"the recorded speeds are {ratio:.2f} times those of the positions in {count}"
