@@ -79,7 +79,7 @@ def _is_hidden(name: str) -> bool:
     return any(part.startswith((".", "__MACOSX")) for part in name.split("/"))
 
 
-def _copy(source: IO[bytes], target: Path, room: int) -> int:
+def _copy(source: IO[bytes] | gzip.GzipFile, target: Path, room: int) -> int:
     """Copy bytes, at most one more than there is room for; return how many."""
     with target.open("wb") as file:
         left = room + 1

@@ -194,6 +194,7 @@ REFUSED = {
         lambda rows: rows.rename(columns={"vehicle_id": "tracker"}).assign(id=range(len(rows))),
         "--set log.columns=vehicle=tracker",
     ),
+    "hours": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0), "the time may be in h: --set log.columns=time="),
     "degrees and minutes": (nmea, "lat=…:ddmm"),
     "1e-7 degrees": (lambda rows: geographic(rows).assign(lat_deg=4.8e8, lon_deg=1.1e8), "lat=…:e7"),
     "a pedestrian": (lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "pedestrian"})), "1 × pedestrian"),

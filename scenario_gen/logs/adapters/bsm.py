@@ -110,7 +110,7 @@ def _seconds(generated: str, mark: Any) -> float:
     date = pd.to_datetime(re.sub(r"\s*\[.*", "", generated), utc=True, errors="coerce")
     if pd.isna(date):
         return math.nan
-    milliseconds = date.value // 1_000_000
+    milliseconds = int(date.value) // 1_000_000
     if mark is not None and 0 <= int(mark) < 61_000:
         off = (int(mark) - milliseconds) % MINUTE_MS
         milliseconds += off - MINUTE_MS * (off > MINUTE_MS / 2)
