@@ -108,7 +108,8 @@ def _of_speeds(totals: Floats, geographic: bool) -> str:
         return ""
     whole = totals[:, 0] / np.maximum(totals[:, 1], 1e-3)
     all_in_all = totals[:, 0].sum() / max(totals[:, 1].sum(), 1e-3)
-    far, unit, ratio = min(_nearest(float(own), geographic) for own in (np.median(ratios), np.median(whole), all_in_all))
+    known = [_nearest(float(own), geographic) for own in (np.median(ratios), all_in_all, np.median(whole))]
+    far, unit, ratio = next((one for one in known if one[0] < NEAR), known[0])
     swapped = totals[:, 0] / np.maximum(totals[:, 2], 1e-3)
     count = f"{(off > DIFFERS).sum()} of {len(totals)} vehicles"
     said = f"the recorded speeds are {ratio:.2f} times those of the positions in {count}"
