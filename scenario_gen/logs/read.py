@@ -140,7 +140,17 @@ def notes_on_drops(log: RawLog, drops: Drops) -> tuple[str, ...]:
     """Return a note if more than `MUCH` of the rows were left out, with the causes."""
     if sum(drops.count.values()) <= MUCH * log.rows:
         return ()
-    return (f"of {log.rows} rows there are left out, or sorted: {'; '.join(map(str, drops.of(log)))}",)
+    return (f"of {log.rows} rows there are left out, or sorted: {'; '.join(map(str, drops.of(log)))}{advice(log, drops)}",)
+
+
+def advice(log: RawLog, drops: Drops) -> str:
+    """Return what to check if most rows were left out for one reason."""
+    units = {
+        "speed is above": "the unit of the speeds (speed=…:kmh, …:cmps)",
+        "position jumps": "the unit of x, y (x=…:cm,y=…:cm)",
+    }
+    checks = [words for why, words in units.items() if any(n > 0.3 * log.rows for own, n in drops.count.items() if why in own)]
+    return f": check {' and '.join(checks)} with --set log.columns=…" if checks else ""
 
 
 def notes_on_origin(tracks: Sequence[Observations], config: LogConfig) -> tuple[str, ...]:
@@ -264,7 +274,7 @@ def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
     return (
         f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock. "
         "Give the files of all vehicles in one command, or check --set log.columns=… and log.vehicles=…"
-        + (f". Left out: {causes}" if causes else "")
+        + (f". Left out: {causes}{advice(log, drops)}" if causes else "")
     )
 
 
