@@ -12,14 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.numerics import Floats, runs
-from scenario_gen.template import conflict_of, lag_behind, Motion, time_gaps
+from scenario_gen.template import conflict_of, departure, lane_gaps, Motion, passing, time_gaps
 from scenario_gen.types import Reaction
 
-EARLY = 0.5  # s, by which a yielder leaves before the other has cleared
+EARLY, _ROUNDED = 0.5, 0.15  # s, by which a yielder leaves, and enters, before the other has cleared
 _BRAKES, _LOSES = 0.6, 1.5  # m/s², m/s
 _NEAR, _AHEAD = 12.0, 3.0  # m, s
 _BENDS = 0.8  # m/s² sideways
-_PATH = 4.0  # m, within which two paths meet
+_PATH = 2.2  # m, within which two paths meet: nearer than lanes lie beside each other
+_TAILGATES, _FOR = 0.3, 0.05  # s bumper to bumper, and share of the time below it
+LONG_ENOUGH = 2.0  # s in one lane
 _START = 1.0  # s
 _LONGEST_LAG = 4.0  # s
 
@@ -59,7 +61,7 @@ def following(edge: Reaction, template: Motion, scenarios: Sequence[Motion]) -> 
     leader, own = (speeds - speeds.mean(axis=0)).T
     square = float(np.square(leader).sum())
     slope = float((leader * own).sum()) / square if square > 1e-6 * len(leader) else np.nan
-    middles = [float(np.median(gaps)) for one in scenarios if len(gaps := time_gaps(one, edge.who, edge.whom))]
+    middles = [float(np.median(gaps)) for one in scenarios if len(gaps := time_gaps(one, edge.who, edge.whom)) > 0]
     base = time_gaps(template, edge.who, edge.whom)
     relative = np.array(middles) / float(np.median(base)) if middles and len(base) else np.array([np.nan])
     low, high = np.percentile(relative, (10, 90)).tolist()
@@ -67,17 +69,39 @@ def following(edge: Reaction, template: Motion, scenarios: Sequence[Motion]) -> 
     return Following(edge, slope, (low, high), lag, 1.0 - explained)
 
 
+def shared(motion: Motion) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Return (who, whom) of all who drive behind another in its lane for two seconds, and of all who meet otherwise."""
+    step = float(motion.time[1] - motion.time[0])
+    lanes = [pair for pair, (speed, _) in lane_gaps(motion).items() if len(speed) * step >= LONG_ENOUGH]
+    meet = [conflict_of(motion, a, b) for b in range(len(motion.vehicles)) for a in range(b)]
+    others = [(one.second, one.first) for one in meet if one is not None]
+    return lanes, [(who, whom) for who, whom in others if (who, whom) not in lanes and (whom, who) not in lanes]
+
+
+def tailgates(motion: Motion, who: int, whom: int) -> bool:
+    """Whether one drives 5 % of its time nearer to another one than 0.3 s, bumper to bumper."""
+    gaps = time_gaps(motion, who, whom)
+    return len(gaps) > 0 and float(np.mean(gaps < _TAILGATES)) >= _FOR
+
+
 def yielding(edge: Reaction, scenarios: Sequence[Motion]) -> Yielding:
-    """Measure a yielding edge over a set; a scenario in which the two do not meet, or in the other order, counts as early."""
-    lags = []
+    """Measure a yielding edge over a set; a scenario in which the two do not meet, or in the other order, counts as early.
+
+    The lag is that of the departure behind the clearing, or, of one that does not stand, of its entry.
+    """
+    lags, early = [], []
     for one in scenarios:
         conflict = conflict_of(one, edge.who, edge.whom)
-        lags.append(-np.inf if conflict is None or conflict.second != edge.who else lag_behind(one, conflict))
-    known = np.array([lag for lag in lags if np.isfinite(lag)])
-    early = float(np.mean([lag < -EARLY for lag in lags])) if lags else np.nan
-    if len(known) < 2:
-        return Yielding(edge, early, np.nan, np.nan)
-    return Yielding(edge, early, float(known.mean()), float(known.std()))
+        if conflict is None or conflict.second != edge.who:
+            early.append(True)
+            continue
+        clears, enters = passing(one, conflict, merges=edge.merges)
+        lags.append((departure(one, edge.who, enters) if edge.stands else enters) - clears)
+        early.append(enters - clears < min(edge.gap, 0.0) - _ROUNDED or (edge.stands and lags[-1] < min(edge.lag, 0.0) - EARLY))
+    share = float(np.mean(early)) if early else np.nan
+    if len(lags) < 2:
+        return Yielding(edge, share, np.nan, np.nan)
+    return Yielding(edge, share, float(np.mean(lags)), float(np.std(lags)))
 
 
 def braking(motion: Motion, who: int) -> list[int]:

@@ -17,11 +17,13 @@ from ompl import base, geometric, util
 
 from benchmarks._planning_maps import road_of
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import Budget
 from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
-from scenario_gen.method.routing.search.sweep import curve_length, SWEEP
+from scenario_gen.method.routing.search.steering import curve_cost
+from scenario_gen.method.routing.search.sweep import car_scene
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.clearance import blocked_before, clearance_in_cells, footprint_fits, to_cells
+from scenario_gen.roads.clearance import footprint_fits, to_cells
 from scenario_gen.roads.obstacles import Obstacle, with_obstacles
 from scenario_gen.types.road import Road
 
@@ -70,10 +72,8 @@ def rrt_connect(case: Obstructed, seconds: float, reach: float = REACH, *, simpl
     util.setLogLevel(util.LOG_NONE)
     started = process_time()
     road, query = case.road, case.query
-    clearance, blocked, cell = clearance_in_cells(road), blocked_before(road), road.resolution
-    radius = 1.0 / (query.curvature * cell)
-    shape = (0.5 * query.length / cell, 0.5 * query.width / cell, SWEEP / cell)
-    space = base.DubinsStateSpace(radius)
+    scene, cell = car_scene(road, (query.length, query.width), query.curvature), road.resolution
+    space = base.DubinsStateSpace(scene.body.turn)
     bounds = base.RealVectorBounds(2)
     for axis, extent in enumerate(road.drivable.shape[::-1]):
         bounds.setLow(axis, 0.0)
@@ -82,8 +82,7 @@ def rrt_connect(case: Obstructed, seconds: float, reach: float = REACH, *, simpl
     information = base.SpaceInformation(space)
 
     def free(a: Any, b: Any) -> bool:
-        x, y, yaw = a.getX(), a.getY(), a.getYaw()
-        return curve_length(clearance, blocked, x, y, yaw, b.getX(), b.getY(), b.getYaw(), radius, *shape) < np.inf
+        return curve_cost(Pose(a.getX(), a.getY(), a.getYaw()), Pose(b.getX(), b.getY(), b.getYaw()), scene) < np.inf
 
     def valid(_: Any) -> bool:
         return True  # the sweep of a motion says so of all its poses
@@ -125,12 +124,8 @@ def rrt_connect(case: Obstructed, seconds: float, reach: float = REACH, *, simpl
 def dubins_length(case: Obstructed, path: Floats) -> float:
     """Length [m] of a chain of Dubins curves (P, 3) in cells, infinity if it is not free: judged by the same sweep for all."""
     road, query = case.road, case.query
-    cell = road.resolution
-    shape = (1.0 / (query.curvature * cell), 0.5 * query.length / cell, 0.5 * query.width / cell, SWEEP / cell)
-    clearance, blocked = clearance_in_cells(road), blocked_before(road)
-    return cell * float(
-        np.sum([curve_length(clearance, blocked, *(float(v) for v in (*a, *b, *shape))) for a, b in pairwise(path)])
-    )
+    scene = car_scene(road, (query.length, query.width), query.curvature)
+    return road.resolution * float(np.sum([curve_cost(Pose(*a), Pose(*b), scene) for a, b in pairwise(path.tolist())]))
 
 
 def first_path(case: Obstructed, seconds: float, seed: int) -> tuple[float, float] | None:

@@ -43,15 +43,12 @@ CONCEPTS = {
     "gap of two motions in space and time": ("logs/gap.py", r"def \w*space_time_gap\("),
     "growing of groups": ("logs/growing.py", r"class Growth\b|def \w*grow_groups?\("),
     "least squares of a placement": ("template/starts.py", r"def \w*(?:least_squares|solve_starts)\("),
-    "RRT*-Connect": ("method/routing/search/pose_tree.py", r"def _?cheapest_parent\("),
+    "RRT*-Connect": ("method/routing/search/growth.py", r"def _?cheapest_parent\("),
     "fit, plan, sample": ("method/chain.py", r"(?s)\A(?=.*\bfit_template\()(?=.*\bplan_routes\()"),
     "latitude and longitude": ("logs/geodesy.py", r"(?:import|from) pyproj|6_?378_?137|6_?371_?0"),
     "folders that replace others": ("base/folders/", r"renameat2|RENAME_EXCHANGE"),
     "object stores": ("base/stores.py", r"(?:import|from) fsspec"),
     "files of bags": ("bags/storage/", r"(?:import|from) (?:rosbags|mcap)\b"),
-}
-SECOND_HOMES = {  # that are there still; it may only shrink
-    "RRT*-Connect": {"method/routing/search/tree_kernels.py"},
 }
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
 
@@ -106,7 +103,7 @@ def test_every_concept_has_one_home():
         for concept, (home, pattern) in CONCEPTS.items():
             if not name.startswith(home) and re.search(pattern, text):
                 homes.setdefault(concept, set()).add(name)
-    assert not {concept: more for concept, names in homes.items() if (more := names - SECOND_HOMES.get(concept, set()))}
+    assert not homes
 
 
 def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():

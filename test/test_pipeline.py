@@ -105,7 +105,7 @@ def test_a_set_with_a_target_is_not_compared_with_sets_without_it(encounter):
 
 
 def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter, tmp_path):
-    said = "vehicle 2 slows down for vehicle 1 to pass and leaves 0.4 s after"
+    said = "vehicle 2 slows for vehicle 1 and passes 1.7 s behind it"
     config = PipelineConfig(evaluation=QUICK, sampling=SamplingConfig(reactions="none"))
     free = generate(encounter, "t_intersection", config, count=2, seed=3)
     for made, kept in ((case, True), (free, False)):
@@ -126,9 +126,9 @@ def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path
     asked = Request(starts=f"2: {x + 13.0:.2f} {y:.2f} {yaw:.3f}")
     made = generate(lane, "corridor", config, count=2, seed=3, request=asked)
     (sentence,) = [said for said in made.generated.adaptations if "reaction" in said]
-    assert sentence.startswith(f"{NOT_KEPT}: vehicle 2: drives ") and made.generated.reactions == ()
+    assert sentence.startswith(f"{NOT_KEPT}: vehicle 2: comes within ") and made.generated.reactions == ()
     page, figures = written(made, tmp_path)
     text = printed(made)
-    assert sentence in text and "1.5 s behind, and answers its speed after 1.2 s: the scenarios are not held to it" in text
+    assert sentence in text and "and answers its speed after 1.2 s: the scenarios are not held to it" in text
     assert page.count(str(escape(sentence))) > 1 and "are not held to it" in page  # beside the reaction, and in accounts
     assert figures["adaptations"] == list(made.generated.adaptations)

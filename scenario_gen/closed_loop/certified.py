@@ -20,7 +20,7 @@ from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT3
 from scenario_gen.numerics.plane import unit
-from scenario_gen.template import conflict_of, lag_behind
+from scenario_gen.template import conflict_of, passing
 from scenario_gen.types import Scenario, tokens, yielders_of
 
 CELL = 0.1  # seconds of a certified clock that are taken together
@@ -95,15 +95,15 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
 
 
 def _keep_waiting(scenario: Scenario, who: int, whom: int, order: Floats) -> None:
-    """Lower the `order` (K,) of a yielder and the one it waits for: until that one has cleared it does not leave.
+    """Lower the `order` (K,) of a yielder and the one it waits for: until that one has cleared it does not enter.
 
-    Its clock is held where that one clears, or where it leaves, if that is earlier. So its lag behind the clearing stays.
+    Its clock is held where that one clears, or where it enters, if that is earlier. So its gap behind the clearing stays.
     """
     conflict = conflict_of(scenario, who, whom)
     if conflict is None or conflict.second != who:
         return
-    cleared = conflict.exit_first
-    held = np.floor(min(cleared, cleared + lag_behind(scenario, conflict)) / CELL) * CELL
+    cleared, enters = passing(scenario, conflict, merges=conflict.following)
+    held = np.floor(min(cleared, enters) / CELL) * CELL
     before = np.arange(len(order)) * CELL < cleared
     order[before] = np.minimum(order[before], held)
 

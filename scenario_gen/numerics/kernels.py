@@ -82,19 +82,27 @@ def _record_reader(declared: Any) -> Callable[[Any], Any]:
     The same one as the last time is not looked at anew.
     """
     seen: list[tuple[Any, Any]] = [(None, None)]
+    readers = [_field_reader(kind) for kind in declared.types]
 
-    def convert(kind: Any, value: Any) -> Any:
-        if isinstance(kind, types.Array):
-            array = _reader(kind)(value)
-            return array if kind.mutable or not array.flags.writeable else sealed(array.view())
-        return _reader(kind)(value) if isinstance(kind, types.BaseTuple) else {F: float, I: int, B: bool}.get(kind, _same)(value)
-
-    def read(value: Any) -> Any:
+    def read_record(value: Any) -> Any:
         last = seen[0]  # one look: other threads have tuples of their own
         if last[0] is not value:
-            last = value, type(value)(*(convert(kind, each) for kind, each in zip(declared.types, value, strict=True)))
+            last = value, type(value)(*[read(each) for read, each in zip(readers, value, strict=True)])
             seen[0] = last
         return last[1]
+
+    return read_record
+
+
+def _field_reader(declared: Any) -> Callable[[Any], Any]:
+    """The same for a field of one."""
+    if not isinstance(declared, types.Array) or declared.mutable:
+        return {F: float, I: int, B: bool}.get(declared) or _reader(declared)
+    read_array = _reader(declared)
+
+    def read(value: Any) -> Any:
+        array = read_array(value)
+        return sealed(array.view()) if array.flags.writeable else array
 
     return read
 
@@ -152,17 +160,18 @@ def _typeof_kernel(kernel: Kernel, context: Any) -> Any:
     return typeof_impl(kernel.compile(), context)
 
 
-def kernel(*declared: Any, inline: bool = False) -> Callable[[Function], Function]:
+def kernel(*declared: Any, inline: bool = False, forced: bool = False) -> Callable[[Function], Function]:
     """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath).
 
     Args:
         declared: numba types of the positional arguments, e.g. `kernel(F2, I, OUT1)`.
         inline: a small helper called only from kernels; it takes its types from them and is compiled, and kept, with them.
+        forced: it becomes part of its caller however large it is: else a call counts the references of the arrays it is given.
     """
 
     def decorate(function: Function) -> Function:
         if inline:
-            return cast("Function", _compiler(function, no_cpython_wrapper=True))
+            return cast("Function", _compiler(function, no_cpython_wrapper=True, forceinline=forced))
         _kernels.append(Kernel(function, declared))
         return cast("Function", _kernels[-1])
 

@@ -39,7 +39,7 @@ def component_cells(road: Road, radius: float, label: int) -> tuple[Ints, Ints]:
         beside, above = inside[1:-1, dj : dj + columns], inside[di : di + rows, 1:-1]
         corner |= ~inside[di : di + rows, dj : dj + columns] & beside & above
     corner &= inside[1:-1, 1:-1]
-    return np.flatnonzero(inside[1:-1, 1:-1]), np.flatnonzero(corner)
+    return sealed(np.flatnonzero(inside[1:-1, 1:-1])), sealed(np.flatnonzero(corner))
 
 
 def component_at(road: Road, xy: Floats, radius: float) -> int:

@@ -3,7 +3,7 @@
 
 """What is about the recorded encounter on its own ground: tracks, path coordinates, stops, conflicts."""
 
-from scenario_gen.template.answers import conflict_of, lag_behind, Motion, time_gaps
+from scenario_gen.template.answers import conflict_of, departure, lag_behind, lane_gaps, Motion, passing, time_gaps
 from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine, to_frenet
 from scenario_gen.template.interaction import (
     closest_crossing,
@@ -41,11 +41,13 @@ __all__ = [
     "clean_tracks",
     "closest_crossing",
     "conflict_of",
+    "departure",
     "find_conflicts",
     "find_waits",
     "in_words",
     "keeps",
     "lag_behind",
+    "lane_gaps",
     "least_gap",
     "least_gaps",
     "main_line",
@@ -53,6 +55,7 @@ __all__ = [
     "mirrored",
     "own_paths",
     "pair_crossings",
+    "passing",
     "path_crossing",
     "reactions_of",
     "refuse_too_large",

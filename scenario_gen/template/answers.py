@@ -1,17 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How a reaction shows in a motion, recorded or generated: when a yielder leaves, how far behind its leader a follower drives."""
+"""How a reaction shows in a motion, recorded or generated: when one passes behind another, how near one drives behind another."""
 
+from itertools import permutations
 from typing import Protocol
 
 import numpy as np
+from scipy.spatial import distance
 
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
+from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template.interaction import Conflict, find_conflicts, WAIT_SPEED
-from scenario_gen.types import once_per_object, Vehicle
+from scenario_gen.types import once_per_object, together, Vehicle
 
+FAR = 60.0  # m, within which one follows
+LANE = 2.2  # m, to the side of the other's path
+ALIKE = 0.5  # rad, of two headings on one way
+_LEFT = 0.5  # m, by which one that merges keeps away from the place that the other one leaves
 SLOWEST = 2.0  # m/s, below which a time gap says nothing
 
 
@@ -83,13 +90,66 @@ def lag_behind(motion: Motion, conflict: Conflict) -> float:
     return departure(motion, conflict.second, conflict.entry_second) - conflict.exit_first
 
 
+def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float, float]:
+    """Return when [s] the first one of a conflict clears, and when the second one enters.
+
+    What they share is what both sweep; of one that merges the place where it enters, for the other one goes on before it.
+    """
+    enters = conflict.entry_second
+    if not merges:
+        return conflict.exit_first, enters
+    first, second = conflict.first, conflict.second
+    poses, place = (np.column_stack([motion.position[n], motion.heading[n]]) for n in (first, second))
+    place = np.repeat([[np.interp(enters, motion.time, column) for column in place.T]], len(poses), axis=0)
+    gap, _ = footprint_gaps(motion.vehicles[first].half, poses, motion.vehicles[second].half, place)
+    came, goes = motion.present[first].tolist()
+    near = came + np.flatnonzero(gap[came : goes + 1] < max(_LEFT, float(gap[came : goes + 1].min()) + 1e-9))
+    k, last = int(near[-1]), min(int(near[-1]) + 1, goes)
+    share = (_LEFT - gap[k]) / (gap[last] - gap[k]) if gap[last] > _LEFT > gap[k] else 0.0
+    return float(motion.time[k] + share * (motion.time[last] - motion.time[k])), enters
+
+
+def is_behind(motion: Motion, who: int, whom: int) -> Bools:
+    """(T,) whether one drives behind the other on the same way, within 60 m: where that one was, or straight behind it."""
+    a, b = motion.position[who], motion.position[whom]
+    yaw_a, yaw_b = motion.heading[who], motion.heading[whom]
+    both = np.zeros(len(a), dtype=np.bool_)
+    both[together(motion.present, who, whom)] = True
+    between = b - a
+    along, across = ahead_and_left(between, yaw_a)
+    alike = np.abs(wrap_angle(yaw_b - yaw_a)) < ALIKE
+    behind = (along > 0.0) & (np.abs(across) < LANE) & alike
+    step = max(round(0.5 / float(motion.time[1] - motion.time[0])), 1)
+    now = np.arange(len(a))
+    for mine, yaw, path, path_yaw, sign in ((a, yaw_a, b, yaw_b, -1), (b, yaw_b, a, yaw_a, 1)):
+        rows = np.arange(0, len(path), step)  # where the other was before; where this one will be
+        square = distance.cdist(mine, path[rows], "sqeuclidean")
+        nearest = np.argmin(square, axis=1)
+        near = (np.sqrt(square[now, nearest]) < LANE) & (np.abs(wrap_angle(path_yaw[rows[nearest]] - yaw)) < ALIKE)
+        behind = behind | (near & (sign * (rows[nearest] - now) > step))
+    return np.asarray(behind & both & (np.sqrt(np.square(between).sum(axis=1)) < FAR))
+
+
+def bumper_gaps(motion: Motion, who: int, whom: int) -> Floats:
+    """(T,) metres from the front bumper of one to the rear one of another that it drives behind."""
+    apart = np.sqrt(np.square(motion.position[whom] - motion.position[who]).sum(axis=1))
+    return np.asarray(apart - 0.5 * (motion.vehicles[who].length + motion.vehicles[whom].length))
+
+
+@once_per_object
+def lane_gaps(motion: Motion) -> dict[tuple[int, int], tuple[Floats, Floats]]:
+    """Return (who, whom): speeds (k,) [m/s] and gaps (k,) [m], bumper to bumper, of all who drive behind another one."""
+    found = {}
+    for who, whom in permutations(range(len(motion.vehicles)), 2):
+        alike = np.abs(wrap_angle(motion.heading[who] - motion.heading[whom])) < ALIKE
+        at = alike & is_behind(motion, who, whom) if alike.any() else alike
+        if at.any():
+            found[who, whom] = motion.speed[who, at], bumper_gaps(motion, who, whom)[at]
+    return found
+
+
 def time_gaps(motion: Motion, who: int, whom: int) -> Floats:
-    """Return the time gaps (k,) [s], centre to centre, of a vehicle that drives (2 m/s or more) behind another one."""
-    (a, b), (c, d) = motion.present[[who, whom]].tolist()
-    at = slice(max(a, c), min(b, d) + 1)
-    speed = motion.speed[who, at]
-    between = motion.position[whom, at] - motion.position[who, at]
-    along, _ = ahead_and_left(between, motion.heading[who, at])
-    apart = np.sqrt(np.square(between).sum(axis=1))
-    drives = (speed > SLOWEST) & (along > 0.5 * apart)
-    return np.asarray(apart[drives] / speed[drives])
+    """Return the time gaps (k,) [s], bumper to bumper, of a vehicle that drives (2 m/s or more) behind another one."""
+    speed, gap = lane_gaps(motion).get((who, whom), (np.zeros(0), np.zeros(0)))
+    drives = speed > SLOWEST
+    return np.asarray(gap[drives] / speed[drives])

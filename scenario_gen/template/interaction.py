@@ -114,7 +114,7 @@ def find_conflicts(
     """Return one conflict per pair of vehicles whose swept footprints intersect, ordered by pair.
 
     Between samples both position and heading are linear. Two vehicles that enter at the same instant (both are inside
-    the shared area from the start) are ordered by index, unless one follows the other.
+    the shared area from the start) are ordered along what they share of the route, else by index.
 
     Args:
         vehicles: N footprints.
@@ -333,6 +333,6 @@ def _conflict(
         return
     shared, lead = _shared_path(a, b, circles_b, half_a, half_b)
     following = shared >= FOLLOWING_LENGTHS * max(size_a[0], size_b[0])
-    a_first = lead > 0.0 if following and lead != 0.0 else entry_a <= entry_b
+    a_first = lead > 0.0 if (following or entry_a == entry_b) and lead != 0.0 else entry_a <= entry_b
     out[0], out[1], out[2] = 1.0, 1.0 if a_first else 0.0, 1.0 if following else 0.0
     out[3], out[4], out[5], out[6] = entry_a, exit_a, entry_b, exit_b

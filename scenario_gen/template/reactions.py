@@ -1,58 +1,91 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who reacts to whom in a record: followers to leaders, yielders to those who go first, and nobody where nothing is seen.
+"""Who reacts to whom in a record: followers to leaders, and those who enter a shared area second to those who go first.
 
-Every edge is a comparison of two explanations. A follower's accelerations are either its own, or in part those of its leader some
-time ago; its gap is either what two free speeds make of it, or kept. A yielder's departure is either anywhere in the record, or
-soon after the other has cleared. docs/interaction.md has the definitions.
+Need decides, and who is near another one depends on it. *Need*: had the one gone on as it drove, it would have come into the
+other's swept space within a human margin, and the record shows that it did not. *Closeness*: it drives in the other's lane, or
+passes behind it, within a few seconds. How alike the motions are says how late and how strongly one answers, and beyond that
+closeness alone whether it does. docs/interaction.md has the definitions.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
 import math
 
 import numpy as np
 from scipy import ndimage
 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.template.answers import SLOWEST, time_gaps
-from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits
+from scenario_gen.numerics.boxes import footprint_gaps
+from scenario_gen.template.answers import ALIKE, bumper_gaps, is_behind, LANE, passing, SLOWEST
+from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, WAIT_SPEED
+from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, ReactionGraph, YIELD
 
-FAR = 60.0  # m, within which one follows
-LONG_ENOUGH = 3.0  # s, for which it drives behind the other
+LONG_ENOUGH = 2.0  # s, for which one drives behind another
 LAGS = 0.3, 3.0  # s, between which a follower answers
 SURE = 0.3  # confidence below which there is no edge
-ANTICIPATES, LATEST = 1.5, 4.0  # s, by which a yielder leaves before the other has cleared, and behind it, at most
-_LANE = 2.2  # m, to the side of the other's path
-_ALIKE = 0.5  # rad, of two headings on one way
+NEAR, IN_LANE, PASSES = 0.9, (2.0, 4.0), (3.0, 5.0)  # confidence of closeness up to so many s apart, and 0.5 until so many
+_STANDS_AS = 4.0  # m/s, of a follower that is slower, where its gap is turned into seconds
+_BESIDE = 0.25  # of its length, by which records may overlap of who is behind another one and not beside it
+_KEPT_FOR = 1.0  # s, for which a gap in a lane is kept to count
+_HEAD_ON, _ALONG = 2.6, 0.35  # rad between headings, beyond and below which closeness to a crossing says nothing
+_BEFORE = 8.0  # s, for which a driver foresees
+_APART, _MARGIN = 0.5, 1.0  # m and s by which a footprint is kept away from another one's
+_LOOKS = 0.5, 0.2  # s, between the instants at which a driver looks ahead, and between those that it sees
 _SMOOTH = 1.0  # s
 _SIGNIFICANT = 2.6  # standard errors of a correlation, the best of some lags
-_HEADWAY = 3.5  # s, beyond which an even gap says nothing
-_EVEN, _EVEN_FOR = 0.2, 5.0  # difference of speeds as a share of them that is no keeping of a gap; s
 _STEADY = 0.3  # m/s, spread of a leader's speed below which no gain can be seen
 _GAINS = 0.3, 1.0
 _OWN = 0.05, 0.15  # of the gap, least and greatest own residual of a follower
 _HUMAN_LAG, _HUMAN_SPREAD = 1.2, 1.4  # s, of departures behind a clearing
 _OWN_LAG = 0.6  # s, what one driver's varies by
-_SLOWS_BY, _SLOWS_TO, _BENDS = 2.0, 0.6, 0.7  # m/s, share of the speed, and what a slowing without a stand counts
-_NEAR = 25.0  # m from the shared area, within which one waits for it
+_SLOWS_BY = 1.0  # m/s
+_WAITS_WITHIN = 25.0  # m from the shared area, within which one waits for it
+_ASIDE = 3.0  # s, before it enters, at which one that merges is beside the lane
+ANTICIPATES = 1.5  # s, by which one passes before the other has cleared, at most, to be near it
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What is seen of a pair: an edge, if it is sure enough, and how many seconds the one is apart from the other."""
+
+    who: int
+    whom: int
+    apart: float
+    edge: Reaction | None
 
 
 @once_per_object
 def reactions_of(encounter: Encounter) -> ReactionGraph:
     """Return who reacts to whom."""
-    follows = _nearest_leaders(encounter)
+    seen, leaders = _nearest_leaders(encounter)
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-    yields = [edge for conflict in conflicts if (edge := _yields(encounter, conflict)) is not None]
-    led = {edge.who: edge for edge in follows}
-    kept = [edge for edge in yields if not _explained(edge, led.get(edge.who), encounter)]
+    passes = [found for conflict in conflicts if (found := _passes(encounter, conflict)) is not None]
+    led = {edge.who: edge for edge in leaders}
+    met = {pair for one in conflicts for pair in ((one.first, one.second), (one.second, one.first))}
+    met |= {(found.who, found.whom) for found in seen}
+    pairs = [pair for pair in permutations(range(len(encounter.vehicles)), 2) if pair not in met]
+    short = [edge for pair in pairs if (edge := _stops_short(encounter, *pair)) is not None]
     best: dict[tuple[int, float], Reaction] = {}
-    for edge in kept:  # of several that a wait is for, the last to clear lets it go
-        key = edge.who, edge.until
-        best[key] = max(best.get(key, edge), edge, key=lambda known: known.confidence)
-    return without_circles([*follows, *best.values()], len(encounter.vehicles))
+    for edge in [*short, *(found.edge for found in passes if found.edge is not None)]:
+        if not _explained(edge, led.get(edge.who), encounter):  # of several that a wait is for, the last to clear lets it go
+            key = edge.who, edge.until
+            best[key] = max(best.get(key, edge), edge, key=lambda known: (known.clears, known.confidence))
+    graph = without_circles([*leaders, *best.values()], len(encounter.vehicles))
+    return graph if graph.edges else replace(graph, why=_why(encounter, [*seen, *passes]))
+
+
+def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
+    """Say why nobody is seen to react."""
+    nearest = min(seen, key=lambda found: found.apart, default=None)
+    if nearest is None or nearest.apart == math.inf:
+        return "none drives behind another one in its lane, or crosses its way"
+    who, whom = (encounter.vehicles[n].id for n in (nearest.who, nearest.whom))
+    least = math.floor(10.0 * nearest.apart) / 10.0
+    return f"the nearest are vehicle {who} and vehicle {whom}, and they are never within {least:.1f} s of each other"
 
 
 def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:
@@ -74,99 +107,92 @@ def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:
     return ReactionGraph(tuple(kept), order, tuple(cut))
 
 
+def _closeness(apart: float, limits: tuple[float, float]) -> float:
+    """The confidence of a pair that comes within so many seconds of each other."""
+    near, far = limits
+    return float(np.interp(apart, [near, far], [NEAR, 0.5])) if apart <= far else 0.0
+
+
+def _need(encounter: Encounter, who: int, whom: int) -> float:
+    """The confidence that one had to act, and did: it foresees the other in its way, and comes there later than foreseen.
+
+    It foresees itself at its speed, its acceleration fading over a second, on its own path; the other one as it drives.
+    """
+    one, other = clean_tracks(encounter)[who], clean_tracks(encounter)[whom]
+    rows = np.flatnonzero(one.there & other.there)
+    speed = _smoothed(one.speed, one.dt)
+    begins = rows[:: max(round(_LOOKS[0] / one.dt), 1)]
+    begins = begins[speed[begins] > SLOWEST]
+    if len(begins) == 0:
+        return 0.0
+    ahead = np.arange(_LOOKS[1], _BEFORE, _LOOKS[1])
+    later = begins[:, None] + np.round(ahead / one.dt).astype(np.int64)
+    gains = np.gradient(speed, one.dt)[begins, None] * (ahead - 1.0 + np.exp(-ahead))
+    driven = np.maximum.accumulate(speed[begins, None] * ahead + gains, axis=1)
+    poses = one.curve.at(one.progress[begins, None] + driven).reshape(-1, 3)
+    gap = np.full(len(poses), np.inf)
+    for off in (-_MARGIN, 0.0, _MARGIN):
+        at = np.clip(later + round(off / one.dt), rows[0], rows[-1]).ravel()
+        gap = np.minimum(gap, footprint_gaps(one.vehicle.half, poses, other.vehicle.half, other.poses[at])[0])
+    meets = (gap.reshape(later.shape) < _APART) & (later <= rows[-1])
+    first = np.argmax(meets, axis=1)
+    each = np.arange(len(begins))
+    recorded = one.progress[np.minimum(later, rows[-1])[each, first]] - one.progress[begins]
+    relief = ((driven[each, first] - recorded) / speed[begins])[meets.any(axis=1)].max(initial=0.0)
+    return float(0.9 * (1.0 - np.exp(-max(relief - 0.4, 0.0) / 0.4)))
+
+
 # --- followers --------------------------------------------------------------------------------------------------------
 
 
-def _nearest_leaders(encounter: Encounter) -> list[Reaction]:
-    """At most one edge per follower: to the nearest one ahead."""
+def _nearest_leaders(encounter: Encounter) -> tuple[list[_Seen], list[Reaction]]:
+    """What is seen of all who drive behind another one, and at most one edge per follower: to the nearest one ahead."""
     n = len(encounter.vehicles)
-    leaders = []
+    leaders, seen = [], []
     for who in range(n):
-        ahead = {whom: is_behind(encounter, who, whom) for whom in range(n) if whom != who}
-        apart = {whom: _apart(encounter, who, whom) for whom in ahead}
-        nearest = np.min([np.where(ahead[whom], apart[whom], np.inf) for whom in ahead], axis=0)
-        edges = [_follows(encounter, who, whom, ahead[whom] & (apart[whom] <= nearest), apart[whom]) for whom in ahead]
-        sure = [edge for edge in edges if edge is not None]
+        gaps = {whom: bumper_gaps(encounter, who, whom) for whom in range(n) if whom != who}
+        ahead = {
+            whom: is_behind(encounter, who, whom) & (gaps[whom] > -_BESIDE * encounter.vehicles[whom].length) for whom in gaps
+        }
+        nearest = np.min([np.where(ahead[whom], gaps[whom], np.inf) for whom in ahead], axis=0)
+        found = [_follows(encounter, who, whom, ahead[whom] & (gaps[whom] <= nearest), gaps[whom]) for whom in ahead]
+        seen += [one for one in found if one is not None]
+        sure = [one.edge for one in found if one is not None and one.edge is not None]
         if sure:
             leaders.append(max(sure, key=lambda edge: (edge.until - edge.since) * edge.confidence))
-    return leaders
+    return seen, leaders
 
 
-def is_behind(encounter: Encounter, who: int, whom: int) -> Bools:
-    """(T,) whether one drives behind the other on the same way, within 60 m: where that one was, or straight behind it."""
-    a, b = encounter.position[who], encounter.position[whom]
-    yaw_a, yaw_b = encounter.heading[who], encounter.heading[whom]
-    both = encounter.there[who] & encounter.there[whom]
-    between = b - a
-    along, across = ahead_and_left(between, yaw_a)
-    alike = np.abs(wrap_angle(yaw_b - yaw_a)) < _ALIKE
-    straight = (along > 0.0) & (np.abs(across) < _LANE) & alike
-    step = max(round(0.5 / encounter.dt), 1)
-    now, behind = np.arange(len(a)), straight
-    for mine, yaw, path, path_yaw, sign in ((a, yaw_a, b, yaw_b, -1), (b, yaw_b, a, yaw_a, 1)):
-        rows = np.arange(0, len(path), step)  # where the other was before; where this one will be
-        square = np.square(mine[:, None] - path[None, rows]).sum(axis=-1)
-        nearest = np.argmin(square, axis=1)
-        near = (np.sqrt(square[now, nearest]) < _LANE) & (np.abs(wrap_angle(path_yaw[rows[nearest]] - yaw)) < _ALIKE)
-        behind = behind | (near & (sign * (rows[nearest] - now) > step))
-    return np.asarray(behind & both & (np.sqrt(np.square(between).sum(axis=1)) < FAR))
-
-
-def _apart(encounter: Encounter, who: int, whom: int) -> Floats:
-    """(T,) metres between two centres."""
-    return np.asarray(np.sqrt(np.square(encounter.position[who] - encounter.position[whom]).sum(axis=1)))
-
-
-def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, apart: Floats) -> Reaction | None:
-    """The edge of a vehicle that drives `behind` (T,) another one at a distance `apart` (T,) [m], if there is one."""
+def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, gaps: Floats) -> _Seen | None:
+    """What is seen of a vehicle that drives `behind` (T,) another one with `gaps` (T,) [m]; None if it does so for too short."""
     dt, time = encounter.dt, encounter.time
     rows = np.flatnonzero(behind)
-    if len(rows) * dt < LONG_ENOUGH:
-        return None
     own, other = _smoothed(encounter.speed[who], dt), _smoothed(encounter.speed[whom], dt)
-    moves = behind & (own > SLOWEST)
-    if moves.sum() * dt < LONG_ENOUGH:
+    if len(rows) * dt < LONG_ENOUGH or own[rows].max() < WAIT_SPEED:
         return None
+    seconds = np.sort(gaps[rows] / np.maximum(own[rows], _STANDS_AS))
+    apart = float(seconds[round(_KEPT_FOR / dt)])
     lag, drop = _best_lag(np.gradient(own, dt), np.gradient(other, dt), behind, dt)
-    headway = time_gaps(encounter, who, whom)
-    if len(headway) == 0:
-        return None
-    near = moves & (apart < _HEADWAY * np.maximum(own, SLOWEST))
-    even = 0.0
-    if near.sum() * dt >= _EVEN_FOR:
-        differs = float(np.sqrt(np.square(own[near] - other[near]).mean()) / np.sqrt(np.square(own[near]).mean()))
-        even = max(1.0 - differs / _EVEN, 0.0)
-    starts = _starts_behind(encounter, who, whom, behind)
-    confidence = 1.0 - (1.0 - drop) * (1.0 - even) * (1.0 - (starts[1] if starts else 0.0))
+    near = _closeness(apart, IN_LANE)
+    confidence = 1.0 - (1.0 - near) * (1.0 - _need(encounter, who, whom)) * (1.0 - (0.0 if near else drop))
     if confidence < SURE:
-        return None
-    if starts and not drop:
-        lag = min(max(starts[0], LAGS[0]), LAGS[1])
+        return _Seen(who, whom, apart, None)
     steps = round(lag / dt)
     late = rows[rows >= steps]
     led, answer = other[late - steps], own[late]
     spread = float(np.std(led))
     gain = 1.0 if spread < _STEADY else float(((led - led.mean()) * (answer - answer.mean())).mean()) / (spread * spread)
-    gap = float(np.median(apart[moves]))
-    line = np.column_stack([np.ones(int(moves.sum())), own[moves]])
-    rest = apart[moves] - line @ np.linalg.lstsq(line, apart[moves], rcond=None)[0]
-    low, middle, high = np.sort(headway)[[0, len(headway) // 2, -1]].tolist()
-    return Reaction(
+    gap = max(float(np.median(gaps[rows])), 1.0)
+    line = np.column_stack([np.ones(len(rows)), own[rows]])
+    rest = gaps[rows] - line @ np.linalg.lstsq(line, gaps[rows], rcond=None)[0]
+    moves = rows[own[rows] > SLOWEST] if own[rows].max() > SLOWEST else rows
+    headway = np.sort(gaps[moves] / np.maximum(own[moves], SLOWEST))
+    low, middle, high = headway[[0, len(headway) // 2, -1]].tolist()
+    return _Seen(who, whom, apart, Reaction(
         FOLLOW, who, whom, lag, min(max(gain, _GAINS[0]), _GAINS[1]),
         min(max(float(np.std(rest)), _OWN[0] * gap), _OWN[1] * gap), confidence,
         float(time[rows[0]]), float(time[rows[-1]]), (low, middle, high),
-    )  # fmt: skip
-
-
-def _starts_behind(encounter: Encounter, who: int, whom: int, behind: Bools) -> tuple[float, float] | None:
-    """By how much [s] a vehicle drives off later than the one it stands behind, and how sure it is that it waited for that."""
-    pairs = []
-    leaders = [wait.end for wait in find_waits(encounter) if wait.vehicle == whom]
-    for wait in find_waits(encounter):
-        lags = [wait.end - end for end in leaders if 0.0 < wait.end - end <= LAGS[1]]
-        if wait.vehicle == who and lags and behind[int(np.searchsorted(encounter.time, wait.end - 1e-9))]:
-            pairs.append((min(lags), _soon(min(lags), encounter.duration)))
-    return max(pairs, key=lambda start: start[1], default=None)
+    ))  # fmt: skip
 
 
 def _soon(lag: float, duration: float) -> float:
@@ -219,48 +245,71 @@ def _standard_error(a: Floats, b: Floats) -> float:
     return math.sqrt(max(total, 1.0) / n)
 
 
-# --- yielders ---------------------------------------------------------------------------------------------------------
+# --- those who pass second --------------------------------------------------------------------------------------------
 
 
-def _yields(encounter: Encounter, conflict: Conflict) -> Reaction | None:
-    """The edge of the second one at a crossing to the first: it waits or slows down while that one comes, and goes behind it."""
+def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
+    """What is seen of the second one at a conflict, unless it drives behind the first before and after."""
     who, whom = conflict.second, conflict.first
-    time, speed = encounter.time, encounter.speed[who]
-    if conflict.following or conflict.exit_first >= time[encounter.present[whom, 1]] - 1e-9:
+    aside = _from_aside(encounter, conflict)
+    k = max(int(np.searchsorted(encounter.time, conflict.entry_second)) - 1, 0)
+    if k <= encounter.present[who, 0] or (not aside and (conflict.following or is_behind(encounter, who, whom)[k])):
         return None
-    stands = [wait for wait in find_waits(encounter) if wait.vehicle == who and wait.end <= conflict.entry_second + 1.0]
-    if stands:
-        since, until, weight = stands[-1].start, stands[-1].end, 1.0
-    else:
-        slow = _slows(time, speed, encounter.there[who] & (time <= conflict.entry_second))
-        if slow is None:
-            return None
-        (since, until), weight = slow, _BENDS
-    k = int(np.searchsorted(time, until))
-    entry = encounter.position[who, min(int(np.searchsorted(time, conflict.entry_second)), len(time) - 1)]
-    lag = until - conflict.exit_first
-    near = float(np.sqrt(np.square(entry - encounter.position[who, k]).sum())) < _NEAR
-    comes = since < conflict.exit_first and until < time[encounter.present[who, 1]] - 1e-9
-    if not (near and comes and -ANTICIPATES <= lag <= LATEST):
-        return None
-    confidence = weight * _soon(lag, encounter.duration)
+    clears, enters = passing(encounter, conflict, merges=conflict.following)
+    gap = enters - clears
+    yaw, other_yaw = (float(np.interp(at, encounter.time, encounter.heading[n])) for n, at in ((who, enters), (whom, clears)))
+    turned = abs(float(wrap_angle(np.array(yaw - other_yaw))))
+    apart = max(gap, 0.0) if gap > -ANTICIPATES and (conflict.following or _ALONG < turned < _HEAD_ON) else math.inf
+    near = _closeness(apart, PASSES)
+    since, until, stands = _slow_before(encounter, who, clears, enters)
+    soon = _soon(until - clears, encounter.duration) if stands and until - clears > -ANTICIPATES else 0.0
+    need = _need(encounter, who, whom) * float(np.interp(gap, [PASSES[1], 2.0 * PASSES[1]], [1.0, 0.0]))
+    confidence = 1.0 - (1.0 - near) * (1.0 - need) * (1.0 - soon)
     if confidence < SURE:
-        return None
-    return Reaction(YIELD, who, whom, lag, 1.0, _OWN_LAG, confidence, since, until, stands=bool(stands))
+        return _Seen(who, whom, apart, None)
+    lag, merges = until - clears, conflict.following
+    edge = Reaction(YIELD, who, whom, lag, 1.0, _OWN_LAG, confidence, since, until, gap=gap, stands=stands, merges=merges)
+    return _Seen(who, whom, apart, edge)
 
 
-def _slows(time: Floats, speed: Floats, before: Bools) -> tuple[float, float] | None:
-    """When [s] a vehicle begins to slow down `before` (T,) something, and when it is slowest; None if it does not."""
-    rows = np.flatnonzero(before)
-    if len(rows) < 2:
+def _from_aside(encounter: Encounter, conflict: Conflict) -> bool:
+    """Whether the second one comes into the first one's lane from beside it."""
+    time, who = encounter.time, conflict.second
+    rows = np.flatnonzero(encounter.there[who] & (np.abs(time - conflict.entry_second + 0.5 * _ASIDE) <= 0.5 * _ASIDE))
+    path = clean_tracks(encounter)[conflict.first].curve
+    station, left = path.project(encounter.position[who, rows])
+    turned = wrap_angle(path.at(station)[:, 2] - encounter.heading[who, rows])
+    return bool(((station > 0.0) & ((np.abs(left) > LANE) | (np.abs(turned) > ALIKE))).any())
+
+
+def _stops_short(encounter: Encounter, who: int, whom: int) -> Reaction | None:
+    """The edge of one who slows down to the record's end for another that would else be in its way."""
+    rows = np.flatnonzero(encounter.there[who])
+    speed, until = encounter.speed[who, rows], float(encounter.time[rows[-1]])
+    top = int(np.argmax(speed))
+    if speed[-1] > SLOWEST or speed[top] - speed[-1] < _SLOWS_BY or (need := _need(encounter, who, whom)) < SURE:
         return None
-    low = rows[int(np.argmin(speed[rows]))]
-    earlier = rows[rows <= low]
-    top = earlier[int(np.argmax(speed[earlier]))]
-    drop = float(speed[top] - speed[low])
-    if drop < _SLOWS_BY or speed[low] > _SLOWS_TO * speed[top]:
-        return None
-    return float(time[top]), float(time[low])
+    since = float(encounter.time[rows[top]])
+    return Reaction(YIELD, who, whom, 0.0, 1.0, _OWN_LAG, need, since, until, gap=math.inf, stands=True)
+
+
+def _slow_before(encounter: Encounter, who: int, clears: float, enters: float) -> tuple[float, float, bool]:
+    """When [s] a vehicle begins to slow down or stand before it enters, and is slowest or drives off; whether it stands.
+
+    Slow instants in one approach are one wait. Both are when it enters, if it does not slow down.
+    """
+    time = encounter.time
+    stands = [wait for wait in find_waits(encounter) if wait.vehicle == who and wait.start < clears and wait.end <= enters + 1.0]
+    place = encounter.position[who, min(int(np.searchsorted(time, enters)), len(time) - 1)]
+    if stands and np.hypot(*(encounter.position[who, int(np.searchsorted(time, stands[-1].end - 1e-9))] - place)) < _WAITS_WITHIN:
+        return stands[-1].start, stands[-1].end, True
+    rows = np.flatnonzero(encounter.there[who] & (time <= enters))
+    speed = encounter.speed[who, rows]
+    low = int(np.argmin(speed))
+    top = int(np.argmax(speed[: low + 1]))
+    if speed[top] - speed[low] < _SLOWS_BY:
+        return enters, enters, False
+    return float(time[rows[top]]), float(time[rows[low]]), False
 
 
 def _explained(edge: Reaction, leader: Reaction | None, encounter: Encounter) -> bool:

@@ -5,6 +5,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 from typing import Any
 
 from scenario_gen.types.pieces import split_pieces
@@ -24,13 +25,15 @@ class Reaction:
         who: the one that reacts.
         whom: the one it reacts to.
         lag: seconds; of a follower from its leader's change of speed to its own, of a yielder from the other's clearing of the
-            shared area to its own departure (slightly negative if it anticipates).
+            shared area to when it drives off, or is slowest (negative if it anticipates).
         gain: how much of a leader's quick change of speed its follower takes over, 0 to 1; 1 of a yielder.
         residual: what is its own: metres of gap of a follower, seconds of lag of a yielder (one standard deviation).
         confidence: 0 to 1, how much better the record is explained with the edge than without.
         since, until: seconds of the template's clock: during which it follows; from its wait's begin to its departure.
-        headway: least, median and greatest time gap [s], centre to centre, of a follower while it drives; zeros of a yielder.
-        stands: whether a yielder stands before it goes; one that does not only slows down.
+        headway: least, median and greatest time gap [s], bumper to bumper, of a follower while it drives; zeros of a yielder.
+        stands: whether a yielder stands before it goes; one that does not only slows down, or passes (`since` is `until`).
+        gap: seconds from the other's clearing of the shared area to a yielder's entry; infinite if it stops before it to the end.
+        merges: whether a yielder enters the other's lane and goes on behind it.
     """
 
     kind: str
@@ -44,6 +47,13 @@ class Reaction:
     until: float
     headway: tuple[float, float, float] = (0.0, 0.0, 0.0)
     stands: bool = False
+    gap: float = 0.0
+    merges: bool = False
+
+    @property
+    def enters(self) -> float:
+        """When [s] a yielder enters the shared area, on the template's clock."""
+        return self.clears + self.gap
 
     @property
     def clears(self) -> float:
@@ -58,11 +68,13 @@ class Reaction:
         """Return the reaction in words, with the vehicles' ids."""
         who, whom = f"vehicle {ids[self.who]}", f"vehicle {ids[self.whom]}"
         if self.kind == FOLLOW:
-            text = f"{who} follows {whom}, {self.headway[1]:.1f} s behind, and answers its speed after {self.lag:.1f} s"
+            text = f"{who} follows {whom}, {self.headway[1]:.1f} s bumper to bumper, and answers its speed after {self.lag:.1f} s"
         else:
-            verb = "waits for" if self.stands else "slows down for"
-            when = f"{self.lag:.1f} s after" if self.lag >= 0.0 else f"{-self.lag:.1f} s before {whom} has passed"
-            text = f"{who} {verb} {whom} to pass and leaves {when}"
+            verb = f"waits for {whom}, then" if self.stands else f"slows for {whom} and" if self.since < self.until else ""
+            when = f"{self.gap:.1f} s behind" if self.gap >= 0.05 else "right behind"
+            text = f"{who} {verb} passes {when} it" if verb else f"{who} passes {when} {whom}"
+            if self.gap == math.inf:
+                text = f"{who} stops for {whom}"
         return f"{text} (doubtful)" if self.doubtful else text
 
     @property
@@ -87,18 +99,20 @@ class ReactionGraph:
         edges: the reactions, those of a vehicle behind those of the ones it reacts to.
         order: all vehicles, each behind those it reacts to.
         cut: reactions that were left out because they close a circle, each the least sure one of it.
+        why: why there is none, "" if there is one.
     """
 
     edges: tuple[Reaction, ...]
     order: tuple[int, ...]
     cut: tuple[Reaction, ...] = ()
+    why: str = ""
 
     def sentences(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> tuple[str, ...]:
         """Return one sentence for each edge of the graph, which also names those that are not among the `kept`."""
         free = "" if kept is None else ": the scenarios are not held to it"
         sentences = [edge.words(ids) if edge in (kept or ()) else f"{edge.words(ids)}{free}" for edge in self.edges]
         sentences += [f"{edge.words(ids)}: left out, for it closes a circle of reactions" for edge in self.cut]
-        return tuple(sentences) or ("no vehicle is seen to react to another",)
+        return tuple(sentences) or (f"no vehicle is seen to react to another{self.why and ': '}{self.why}",)
 
     def document(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> dict[str, Any]:
         """Return the graph as a document: edges, those that were cut, sentences; and of each edge whether it is `kept`."""

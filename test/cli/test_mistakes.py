@@ -77,7 +77,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("generate", "columns.csv", *ROAD), "--set log.columns=time=…; is it tyme?"),
     ((*GENERATE, "--params", "bad.yaml"), "bad.yaml: not YAML (line 2"),
     ((*DRIVE, "--against", "bad.json"), "bad.json (give a drives.json of `scenario-gen drive`): not JSON"),
-    (("validate", "none"), "none does not exist; name the folder of a bag"),
+    (("validate", "none"), "none does not exist; name a folder"),
     (("validate", "my log ü.csv"), "is not a bag; name a folder"),
     (("compare", "made", "nothing"), "nothing/evaluation.json is no evaluation"),
     (("reindex", "nothing"), "no .mcap file here; name the folder of a recorded bag"),

@@ -11,7 +11,7 @@ from suite_processes import Processes, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics
 
-pytestmark = [pytest.mark.dds, pytest.mark.slow]
+pytestmark = [pytest.mark.dds, pytest.mark.slow, pytest.mark.long]
 NODES = {
     "log_player": ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"],
     "road_server": ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],

@@ -100,7 +100,7 @@ process.run_nodes([Stuck], ["stuck"])
 """
 
 
-@pytest.mark.parametrize("place", ["destroy_node", "close"])
+@pytest.mark.parametrize("place", ["destroy_node", pytest.param("close", marks=pytest.mark.long)])
 def test_a_node_ends_when_something_waits_for_ever_holding_the_lock_of_python(domain, place):
     """Where it was stuck is said."""
     environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}

@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 import pytest
 from reaction_scenes import answering, crossing, lane_encounter, wander
+from textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
 from scenario_gen.template.reactions import reactions_of, without_circles
 from scenario_gen.types.reaction import FOLLOW, Reaction, YIELD
@@ -31,7 +32,7 @@ def test_independent_drives_hardly_ever_react():
     for seed in range(40):
         rng = np.random.default_rng(seed)
         leader, other = wander(rng, 300, 1.5), wander(rng, 300, 1.5) - 2.5
-        behind += bool(reactions_of(lane_encounter(leader, other, 45.0)).edges)
+        behind += bool(reactions_of(lane_encounter(leader, other, 58.0)).edges)
         beside += bool(reactions_of(lane_encounter(leader, other, 25.0, lane=3.5)).edges)
     assert beside == 0
     assert behind <= 4
@@ -44,13 +45,55 @@ def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
     (edge,) = graph.edges
     assert (edge.kind, edge.who, edge.whom, edge.stands) == (YIELD, 1, 0, True)
     assert edge.lag == pytest.approx(lag, abs=0.35)  # it leaves when it is faster than 0.5 m/s
-    assert graph.sentences(("1", "2"))[0].startswith("vehicle 2 waits for vehicle 1 to pass and leaves")
+    assert graph.sentences(("1", "2"))[0].startswith("vehicle 2 waits for vehicle 1, then passes")
 
 
 def test_who_leaves_long_after_waits_for_something_else():
     graph = reactions_of(crossing(14.0))
     assert graph.edges == ()
-    assert graph.sentences(("1", "2")) == ("no vehicle is seen to react to another",)
+    assert graph.sentences(("1", "2"))[0].startswith(
+        "no vehicle is seen to react to another: the nearest are vehicle 2 and vehicle 1"
+    )
+
+
+def seen(kinds, seeds):
+    """(confidence, whether it is right) of all edges of drawn motions, and how many reactions there are."""
+    edges, there = [], 0
+    for kind, seed in itertools.product(kinds, seeds):
+        motion = labelled(kind, seed)
+        there += motion.edge is not None
+        edges += [(one.confidence, (one.who, one.whom) == motion.edge) for one in pairs_of(motion.encounter)]
+    return np.array(edges), there
+
+
+def pairs_of(encounter):
+    """The surest edge of each pair: one may both come behind another and follow it."""
+    return {(one.who, one.whom): one for one in sorted(reactions_of(encounter).edges, key=lambda one: one.confidence)}.values()
+
+
+def test_textbook_motions_are_seen_and_those_that_only_look_alike_are_not():
+    edges, there = seen([kind for kind in (*REACTIONS, *NOTHING) if kind not in CHANCE], range(20))
+    right = int(edges[:, 1].sum())
+    assert right / len(edges) >= 0.95 and right / there >= 0.95
+
+
+@pytest.mark.parametrize("kind", REACTIONS)
+def test_every_kind_of_reaction_is_seen(kind):
+    edges, there = seen([kind], range(20, 40))
+    assert edges[:, 1].sum() >= 0.85 * there == 17.0
+
+
+def test_confidence_is_how_often_an_edge_is_right():
+    edges, _ = seen((*REACTIONS, *NOTHING), range(40, 60))
+    for low, high in ((0.5, 0.85), (0.85, 0.95), (0.95, 1.0)):
+        band = edges[(edges[:, 0] >= low) & (edges[:, 0] < high)]
+        assert band[:, 1].mean() == pytest.approx(band[:, 0].mean(), abs=0.12)
+
+
+def test_why_none_is_seen_is_said():
+    apart = reactions_of(labelled("crossing, long after", 0).encounter)
+    assert "never within" in apart.why and apart.sentences("12")[0].endswith(apart.why)
+    assert "none drives behind another" in reactions_of(labelled("beside", 1).encounter).why
 
 
 def edge(who, whom, confidence):
@@ -79,4 +122,4 @@ def test_whatever_the_edges_everybody_comes_behind_those_it_reacts_to(count):
 def test_a_doubtful_edge_is_said_to_be():
     assert edge(0, 1, 0.4).words("ab").endswith("(doubtful)")
     assert "doubtful" not in edge(0, 1, 0.6).words("ab")
-    assert edge(0, 1, 0.6).document("ab")["words"].startswith("vehicle a follows vehicle b, 1.0 s behind")
+    assert edge(0, 1, 0.6).document("ab")["words"].startswith("vehicle a follows vehicle b, 1.0 s bumper to bumper")

@@ -3,9 +3,12 @@
 
 """How reactions are put in words and documents."""
 
+from dataclasses import replace
+import math
+
 from scenario_gen.types.reaction import FOLLOW, Reaction, ReactionGraph, YIELD, yielders_of
 
-SURE = Reaction(YIELD, 1, 0, 1.4, 1.0, 0.6, 0.9, 3.0, 9.0, stands=True)
+SURE = Reaction(YIELD, 1, 0, 1.4, 1.0, 0.6, 0.9, 3.0, 9.0, stands=True, gap=2.4)
 DOUBTFUL = Reaction(FOLLOW, 2, 1, 1.2, 0.8, 1.5, 0.4, 0.0, 20.0, (0.9, 1.3, 2.0))
 CUT = Reaction(FOLLOW, 0, 2, 0.8, 0.5, 1.0, 0.35, 0.0, 9.0, (1.0, 1.5, 2.0))
 GRAPH = ReactionGraph((SURE, DOUBTFUL), (0, 1, 2), (CUT,))
@@ -14,16 +17,18 @@ IDS = ("a", "b", "c")
 
 def test_every_edge_has_a_sentence_and_what_is_doubtful_or_cut_says_so():
     assert GRAPH.sentences(IDS) == (
-        "vehicle b waits for vehicle a to pass and leaves 1.4 s after",
-        "vehicle c follows vehicle b, 1.3 s behind, and answers its speed after 1.2 s (doubtful)",
-        "vehicle a follows vehicle c, 1.5 s behind, and answers its speed after 0.8 s (doubtful): left out, "
+        "vehicle b waits for vehicle a, then passes 2.4 s behind it",
+        "vehicle c follows vehicle b, 1.3 s bumper to bumper, and answers its speed after 1.2 s (doubtful)",
+        "vehicle a follows vehicle c, 1.5 s bumper to bumper, and answers its speed after 0.8 s (doubtful): left out, "
         "for it closes a circle of reactions",
     )
 
 
-def test_who_leaves_before_the_other_has_passed_is_said_to():
-    early = Reaction(YIELD, 1, 0, -0.3, 1.0, 0.6, 0.9, 3.0, 9.0)
-    assert early.words(IDS) == "vehicle b slows down for vehicle a to pass and leaves 0.3 s before vehicle a has passed"
+def test_who_slows_passes_or_stops_is_said_to():
+    early = Reaction(YIELD, 1, 0, -0.3, 1.0, 0.6, 0.9, 3.0, 9.0, gap=-0.2)
+    assert early.words(IDS) == "vehicle b slows for vehicle a and passes right behind it"
+    assert replace(early, since=9.0, gap=1.2).words(IDS) == "vehicle b passes 1.2 s behind vehicle a"
+    assert replace(early, gap=math.inf).words(IDS) == "vehicle b stops for vehicle a"
 
 
 def test_edges_that_scenarios_do_not_keep_are_said():

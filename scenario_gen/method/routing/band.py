@@ -3,16 +3,57 @@
 
 """The elastic band: one banded least-squares problem per step, solved in place (after Quinlan & Khatib 1993)."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.kernels import F, F1, F2, I, kernel, OUT1, OUT2
+from scenario_gen.numerics.kernels import F, F1, F2, I, kernel, named, OUT1, OUT2
 
 PINNED = 1e15
 STRONG = 1e4  # no weight grows beyond this
 DAMPING = 0.05
 WISH_WEIGHT = 5.0  # weight of an obstacle that is only nearer than wished for
 CURVATURE_THRESHOLD = 0.9  # share of the curvature limit up to which bending is not made dearer
+
+
+class Band(NamedTuple):
+    """What holds a band of M points, and what it keeps clear of; lengths in metres from the grid's corner.
+
+    Attributes:
+        field: (H, W) clearance.
+        resolution: size of a cell.
+        guess: (M, 2) the first guess.
+        hold: (M,) its weight.
+        anchor: (M, 2) the anchor beside each point.
+        pull: (M,) its weight, 0 where there is no anchor.
+        ends: (2, 2) unit vectors of the headings at the first and the last point.
+        disc: (D,) offsets along the heading of the discs that cover the footprint.
+        required: (M, D) clearance that each disc's centre must have: where it lacks, the push becomes ever stronger.
+        wish: (M,) clearance that they should have: it only pushes.
+        spacing: distance between two points.
+        bend: weight of bending [m^4].
+        limit: largest curvature wanted [1/m].
+    """
+
+    field: Floats
+    resolution: float
+    guess: Floats
+    hold: Floats
+    anchor: Floats
+    pull: Floats
+    ends: Floats
+    disc: Floats
+    required: Floats
+    wish: Floats
+    spacing: float
+    bend: float
+    limit: float
+
+
+UNIT, SECOND, THIRD = np.ones(1), np.array([1.0, -2.0, 1.0]), np.array([-1.0, 3.0, -3.0, 1.0])
+FIRST_THIRD, LAST_THIRD = np.array([3.0, -4.0, 1.0]), np.array([1.0, -4.0, 3.0])
+BAND = named(Band, F2, F, F2, F1, F2, F1, F2, F1, F2, F1, F, F, F)
 
 
 @kernel(inline=True)
@@ -74,82 +115,83 @@ def _bending(points: Floats, ends: Floats, spacing: float, i: int) -> tuple[floa
     return (before_x - 2.0 * points[i, 0] + after_x) / square, (before_y - 2.0 * points[i, 1] + after_y) / square
 
 
-@kernel(I, F2, F, F2, F1, F2, F1, F2, F1, F2, F1, F, F, F, OUT1, OUT1, OUT2)
-def relax(
-    steps: int, field: Floats, resolution: float, reference: Floats, hold: Floats, anchor: Floats, pull: Floats,
-    ends: Floats, disc: Floats, required: Floats, wish: Floats, spacing: float, bend: float, limit: float,
-    stiff: Floats, push: Floats, points: Floats,
-) -> None:  # fmt: skip
+@kernel(inline=True, forced=True)
+def _add_tension(i: int, band: Band, points: Floats, stiff: Floats, matrix: Floats, right: Floats) -> None:
+    """Add what draws point i to the guess, to its anchor and to where it is, and what bending costs."""
+    n, curve, twist = points.shape[0], band.bend / band.spacing**4, band.bend / band.spacing**6
+    _add(matrix, right, i, UNIT, 1, band.hold[i], band.guess[i, 0], band.guess[i, 1])
+    _add(matrix, right, i, UNIT, 1, band.pull[i], band.anchor[i, 0], band.anchor[i, 1])
+    _add(matrix, right, i, UNIT, 1, DAMPING, points[i, 0], points[i, 1])
+    if i + 2 < n:
+        _add(matrix, right, i, SECOND, 3, stiff[i + 1] * curve, 0.0, 0.0)
+    if i + 3 < n:
+        _add(matrix, right, i, THIRD, 4, (stiff[i + 1] + stiff[i + 2]) * twist, 0.0, 0.0)
+
+
+@kernel(inline=True, forced=True)
+def _add_obstacles(i: int, band: Band, points: Floats, row: Floats, matrix: Floats, right: Floats) -> float:
+    """Add what pushes the discs of point i away from obstacles, with weight row[3]; how much the nearest lacks, as a share."""
+    disc, cell = band.disc, band.resolution
+    tx, ty = points[i + 1, 0] - points[i - 1, 0], points[i + 1, 1] - points[i - 1, 1]
+    norm = max(np.sqrt(tx * tx + ty * ty), 1e-9)
+    worst = 0.0
+    for k in range(disc.shape[0]):
+        x, y = points[i, 0] + disc[k] * tx / norm, points[i, 1] + disc[k] * ty / norm
+        room, gx, gy = _clearance_at(band.field, x / cell, y / cell)
+        slope, needed = np.sqrt(gx * gx + gy * gy), band.required[i, k]
+        aim = needed if room < needed else band.wish[i]
+        if room < aim and slope > 1e-9:
+            away = (aim - room) / slope
+            row[0], row[1], row[2] = -disc[k] / norm, 1.0, disc[k] / norm
+            _add(matrix, right, i - 1, row, 3, row[3] if room < needed else WISH_WEIGHT, x + away * gx, y + away * gy)
+            if room < needed:
+                worst = max(worst, (needed - room) / needed)
+    return worst
+
+
+@kernel(inline=True)
+def _pin_ends(band: Band, points: Floats, stiff: Floats, matrix: Floats, right: Floats) -> None:
+    """Hold the ends: their positions, and their headings through the mirrored points."""
+    n = points.shape[0]
+    curve, twist = band.bend / band.spacing**4, band.bend / band.spacing**6
+    for side in range(2):
+        i, inner = (0, 1) if side == 0 else (n - 1, n - 2)
+        sign = band.spacing if side == 0 else -band.spacing
+        hx, hy = sign * band.ends[side, 0], sign * band.ends[side, 1]
+        _add(matrix, right, i, UNIT, 1, PINNED, points[i, 0], points[i, 1])
+        _add(matrix, right, inner, UNIT, 1, 4.0 * stiff[i] * curve, points[i, 0] + hx, points[i, 1] + hy)
+        edge, first = (FIRST_THIRD, 0) if side == 0 else (LAST_THIRD, n - 3)
+        _add(matrix, right, first, edge, 3, (stiff[i] + stiff[inner]) * twist, -2.0 * hx, -2.0 * hy)
+
+
+@kernel(I, BAND, OUT1, OUT1, OUT2)
+def relax(steps: int, band: Band, stiff: Floats, push: Floats, points: Floats) -> None:
     """Relax a band of M >= 6 points between two fixed poses; lengths in metres from the grid's corner.
 
-    Minimises the sum over its points of hold |p - reference|^2 + pull |p - anchor|^2 + stiff bend (|p''|^2 + 2 |p'''|^2)
-    + push (need or wish - clearance)^2, the last for each disc of the footprint that comes too near to an obstacle. The headings
-    at the ends enter through a mirrored point beyond each end, so that the band may bend there as anywhere.
+    Minimises the sum over its points of hold |p - guess|^2 + pull |p - anchor|^2 + stiff bend (|p''|^2 + 2 |p'''|^2)
+    + push (required or wish - clearance)^2, the last for each disc of the footprint that comes too near to an obstacle. The
+    headings at the ends enter through a mirrored point beyond each end, so that the band may bend there as anywhere.
 
     Args:
         steps: how many least-squares problems to solve, each linearised about the one before.
-        field: (H, W) clearance [m].
-        resolution: size of a cell.
-        reference: (M, 2) the first guess.
-        hold: (M,) its weight.
-        anchor: (M, 2) the anchor beside each point.
-        pull: (M,) its weight, 0 where there is no anchor.
-        ends: (2, 2) unit vectors of the headings at the first and the last point.
-        disc: (D,) offsets along the heading of the discs that cover the footprint.
-        required: (M, D) clearance that each disc's centre must have: where it lacks, the push becomes ever stronger.
-        wish: (M,) clearance that they should have: it only pushes.
-        spacing: distance between two points.
-        bend: weight of bending [m^4].
-        limit: largest curvature wanted [1/m].
+        band: what holds the band, and what it keeps clear of.
         stiff: (M,) factors of `bend`, raised where the limit is exceeded.
         push: (M,) weights of the obstacles, raised where they are too near.
         points: (M, 2) the band, changed in place.
     """
     n = points.shape[0]
-    matrix, right = np.empty((n, 4)), np.empty((n, 2))
-    unit, row = np.ones(1), np.empty(3)
-    second, third = np.array([1.0, -2.0, 1.0]), np.array([-1.0, 3.0, -3.0, 1.0])
-    first_third, last_third = np.array([3.0, -4.0, 1.0]), np.array([1.0, -4.0, 3.0])
-    curve, twist = bend / spacing**4, bend / spacing**6
+    matrix, right, row = np.empty((n, 4)), np.empty((n, 2)), np.empty(4)
     for _ in range(steps):
         matrix[:], right[:] = 0.0, 0.0
         for i in range(n):
-            _add(matrix, right, i, unit, 1, hold[i], reference[i, 0], reference[i, 1])
-            _add(matrix, right, i, unit, 1, pull[i], anchor[i, 0], anchor[i, 1])
-            _add(matrix, right, i, unit, 1, DAMPING, points[i, 0], points[i, 1])
-            if i + 2 < n:
-                _add(matrix, right, i, second, 3, stiff[i + 1] * curve, 0.0, 0.0)
-            if i + 3 < n:
-                _add(matrix, right, i, third, 4, (stiff[i + 1] + stiff[i + 2]) * twist, 0.0, 0.0)
+            _add_tension(i, band, points, stiff, matrix, right)
             if 1 <= i < n - 1:
-                tx, ty = points[i + 1, 0] - points[i - 1, 0], points[i + 1, 1] - points[i - 1, 1]
-                norm = max(np.sqrt(tx * tx + ty * ty), 1e-9)
-                worst = 0.0
-                for k in range(disc.shape[0]):
-                    x, y = points[i, 0] + disc[k] * tx / norm, points[i, 1] + disc[k] * ty / norm
-                    room, gx, gy = _clearance_at(field, x / resolution, y / resolution)
-                    slope = np.sqrt(gx * gx + gy * gy)
-                    aim = required[i, k] if room < required[i, k] else wish[i]
-                    if room < aim and slope > 1e-9:
-                        away = (aim - room) / slope
-                        row[0], row[1], row[2] = -disc[k] / norm, 1.0, disc[k] / norm
-                        weight = push[i] if room < required[i, k] else WISH_WEIGHT
-                        _add(matrix, right, i - 1, row, 3, weight, x + away * gx, y + away * gy)
-                        if room < required[i, k]:
-                            worst = max(worst, (required[i, k] - room) / required[i, k])
-                push[i] = min(push[i] * (1.0 + worst), STRONG)
-        for side in range(2):  # the ends: position, and heading through the mirrored point
-            i, inner = (0, 1) if side == 0 else (n - 1, n - 2)
-            sign = spacing if side == 0 else -spacing
-            hx, hy = sign * ends[side, 0], sign * ends[side, 1]
-            _add(matrix, right, i, unit, 1, PINNED, points[i, 0], points[i, 1])
-            _add(matrix, right, inner, unit, 1, 4.0 * stiff[i] * curve, points[i, 0] + hx, points[i, 1] + hy)
-            edge, first = (first_third, 0) if side == 0 else (last_third, n - 3)
-            _add(matrix, right, first, edge, 3, (stiff[i] + stiff[inner]) * twist, -2.0 * hx, -2.0 * hy)
+                row[3] = push[i]
+                push[i] = min(push[i] * (1.0 + _add_obstacles(i, band, points, row, matrix, right)), STRONG)
+        _pin_ends(band, points, stiff, matrix, right)
         _solve(matrix, right)
-        for i in range(1, n - 1):
-            points[i, 0], points[i, 1] = right[i, 0], right[i, 1]
+        points[1 : n - 1] = right[1 : n - 1]
         for i in range(n):
-            bx, by = _bending(points, ends, spacing, i)
-            excess = np.sqrt(bx * bx + by * by) / (CURVATURE_THRESHOLD * limit)
+            bx, by = _bending(points, band.ends, band.spacing, i)
+            excess = np.sqrt(bx * bx + by * by) / (CURVATURE_THRESHOLD * band.limit)
             stiff[i] = min(stiff[i] * min(excess, 1.5), STRONG) if excess > 1.0 else max(0.98 * stiff[i], 1.0)

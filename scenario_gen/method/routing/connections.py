@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.method.routing.search.dubins import shortest_into, TURNS
+from scenario_gen.method.routing.search.dubins import Pose, shortest_curve, TURNS
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.types import Road, Vehicle
@@ -38,9 +38,8 @@ def candidates(start: Floats, end: Floats, limit: float) -> Iterator[Floats]:
         if poses is not None:
             yield poses
     yield from _by_an_arc(start, end, limit)
-    out = np.empty(7)
-    shortest_into(start[0], start[1], start[2], end[0], end[1], end[2], 1.0 / limit, out)
-    yield chained(start, [(float(TURNS[int(out[0]), k]) * limit, float(out[1 + k])) for k in range(3)])
+    (word, *lengths), _ = shortest_curve(Pose(*start), Pose(*end), 1.0 / limit)
+    yield chained(start, [(float(turn) * limit, length) for turn, length in zip(TURNS[word], lengths, strict=True)])
 
 
 def hermite(start: Floats, end: Floats, stretch: float, limit: float) -> Floats | None:

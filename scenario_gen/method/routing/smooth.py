@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from scenario_gen.method.routing.band import relax
+from scenario_gen.method.routing.band import Band, relax
 from scenario_gen.method.routing.config import PlanningConfig
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
@@ -108,10 +108,11 @@ def smooth(
         required = np.minimum(_room(road, guess.points, disc), cover)
         wish = _wished(road, disc, cover + config.margin, start, end, spacing, len(points))
         before, points = points, np.ascontiguousarray(points - road.origin)
-        relax(
-            STEPS, field, road.resolution, guess.points - road.origin, guess.hold, anchor - road.origin, pull, headings,
-            disc, required, wish, spacing, BEND, config.max_curvature, stiff, push, points,
+        band = Band(
+            field, road.resolution, guess.points - road.origin, guess.hold, anchor - road.origin, pull, headings, disc,
+            required, wish, spacing, BEND, config.max_curvature,
         )  # fmt: skip
+        relax(STEPS, band, stiff, push, points)
         points = points + road.origin
         still = np.abs(points - before).max() < 0.02
         if still or round_ % 4 == 3:

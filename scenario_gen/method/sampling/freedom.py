@@ -24,7 +24,7 @@ from scenario_gen.types import BoundaryStates, Encounter, Request, Vehicle
 CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
 """Length and width [m] of cars, each as likely: our choice of typical ones, from a city car to a large saloon."""
 _CARS = 3.2, 5.4  # m: a vehicle of such a length gets the size of another car
-_GROWS = 0.5  # of its least gap in the template, by which a vehicle is longer at most: cars stand close in a queue
+_GROWS = 0.15  # of its least gap in the template, by which a vehicle is longer at most: cars stand close in a queue
 _RAMP = 6.0  # s, over which an own clock leaves the shared one where states are asked
 _RAMP_SHARE = 1.0 / 3.0  # of the duration, or of a way, that this takes at most
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
@@ -155,10 +155,17 @@ class OwnClock:
         """Standard normal numbers needed per sample."""
         return len(self.sigma)
 
+    def effective(self, z: Floats, scale: float) -> Floats:
+        """Numbers (S, size) that do the same as numbers z (S, size) do after what is cut off."""
+        off = cut(z, self.bound)
+        unit = np.maximum(scale * self.sigma[2:], 1e-9)
+        off[:, 2:] = np.clip(off[:, 2:], self.low / unit, self.high / unit)
+        return off
+
     def sample(self, z: Floats, scale: float, shared: Clock, nominal: Clock) -> Clock:
         """Clocks (S, G) of the vehicle from numbers z (S, size), deviations multiplied by `scale`."""
-        off = scale * self.sigma * cut(z, self.bound)
-        waits = np.clip(off[:, 2:], self.low, self.high)
+        off = scale * self.sigma * self.effective(z, scale)
+        waits = off[:, 2:]
         rate = off[:, :1] * self.shift_rate + off[:, 1:2] * self.pace_rate
         runs = shared.rate + waits @ self.made_up
         room = np.where(rate < 0.0, runs - SHORTEST_SHARE * nominal.rate, LONGEST_SHARE * nominal.rate - runs)

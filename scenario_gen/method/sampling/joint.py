@@ -13,21 +13,26 @@ lag and gain g of the edge:
 
 - follower f, leader l, every 0.8 s: ℓ_f(τ)ᵀz_f − ℓ_l(τ − lag)ᵀz_l = ε₁(τ) and
   d_f(τ)ᵀz_f − [g d_l(τ − lag) + (1 − g) mean of d_l over ± 3 s]ᵀz_l = ε₂(τ). ε₂ has the edge's residual over 8 s and 8 cm over
-  1.2 s; ε₁ is the residual divided by the follower's speed.
-- yielder y, first o: ℓ_y(leaves)ᵀz_y − [ℓ_o(clears) − d_o(clears) / v_o]ᵀz_o = ε, 0.6 s.
+  1.2 s, and is as much smaller as the gap at a lower speed; ε₁ is ε₂ divided by the follower's speed.
+- yielder y, first o, with the late arrival at a place a_n(τ) = ℓ_n(τ) − d_n(τ) / v_n(τ):
+  a_y(enters)ᵀz_y − a_o(clears)ᵀz_o = ε, 0.3 s and a fifth of the template's gap; and where it stands, and drives off:
+  ℓ_y(leaves)ᵀz_y − a_o(clears)ᵀz_o = ε, 0.6 s. One that stops for the other to the record's end: ℓ_y(slows) − ℓ_o(slows) = ε.
 
 Given the numbers of the vehicles it reacts to, those of a vehicle are again Gaussian. With the whitened equations
 A z + B z_others = η and A = U S Vᵀ they are z = ε + V ((I + S²)^−½ − I) Vᵀ ε − V S (I + S²)⁻¹ Uᵀ B z_others. So all numbers
 follow from independent ones, ε, vehicle by vehicle in the order of the graph. A vehicle that reacts to nobody keeps its own ε.
+What its clock cuts off (a wait cannot be much shorter), nobody reacts to.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 import numpy as np
 from scipy import linalg
 
 from scenario_gen.method.sampling.candidates import Scale, VehicleModel
+from scenario_gen.method.sampling.freedom import OwnClock
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Floats
 from scenario_gen.types import FOLLOW, Reaction, ReactionGraph
@@ -37,6 +42,8 @@ _BLUR = 3.0  # [s] to either side over which a leader's motion is averaged, in t
 _SLOWLY, _QUICKLY = 8.0, 1.2  # [s] correlation lengths of the slow and the quick part of a follower's residual
 _QUICK = 0.08  # [m] standard deviation of the quick part
 _ROUGH = 0.05  # share of a residual that is independent in each equation
+_ENTERS, _OF_GAP = 0.3, 0.2  # [s] and share of the gap, standard deviation of when a yielder enters
+_STANDSTILL = 2.0  # [m] of a follower's gap that does not depend on its speed
 _SLOWEST, _STANDS = 1.0, 0.5  # [m/s] least speeds, of a crossing vehicle and of a follower, that turn metres into seconds
 _EVENT = 0.05  # [s] standard deviation of when a vehicle clears or leaves, beside the residual
 
@@ -46,30 +53,34 @@ Rows = dict[int, Floats]
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """How the numbers of one vehicle follow from all: z[own] += (z into) out, of rank k.
+    """How the numbers of one vehicle follow from all: z[own] += (z into) out, of rank k; 0 for one that reacts to nobody.
 
     Attributes:
         own: the place of its d numbers among all of them.
         into: (size, k) from all numbers.
         out: (k, d) to its own.
+        clock: its own clock, None if it has none; `free`: the place of that one's numbers among all.
     """
 
     own: slice
     into: Floats
     out: Floats
+    clock: OwnClock | None
+    free: slice
 
 
 @dataclass(frozen=True, eq=False)
 class Mixing:
-    """The numbers of all vehicles from independent ones: a step for each vehicle that reacts, in the order of the graph."""
+    """The numbers of all vehicles from independent ones: a step for each vehicle, in the order of the graph."""
 
     steps: tuple[Step, ...]
+    scale: Scale
 
     @classmethod
     def of(
         cls, models: Sequence[VehicleModel], first: Sequence[int], nominal: Clock, graph: ReactionGraph, scale: Scale
     ) -> "Mixing":
-        """Prepare the steps of all vehicles that react.
+        """Prepare the steps of all vehicles.
 
         Args:
             models: of all vehicles.
@@ -79,25 +90,34 @@ class Mixing:
             scale: factors on the standard deviations of a candidate.
         """
         steps = []
-        for n in graph.order:
+        for n in graph.order if graph.edges else ():
             edges = [edge for edge in graph.edges if edge.who == n]
             equations = [
                 equation for edge in edges for equation in _equations(edge, models, nominal, scale) if equation[0][n].any()
             ]
-            if equations:
-                steps.append(_step(n, equations, first))
-        return cls(tuple(steps))
+            freedom = models[n].freedom
+            clock = freedom.clock if freedom else None
+            begin = first[n] + models[n].lateral_root.shape[1] + models[n].speed.size
+            free = slice(begin, begin + (clock.size if clock else 0))
+            into, out = _solved(n, equations, first)
+            steps.append(Step(slice(first[n], first[n + 1]), into, out, clock, free))
+        return cls(tuple(steps), scale)
 
     def mixed(self, eps: Floats) -> Floats:
         """Numbers (S, size) of candidates from independent ones (S, size)."""
-        z = eps.copy()
+        z, seen = eps.copy(), eps.copy()
         for step in self.steps:
-            z[:, step.own] += z @ step.into @ step.out
+            z[:, step.own] += seen @ step.into @ step.out
+            seen[:, step.own] = z[:, step.own]
+            if step.clock is not None:
+                seen[:, step.free] = step.clock.effective(z[:, step.free], self.scale.own)
         return z
 
 
-def _step(n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[int]) -> Step:
-    """The numbers of vehicle n given equations (rows, covariance of residuals): rows times numbers, plus residual, are 0."""
+def _solved(n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[int]) -> tuple[Floats, Floats]:
+    """`into` and `out` of vehicle n given equations (rows, covariance of residuals): rows times numbers, plus residual, are 0."""
+    if not equations:
+        return np.zeros((first[-1], 0)), np.zeros((0, first[n + 1] - first[n]))
     own, others, k = [], [], 0
     for rows, covariance in equations:
         whole = np.zeros((len(covariance), first[-1]))
@@ -111,7 +131,7 @@ def _step(n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[int]
     u, s, v = np.linalg.svd(np.vstack(own), full_matrices=False)
     into = -np.vstack(others).T @ (u * (s / (1.0 + np.square(s))))
     into[first[n] : first[n + 1]] = v.T * (1.0 / np.sqrt(1.0 + np.square(s)) - 1.0)
-    return Step(slice(first[n], first[n + 1]), into, v)
+    return into, v
 
 
 def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, scale: Scale) -> list[tuple[Rows, Floats]]:
@@ -121,24 +141,35 @@ def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, s
         count = min(max(int((edge.until - edge.since) / _STEP), 1) + 1, _MOST)
         at = np.linspace(edge.since, edge.until, count)
         before = at - edge.lag
-        spread = edge.residual / np.maximum(_speeds(who, at), _STANDS)  # [s] the slower it drives, the less its lateness shows
+        speed = _speeds(who, at)
+        gap = _STANDSTILL + edge.headway[1] * speed
+        residual = edge.residual * np.minimum(gap / np.median(gap), 1.0)
+        spread = residual / np.maximum(speed, _STANDS)  # [s] the slower it drives, the less its lateness shows
         slow, quick = _alike(at, _SLOWLY), _alike(at, _QUICKLY)
         rough = np.square(_ROUGH) * np.eye(count)
         late = {edge.who: lateness(who, at, nominal, scale), edge.whom: -lateness(whom, before, nominal, scale)}
         ahead = {edge.who: advance(who, at, scale), edge.whom: -_answered(edge, whom, before, scale)}
         return [
             (late, spread[:, None] * spread * (slow + rough)),
-            (ahead, np.square(edge.residual) * (slow + rough) + np.square(_QUICK) * quick),
+            (ahead, residual[:, None] * residual * (slow + rough) + np.square(_QUICK) * quick),
         ]
-    leaves, clears = np.array([edge.until]), np.array([edge.clears])
-    speed = np.maximum(_speeds(whom, clears), _SLOWEST)
-    other = lateness(whom, clears, nominal, scale) - advance(whom, clears, scale) / speed
-    return [
-        (
-            {edge.who: lateness(who, leaves, nominal, scale), edge.whom: -other},
-            np.array([[np.square(edge.residual) + np.square(_EVENT)]]),
-        )
-    ]
+    if edge.gap == math.inf:
+        slows = np.array([edge.since])
+        rows = {edge.who: lateness(who, slows, nominal, scale), edge.whom: -lateness(whom, slows, nominal, scale)}
+        return [(rows, np.array([[np.square(edge.residual)]]))]
+    first = -_arrival(whom, edge.clears, nominal, scale)
+    entry = _ENTERS + _OF_GAP * abs(edge.gap)
+    equations = [({edge.who: _arrival(who, edge.enters, nominal, scale), edge.whom: first}, np.array([[np.square(entry)]]))]
+    if edge.stands:
+        leaves = lateness(who, np.array([edge.until]), nominal, scale)
+        equations.append(({edge.who: leaves, edge.whom: first}, np.array([[np.square(edge.residual) + np.square(_EVENT)]])))
+    return equations
+
+
+def _arrival(model: VehicleModel, at: float, nominal: Clock, scale: Scale) -> Floats:
+    """(1, d) seconds by which each number makes a vehicle late at the place where it is at a template time [s]."""
+    times = np.array([at])
+    return lateness(model, times, nominal, scale) - advance(model, times, scale) / np.maximum(_speeds(model, times), _SLOWEST)
 
 
 def _answered(edge: Reaction, leader: VehicleModel, at: Floats, scale: Scale) -> Floats:

@@ -34,6 +34,8 @@ from scenario_gen.types import Encounter, FOLLOW, ReactionGraph, Road
 _STRETCHES = 9
 _TIME_SHARE = 1.0 / 3.0  # of the duration, at most: what varies more slowly between given ends hardly varies
 _FREE_SHIFT = 1.5  # m, by which changepoints may be passed from their place before the clock is stretched
+_ANSWERS = 1.4  # times the bound of one that reacts to nobody
+_HALTS = 0.3  # m/s; who is slower at an end of the template halts there, in every scenario
 _REPORTED_PACE, _REPORTED_SHIFT, _REPORTED_JERK = 0.02, 0.3, 0.2  # slowing, m and m/s³ from which on they are reported
 
 
@@ -91,13 +93,14 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
         sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints")
     warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
     vehicles = [_model(routed, road, *mean, config, sentences) for routed, mean in zip(routed_vehicles, feasible, strict=True)]
+    reactions = kept_reactions(encounter, config, order)
     if config.variety == "wide":
+        answers = {edge.who for edge in reactions.edges}
         tied, gaps = (requested.relaxed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
         vehicles = [
-            replace(v, freedom=_freedom(routed, v, warp.nominal, requested.relaxed[n], tied, road, gaps[n], config))
+            replace(v, freedom=_freedom(routed, n in answers, warp.nominal, requested.relaxed[n], tied, road, gaps[n], config))
             for n, (v, routed) in enumerate(zip(vehicles, routed_vehicles, strict=True))
         ]
-    reactions = kept_reactions(encounter, config, order)
     return Prepared(CandidateModel(tuple(vehicles), warp, reactions), tuple(sentences))
 
 
@@ -114,7 +117,7 @@ def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "k
 
 def _freedom(
     routed: RoutedVehicle,
-    model: VehicleModel,
+    answers: bool,
     nominal: Clock,
     relaxed: Floats,
     tied: Bools,
@@ -122,10 +125,13 @@ def _freedom(
     gap: float,
     config: SamplingConfig,
 ) -> Freedom:
-    """What preset `wide` relaxes for a vehicle that came so near [m] to others in the template."""
+    """What preset `wide` relaxes for a vehicle that came so near [m] to others in the template, and `answers` one or not."""
     fastest = routed.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * config.max_acceleration * FADES
     ahead = road_ahead(routed.path, routed.vehicle, road, MOST_ONWARD * fastest)
     clock = OwnClock.of(nominal, routed.rests, (bool(tied[0]), bool(tied[1])), config)
+    if answers:  # what the other one does comes on top of its own
+        clock = replace(clock, bound=_ANSWERS * clock.bound)
+    relaxed = np.where([[True, drives] for drives in routed.speed[[0, -1]] > _HALTS], relaxed, 0.0)
     return freedom_of(routed.vehicle, routed.path.arc, clock, relaxed, tied, ahead, gap, config)
 
 

@@ -16,15 +16,15 @@ from scenario_gen.method.validity import dynamics
 from scenario_gen.method.validity.dynamics import control_points, is_motion
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
+from scenario_gen.method.validity.reactions import broken_reactions, LaneGaps, tailgaters
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.roads import drives_against, RuleCheck
-from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, required_orders, time_gaps, Wait
+from scenario_gen.template import Conflict, conflict_of, find_conflicts, lane_gaps, required_orders, Wait
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
     Cause,
     Encounter,
-    FOLLOW,
     Reaction,
     Road,
     Scenario,
@@ -54,6 +54,7 @@ class Checker:
         reactions: of the template, which every scenario keeps.
         ends: (N, 2) whether each vehicle is there at the template's first and last instant, as it then must be at the
             scenario's; None if that is not known.
+        lane_gaps: how near the template's vehicles come to one ahead of them, as of `lane_gaps`; None if that is not known.
     """
 
     road: Road | None
@@ -64,6 +65,7 @@ class Checker:
     first: Sequence[int | None] | None = None
     reactions: Sequence[Reaction] = ()
     ends: Bools | None = None
+    lane_gaps: LaneGaps | None = None
 
     def __post_init__(self) -> None:
         self._first = tuple(conflict.first for conflict in self.conflicts or ()) if self.first is None else tuple(self.first)
@@ -102,7 +104,9 @@ class Checker:
         conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
         own = (limits or Limits()).for_template(encounter)
         ends = at_ends(encounter.present, len(encounter.time))
-        return cls(road, requested, conflicts, waits, own, required_orders(conflicts, order), reactions, ends)
+        return cls(
+            road, requested, conflicts, waits, own, required_orders(conflicts, order), reactions, ends, lane_gaps(encounter)
+        )
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
@@ -149,7 +153,10 @@ class Checker:
         ]
         conflicts = [conflict_of(scenario, conflict.first, conflict.second) for conflict in self.conflicts or ()]
         wrong, present, absent = self._passing_orders(scenario, conflicts)
-        return Verdict((*violations, *wrong, *self._reactions(scenario, conflicts)), present, absent)
+        reactions = [*broken_reactions(scenario, conflicts, self.reactions, self._limits)]
+        if self.lane_gaps is not None:
+            reactions += tailgaters(scenario, self.lane_gaps, self._limits)
+        return Verdict((*violations, *wrong, *reactions), present, absent)
 
     def _refuse_misfits(self, scenario: Scenario) -> None:
         n, where = len(scenario.vehicles), f"scenario {scenario.index} of seed {scenario.seed}"
@@ -341,35 +348,6 @@ class Checker:
                 message = f"vehicles {a} and {b} do not meet; {expected} vehicle {first} goes first"
                 wrong.append(Violation(Cause.PASSING_ORDER, 0.0, (a, b), message))
         return wrong, present, len(self.conflicts or ()) - present
-
-    def _reactions(self, scenario: Scenario, conflicts: Sequence[Conflict | None]) -> Iterator[Violation]:
-        """Yielders that leave too early or too late, followers that are too near or too far, in the scenario with `conflicts`."""
-        limits = self._limits
-        met = {(c.second, c.first): c for c in conflicts if c is not None}
-        for edge in self.reactions:
-            who, whom = scenario.vehicles[edge.who].id, scenario.vehicles[edge.whom].id
-            if edge.kind == FOLLOW:
-                gaps = time_gaps(scenario, edge.who, edge.whom)
-                low, high = (1.0 - limits.headway_share) * edge.headway[0], (1.0 + limits.headway_share) * edge.headway[2]
-                if len(gaps) and (gaps.min() < low or gaps.max() > high):
-                    message = (
-                        f"vehicle {who}: drives {gaps.min():.2f} to {gaps.max():.2f} s behind vehicle {whom}; its own "
-                        f"driver's gaps allow {low:.2f} to {high:.2f} s"
-                    )
-                    yield Violation(Cause.REACTION, 0.0, (edge.who, edge.whom), message)
-                continue
-            conflict = met.get((edge.who, edge.whom))
-            if conflict is None:
-                message = f"vehicle {who}: does not come behind vehicle {whom}, for which it waits in the template"
-                yield Violation(Cause.REACTION, 0.0, (edge.who, edge.whom), message)
-                continue
-            lag = lag_behind(scenario, conflict)
-            low, high = min(edge.lag, 0.0) - limits.anticipation, max(edge.lag, 0.0) + limits.patience
-            if not low <= lag <= high:
-                message = (
-                    f"vehicle {who}: leaves {lag:.2f} s after vehicle {whom} has cleared; allowed are {low:.2f} to {high:.2f} s"
-                )
-                yield Violation(Cause.REACTION, conflict.exit_first + lag, (edge.who, edge.whom), message)
 
     def _waits(self, scenario: Scenario) -> Iterator[Violation]:
         waits = self.waits or ()

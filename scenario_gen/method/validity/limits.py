@@ -54,18 +54,29 @@ class Limits(Parameters):
         low=0.0,
         high=10.0,
     )
+    gap_share: float = parameter(
+        0.5, "who passes second does so with the template's gap behind the other's clearing, more or less by this share", low=0.0
+    )
     anticipation: float = parameter(
         0.5,
-        "who waits for another one in the template leaves at most this long before that one has cleared, or earlier by this than "
-        "the template's if that anticipates",
+        "or earlier by this, but not before that one has cleared unless it does in the template; and who stands for another one "
+        "drives off at most this long before that one has cleared, or earlier by this than in the template",
         unit="s",
         low=0.0,
     )
-    patience: float = parameter(
-        3.0, "and at most this long after the template's own lag, or after the clearing if that is later", unit="s", low=0.0
-    )
+    patience: float = parameter(1.0, "and later by this", unit="s", low=0.0)
     headway_share: float = parameter(
-        0.5, "a follower's time gaps stay within those of the template's, widened by this share", low=0.0, high=10.0
+        0.5, "a follower's median time gap is at most the template's greatest, and greater by this share", low=0.0, high=10.0
+    )
+    floor_share: float = parameter(
+        0.8,
+        "a vehicle comes as near to one ahead of it in its lane, bumper to bumper, as this share of the least gap that it has "
+        "in the template at such a speed (2 m/s more or less)",
+        low=0.0,
+        high=1.0,
+    )
+    least_headway: float = parameter(
+        0.5, "and above 3 m/s no nearer than this time gap, unless it does in the template", unit="s", low=0.0, high=5.0
     )
     time_resolution: float = parameter(
         1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0

@@ -21,9 +21,9 @@ from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, S
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.method.validity import Checker, LaneGaps, Limits
 from scenario_gen.numerics import Bools
-from scenario_gen.template import Conflict, find_conflicts, find_waits, reactions_of, required_orders, Wait
+from scenario_gen.template import Conflict, find_conflicts, find_waits, lane_gaps, reactions_of, required_orders, Wait
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
@@ -86,7 +86,7 @@ class Reference:
 
     `first` says who must go first at each conflict, by index in `template`, None for anyone; nothing: as in the template.
     `reactions` are those of the template that the entry says are kept. `ends` (N, 2) says who of `template` is there at its first
-    and last instant.
+    and last instant, `lane_gaps` how near they come to one ahead of them.
     """
 
     road: Road | None
@@ -96,6 +96,7 @@ class Reference:
     first: tuple[int | None, ...] = ()
     reactions: tuple[Reaction, ...] = ()
     ends: Bools | None = None
+    lane_gaps: LaneGaps = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -114,6 +115,7 @@ class Reference:
             required_orders(conflicts, entry.order if entry else "keep"),
             kept_reactions(encounter, entry),
             at_ends(encounter.present, len(encounter.time)),
+            lane_gaps(encounter),
         )
 
     def checker(self, scenario: Scenario, limits: Limits | None, requested: BoundaryStates | None) -> Checker:
@@ -129,7 +131,8 @@ class Reference:
         waits = None if self.waits is None else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
         edges = [replace(e, who=at[e.who], whom=at[e.whom]) for e in self.reactions if {e.who, e.whom} <= set(at)]
         ends = None if self.ends is None else self.ends[list(at)]
-        return Checker(self.road, requested, conflicts, waits, limits, first, edges, ends)
+        gaps = {(at[who], at[whom]): found for (who, whom), found in self.lane_gaps.items() if {who, whom} <= set(at)}
+        return Checker(self.road, requested, conflicts, waits, limits, first, edges, ends, gaps)
 
 
 def validate_bag(

@@ -6,17 +6,17 @@
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 import numpy as np
+from oracle import drivable_area, footprints
 import pytest
-from shapely import affinity
-from shapely.geometry import box, LineString, MultiPoint, Point
-from shapely.ops import unary_union
+import shapely
+from shapely.geometry import LineString, Point
 
 from benchmarks._planning_maps import road_of
 from benchmarks._planning_obstructed import obstructed
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing import plan, plan_routes, PlanningConfig
 from scenario_gen.method.routing.distance import distances_to_line, farthest
-from scenario_gen.method.routing.search.dubins import shortest_into
+from scenario_gen.method.routing.search.dubins import Pose, shortest_curve
 from scenario_gen.method.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError
 from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, PoseSearchConfig, Wishes
 from scenario_gen.method.routing.search.sweep import sweep_is_free
@@ -57,35 +57,24 @@ def route_on(road, *anchors, config=PlanningConfig(), seed=0, path=None):
     return route
 
 
-def blocked_area(road):
-    """What is not drivable, and what lies beyond the grid, as one shape."""
-    height, width = road.drivable.shape
-    cells = [box(j, i, j + 1, i + 1) for i, j in np.argwhere(~road.drivable)]
-    frame = box(-99, -99, width + 99, height + 99).difference(box(0, 0, width, height))
-    return affinity.scale(unary_union([*cells, frame]), road.resolution, road.resolution, origin=(0, 0))
-
-
-def footprint(at, size=CAR):
-    shape = affinity.rotate(box(-size[0] / 2, -size[1] / 2, size[0] / 2, size[1] / 2), at[2], origin=(0, 0), use_radians=True)
-    return affinity.translate(shape, at[0], at[1])
+def off_road_area(road, poses):
+    shapes = footprints(poses[:, :2], poses[:, 2], *CAR)
+    return shapely.area(shapely.difference(shapes, drivable_area(road))).max()
 
 
 @given(pose, pose, st.floats(0.3, 5.0))
 def test_a_dubins_curve_ends_where_it_should(start, end, radius):
-    out = np.empty(7)
-    shortest_into(*start, *end, radius, out)
-    np.testing.assert_allclose(out[4:6], end[:2], atol=1e-6)
-    np.testing.assert_allclose((out[6] - end[2] + np.pi) % (2 * np.pi) - np.pi, 0.0, atol=1e-6)
-    assert out[1:4].sum() >= np.hypot(end[0] - start[0], end[1] - start[1]) - 1e-9
+    curve, reached = shortest_curve(Pose(*start), Pose(*end), radius)
+    np.testing.assert_allclose(reached[:2], end[:2], atol=1e-6)
+    np.testing.assert_allclose((reached[2] - end[2] + np.pi) % (2 * np.pi) - np.pi, 0.0, atol=1e-6)
+    assert sum(curve[1:]) >= np.hypot(end[0] - start[0], end[1] - start[1]) - 1e-9
 
 
 def test_a_dubins_curve_is_as_long_driven_backwards():
-    rng = np.random.default_rng(0)
-    there, back = np.empty(7), np.empty(7)
-    for start, end in rng.uniform((-5.0, -5.0, -4.0), (5.0, 5.0, 4.0), (200, 2, 3)):
-        shortest_into(*start, *end, 1.7, there)
-        shortest_into(*end[:2], end[2] + np.pi, *start[:2], start[2] + np.pi, 1.7, back)  # by a car that was turned round
-        np.testing.assert_allclose(back[1:4].sum(), there[1:4].sum(), atol=1e-6)
+    for start, end in np.random.default_rng(0).uniform((-5.0, -5.0, -4.0), (5.0, 5.0, 4.0), (200, 2, 3)):
+        there, _ = shortest_curve(Pose(*start), Pose(*end), 1.7)
+        back, _ = shortest_curve(*(Pose(*each[:2], each[2] + np.pi) for each in (end, start)), 1.7)  # a car that was turned round
+        assert sum(back[1:]) == pytest.approx(sum(there[1:]), abs=1e-6)
 
 
 @settings(max_examples=60)
@@ -98,10 +87,13 @@ def test_what_is_swept_is_free_exactly(seed):
     turn = first[2] + curvature * np.array([0.0, 0.2])
     middle = turn.mean()
     poses = np.array([[*first[:2], turn[0]], [first[0] + 0.2 * np.cos(middle), first[1] + 0.2 * np.sin(middle), turn[1]]])
-    swept = MultiPoint([p for at in poses for p in footprint(at, size).exterior.coords]).convex_hull
-    depth = swept.buffer(0.01).intersection(blocked_area(road)).area - swept.buffer(-0.01).intersection(blocked_area(road)).area
-    overlap = swept.intersection(blocked_area(road)).area
-    assume(overlap > 0.02 or depth == 0.0)
+    swept = shapely.convex_hull(shapely.union_all(footprints(poses[:, :2], poses[:, 2], *size)))
+    area = drivable_area(road)
+    overlap, doubt = (
+        swept.difference(area).area,
+        swept.buffer(0.01).difference(area).area - swept.buffer(-0.01).difference(area).area,
+    )
+    assume(overlap > 0.02 or doubt == 0.0)
     both = sweep_is_free(road, poses, *size)[:, 0]
     assert (both.min() > 0.0) == (overlap == 0.0)
 
@@ -121,8 +113,7 @@ def test_paths_are_arcs_and_keep_clear(obstacles):
     chord = plan.step[1:] * np.sinc(half / np.pi)
     np.testing.assert_allclose(np.hypot(*np.diff(plan.poses[:, :2], axis=0).T), chord, atol=1e-6)
     assert plan.cost == pytest.approx(plan.step.sum())
-    shape = unary_union([footprint(at) for at in plan.poses])
-    assert shape.intersection(blocked_area(road)).area < 1e-6
+    assert off_road_area(road, plan.poses) < 1e-6
     again = PoseRrtStarConnect().plan(road, query(), Budget(2000), 3)
     assert again.poses.tobytes() == plan.poses.tobytes()
 
@@ -178,8 +169,7 @@ def test_a_slalom_is_driven():
     bend = np.diff(route.points[:, 2]) / np.diff(route.length)
     assert np.abs(bend).max() < LIMIT * 1.02
     assert np.abs(np.diff(bend)).max() < 0.08  # per half a metre: no jump of curvature
-    shape = unary_union([footprint(at) for at in route.points])
-    assert shape.intersection(blocked_area(road)).area < 1e-6
+    assert off_road_area(road, route.points) < 1e-6
 
 
 def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):

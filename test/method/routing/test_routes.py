@@ -8,10 +8,9 @@ import csv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
+from oracle import drivable_area, footprints
 import pytest
-from shapely import affinity
-from shapely.geometry import box, Polygon
-from shapely.ops import unary_union
+import shapely
 
 from benchmarks._planning_maps import recorded_maps, road_of
 from scenario_gen.base.errors import InputError, RefusedError
@@ -52,26 +51,12 @@ def routes_of(road, *vehicles, config=PlanningConfig(), seed=0):
     return plan_routes(road, fit_of(*vehicles), config, seed)
 
 
-def swept(route, car):
-    """The footprint at every point of the route and between, as shapely polygons."""
-    at = np.linspace(0.0, route.length[-1], max(4 * len(route.points), 2))
-    x, y, yaw = (np.interp(at, route.length, route.points[:, k]) for k in range(3))
-    shape = box(-car.length / 2, -car.width / 2, car.length / 2, car.width / 2)
-    for pose in zip(x, y, yaw, strict=True):
-        yield affinity.translate(affinity.rotate(shape, pose[2], origin=(0, 0), use_radians=True), pose[0], pose[1])
-
-
 def off_road_area(road, route, car):
-    """Largest area [m²] of the footprint off the road, by shapely; the grid's rows become strips."""
-    strips = []
-    height, width = road.drivable.shape
-    for i in range(height):
-        edge = np.flatnonzero(np.diff(np.concatenate(([0], ~road.drivable[i], [0])).astype(int)))
-        strips += [box(a, i, b, i + 1) for a, b in edge.reshape(-1, 2)]
-    frame = box(-99, -99, width + 99, height + 99).difference(box(0, 0, width, height))
-    blocked = affinity.scale(unary_union([*strips, frame]), road.resolution, road.resolution, origin=(0, 0))
-    blocked = affinity.translate(blocked, *road.origin)
-    return max(shape.intersection(blocked).area for shape in swept(route, car))
+    """Largest area [m²] of the footprint off the road, at every point of the route and between, by shapely."""
+    at = np.linspace(0.0, route.length[-1], max(4 * len(route.points), 2))
+    poses = np.column_stack([np.interp(at, route.length, column) for column in route.points.T])
+    shapes = footprints(poses[:, :2], poses[:, 2], car.length, car.width)
+    return shapely.area(shapely.difference(shapes, drivable_area(road))).max()
 
 
 def assert_drivable(route, anchors, limit=0.2):
@@ -218,11 +203,3 @@ def test_recorded_vehicles_on_their_own_map(data, name):
         assert_drivable(route, anchors)
         assert deviations(route, fit.fitted[0]).max() < 0.5
         assert off_road_area(road, route, car) < 1e-6
-
-
-def test_swept_shapes_are_footprints():
-    (route,) = routes_of(T, ([[5, 48.25, 0], [30, 48.25, 0]], [False]))
-    first = next(iter(swept(route, CAR)))
-    assert first.equals_exact(Polygon([(7.4, 47.3), (7.4, 49.2), (2.6, 49.2), (2.6, 47.3)]), 1e-9) or first.area == pytest.approx(
-        CAR.length * CAR.width
-    )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, road_of, t_intersection
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.search.planner import (
     BlockedError,
     Budget,
@@ -20,9 +20,10 @@ from scenario_gen.method.routing.search.planner import (
     plan_with_retry,
     Query,
 )
-from scenario_gen.method.routing.search.rrt_star_connect import _Trees, LARGE, PAPER, RrtStarConnect, RrtStarConnectConfig
-from scenario_gen.method.routing.search.tree_nodes import CHUNK, COST, EDGE, ITERATION, NODES_A, NODES_B, PARENT
-from scenario_gen.roads.clearance import clearance_in_cells, segments_free
+from scenario_gen.method.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig, straight_path
+from scenario_gen.method.routing.search.tree import CHUNK, COST, EDGE, PARENT
+from scenario_gen.method.routing.search.two_trees import LARGE
+from scenario_gen.roads.clearance import segments_free
 from scenario_gen.roads.connectivity import common_component
 
 SMALL = 24
@@ -52,16 +53,6 @@ def test_no_path_enters_a_blocked_cell(config, radius):
         assert segments_free(road, plan.path[:-1], plan.path[1:], radius).all()
         assert plan.cost == pytest.approx(path_length(plan.path))
     assert found > QUERIES / 5
-
-
-def test_the_rasteriser_sees_what_enters():
-    drivable = np.ones((4, 4), dtype=bool)
-    drivable[1, 1] = False
-    assert enters_blocked(drivable, np.array([[0.5, 0.5], [2.5, 2.5]]))
-    assert not enters_blocked(drivable, np.array([[1.0, 0.5], [1.0, 3.5]]))  # along the edge
-    assert enters_blocked(drivable, np.array([[1.0 + 1e-12, 0.5], [1.0 + 1e-12, 3.5]]))
-    assert not enters_blocked(drivable, np.array([[0.0, 2.0], [2.0, 0.0]]))  # touches a corner
-    assert enters_blocked(drivable, np.array([[3.5, 3.5], [4.5, 3.5]]))  # leaves the grid
 
 
 @settings(max_examples=80)
@@ -111,43 +102,40 @@ def test_the_paper_preset_goes_on_improving_after_the_first_meeting():
     assert np.hypot(*np.diff(first.path, axis=0).T).max() <= 30.0 + 1e-9  # no edge longer than the near radius
 
 
+def small():
+    return road_of("small", np.ones((8, 30), dtype=bool)), np.array([[1.5, 1.5], [28.5, 6.5]])
+
+
 def grown(road, ends, config, iterations):
     """Both trees after so many iterations, and the ids of all their nodes."""
-    search = _Trees(road, Query(*ends), 1, config, 2)
-    while search.counter[ITERATION] < iterations:
-        search.grow(iterations - int(search.counter[ITERATION]))
+    search = RrtStarConnect(config).search(road, Query(*ends), 1, 2)
+    while search.iteration < iterations:
+        search.grow(iterations - search.iteration)
     found = []
-    for first in search.head[search.head >= 0]:
+    for first in search.tree.head[search.tree.head >= 0]:
         k = first
         while k >= 0:
-            found.append(k * CHUNK + np.arange(search.chunk[k, 1]))
-            k = search.chunk[k, 0]
+            found.append(k * CHUNK + np.arange(search.tree.chunk[k, 1]))
+            k = search.tree.chunk[k, 0]
     return search, np.concatenate(found)
 
 
 @pytest.mark.parametrize("config", [RrtStarConnectConfig(), PAPER], ids=["default", "paper"])
-@pytest.mark.parametrize("case", [clutter, lane])
+@pytest.mark.parametrize("case", [clutter, lane, small])
 def test_large_trees_are_whole(config, case):
     road, ends = case()
     search, m = grown(road, ends, config, 60_000)
-    assert len(m) == len(np.unique(m)) == search.counter[NODES_A] + search.counter[NODES_B]
+    assert len(m) == len(np.unique(m)) == search.state["nodes"].sum()
     assert len(search.drawn) > 0 or len(m) <= LARGE
-    m = m[search.link[m, PARENT] >= 0]
-    parent = search.link[m, PARENT]
-    edge = np.hypot(*(search.node[m, :2] - search.node[parent, :2]).T)
-    np.testing.assert_allclose(search.node[m, EDGE], edge, atol=1e-9)
-    np.testing.assert_allclose(search.node[m, COST], search.node[parent, COST] + edge, atol=1e-7)
-    assert segments_free(road, search.node[parent, :2], search.node[m, :2], 0.0).all()
-    path = search.path()
+    m = m[search.tree.link[m, PARENT] >= 0]
+    parent = search.tree.link[m, PARENT]
+    edge = np.hypot(*(search.tree.node[m, :2] - search.tree.node[parent, :2]).T)
+    np.testing.assert_allclose(search.tree.node[m, EDGE], edge, atol=1e-9)
+    np.testing.assert_allclose(search.tree.node[m, COST], search.tree.node[parent, COST] + edge, atol=1e-7)
+    assert segments_free(road, search.tree.node[parent, :2], search.tree.node[m, :2], 0.0).all()
+    path = straight_path(search)
     assert path_length(path) == pytest.approx(search.best)
     np.testing.assert_array_equal(path[[0, -1]], ends)
-
-
-def test_many_nodes_on_a_small_map():
-    road, ends = road_of("small", np.ones((8, 30), dtype=bool)), np.array([[1.5, 1.5], [28.5, 6.5]])
-    search, m = grown(road, ends, PAPER, 40_000)
-    assert len(m) == search.counter[NODES_A] + search.counter[NODES_B] > LARGE
-    assert search.best == pytest.approx(np.hypot(*(ends[1] - ends[0])))
 
 
 def test_only_an_informed_search_leaves_out_what_cannot_help():
@@ -156,7 +144,7 @@ def test_only_an_informed_search_leaves_out_what_cannot_help():
     road, ends = road_of("open", drivable), np.array([[80.5, 100.5], [120.5, 100.5]])
     for config, everywhere in ((PAPER, True), (RrtStarConnectConfig(greedy=False, pull=False), False)):
         search, m = grown(road, ends, config, 4_000)
-        place = search.node[m, :2]
+        place = search.tree.node[m, :2]
         by_way_of = np.hypot(*(place - ends[0]).T) + np.hypot(*(place - ends[1]).T)
         assert (np.mean(by_way_of > 2.0 * search.best) > 0.3) == everywhere
 
@@ -189,8 +177,11 @@ def test_failures_are_told_apart():
         planner.plan(road_of("a gap", drivable), Query(left, right), Budget(10**9, cancelled=lambda: True), 0)
 
 
-def test_cancelling_ends_a_search_and_keeps_what_it_has():
+def test_time_and_cancelling_end_a_search_that_keeps_what_it_has():
     road, ends = clutter()
+    timed = RrtStarConnect().plan(road, Query(*ends), Budget(None, seconds=0.05), 0)
+    assert timed.iterations > 100
+    assert timed.history[-1, 1] < 0.5
     looks = iter([False] * 8 + [True])
     plan = RrtStarConnect().plan(road, Query(*ends), Budget(None, cancelled=lambda: next(looks)), 0)
     assert plan.cost == pytest.approx(plan.history[-1, 2])
@@ -208,19 +199,6 @@ def test_a_disc_needs_its_room():
     assert wide.cost > RrtStarConnect().plan(road, Query(*query, 0.0), Budget(2000), 0).cost
     with pytest.raises(NoWayError):
         RrtStarConnect().plan(road, Query(*query, 1.6), Budget(2000), 0)
-
-
-def test_time_ends_a_search():
-    road, ends = clutter()
-    clearance_in_cells(road)
-    plan = RrtStarConnect(RrtStarConnectConfig(pull=False)).plan(road, Query(*ends), Budget(None, seconds=0.05), 0)
-    assert plan.iterations > 100
-    assert plan.history[-1, 1] < 0.5
-
-
-def test_settings_are_checked():
-    with pytest.raises(InputError, match="step"):
-        RrtStarConnectConfig(step=0.0)
 
 
 def test_patience_finds_the_way_that_a_small_budget_does_not():

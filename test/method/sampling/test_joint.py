@@ -59,7 +59,11 @@ def test_roots_keep_their_numbers_and_the_others_are_gaussian_with_the_stated_re
     assert np.array_equal(z[:, : first[0]], eps[:, : first[0]])
     assert np.allclose(z.mean(axis=0), 0.0, atol=0.06)
     who, whom = model.vehicles[edge.who], model.vehicles[edge.whom]
-    own, other = z[:, parts[edge.who]], z[:, parts[edge.whom]]
+    own, other = z[:, parts[edge.who]], z[:, parts[edge.whom]].copy()
+    begin, clock = whom.lateral_root.shape[1] + whom.speed.size, whom.freedom.clock
+    other[:, begin : begin + clock.size] = clock.effective(
+        other[:, begin : begin + clock.size], 1.0
+    )  # what is cut off is nobody's
     if edge.kind == FOLLOW:
         at = np.linspace(edge.since + 4.0, edge.until - 4.0, 7)
         late = own @ lateness(who, at, model.warp.nominal, Scale()).T

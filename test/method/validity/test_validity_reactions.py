@@ -1,15 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The certificate of interaction: who leaves too early or too late, or follows too near or too far, is refused."""
+"""The certificate of interaction: who enters or leaves too early or too late, or drives too near or too far, is refused."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from reaction_scenes import answering, crossing, lane_encounter, wander
+from textbook_motions import labelled, REACTIONS
 
 from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.template.answers import lane_gaps
 from scenario_gen.template.interaction import find_conflicts
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.scenario import Cause, Scenario
@@ -28,7 +30,7 @@ def as_scenario(encounter):
 
 def refusals(scenario, template, limits=None):
     conflicts = find_conflicts(template.vehicles, template.time, template.position, template.heading)
-    checker = Checker(None, None, conflicts, None, limits, reactions=reactions_of(template).edges)
+    checker = Checker(None, None, conflicts, None, limits, reactions=reactions_of(template).edges, lane_gaps=lane_gaps(template))
     (verdict,) = checker.check([scenario])
     return [one for one in verdict.violations if one.cause == Cause.REACTION]
 
@@ -38,7 +40,7 @@ CLEARS = reactions_of(TEMPLATE).edges[0].clears
 
 
 @pytest.mark.parametrize(
-    ("lag", "kept"), [(-1.5, False), (-1.2, False), (-0.7, True), (0.0, True), (2.0, True), (3.9, True), (5.0, False)]
+    ("lag", "kept"), [(-1.5, False), (-1.2, False), (-0.7, True), (0.0, True), (2.0, True), (3.0, True), (5.0, False)]
 )
 def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(lag, kept):
     """It is seen to leave 0.25 s after its speed begins to rise."""
@@ -48,7 +50,7 @@ def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(la
     assert (found == []) == kept
     if not kept:
         assert found[0].vehicles == (1, 0)
-        assert "vehicle 2: leaves" in found[0].message and "after vehicle 1 has cleared" in found[0].message
+        assert ("leaves" if lag < 0.0 else "enters") in found[0].message and "vehicle 1 has cleared" in found[0].message
 
 
 def test_the_bounds_of_a_lag_are_parameters():
@@ -70,12 +72,31 @@ LEADER = wander(np.random.default_rng(3), 200)
 LANE = lane_encounter(LEADER, answering(LEADER, 1.2, 0.9))
 
 
-@pytest.mark.parametrize(("ahead", "kept"), [(0.0, True), (5.0, True), (12.0, False), (-8.0, True), (-25.0, False)])
-def test_a_follower_keeps_its_own_drivers_time_gaps(ahead, kept):
+@pytest.mark.parametrize(("ahead", "kept"), [(0.0, True), (2.0, True), (5.0, False), (12.0, False), (-3.0, True), (-25.0, False)])
+def test_a_follower_keeps_its_own_drivers_gaps(ahead, kept):
     moved = LANE.position.copy()
     moved[1, :, 0] += ahead
     found = refusals(as_scenario(replace(LANE, position=moved)), LANE)
     assert (found == []) == kept
+
+
+def test_nobody_drives_nearer_than_half_a_second_even_without_a_reaction():
+    """A driver who in the template is far behind, at any speed of it."""
+    far = lane_encounter(LEADER, LEADER, 75.0)
+    assert reactions_of(far).edges == ()
+    for gap, kept in ((12.0, True), (9.0, False)):  # between centres, at 12 m/s
+        found = refusals(as_scenario(lane_encounter(LEADER, LEADER, gap)), far)
+        assert (found == []) == kept
+    assert refusals(as_scenario(lane_encounter(LEADER, LEADER, 9.0)), far, Limits(least_headway=0.2)) == []
+    assert refusals(as_scenario(lane_encounter(LEADER, LEADER, 9.0)), lane_encounter(LEADER, LEADER, 9.5)) == [], (
+        "it does so, too"
+    )
+
+
+@pytest.mark.parametrize("kind", REACTIONS)
+def test_textbook_motions_keep_their_own_reactions(kind):
+    template = labelled(kind, 3).encounter
+    assert refusals(as_scenario(template), template) == []
 
 
 def test_templates_keep_their_own_reactions():

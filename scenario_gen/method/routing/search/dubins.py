@@ -3,22 +3,44 @@
 
 """Dubins curves: the shortest ways between two poses for a car that drives ahead and turns no tighter than a radius.
 
-A curve is a word of three parts (arc or straight, arc), each with its length: (word, a, b, c). Lengths are in one unit, any.
+A curve is a word of three parts (arc, arc or straight, arc), each with its length. Lengths are in one unit, any.
 
 Source: Dubins 1957; the closed forms are those of Shkel & Lumelsky 2001.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.kernels import F, kernel, OUT1
+from scenario_gen.numerics.kernels import F, kernel, named
 
 LSL, RSR, LSR, RSL, RLR, LRL = 0, 1, 2, 3, 4, 5
 TURNS = np.array(  # by word and part: 1 left, -1 right, 0 straight
     [[1.0, 0.0, 1.0], [-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, 1.0]]
 )
+REVERSED = np.array([RSR, LSL, LSR, RSL, LRL, RLR])  # the words driven the other way round, by a car that was turned
 FULL = 2.0 * np.pi
 CLOSED = 1e-9  # [rad] an arc this near to a full circle is none
+
+
+class Pose(NamedTuple):
+    """A place, and the heading there [rad]."""
+
+    x: float
+    y: float
+    yaw: float
+
+
+class Curve(NamedTuple):
+    """A word, and the lengths of its three parts."""
+
+    word: int
+    a: float
+    b: float
+    c: float
+
+
+POSE = named(Pose, F, F, F)
 
 
 @kernel(inline=True)
@@ -29,17 +51,15 @@ def _turned(angle: float) -> float:
 
 
 @kernel(inline=True)
-def shortest(  # noqa: PLR0912
-    x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius: float
-) -> tuple[int, float, float, float]:
-    """The shortest curve from pose to pose [any length, rad]: its word and the lengths of its three parts.
+def shortest(start: Pose, end: Pose, radius: float) -> Curve:  # noqa: PLR0912
+    """The shortest curve from pose to pose.
 
     Source: Shkel & Lumelsky 2001, "Classification of the Dubins set".
     """
-    dx, dy = (x1 - x0) / radius, (y1 - y0) / radius
+    dx, dy = (end.x - start.x) / radius, (end.y - start.y) / radius
     d = np.sqrt(dx * dx + dy * dy)
     direction = np.arctan2(dy, dx) if d > 0.0 else 0.0
-    alpha, beta = yaw0 - direction, yaw1 - direction
+    alpha, beta = start.yaw - direction, end.yaw - direction
     sa, ca, sb, cb = np.sin(alpha), np.cos(alpha), np.sin(beta), np.cos(beta)
     cab = ca * cb + sa * sb
     best, word, t, p, q = np.inf, LSL, 0.0, 0.0, 0.0
@@ -89,39 +109,52 @@ def shortest(  # noqa: PLR0912
             last = _turned(beta - alpha - first + middle)
             if first + middle + last < best:
                 best, word, t, p, q = first + middle + last, LRL, first, middle, last
-    return word, t * radius, p * radius, q * radius
+    return Curve(word, t * radius, p * radius, q * radius)
 
 
 @kernel(inline=True)
-def onward(x: float, y: float, yaw: float, turn: float, length: float, radius: float) -> tuple[float, float, float]:
+def length_of(curve: Curve) -> float:
+    """The length of a curve."""
+    return curve.a + curve.b + curve.c
+
+
+@kernel(inline=True)
+def part_of(curve: Curve, part: int) -> float:
+    """The length of one part."""
+    return curve.a if part == 0 else curve.b if part == 1 else curve.c
+
+
+@kernel(inline=True)
+def onward(pose: Pose, turn: float, length: float, radius: float) -> Pose:
     """The pose `length` farther on, by an arc (turn 1 left, -1 right) or straight on (0)."""
     if turn == 0.0:
-        return x + length * np.cos(yaw), y + length * np.sin(yaw), yaw
-    end = yaw + turn * length / radius
+        return Pose(pose.x + length * np.cos(pose.yaw), pose.y + length * np.sin(pose.yaw), pose.yaw)
+    end = pose.yaw + turn * length / radius
     side = turn * radius
-    return x + side * (np.sin(end) - np.sin(yaw)), y - side * (np.cos(end) - np.cos(yaw)), end
+    x, y = pose.x + side * (np.sin(end) - np.sin(pose.yaw)), pose.y - side * (np.cos(end) - np.cos(pose.yaw))
+    return Pose(x, y, end)
 
 
 @kernel(inline=True)
-def end_of(x: float, y: float, yaw: float, word: int, a: float, b: float, c: float, radius: float) -> tuple[float, float, float]:
+def end_of(pose: Pose, curve: Curve, radius: float) -> Pose:
     """The pose at the end of a curve."""
-    x, y, yaw = onward(x, y, yaw, TURNS[word, 0], a, radius)
-    x, y, yaw = onward(x, y, yaw, TURNS[word, 1], b, radius)
-    return onward(x, y, yaw, TURNS[word, 2], c, radius)
+    pose = onward(pose, TURNS[curve.word, 0], curve.a, radius)
+    pose = onward(pose, TURNS[curve.word, 1], curve.b, radius)
+    return onward(pose, TURNS[curve.word, 2], curve.c, radius)
 
 
 @kernel(inline=True)
-def piece(a: float, b: float, c: float, start: float, end: float) -> tuple[float, float, float]:
-    """The parts of a curve between two of its lengths."""
+def piece(curve: Curve, start: float, end: float) -> Curve:
+    """The part of a curve between two of its lengths."""
+    a, b, c = curve.a, curve.b, curve.c
     first = min(a, end) - min(a, start)
     second = min(max(end - a, 0.0), b) - min(max(start - a, 0.0), b)
     third = min(max(end - a - b, 0.0), c) - min(max(start - a - b, 0.0), c)
-    return first, second, third
+    return Curve(curve.word, first, second, third)
 
 
-@kernel(F, F, F, F, F, F, F, OUT1)
-def shortest_into(x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius: float, out: Floats) -> None:
-    """Write word, three lengths, and the pose (x, y, yaw) that they lead to, into `out` (7,): `shortest` for Python."""
-    word, a, b, c = shortest(x0, y0, yaw0, x1, y1, yaw1, radius)
-    out[0], out[1], out[2], out[3] = word, a, b, c
-    out[4], out[5], out[6] = end_of(x0, y0, yaw0, word, a, b, c, radius)
+@kernel(POSE, POSE, F)
+def shortest_curve(start: Pose, end: Pose, radius: float) -> tuple[Curve, Pose]:
+    """`shortest` for Python, and the pose that it leads to."""
+    curve = shortest(start, end, radius)
+    return curve, end_of(start, curve, radius)

@@ -132,4 +132,5 @@ def check_query(road: Road, query: Query) -> int:
 
 def path_length(path: Floats) -> float:
     """Length of a polyline (P, 2), in its unit, metres or cells."""
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+    edge = path[1:] - path[:-1]
+    return float(np.hypot(edge[:, 0], edge[:, 1]).sum())

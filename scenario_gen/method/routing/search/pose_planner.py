@@ -5,21 +5,20 @@
 
 from dataclasses import dataclass, field
 import math
-from time import thread_time
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.routing.search import pose_tree as trees
-from scenario_gen.method.routing.search import tree_nodes as shared
+from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError, Query
 from scenario_gen.method.routing.search.pose_path import shorten, trace
 from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig, string_pulled
-from scenario_gen.method.routing.search.sweep import SWEEP
+from scenario_gen.method.routing.search.sweep import car_scene, NOWHERE, Prices
+from scenario_gen.method.routing.search.tree_samples import Rules
+from scenario_gen.method.routing.search.two_trees import Search
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.roads import (
-    blocked_before,
     clearance_in_cells,
     common_component,
     component_cells,
@@ -29,14 +28,13 @@ from scenario_gen.roads import (
 )
 from scenario_gen.types import Road
 
-POOL = 512  # nodes that a pool has room for at first
 PIECE = 0.5  # [m] longest piece of a path
 BATCH = 64  # iterations between two looks at the clock
 DISCS = (0.0, 0.25, 0.05)  # [m] by which the discs are wider than the footprint whose paths are sampled about, one after another
 DISC_BUDGET = 5000  # iterations for such a path
 ANOTHER = 512  # iterations after which another one is taken, if there is no path yet
 DISC = RrtStarConnect(RrtStarConnectConfig(pull=False))
-NOWHERE = np.empty((0, 3))
+DIMENSIONS = 4  # d of eq 10, of a ball that small Dubins curves reach: along 1, heading 1, sideways 2 (Karaman & Frazzoli 2013)
 
 
 @dataclass(frozen=True)
@@ -115,89 +113,6 @@ class PosePlan:
     history: Floats
 
 
-class _Search:
-    """The two trees' arrays, and their growth."""
-
-    def __init__(self, road: Road, query: PoseQuery, wishes: Wishes, config: PoseSearchConfig, seed: int) -> None:
-        cell = road.resolution
-        self.road, self.query, self.wishes = road, query, wishes
-        self.clearance, self.blocked = clearance_in_cells(road), blocked_before(road)
-        self.ends = np.stack([_in_cells(road, pose) for pose in (query.start, query.goal)])
-        self.free_cells = np.zeros(1, dtype=np.int64)
-        self.guide, self.about = _in_cells(road, wishes.guide), NOWHERE
-        self.setting = np.zeros(trees.SETTINGS)
-        self.setting[[shared.BOUND, shared.BEST]] = np.inf
-        self.setting[[shared.STEP, shared.ZETA]] = config.step / cell, config.zeta / cell
-        self.setting[[shared.GREEDY, shared.INFORMED]] = 1.0, 1.0
-        self.setting[trees.TURN] = 1.0 / (query.curvature * cell)
-        self.setting[[trees.HALF_LENGTH, trees.HALF_WIDTH]] = 0.5 * query.length / cell, 0.5 * query.width / cell
-        self.setting[trees.SWEEP] = SWEEP / cell
-        prices = wishes.room / cell, wishes.lack, wishes.left * cell, wishes.right * cell
-        self.setting[trees.WISH : trees.WISH + 6] = *prices, wishes.most_left / cell, wishes.most_right / cell
-        self.setting[[trees.ABOUT, trees.SPREAD, trees.YAW_SPREAD]] = config.about, config.spread / cell, config.yaw_spread
-        self.counter = np.zeros(shared.COUNTERS, dtype=np.int64)
-        self.counter[shared.CONNECTION] = -1
-        self.random = np.array([seed % 2**64], dtype=np.uint64)
-        self.node, self.link = np.empty((POOL, trees.COLUMNS)), np.empty((POOL, 5), dtype=np.int32)
-        trees.plant(self.ends, self.node, self.link, self.counter)
-
-    def sample_from(self, cells: "np.ndarray[tuple[int], np.dtype[np.int64]]", about: Floats, gamma_factor: float) -> None:
-        """Say where samples may lie: flat indices of cells, and poses (G, 3) [m] of a path to sample about."""
-        self.free_cells, self.about = cells, _in_cells(self.road, about)
-        # Karaman & Frazzoli 2013; a ball of radius r holds poses r ahead, r² / 2R aside, r / R in heading
-        volume = len(cells) * 2.0 * math.pi
-        unit = 1.0 / np.square(self.setting[trees.TURN])
-        dimensions = trees.DIMENSIONS
-        root = np.sqrt(np.sqrt((1.0 + 1.0 / dimensions) * volume / unit))  # 1 / d
-        self.setting[shared.GAMMA] = gamma_factor * 2.0 * float(root)
-
-    def grow(self, iterations: int) -> None:
-        """Make so many iterations, or fewer where the first path is found."""
-        goal = self.counter[shared.ITERATION] + iterations
-        had_path = self.best < np.inf
-        while self.counter[shared.ITERATION] < goal and (had_path or self.best == np.inf):
-            trees.grow(
-                goal - self.counter[shared.ITERATION], self.clearance, self.blocked, self.ends, self.free_cells, self.about,
-                self.guide, self.node, self.link, self.counter, self.setting, self.random,
-            )  # fmt: skip
-            if self.counter[shared.NODES_A] + self.counter[shared.NODES_B] + 64 >= len(self.node):
-                self._make_room()
-
-    def _make_room(self) -> None:
-        """Twice the pool; the second tree moves to the new back."""
-        old, theirs = len(self.node), int(self.counter[shared.NODES_B])
-        first, shift = old - theirs, old
-        node, link = np.empty((2 * old, trees.COLUMNS)), np.empty((2 * old, 5), dtype=np.int32)
-        self.link = np.where(self.link >= first, self.link + shift, self.link).astype(np.int32)
-        ours = int(self.counter[shared.NODES_A])
-        for new, had in ((node, self.node), (link, self.link)):
-            new[:ours], new[2 * old - theirs :] = had[:ours], had[first:]
-        self.node, self.link = node, link
-        if self.counter[shared.CONNECTION] >= first:
-            self.counter[shared.CONNECTION] += shift
-
-    @property
-    def best(self) -> float:
-        """Cost [cells] of the trees' best path."""
-        return float(self.setting[shared.BEST])
-
-    def path(self, shortcuts: int) -> tuple[Floats, float]:
-        """The best path, shortened: (P, 5) poses, curvature and length of the piece to each; and its cost [cells]."""
-        room = 256
-        piece = PIECE / self.road.resolution
-        while True:
-            path = np.empty((room, 5))
-            count = trace(self.node, self.link, self.counter, float(self.setting[trees.TURN]), piece, path)
-            if count < room // 2:
-                break
-            room *= 2
-        path[count - 1, :3] = self.ends[1]
-        count = shorten(
-            count, shortcuts, piece, self.clearance, self.blocked, self.guide, self.setting, self.random, path
-        )  # fmt: skip
-        return path[:count].copy(), float(self.setting[trees.LENGTH])
-
-
 def _refuse_blocked(road: Road, query: PoseQuery) -> None:
     """Refuse a start or goal at which the footprint has no room.
 
@@ -249,67 +164,67 @@ class PoseRrtStarConnect:
             NoWayError: not even a disc as wide as the footprint can get there.
             BudgetSpentError: none was found within the budget.
         """
-        started = thread_time()
         _refuse_blocked(road, query)
-        search = _Search(road, query, wishes, self.config, seed)
-        look, end = 1, 0  # iterations at which the way of a disc is looked for, and at which enough was made for a better path
+        search = self._search(road, query, wishes, seed)
+        look, limit, known = 1, budget.iterations, np.inf  # look: when the way of a disc is looked for; limit: of iterations
         search.grow(1)  # the direct curve
-        best: Floats | None = None
-        cost, known = np.inf, np.inf
-        history: list[tuple[int, float, float]] = []
-        straight = float(np.hypot(*(search.ends[1] - search.ends[0])[:2]))
-        while not (budget.cancelled and budget.cancelled()):
+        while True:
             if search.best < known:
                 known = search.best
-                path, length = search.path(self.config.shortcuts if best is not None or not budget.first else 0)
-                if length < cost:
-                    cost, best = length, path
-                    history.append((int(search.counter[shared.ITERATION]), thread_time() - started, cost * road.resolution))
-                    if search.about is not NOWHERE:
-                        search.about = np.ascontiguousarray(path[:, :3])
-                if len(history) <= 1:
-                    search.setting[shared.STEP] = self.config.stride / road.resolution
-                    end = int(search.counter[shared.ITERATION]) + self.config.improve
-            if best is not None and (budget.first or cost <= straight * (1.0 + 1e-9) or search.about is NOWHERE):
+                shortcuts = self.config.shortcuts if search.path is not None or not budget.first else 0
+                path, cost = _shortened(search, shortcuts)
+                if search.keep(path, cost) and len(search.rules.about):
+                    search.rules = search.rules._replace(about=np.ascontiguousarray(path[:, :3]))
+                if len(search.history) <= 1:
+                    search.rules = search.rules._replace(step=self.config.stride / road.resolution)
+                    limit = search.iteration + self.config.improve
+            found = search.path is not None
+            if found and (budget.first or search.is_straight() or not len(search.rules.about)):
                 break
-            done = int(search.counter[shared.ITERATION])
-            if best is None and done >= look:
-                self._look_around(search, seed, look)
+            if not found and search.iteration >= look:
+                self._look_around(search, query, wishes, seed + look)
                 look += ANOTHER
-            most = budget.iterations if best is None else end
-            batch = BATCH if most is None else min(BATCH, most - done)
-            if batch <= 0 or (budget.seconds is not None and thread_time() - started >= budget.seconds):
+            batch = search.batch(BATCH, limit, budget)
+            if batch <= 0:
                 break
             search.grow(batch)
-        if best is None:
-            raise BudgetSpentError(
-                f"no path found on road {road.name!r} within {int(search.counter[shared.ITERATION])} iterations, "
-                f"{thread_time() - started:.2f} s of CPU time"
-            )
+        best = search.result()
         poses = np.column_stack((to_metres(road, best[:, :2]), best[:, 2]))
         poses[0, :2], poses[-1, :2] = query.start[:2], query.goal[:2]
+        cell = road.resolution
         return PosePlan(
-            poses,
-            best[:, 3] / road.resolution,
-            best[:, 4] * road.resolution,
-            cost * road.resolution,
-            int(search.counter[shared.ITERATION]),
-            np.array(history),
+            poses, best[:, 3] / cell, best[:, 4] * cell, search.cost * cell, search.iteration, np.array(search.history)
         )
 
-    def _look_around(self, search: _Search, seed: int, look: int) -> None:
+    def _search(self, road: Road, query: PoseQuery, wishes: Wishes, seed: int) -> Search:
+        """The trees of a query, with no more than their roots."""
+        cell, config = road.resolution, self.config
+        prices = Prices(
+            wishes.room / cell, wishes.lack, wishes.left * cell, wishes.right * cell, wishes.most_left / cell,
+            wishes.most_right / cell,
+        )  # fmt: skip
+        scene = car_scene(road, (query.length, query.width), query.curvature, prices, _in_cells(road, wishes.guide))
+        start, goal = (Pose(*_in_cells(road, pose).tolist()) for pose in (query.start, query.goal))
+        step, none = config.step / cell, np.empty(0, dtype=np.int64)
+        rules = Rules(
+            start, goal, np.flatnonzero(road.drivable), none, NOWHERE, config.about, config.spread / cell, config.yaw_spread,
+            step, 0.5 * step, 0.0, config.zeta / cell, greedy=True, skip=False, informed=True,
+        )  # fmt: skip
+        return Search(road, scene, rules, seed)
+
+    def _look_around(self, search: Search, query: PoseQuery, wishes: Wishes, seed: int) -> None:
         """Find the way of the disc that the footprint holds, and sample about it.
 
         Raises:
             NoWayError: there is none, so that there is none for the footprint.
         """
-        road, query = search.road, search.query
+        road = search.road
         half = 0.5 * min(query.width, query.length)
         last = max(half - 0.75 * road.resolution, 0.0)  # connected components may miss a gap between cells' centres
-        for radius in (half + DISCS[(look // ANOTHER) % len(DISCS)], half, last):
+        for radius in (half + DISCS[(search.iteration // ANOTHER) % len(DISCS)], half, last):
             disc = Query(query.start[:2], query.goal[:2], radius)
             try:
-                line = DISC.plan(road, disc, Budget(DISC_BUDGET, first=True), seed + look).path
+                line = DISC.plan(road, disc, Budget(DISC_BUDGET, first=True), seed).path
             except (BlockedError, NoWayError):
                 if radius > last:
                     continue
@@ -322,14 +237,31 @@ class PoseRrtStarConnect:
                 if radius > last:
                     continue
                 line = np.stack((disc.start, disc.goal))
-            field = clearance_in_cells(road)
-            taut = string_pulled(field, to_cells(road, line), radius / road.resolution, 1)
-            cells = component_cells(road, radius, common_component(road, disc.start, disc.goal, radius) or 0)[0]
-            if not len(cells):
-                cells = np.flatnonzero(road.drivable)
-            about = search.wishes.about if len(search.wishes.about) else along(to_metres(road, taut), PIECE)
-            search.sample_from(cells, about, self.config.gamma_factor)
-            return
+            break
+        taut = string_pulled(clearance_in_cells(road), to_cells(road, line), radius / road.resolution, 1)
+        cells = component_cells(road, radius, common_component(road, disc.start, disc.goal, radius) or 0)[0]
+        if not len(cells):
+            cells = np.flatnonzero(road.drivable)
+        about = wishes.about if len(wishes.about) else along(to_metres(road, taut), PIECE)
+        # Karaman & Frazzoli 2013; a ball of radius r holds poses r ahead, r² / 2R aside, r / R in heading
+        volume = len(cells) * 2.0 * math.pi * (1.0 / (query.curvature * road.resolution)) ** 2
+        root = ((1.0 + 1.0 / DIMENSIONS) * volume) ** (1.0 / DIMENSIONS)
+        gamma = self.config.gamma_factor * 2.0 * root
+        search.rules = search.rules._replace(cells=cells, about=_in_cells(road, about), gamma=gamma)
+
+
+def _shortened(search: Search, shortcuts: int) -> tuple[Floats, float]:
+    """The trees' best path, shortened: (P, 5) poses, curvature and length of the piece to each; and its cost; in cells."""
+    (ours, theirs), spacing, room = search.chains(), PIECE / search.road.resolution, 256
+    while True:
+        path = np.empty((room, 5))
+        count = trace(np.array(ours), np.array(theirs), search.tree.node, search.scene.body.turn, spacing, path)
+        if count < room // 2:
+            break
+        room *= 2
+    path[count - 1, :3] = search.rules.goal
+    count, cost = shorten(count, shortcuts, spacing, search.scene, search.state, path)
+    return path[:count].copy(), float(cost)
 
 
 def along(line: Floats, spacing: float) -> Floats:

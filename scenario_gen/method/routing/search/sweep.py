@@ -4,20 +4,101 @@
 """Whether a footprint can follow a curve: the area that it sweeps against the grid, cell by cell; and how much room it leaves.
 
 Between two near poses the convex hull of both footprints, widened by what an arc rises above its chord, is compared with the
-cells: the swept area lies in it, so nothing slips between two poses.
+cells: the swept area lies in it, so nothing slips between two poses. Lengths are in cells, in kernels.
 """
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenario_gen.method.routing.search.dubins import shortest, TURNS
-from scenario_gen.numerics import Counts, Floats
-from scenario_gen.numerics.kernels import F, F2, kernel, N2, OUT2
+from scenario_gen.method.routing.search.dubins import Curve, part_of, Pose, TURNS
+from scenario_gen.numerics import Counts, Floats, sealed
+from scenario_gen.numerics.kernels import F, F2, kernel, N2, named, OUT2
 from scenario_gen.roads import blocked_before, clearance_in_cells, CONTACT, to_cells
 from scenario_gen.types import Road
 
 SWEEP = 0.2  # [m] between two poses that are compared with the grid
 FEELERS = 6  # most discs that cover a footprint
 FAR = 1e9  # [cells] room where nothing is near
+LONGEST = 64.0  # [cells] no two near poses are farther apart
+
+
+class Disc(NamedTuple):
+    """What moves along straight lines, as in the paper; its headings mean nothing."""
+
+    radius: float
+
+
+class Car(NamedTuple):
+    """What moves along Dubins curves.
+
+    Attributes:
+        turn: radius of its arcs.
+        half_length: of the footprint.
+        half_width: likewise.
+        sweep: largest distance between two poses that are looked at.
+    """
+
+    turn: float
+    half_length: float
+    half_width: float
+    sweep: float
+
+
+class Prices(NamedTuple):
+    """What is dearer than its length.
+
+    Attributes:
+        room: wished for beside the footprint.
+        lack: what its lack costs per length.
+        left: what a cell left of the guide costs per length.
+        right: likewise right of it.
+        most_left: how far left of it one may be at all.
+        most_right: likewise right of it.
+    """
+
+    room: float
+    lack: float
+    left: float
+    right: float
+    most_left: float
+    most_right: float
+
+
+class Scene(NamedTuple):
+    """What edges are checked against.
+
+    Attributes:
+        clearance: (H, W).
+        blocked: (H, W + 1) from `blocked_before`; of a disc, none.
+        guide: (G, 3) poses of the line to keep to; none: no side is dearer.
+        body: what moves, a `Disc` or a `Car`: it says what an edge is, see `steering`.
+        prices: what is dear.
+        rows: (2, R) scratch for as many rows of cells as the footprint is long across, and more; of a disc, none.
+    """
+
+    clearance: Floats
+    blocked: Counts
+    guide: Floats
+    body: Any
+    prices: Prices
+    rows: Floats
+
+
+PRICES = named(Prices, F, F, F, F, F, F)
+CAR_SCENE = named(Scene, F2, N2, F2, named(Car, F, F, F, F), PRICES, OUT2)
+DISC_SCENE = named(Scene, F2, N2, F2, named(Disc, F), PRICES, OUT2)
+NOWHERE = sealed(np.empty((0, 3)))
+NO_PRICES = Prices(0.0, 0.0, 0.0, 0.0, np.inf, np.inf)
+
+
+class _Stance(NamedTuple):
+    """A place, and cosine and sine of the heading."""
+
+    x: float
+    y: float
+    cos: float
+    sin: float
 
 
 @kernel(inline=True)
@@ -36,46 +117,29 @@ def _spread(ax: float, ay: float, bx: float, by: float, first: int, low: Floats,
 
 
 @kernel(inline=True)
-def swept_free(
-    blocked: Counts, x0: float, y0: float, c0: float, s0: float, x1: float, y1: float, c1: float, s1: float, half_length: float,
-    half_width: float, bulge: float, low: Floats, high: Floats,
-) -> bool:  # fmt: skip
-    """Whether the hull of the footprints at two near poses (x, y, cos, sin; in cells) covers drivable cells only.
-
-    Args:
-        blocked: (H, W + 1) from `blocked_before`.
-        x0: of the first pose; the others likewise.
-        y0: see above.
-        c0: see above.
-        s0: see above.
-        x1: of the second pose; the others likewise.
-        y1: see above.
-        c1: see above.
-        s1: see above.
-        half_length: of the footprint.
-        half_width: likewise.
-        bulge: what is added on every side.
-        low: (R,) scratch, for as many rows of cells as the footprint is long across, and more.
-        high: likewise.
-    """
-    a, b = half_length + bulge, half_width + bulge
-    reach0, reach1 = a * abs(s0) + b * abs(c0), a * abs(s1) + b * abs(c1)
-    bottom, top = min(y0 - reach0, y1 - reach1), max(y0 + reach0, y1 + reach1)
+def _swept_free(blocked: Counts, here: _Stance, there: _Stance, body: Car, bulge: float, rows: Floats) -> bool:
+    """Whether the hull of the footprints at two near stances covers drivable cells only; `bulge` is added on every side."""
+    a, b = body.half_length + bulge, body.half_width + bulge
+    reach0, reach1 = a * abs(here.sin) + b * abs(here.cos), a * abs(there.sin) + b * abs(there.cos)
+    bottom, top = min(here.y - reach0, there.y - reach1), max(here.y + reach0, there.y + reach1)
     first, last = int(np.floor(bottom + CONTACT)), int(np.ceil(top - CONTACT)) - 1
     height, width = blocked.shape[0], blocked.shape[1] - 1
     if first < 0 or last >= height:
         return False
     count = last - first + 1
+    low, high = rows[0, :count], rows[1, :count]
     for k in range(count):
         low[k], high[k] = np.inf, -np.inf
-    lines, columns = low[:count], high[:count]
     for k in range(4):
         u, v = a if k in (0, 3) else -a, b if k < 2 else -b
         w, z = a if k in (3, 2) else -a, b if k in (3, 0) else -b  # the next corner
-        px, py, qx, qy = x0 + c0 * u - s0 * v, y0 + s0 * u + c0 * v, x1 + c1 * u - s1 * v, y1 + s1 * u + c1 * v
-        _spread(px, py, x0 + c0 * w - s0 * z, y0 + s0 * w + c0 * z, first, lines, columns)
-        _spread(qx, qy, x1 + c1 * w - s1 * z, y1 + s1 * w + c1 * z, first, lines, columns)
-        _spread(px, py, qx, qy, first, lines, columns)
+        px, py = here.x + here.cos * u - here.sin * v, here.y + here.sin * u + here.cos * v
+        qx, qy = there.x + there.cos * u - there.sin * v, there.y + there.sin * u + there.cos * v
+        rx, ry = here.x + here.cos * w - here.sin * z, here.y + here.sin * w + here.cos * z
+        sx, sy = there.x + there.cos * w - there.sin * z, there.y + there.sin * w + there.cos * z
+        _spread(px, py, rx, ry, first, low, high)
+        _spread(qx, qy, sx, sy, first, low, high)
+        _spread(px, py, qx, qy, first, low, high)
     for k in range(count):
         begin, end = int(np.floor(low[k] + CONTACT)), int(np.ceil(high[k] - CONTACT))
         if begin < 0 or end > width or (end > begin and blocked[first + k, end] != blocked[first + k, begin]):
@@ -84,34 +148,32 @@ def swept_free(
 
 
 @kernel(inline=True)
-def room_beside(
-    clearance: Floats, x: float, y: float, c: float, s: float, half_length: float, half_width: float
-) -> tuple[float, float]:
-    """What a footprint at a pose (in cells) surely has around it, and about what it has beside it; -FAR if it is blocked.
+def _room_beside(clearance: Floats, at: _Stance, body: Car) -> tuple[float, float]:
+    """What a footprint surely has around it, and about what it has beside it; -FAR if it is blocked.
 
-    Clearances (H, W) are in cells. The first is proven by discs that cover the footprint: below 0 it tells nothing.
+    The first is proven by discs that cover the footprint: below 0 it says nothing.
     """
     height, width = clearance.shape
-    count = min(max(1, int(np.ceil(1.5 * half_length / half_width))), FEELERS)
-    spacing = 2.0 * half_length / count
-    cover = np.sqrt(0.25 * spacing * spacing + half_width * half_width)
+    count = min(max(1, int(np.ceil(1.5 * body.half_length / body.half_width))), FEELERS)
+    spacing = 2.0 * body.half_length / count
+    cover = np.sqrt(0.25 * spacing * spacing + body.half_width * body.half_width)
     sure, beside = FAR, FAR
     for i in range(count):
-        ahead = (i + 0.5) * spacing - half_length
-        px, py = x + ahead * c, y + ahead * s
+        ahead = (i + 0.5) * spacing - body.half_length
+        px, py = at.x + ahead * at.cos, at.y + ahead * at.sin
         column, row = int(np.floor(px)), int(np.floor(py))
         if row < 0 or column < 0 or row >= height or column >= width or clearance[row, column] == 0.0:
             return -FAR, -FAR
         dx, dy = px - column - 0.5, py - row - 0.5
         off = np.sqrt(dx * dx + dy * dy)
         sure = min(sure, clearance[row, column] - off - cover)
-        beside = min(beside, clearance[row, column] - half_width)
+        beside = min(beside, clearance[row, column] - body.half_width)
     return sure, beside
 
 
 @kernel(inline=True)
-def offset_from(x: float, y: float, guide: Floats) -> float:
-    """How far (x, y) lies left of a guide (G, 3) [cells, rad], at its nearest pose."""
+def _offset_from(x: float, y: float, guide: Floats) -> float:
+    """How far (x, y) lies left of a guide (G, 3), at its nearest pose."""
     best, nearest = np.inf, 0
     for k in range(guide.shape[0]):
         dx, dy = x - guide[k, 0], y - guide[k, 1]
@@ -123,78 +185,51 @@ def offset_from(x: float, y: float, guide: Floats) -> float:
 
 
 @kernel(inline=True)
-def follow(
-    clearance: Floats, blocked: Counts, x: float, y: float, yaw: float, word: int, a: float, b: float, c: float, radius: float,
-    half_length: float, half_width: float, sweep: float, wish: Floats, guide: Floats, low: Floats, high: Floats,
-) -> tuple[float, float]:  # fmt: skip
-    """How far a footprint can follow a Dubins curve, and what that costs; in cells.
-
-    The cost is the length, more where there is less room beside the footprint than wished for, and away from the guide.
-
-    Args:
-        clearance: (H, W).
-        blocked: (H, W + 1) from `blocked_before`.
-        x: of the first pose, which is free.
-        y: likewise.
-        yaw: likewise.
-        word: the curve, see `dubins`.
-        a: length of its first part.
-        b: of the second.
-        c: of the third.
-        radius: of its arcs.
-        half_length: of the footprint.
-        half_width: likewise.
-        sweep: largest distance between two poses that are looked at.
-        wish: (6,) room wished for beside the footprint, what its lack costs per length, what a cell left of the guide costs, and
-            right of it; how far left and right of it one may be at all.
-        guide: (G, 3) x, y, yaw; none: no side is dearer.
-        low: scratch, see `swept_free`.
-        high: likewise.
-
-    Returns:
-        Length up to the first pose that is not free (infinity: all is), and the cost up to there.
-    """
-    gone, cost, since, dear = 0.0, 0.0, np.inf, 0.0
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    for part in range(3):
-        turn = TURNS[word, part]
-        length = a if part == 0 else b if part == 1 else c
-        if length <= 0.0:
-            continue
-        steps = int(np.ceil(length / sweep))
-        h = length / steps
-        ahead, aside, dc, ds = h, 0.0, 1.0, 0.0
-        if turn != 0.0:
-            dc, ds = np.cos(h / radius), turn * np.sin(h / radius)
-            ahead, aside = radius * turn * ds, turn * radius * (1.0 - dc)
-        bulge = (radius + half_length) * h * h / (8.0 * radius * radius) if turn != 0.0 else 0.0
-        slack = 0.5 * h * (1.0 + half_length / radius)
-        for _ in range(steps):
-            nx, ny = x + cos * ahead - sin * aside, y + sin * ahead + cos * aside
-            nc, ns = cos * dc - sin * ds, sin * dc + cos * ds
-            sure, beside = room_beside(clearance, nx, ny, nc, ns, half_length, half_width)
-            if sure < slack and (
-                sure == -FAR
-                or not swept_free(blocked, x, y, cos, sin, nx, ny, nc, ns, half_length, half_width, bulge, low, high)
-            ):  # fmt: skip
-                return gone, cost
-            x, y, cos, sin = nx, ny, nc, ns
-            gone += h
-            since += h
-            if since >= 5.0 * sweep and guide.shape[0] > 0:
-                since, offset = 0.0, offset_from(x, y, guide)
-                if offset > wish[4] or offset < -wish[5]:
-                    return gone, cost
-                dear = max(wish[2] * offset, -wish[3] * offset)
-            lack = max(wish[0] - beside, 0.0) / wish[0] if wish[0] > 0.0 else 0.0
-            cost += h * (1.0 + wish[1] * lack + dear)
-    return np.inf, cost
+def pose_is_free(pose: Pose, body: Car, scene: Scene) -> bool:
+    """Whether the footprint at a pose is free."""
+    at = _Stance(pose.x, pose.y, np.cos(pose.yaw), np.sin(pose.yaw))
+    return bool(_swept_free(scene.blocked, at, at, body, 0.0, scene.rows))
 
 
 @kernel(inline=True)
-def scratch_rows(half_length: float, half_width: float, sweep: float) -> int:
-    """How many rows of scratch `swept_free` needs for a footprint."""
-    return int(2.0 * np.sqrt(half_length * half_length + half_width * half_width) + sweep) + 8
+def follow(pose: Pose, curve: Curve, body: Car, scene: Scene) -> tuple[bool, float]:
+    """Whether a footprint can follow a Dubins curve from a free pose on, and what that costs, or the way to where it cannot.
+
+    The cost is the length, more where there is less room beside the footprint than wished for, and away from the guide.
+    """
+    prices, radius = scene.prices, body.turn
+    cost, since, dear = 0.0, np.inf, 0.0
+    at = _Stance(pose.x, pose.y, np.cos(pose.yaw), np.sin(pose.yaw))
+    for part in range(3):
+        turn, length = TURNS[curve.word, part], part_of(curve, part)
+        if length <= 0.0:
+            continue
+        steps = int(np.ceil(length / body.sweep))
+        h = length / steps
+        ahead, aside, dc, ds, bulge = h, 0.0, 1.0, 0.0, 0.0
+        if turn != 0.0:
+            dc, ds = np.cos(h / radius), turn * np.sin(h / radius)
+            ahead, aside = radius * turn * ds, turn * radius * (1.0 - dc)
+            bulge = (radius + body.half_length) * h * h / (8.0 * radius * radius)
+        slack = 0.5 * h * (1.0 + body.half_length / radius)
+        for _ in range(steps):
+            x, y = at.x + at.cos * ahead - at.sin * aside, at.y + at.sin * ahead + at.cos * aside
+            there = _Stance(x, y, at.cos * dc - at.sin * ds, at.sin * dc + at.cos * ds)
+            sure, beside = _room_beside(scene.clearance, there, body)
+            if sure == -FAR:
+                return False, cost
+            if sure < slack and not _swept_free(scene.blocked, at, there, body, bulge, scene.rows):
+                return False, cost
+            at = there
+            since += h
+            if since >= 5.0 * body.sweep and scene.guide.shape[0] > 0:
+                since, offset = 0.0, _offset_from(x, y, scene.guide)
+                if offset > prices.most_left or offset < -prices.most_right:
+                    return False, cost
+                dear = max(prices.left * offset, -prices.right * offset)
+            lack = max(prices.room - beside, 0.0) / prices.room if prices.room > 0.0 else 0.0
+            cost += h * (1.0 + prices.lack * lack + dear)
+    return True, cost
 
 
 @kernel(F2, N2, F2, F, F, OUT2)
@@ -203,20 +238,21 @@ def check_sweep(clearance: Floats, blocked: Counts, poses: Floats, half_length: 
 
     Writes `out` (M, 2): 1 where the way to the pose (for the first: the pose itself) is free, else 0; and about the room beside.
     """
-    rows = scratch_rows(half_length, half_width, 64.0)
-    low, high = np.empty(rows), np.empty(rows)
+    body = Car(0.0, half_length, half_width, LONGEST)
+    rows = int(2.0 * np.sqrt(half_length * half_length + half_width * half_width) + LONGEST) + 8
+    scratch = np.empty((2, rows))
     for m in range(poses.shape[0]):
         k = max(m - 1, 0)
-        x0, y0, c0, s0 = poses[k, 0], poses[k, 1], np.cos(poses[k, 2]), np.sin(poses[k, 2])
-        x1, y1, c1, s1 = poses[m, 0], poses[m, 1], np.cos(poses[m, 2]), np.sin(poses[m, 2])
-        sure, out[m, 1] = room_beside(clearance, x1, y1, c1, s1, half_length, half_width)
-        dx, dy = x1 - x0, y1 - y0
-        moved = np.sqrt(dx * dx + dy * dy) + half_length * (abs(c1 - c0) + abs(s1 - s0))
+        here = _Stance(poses[k, 0], poses[k, 1], np.cos(poses[k, 2]), np.sin(poses[k, 2]))
+        there = _Stance(poses[m, 0], poses[m, 1], np.cos(poses[m, 2]), np.sin(poses[m, 2]))
+        sure, out[m, 1] = _room_beside(clearance, there, body)
+        dx, dy = there.x - here.x, there.y - here.y
+        moved = np.sqrt(dx * dx + dy * dy) + half_length * (abs(there.cos - here.cos) + abs(there.sin - here.sin))
         free = sure >= moved
-        if not free and sure > -FAR and moved < 64.0:
-            turned = np.sqrt((c1 - c0) ** 2 + (s1 - s0) ** 2)
+        if not free and sure > -FAR and moved < LONGEST:
+            turned = np.sqrt((there.cos - here.cos) ** 2 + (there.sin - here.sin) ** 2)
             bulge = 0.125 * turned * (moved + (half_length + half_width) * turned)
-            free = swept_free(blocked, x0, y0, c0, s0, x1, y1, c1, s1, half_length, half_width, bulge, low, high)
+            free = _swept_free(blocked, here, there, body, bulge, scratch)
         out[m, 0] = 1.0 if free else 0.0
 
 
@@ -242,31 +278,11 @@ def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Flo
     return out
 
 
-@kernel(F2, N2, F, F, F, F, F, F, F, F, F, F)
-def curve_length(
-    clearance: Floats, blocked: Counts, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius: float,
-    half_length: float, half_width: float, sweep: float,
-) -> float:  # fmt: skip
-    """Length of the shortest Dubins curve between two poses if a footprint can follow it, else infinity; all in cells.
-
-    Args:
-        clearance: (H, W).
-        blocked: (H, W + 1) from `blocked_before`.
-        x0: of the first pose, which must itself be free.
-        y0: likewise.
-        yaw0: likewise.
-        x1: of the second pose.
-        y1: likewise.
-        yaw1: likewise.
-        radius: of the arcs.
-        half_length: of the footprint.
-        half_width: likewise.
-        sweep: largest distance between two poses that are looked at.
-    """
-    rows = scratch_rows(half_length, half_width, sweep)
-    word, a, b, c = shortest(x0, y0, yaw0, x1, y1, yaw1, radius)
-    free, cost = follow(
-        clearance, blocked, x0, y0, yaw0, word, a, b, c, radius, half_length, half_width, sweep, np.zeros(6), np.empty((0, 3)),
-        np.empty(rows), np.empty(rows),
-    )  # fmt: skip
-    return cost if free == np.inf else np.inf
+def car_scene(
+    road: Road, size: tuple[float, float], curvature: float, prices: Prices = NO_PRICES, guide: Floats = NOWHERE
+) -> Scene:
+    """The scene of a car of some length and width [m] that turns within a curvature [1/m]; prices and guide in cells."""
+    half_length, half_width = (0.5 * extent / road.resolution for extent in size)
+    body = Car(1.0 / (curvature * road.resolution), half_length, half_width, SWEEP / road.resolution)
+    rows = int(2.0 * np.hypot(half_length, half_width) + body.sweep) + 8
+    return Scene(clearance_in_cells(road), blocked_before(road), guide, body, prices, np.empty((2, rows)))
