@@ -34,22 +34,18 @@ def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
     Raises:
         InputError: a file is damaged, or too large when unpacked.
     """
-    if not any(path.is_file() and path.suffix.lower() in PACKED for path in paths):
+    packed = {k: path for k, path in enumerate(paths) if path.is_file() and path.suffix.lower() in PACKED}
+    if not packed:
         yield list(paths)
         return
     with scratch(temporary()) as place:
-        targets = [
-            place / str(k) / without_packing(path).name if path.is_file() and path.suffix.lower() in PACKED else path
-            for k, path in enumerate(paths)
-        ]
-        names = {str(target): str(path) for path, target in zip(paths, targets, strict=True) if target != path}
-        with naming_objects(names):
+        targets = {k: place / str(k) / without_packing(path).name for k, path in packed.items()}
+        with naming_objects({str(targets[k]): str(path) for k, path in packed.items()}):
             room = config.size_limit << 20
-            for path, target in zip(paths, targets, strict=True):
-                if target != path:
-                    target.parent.mkdir()
-                    room -= _unpack(path, target, room, config)
-            yield [_only(target) for target in targets]
+            for k, path in packed.items():
+                targets[k].parent.mkdir()
+                room -= _unpack(path, targets[k], room, config)
+            yield [_only(targets.get(k, path)) for k, path in enumerate(paths)]
 
 
 def _unpack(path: Path, target: Path, room: int, config: LogConfig) -> int:

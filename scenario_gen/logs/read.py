@@ -91,7 +91,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         return as_recorded(log, config)
     log, notes = retimed(log, config)
     tracks, drops = clean(log, config)
-    notes = (*notes, *drops.notes, *notes_on_drops(log, drops))
+    said_first = (*notes, *notes_on_drops(log, drops), *drops.notes)
     if len({track.id for track in tracks}) < 2:
         raise NoEncounterError(explain_few_vehicles(log, [track.id for track in tracks], drops))
     tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
@@ -105,8 +105,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         vehicles.append(quality)
     if not pieces and any(vehicle.lost for vehicle in vehicles):
         raise InputError(f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units")
-    groups, remarks = find_groups(pieces, config)
-    notes += remarks
+    groups, notes = find_groups(pieces, config)
     if not groups:
         raise NoEncounterError(explain_no_encounter(log, pieces, config))
     notes += notes_on_origin(tracks, config)
@@ -125,7 +124,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         dropped=drops.of(log),
         vehicles=tuple(vehicles),
         encounters=tuple(encounter_quality(encounter) for encounter in encounters),
-        notes=(*log.notes, *remarks_on_units(pieces, origin_ns, config), *dict.fromkeys(notes)),
+        notes=(*remarks_on_units(pieces, origin_ns, config), *said_first, *log.notes, *dict.fromkeys(notes)),
     )
     return LogResult(tuple(encounters), summary)
 

@@ -105,26 +105,35 @@ def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -
             del columns["kind"]  # numbers whose meaning is not known
     notes += notes_on(columns, config.columns, header)
     numbers = to_numbers(frame, columns, path)
-    if "vehicle" not in columns and "vehicle=none" not in config.columns.replace(" ", ""):
-        check_alone(frame, columns, numbers["time"], path)
-    if "vehicle" in columns:
+    if "vehicle=none" not in config.columns.replace(" ", ""):
         check_ids(frame, columns, numbers, path)
     check_degrees(numbers, columns, path)
     numbers.attrs["above"] = above
     return numbers
 
 
-def check_alone(frame: pd.DataFrame, columns: dict[str, Column], time: "pd.Series[int]", path: Path) -> None:
-    """Check that a table without a column for the vehicle is of one vehicle.
+def check_ids(frame: pd.DataFrame, columns: dict[str, Column], numbers: pd.DataFrame, path: Path) -> None:
+    """Check that a table without a column for the vehicle is of one vehicle, and that such a column does not number the rows.
 
     Raises:
-        InputError: it has most stamps more than once; the message names the columns that could be of the vehicle.
+        InputError: most stamps are there more than once, or each row is another vehicle's; names the columns that could be meant.
     """
-    if time.nunique() > len(time) / 2 + 1:
+    time = numbers["time"]
+    if "vehicle" not in columns:
+        sound, fault = time.nunique() > len(time) / 2 + 1, "several rows have the same time, and no column names the vehicle"
+    else:
+        sound = len(time) < FEW_ROWS or numbers["vehicle"].nunique() < len(time)
+        fault = f"the column {columns['vehicle'].name!r} is another one in each row, and so no vehicle"
+    if sound:
         return
-    could = possible_ids(frame, columns, time)
+    unused = [name for name in frame.columns if name not in {column.name for column in columns.values()}]
+    could = [
+        str(name)
+        for name in unused
+        if 2 <= frame[name].nunique() <= len(frame) / 2 and not pd.DataFrame({"t": time, "v": frame[name]}).duplicated().any()
+    ]
     remedy = f"it could be {' or '.join(could)}: --set log.columns=vehicle={could[0]}" if could else "add a column `id`"
-    raise InputError(f"{path}: several rows have the same time, and no column names the vehicle; {remedy}")
+    raise InputError(f"{path}: {fault}; {remedy}")
 
 
 def segment_of(path: Path, row: int, *, header: int = 1) -> Segment:
@@ -229,29 +238,6 @@ def check_stamps(values: "pd.Series[Any]", time: "pd.Series[int]", known: "pd.Se
             raise InputError(
                 f"{place}: {first} looks like {since[0]} since 1970: --set log.columns=time={column.name}:{since[0]}"
             )
-
-
-def check_ids(frame: pd.DataFrame, columns: dict[str, Column], numbers: pd.DataFrame, path: Path) -> None:
-    """Refuse a column of vehicles that numbers the rows.
-
-    Raises:
-        InputError: it does; the message names the columns that could be of the vehicle.
-    """
-    if len(numbers) < FEW_ROWS or numbers["vehicle"].nunique() < len(numbers):
-        return
-    could = possible_ids(frame, columns, numbers["time"])
-    remedy = f"it could be {' or '.join(could)}: --set log.columns=vehicle={could[0]}" if could else "--set log.columns=vehicle=…"
-    raise InputError(f"{path}: the column {columns['vehicle'].name!r} is another one in each row, and so no vehicle; {remedy}")
-
-
-def possible_ids(frame: pd.DataFrame, columns: dict[str, Column], time: "pd.Series[int]") -> list[str]:
-    """Return the columns that are not read and could be of the vehicle: each value comes once at a time."""
-    unused = [name for name in frame.columns if name not in {column.name for column in columns.values()}]
-    return [
-        str(name)
-        for name in unused
-        if 2 <= frame[name].nunique() <= len(frame) / 2 and not pd.DataFrame({"t": time, "v": frame[name]}).duplicated().any()
-    ]
 
 
 def check_degrees(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> None:
