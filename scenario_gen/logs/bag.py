@@ -21,6 +21,7 @@ from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Raw
 from scenario_gen.types import Encounter
 
 AT_START_M = 0.5  # m from a frame's origin, in which two vehicles cannot be at once
+SPAWNED_S = 1.0  # s after which another one may begin there
 USED = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
 
 
@@ -196,9 +197,11 @@ def check_frames(label: str, frames: dict[str, str], vehicles: dict[str, Rows]) 
     """
     for vehicle, frame in frames.items():
         refuse_moving(frame, f"{label}: the odometry of vehicle {vehicle}")
-    began = [v for v in frames if vehicles[v].fixes and math.hypot(*min(vehicles[v].fixes)[2:4]) < AT_START_M]
+    first = {vehicle: min(vehicles[vehicle].fixes) for vehicle in frames if vehicles[vehicle].fixes}
+    began = [vehicle for vehicle, (_, _, x, y, _) in first.items() if math.hypot(x, y) < AT_START_M]
+    at_once = len(began) >= 2 and np.ptp([first[vehicle][0] for vehicle in began]) < 1e9 * SPAWNED_S
     named = ", ".join(f"{vehicle} in {frame!r}" for vehicle, frame in frames.items())
-    if len(began) >= 2:
+    if at_once or len({frames[vehicle] for vehicle in began}) >= 2:
         raise InputError(
             f"{label}: the odometries of {' and '.join(began)} begin at 0, 0, each where its vehicle started ({named}); record "
             "positions in one frame, such as map, or choose with the parameter topics"
