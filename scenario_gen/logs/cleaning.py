@@ -20,7 +20,6 @@ from scenario_gen.numerics import Bools, Floats, Ints
 SLOWEST = 5.0  # s between fixes: a slower source does not show how a vehicle drives, or its unit of time is another one
 FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
 UNITS = {"milliseconds": ("ms", 1e-3), "microseconds": ("us", 1e-6), "nanoseconds": ("ns", 1e-9)}
-LONGER = {"min": 60.0, "h": 3600.0, "d": 86400.0}  # units of time, in s
 USUAL = (0.005, 2.0)  # s between fixes of usual sources
 FASTEST = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
 JUMP_SLACK = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
@@ -295,12 +294,6 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
             f"track; {hint}name the unit with the parameter columns, time=<column>:{likely[0][1] if likely else '<unit>'}"
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
-    for unit, factor in LONGER.items():  # what is too short for any encounter
-        if max(spans) * 1e-9 < config.min_duration < max(spans) * 1e-9 * factor and 0.02 < typical * factor < USUAL[1]:
-            raise InputError(
-                f"{log.where(int(vehicles[0].fix_row[1]))}: all lasts {max(spans) * 1e-9:g} s, positions are {typical:g} s apart "
-                f"(median); the time may be in {unit}: --set log.columns=time=<column>:{unit}"
-            )
     ticks = round(sum(int(span) for span in spans) / (config.period * 1e9))
     if ticks > config.tick_limit:
         longest = vehicles[int(np.argmax(spans))]

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.geodesy import on_sphere
 from scenario_gen.logs.raw import Observations, RawLog
@@ -19,6 +20,8 @@ from scenario_gen.numerics import Bools, Floats, Ints
 
 LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
 ROWS = 5  # on either side of a step: fewer are rows out of order
+LONGER = {"min": 60.0, "h": 3600.0, "d": 86400.0}  # units of time, in s
+QUICKEST_S, SOURCE_S = 0.005, (0.02, 2.0)  # s between fixes: less is another unit's; and what is usual
 LEAST = 2  # rows in the time that is there twice
 APART = 3.0  # m between two places at one time: not one vehicle
 ONWARD = 0.5  # share of that distance within which the next row lies, if the vehicle drives on and its clock does not
@@ -56,6 +59,24 @@ def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, tuple[str, ...]]:
         log = _shifted(log, [(own.fix_ns * 0 + seconds * 10**9, own.speed_ns * 0 + seconds * 10**9) for own in log.vehicles])
         notes.append(f"times begin before 1970, or before an event: {seconds} s are added to all")
     return log, tuple(notes)
+
+
+def check_unit(log: RawLog, config: LogConfig) -> None:
+    """Refuse a log that is too short for any encounter, and would not be if its time were in minutes, hours or days.
+
+    Raises:
+        InputError: it is; the message names the unit.
+    """
+    stamps = [np.sort(own.fix_ns[~beyond(own.fix_ns)]) * 1e-9 for own in log.vehicles]
+    steps = np.concatenate([np.zeros(0), *map(np.diff, stamps)])
+    typical = float(np.median(steps)) if len(steps) else np.inf
+    span = max((float(np.ptp(own)) for own in stamps if len(own)), default=0.0)
+    for unit, seconds in LONGER.items() if typical < QUICKEST_S else ():
+        if span < config.min_duration < span * seconds and SOURCE_S[0] < typical * seconds < SOURCE_S[1]:
+            raise InputError(
+                f"{log.segments[0].label}: all lasts {span:g} s, positions are {typical:g} s apart (median); the time may be in "
+                f"{unit}: --set log.columns=time=<column>:{unit}"
+            )
 
 
 def _shifted(log: RawLog, by: Sequence[tuple[Ints, Ints]]) -> RawLog:

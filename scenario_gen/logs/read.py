@@ -22,7 +22,7 @@ from scenario_gen.base.stores import local, renamed
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
-from scenario_gen.logs.clock import retimed
+from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
@@ -89,6 +89,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     """
     if log.encounters:
         return as_recorded(log, config)
+    check_unit(log, config)
     log, notes = retimed(log, config)
     tracks, drops = clean(log, config)
     said_first = (*notes, *notes_on_drops(log, drops), *drops.notes)
