@@ -244,7 +244,7 @@ def without_held(vehicle: Observations, drops: Drops, *, geographic: bool) -> Ob
     """
     repeats = np.concatenate([[False], (np.diff(vehicle.fix, axis=0) == 0.0).all(axis=1)])
     new = np.flatnonzero(~repeats)
-    if not repeats.any() or len(new) < 3:
+    if not repeats.any() or len(new) < 2:
         return vehicle
     places = on_sphere(vehicle.fix[new]) if geographic else vehicle.fix[new]
     rate = np.linalg.norm(np.diff(places, axis=0), axis=1) / (np.diff(vehicle.fix_ns[new]) * 1e-9)
