@@ -39,9 +39,9 @@ from scenario_gen.types.target import Pair, Reached, Target, UNITS
 __all__ = [
     "ALWAYS", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LOST", "MIRRORED", "NARROW", "NOT_KEPT",
     "ORACLE", "ORDERS", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates",
-    "Cause", "CheckCounts", "Coverage", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult", "Interval",
-    "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality", "Reached",
-    "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario", "ScenarioSet",
+    "Cause", "CheckCounts", "Coverage", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult",
+    "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality",
+    "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario", "ScenarioSet",
     "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "Vehicle", "Verdict", "Violation", "always",
     "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut", "formatted", "height", "is_truck", "join_ego",
     "join_pieces", "mask", "once_per_object", "read_numbers", "read_states", "rear_axle", "routes_in_words", "shifted",
