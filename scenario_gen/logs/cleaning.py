@@ -344,7 +344,7 @@ def sized(vehicles: list[Observations], config: LogConfig) -> tuple[list[Observa
     way = next((words for words, (long, wide) in ways.items() if 2.5 < long < 20.0 and 1.2 < wide < 2.7), "")
     more = f" ({len(wrong)} vehicles have such sizes)" if len(wrong) > 1 else ""
     return found, [
-        f"vehicle {wrong[0].id} is {size[0]:g} m long and {size[1]:g} m wide, which no car is{more}"
+        f"vehicle {wrong[0].id} is recorded as {size[0]:g} m long and {size[1]:g} m wide, which no car is{more}"
         + (f"; it looks {way}" if way else "")
         + f": what is wrong is taken as {config.length:g} m × {config.width:g} m"
     ]

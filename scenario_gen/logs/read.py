@@ -269,12 +269,12 @@ def cut_encounter(
 
 def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
     """Return the error message on fewer than two vehicles."""
-    causes = "; ".join((*(note for note in log.notes if "left out" in note), *map(str, drops.of(log))))
+    causes = "; ".join((*(note for note in log.notes if note.startswith("who is no")), *map(str, drops.of(log))))
     have = f"only vehicle {names[0]}" if names else "no vehicle"
     return (
         f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock. "
         "Give the files of all vehicles in one command, or check --set log.columns=… and log.vehicles=…"
-        + (f". Left out: {causes}{advice(log, drops)}" if causes else "")
+        + (f". {causes}{advice(log, drops)}" if causes else "")
     )
 
 
