@@ -44,12 +44,14 @@ class Sample:
         position: latitude and longitude [degrees], or x and y [m]; NaN where there is no fix, None of a TwistStamped.
         heading: rad; NaN if it is not given.
         speed: m/s; None if it is not given.
+        frame: of the position, "" if it is not given.
     """
 
     stamp_ns: int
     position: tuple[float, float] | None = None
     heading: float = math.nan
     speed: float | None = None
+    frame: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,9 @@ def decode_sample(data: bytes, kind: str, what: str) -> Sample:
     if kind == TWIST:
         return Sample(stamp, speed=speed_of(message.twist.linear.x, message.twist.linear.y))
     pose, linear = message.pose.pose, message.twist.twist.linear  # the speed is in the body frame
-    return Sample(stamp, (pose.position.x, pose.position.y), _heading(pose), np.hypot(linear.x, linear.y))
+    return Sample(
+        stamp, (pose.position.x, pose.position.y), _heading(pose), np.hypot(linear.x, linear.y), message.header.frame_id
+    )
 
 
 def decode_tracks(data: bytes, what: str) -> Encounter:

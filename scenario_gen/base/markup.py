@@ -114,6 +114,9 @@ def read_xml(path: Path, what: str, skip: frozenset[str] = frozenset()) -> Eleme
     data = read_bytes(path, MOST_BYTES, what, ": cut the map")
     if not data.strip():
         raise InputError(f"{what} is empty")
+    if (stripped := data.lstrip()).startswith(b"<?xml"):  # blank lines above it move below it: lines keep their numbers
+        declaration, end, rest = stripped.partition(b"?>")
+        data = declaration + end + data[: len(data) - len(stripped)] + rest
     return parse_xml(data, what, skip)
 
 

@@ -24,7 +24,16 @@ from scenario_gen.corpus.grouping import Found, label, part_of, read_found
 from scenario_gen.corpus.kinds import kind_of, Motion
 from scenario_gen.corpus.messages import DEGREE
 from scenario_gen.corpus.tables import write_table
-from scenario_gen.logs import encounters_of, NoEncounterError, Observations, RawLog, read_log, Segment, space_time_gap
+from scenario_gen.logs import (
+    encounters_of,
+    NoEncounterError,
+    Observations,
+    RawLog,
+    read_log,
+    Segment,
+    space_time_gap,
+    UnknownFormatError,
+)
 from scenario_gen.logs.tables import EPOCH_NS
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Encounter
@@ -127,7 +136,7 @@ def read_one_log(task: LogTask) -> None:
     try:
         with fetched(task.paths) as here:
             result = read_log(here, task.config.log)
-    except NoEncounterError as error:  # a result: the log is not read again
+    except (NoEncounterError, UnknownFormatError) as error:  # a result: the log is not read again
         write_encounters(task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []})
         return
     source = ", ".join(path.name for path in task.paths)

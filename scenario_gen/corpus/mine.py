@@ -44,7 +44,7 @@ from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tables import rows_at, rows_of
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
-from scenario_gen.logs import is_bag, is_commonroad, is_nocturne, is_spmd, is_table
+from scenario_gen.logs import is_bag, is_bsm, is_commonroad, is_fcd, is_nocturne, is_spmd, is_table
 from scenario_gen.numerics import Ints
 from scenario_gen.template import reactions_of
 
@@ -243,7 +243,9 @@ def _of_files(archive: Path) -> Files:
     bags = {path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)}
     if bags:
         rest = [path for path in rest if bags.isdisjoint(path.parents)]
-    tables, rest = _parted(rest, lambda path: is_table(path) or is_commonroad(path) or is_nocturne(path))
+    tables, rest = _parted(
+        rest, lambda path: any(is_log(path) for is_log in (is_table, is_commonroad, is_nocturne, is_bsm, is_fcd))
+    )
     loose, others = _parted(rest, lambda path: path.suffix in LOOSE_BAGS)
     if tables and not (spmd or bags or loose) and all(path.parent == archive and is_table(path) for path in tables):
         logs = [tables]  # one log in several tables

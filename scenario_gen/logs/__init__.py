@@ -10,10 +10,12 @@ from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_ti
 from scenario_gen.logs.geodesy import latitude_longitude, local_frame, metres_per_degree, middle_of
 from scenario_gen.logs.groups import APART, shortest, ticks, windows
 from scenario_gen.logs.growing import Growth, Meeting
-from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment
+from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
 from scenario_gen.logs.read import (
     encounters_of,
     is_bag,
+    is_bsm,
+    is_fcd,
     is_known,
     is_osi,
     is_spmd,
@@ -29,7 +31,8 @@ from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
     "APART", "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "Growth", "LogConfig", "LogFormat", "LogResult", "Meeting",
-    "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "bundled", "encounters_of", "is_bag",
-    "is_commonroad", "is_known", "is_nocturne", "is_osi", "is_spmd", "is_table", "latitude_longitude", "local_frame",
-    "metres_per_degree", "middle_of", "read_log", "read_raw", "shortest", "space_time_gap", "ticks", "windows",
+    "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "UnknownFormatError", "bundled",
+    "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_known", "is_nocturne", "is_osi", "is_spmd",
+    "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "read_log", "read_raw", "shortest",
+    "space_time_gap", "ticks", "windows",
 ]  # fmt: skip

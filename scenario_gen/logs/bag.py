@@ -20,6 +20,8 @@ from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, RawLog, Rows, Segment
 from scenario_gen.types import Encounter
 
+AT_START_M = 0.5  # m from a frame's origin, in which two vehicles cannot be at once
+SPAWNED_S = 1.0  # s after which another one may begin there
 USED = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
 
 
@@ -118,22 +120,24 @@ def read_streams(topics: list[Topic], name: str, config: LogConfig) -> RawLog:
     vehicles: dict[str, Rows] = {}
     segments: list[Segment] = []
     unstamped: list[str] = []
+    frames: dict[str, str] = {}  # of odometry, by vehicle
     owners = find_owners(topics)
     check_vehicles(label, len(set(owners.values())), config)
     row = 0
     for topic in topics:
         segments.append(topic.segment(row))
-        if collect(topic, vehicles.setdefault(owners[topic.name], Rows()), row):
-            unstamped.append(topic.name)
+        frame, is_unstamped = collect(topic, vehicles.setdefault(owners[topic.name], Rows()), row)
+        frames |= {owners[topic.name]: frame} if topic.type == ODOMETRY else {}
+        unstamped += [topic.name] if is_unstamped else []
         row += len(topic.data)
+    notes = check_frames(label, frames, vehicles)
     silent = [owners[topic.name] for topic in topics if topic.type == TWIST and not vehicles[owners[topic.name]].fixes]
     if silent:
         raise InputError(
             f"{label}: there are speeds but no positions of {', '.join(silent)}; put {FIX} and {TWIST} in one namespace"
         )
-    notes = []
     if unstamped:
-        notes = [f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: {', '.join(unstamped)}"]
+        notes += [f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: {', '.join(unstamped)}"]
     notes += [
         f"vehicle {vehicle} has no speeds: taken from its positions" for vehicle, rows in vehicles.items() if not rows.speeds
     ]
@@ -148,12 +152,17 @@ def read_streams(topics: list[Topic], name: str, config: LogConfig) -> RawLog:
 
 
 def find_owners(topics: list[Topic]) -> dict[str, str]:
-    """Return the vehicle of each topic by its namespace.
+    """Return the vehicle of each topic by its namespace; by the level in which they differ, where several topics share the last.
 
     Raises:
         InputError: two topics of one type share a namespace.
     """
     owners = {topic.name: vehicle_id(topic.name) for topic in topics}
+    parts = {topic.name: topic.name.strip("/").split("/")[:-1] for topic in topics}
+    for level in range(min(map(len, parts.values()))):
+        if len({(owners[topic.name], topic.type) for topic in topics}) == len(topics):
+            break
+        owners = {name: own[level].removeprefix("vehicle_") or name for name, own in parts.items()}
     taken: dict[tuple[str, str], str] = {}
     for topic in topics:
         other = taken.setdefault((owners[topic.name], topic.type), topic.name)
@@ -165,18 +174,51 @@ def find_owners(topics: list[Topic]) -> dict[str, str]:
     return owners
 
 
-def collect(topic: Topic, vehicle: Rows, row: int) -> bool:
-    """Decode the messages of a topic, rows from `row` on, for a vehicle; return whether their headers bear no stamps."""
-    unstamped = False
+def collect(topic: Topic, vehicle: Rows, row: int) -> tuple[str, bool]:
+    """Decode the messages of a topic, rows from `row` on, for a vehicle; return its frame, and whether headers bear no stamps."""
+    frame, unstamped = "", False
     for number, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
         sample = decode_sample(data, topic.type, f"{topic.where}, message {number + 1}")
+        frame = frame or sample.frame
         unstamped |= sample.stamp_ns == 0
         stamp = sample.stamp_ns or received
         if sample.position is not None:
             vehicle.fixes.append((stamp, row + number, *sample.position, sample.heading))
         if sample.speed is not None:
             vehicle.speeds.append((stamp, row + number, sample.speed))
-    return unstamped
+    return frame, unstamped
+
+
+def check_frames(label: str, frames: dict[str, str], vehicles: dict[str, Rows]) -> list[str]:
+    """Return notes on the frames of odometries, by vehicle.
+
+    Raises:
+        InputError: each counts from where it started, or from a vehicle that moves: they have no frame in common.
+    """
+    for vehicle, frame in frames.items():
+        refuse_moving(frame, f"{label}: the odometry of vehicle {vehicle}")
+    first = {vehicle: min(vehicles[vehicle].fixes) for vehicle in frames if vehicles[vehicle].fixes}
+    began = [vehicle for vehicle, (_, _, x, y, _) in first.items() if math.hypot(x, y) < AT_START_M]
+    at_once = len(began) >= 2 and np.ptp([first[vehicle][0] for vehicle in began]) < 1e9 * SPAWNED_S
+    named = ", ".join(f"{vehicle} in {frame!r}" for vehicle, frame in frames.items())
+    if at_once or len({frames[vehicle] for vehicle in began}) >= 2:
+        raise InputError(
+            f"{label}: the odometries of {' and '.join(began)} begin at 0, 0, each where its vehicle started ({named}); record "
+            "positions in one frame, such as map, or choose with the parameter topics"
+        )
+    return [f"the odometries name several frames ({named}); they are read as one"] if len(set(frames.values())) > 1 else []
+
+
+def refuse_moving(frame: str, what: str) -> None:
+    """Refuse positions in the frame of a vehicle that moves.
+
+    Raises:
+        InputError: they are.
+    """
+    if frame.rpartition("/")[2].startswith("base_"):
+        raise InputError(
+            f"{what} is in frame {frame!r}, which moves with its vehicle; record it in a frame that stands, such as map"
+        )
 
 
 def read_tracks(topics: list[Topic], name: str, others: list[str]) -> RawLog:
@@ -222,6 +264,7 @@ def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
     for row, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
         where = f"{topic.where}, message {row + 1}"
         stamp, frame, objects = decode_tracked(data, where)
+        refuse_moving(frame, where)
         frames.add(frame)
         if len(frames) > 1:
             raise InputError(f"{where}: frame {frame!r} differs from that of the messages before")
@@ -239,6 +282,6 @@ def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
         notes.append(f"the parameter topics can choose {', '.join(others)}")
     found = []
     for vehicle, rows in vehicles.items():
-        length, width = (value if value > 0.0 else math.nan for value in np.median(np.array(sizes[vehicle]), axis=0).tolist())
+        length, width = np.median(np.array(sizes[vehicle]), axis=0).tolist()
         found.append(replace(rows.observations(vehicle), length=length, width=width))
     return RawLog(name, False, tuple(found), len(topic.data), (topic.segment(0),), tuple(notes))

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs.clock import beyond
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
 from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Bools, Floats, Ints
 
-LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
 SLOWEST = 5.0  # s between fixes: a slower source does not show how a vehicle drives, or its unit of time is another one
 FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
 UNITS = {"milliseconds": ("ms", 1e-3), "microseconds": ("us", 1e-6), "nanoseconds": ("ns", 1e-9)}
@@ -24,15 +24,20 @@ USUAL = (0.005, 2.0)  # s between fixes of usual sources
 FASTEST = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
 JUMP_SLACK = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
 JUMP_SPEED = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
+LONGEST_M, WIDEST_M = 100.0, 4.0  # of a vehicle
+SIZES = (("feet", "ft", 0.3048), ("centimetres", "cm", 0.01), ("millimetres", "mm", 0.001))  # that sizes may be in
+MOVES = 1.0  # m/s: above it a vehicle is not where it was
+BORNE_OUT = 0.2  # of a measured speed: what the positions drive at least, in whatever unit it is
 RELOCATED = 5  # fixes in a row that agree with each other and are then a new place, not jumps
 
 
 @dataclass
 class Drops:
-    """Counts of dropped rows by reason, with the first row of each."""
+    """Counts of dropped rows by reason, with the first row of each; and notes on what was replaced."""
 
     count: dict[str, int] = field(default_factory=dict)
     first: dict[str, int] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
     def add(self, reason: str, rows: Ints) -> None:
         """Count `rows` (K,) of the log as dropped for `reason`."""
@@ -67,8 +72,10 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
             f"{log.name}: no position between {config.start:g} s and {config.end:g} s; change --set log.start=… or log.end=…"
         )
     sound = [in_order(vehicle, log, drops) for vehicle in sound]
+    sound = [without_held(vehicle, drops, geographic=log.geographic) for vehicle in sound]
     check_clock(sound, log, config)
-    tracks = [without_jumps(vehicle, drops, config, geographic=log.geographic) for vehicle in sound]
+    tracks, notes = sized([without_jumps(vehicle, drops, geographic=log.geographic) for vehicle in sound], config)
+    drops.notes += notes
     if config.strict and drops.count:
         worst = drops.of(log)[0]
         raise InputError(f"{worst.first}: {worst.reason} ({worst.count} such rows), and strict is set")
@@ -98,11 +105,6 @@ def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) ->
     ]
     keep_speed = judge(slow_checks, vehicle.speed_row, drops)
     return select(vehicle, keep, keep_speed)
-
-
-def beyond(stamps: Ints) -> Bools:
-    """Return which stamps (T,) [ns] are so far from 1970 that differences of them may overflow."""
-    return (stamps < -LATEST_NS) | (stamps > LATEST_NS)
 
 
 def judge(checks: list[tuple[str, Any]], rows: Ints, drops: Drops) -> Bools:
@@ -135,7 +137,7 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
         raise InputError(
             f"{log.segments[0].label} holds no usable position among {log.rows} rows"
             + (f" ({causes})" if causes else "")
-            + ("; lat and lon may be swapped: --set log.columns=lat=…,lon=…" if log.geographic else "")
+            + looks_like(log)
             + "; check the columns and their units, or name them with --set log.columns=…"
         )
     first, last = min(int(s.min()) for s in stamps), max(int(s.max()) for s in stamps)
@@ -144,6 +146,24 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
     if config.start * 1e9 > last - first:
         raise InputError(f"parameter start is {config.start:g} s, but {log.name} is only {(last - first) * 1e-9:.1f} s long")
     return first + round(config.start * 1e9), first + round(config.end * 1e9) if config.end else last
+
+
+def looks_like(log: RawLog) -> str:
+    """Return what positions of which none can be used look like, "" if like nothing that is known."""
+    fix = np.concatenate([vehicle.fix for vehicle in log.vehicles] or [np.zeros((0, 2))])
+    fix = np.abs(fix[np.isfinite(fix).all(axis=1)])
+    if not log.geographic:
+        return ""
+    if not len(fix):
+        return "; the receivers had no fix, or the fields are empty"
+    latitude, longitude = np.median(fix, axis=0)
+    for unit, what, whole in (
+        ("ddmm", "degrees and minutes, as of NMEA", (9_000.0, 18_000.0)),
+        ("e7", "1e-7 degrees", (9e8, 1.8e9)),
+    ):
+        if max(latitude, longitude) > 180.0 and latitude <= whole[0] and longitude <= whole[1]:
+            return f"; they look like {what}: --set log.columns=lat=…:{unit},lon=…:{unit}"
+    return "; lat and lon may be swapped: --set log.columns=lat=…,lon=…" if 90.0 < latitude <= 180.0 else ""
 
 
 def within(vehicle: Observations, first: int, last: int) -> Observations:
@@ -216,6 +236,32 @@ def in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
     return select(vehicle, keep, keep_speed)
 
 
+def without_held(vehicle: Observations, drops: Drops, *, geographic: bool) -> Observations:
+    """Keep the first of positions that repeat while the vehicle moves: the others are no measurements.
+
+    It moves if its measured speeds say so and the next position bears them out; without speeds, if it comes and goes by steps
+    that are as fast as a vehicle, the repeats included.
+    """
+    repeats = np.concatenate([[False], (np.diff(vehicle.fix, axis=0) == 0.0).all(axis=1)])
+    new = np.flatnonzero(~repeats)
+    if not repeats.any() or len(new) < 2:
+        return vehicle
+    places = on_sphere(vehicle.fix[new]) if geographic else vehicle.fix[new]
+    rate = np.linalg.norm(np.diff(places, axis=0), axis=1) / (np.diff(vehicle.fix_ns[new]) * 1e-9)
+    if len(vehicle.speed_ns) >= 2:
+        speed = np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed)
+        counts = np.diff(np.append(new, len(repeats)))
+        goes = rate > BORNE_OUT * (np.add.reduceat(speed, new) / counts)[:-1]
+        moves = speed > MOVES
+    else:
+        goes = np.minimum(rate, np.insert(rate[:-1], 0, rate[0])) > 2.0 * MOVES
+        moves = np.ones(len(repeats), dtype=bool)
+    goes = np.append(goes, (goes & (np.diff(new) > 1)).any())  # the last one, if there are others
+    held = repeats & moves & goes[np.cumsum(~repeats) - 1]
+    drops.add("position repeated while the vehicle moves (the first is kept)", vehicle.fix_row[held])
+    return select(vehicle, ~held, np.ones(len(vehicle.speed_ns), dtype=bool))
+
+
 def first_of_each(stamps: Ints) -> tuple[Ints, Ints]:
     """Return, of stamps (T,), the indices of the first row of each in order of time, and of the rows that repeat one."""
     _, keep = np.unique(stamps, return_index=True)
@@ -260,7 +306,7 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
         )
 
 
-def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig, *, geographic: bool) -> Observations:
+def without_jumps(vehicle: Observations, drops: Drops, *, geographic: bool) -> Observations:
     """Drop fixes that the vehicle cannot have reached at its measured speeds, except several in a row that agree."""
     limit = reach(vehicle)
     places = on_sphere(vehicle.fix) if geographic else vehicle.fix
@@ -270,10 +316,38 @@ def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig, *, geo
     if (step > JUMP_SLACK + limit[1:] * seconds).any():
         keep = reachable(vehicle.fix_ns.astype(np.float64) * 1e-9, places, limit)
         drops.add("position jumps", vehicle.fix_row[~keep])
-    length = vehicle.length if np.isfinite(vehicle.length) else config.length
-    width = vehicle.width if np.isfinite(vehicle.width) else config.width
     every = np.ones(len(vehicle.speed_ns), dtype=bool)
-    return replace(select(vehicle, keep, every), length=length, width=width)
+    return select(vehicle, keep, every)
+
+
+def sized(vehicles: list[Observations], config: LogConfig) -> tuple[list[Observations], list[str]]:
+    """Return the vehicles with lengths and widths, those of `config` where there are none, or such as no car has; and notes."""
+    found, wrong = [], []
+    for vehicle in vehicles:
+        length, width = vehicle.length, vehicle.width
+        # comparisons with NaN, where one is not recorded, are false
+        if width <= 0.0 or width > WIDEST_M or width > length:
+            wrong.append(vehicle)
+            length, width = np.nan, np.nan
+        elif length <= 0.0 or length > LONGEST_M:
+            wrong.append(vehicle)
+            length = np.nan
+        length, width = (own if np.isfinite(own) else usual for own, usual in ((length, config.length), (width, config.width)))
+        found.append(replace(vehicle, length=length, width=width))
+    if not wrong:
+        return found, []
+    size = (wrong[0].length, wrong[0].width)
+    ways = {"swapped (log.columns=length=…,width=…)": size[::-1]} | {
+        f"in {name} (name the unit: log.columns=length=…:{unit},width=…:{unit})": (factor * size[0], factor * size[1])
+        for name, unit, factor in SIZES
+    }
+    way = next((words for words, (long, wide) in ways.items() if 2.5 < long < 20.0 and 1.2 < wide < 2.7), "")
+    more = f" ({len(wrong)} vehicles have such sizes)" if len(wrong) > 1 else ""
+    return found, [
+        f"vehicle {wrong[0].id} is recorded as {size[0]:g} m long and {size[1]:g} m wide, which no car is{more}"
+        + (f"; it looks {way}" if way else "")
+        + f": what is wrong is taken as {config.length:g} m × {config.width:g} m"
+    ]
 
 
 def reach(vehicle: Observations) -> Floats:

@@ -4,13 +4,14 @@
 """The columns of a table by quantity, with their units: by option, or by name and suffix."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 import re
 
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.logs.config import listed
+from scenario_gen.logs.raw import UnknownFormatError
 
 # Column names of each quantity, the preferred first. Clocks that all files share come before those that start with the file.
 NAMES: dict[str, tuple[str, ...]] = {
@@ -27,15 +28,30 @@ NAMES: dict[str, tuple[str, ...]] = {
     "heading": ("heading", "yaw", "theta", "course", "bearing"),
     "length": ("length", "len", "vehicle_length"),
     "width": ("width", "vehicle_width"),
+    "kind": (
+        *("type", "kind", "class", "vehicle_type", "object_type", "agent_type", "actor_type", "obj_type", "category"),
+        *("classification", "vehicle_class", "object_class", "road_user", "road_user_type"),
+    ),
 }
 # Factors to seconds, metres, m/s, radians, or degrees (lat, lon); a column without a unit suffix has the first unit.
 PLACES = {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01}
 SIZES = {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001}
-DEGREES = {"deg": 1.0, "rad": math.degrees(1.0)}
-SPEEDS = {"mps": 1.0, "ms": 1.0, "m_s": 1.0, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600, "fps": 0.3048}
+DEGREES = {"deg": 1.0, "rad": math.degrees(1.0), "e7": 1e-7, "ddmm": 1.0}  # ddmm.mmmm: degrees, and minutes of two digits
+SPEEDS = {
+    "mps": 1.0,
+    "ms": 1.0,
+    "m_s": 1.0,
+    "kmh": 1 / 3.6,
+    "kph": 1 / 3.6,
+    "mph": 0.44704,
+    "kn": 1852 / 3600,
+    "fps": 0.3048,
+    "cmps": 0.01,
+}
 UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "sec": 1.0, "ns": 1e-9, "us": 1e-6, "ms": 1e-3},
+    "time": {"s": 1.0, "sec": 1.0, "ns": 1e-9, "us": 1e-6, "ms": 1e-3, "min": 60.0, "h": 3600.0, "d": 86400.0},
     "vehicle": {},
+    "kind": {},
     **dict.fromkeys(("lat", "lon"), DEGREES),
     **dict.fromkeys(("x", "y"), PLACES),
     **dict.fromkeys(("length", "width"), SIZES),
@@ -48,16 +64,56 @@ NGSIM = {  # columns of the trajectory files, in feet, and their units; position
     "time": ("global_time", "ms"), "vehicle": ("vehicle_id", ""), "x": ("local_x", "ft"), "y": ("local_y", "ft"),
     "speed": ("v_vel", "fps"), "length": ("v_length", "ft"), "width": ("v_width", "ft"),
 }  # fmt: skip
+FRAMES = re.compile(r"(\d+(?:\.\d+)?)fps")  # a unit of time: frames, so many each second
+SHOWN = 12  # columns that are not read, by name
 CLOCKWISE = ("course", "bearing")  # by convention degrees clockwise from north
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table, the factor to the unit used here, and whether it is a heading clockwise from north."""
+    """A column of the table.
+
+    Attributes:
+        name: of the column.
+        factor: to the unit used here; negative if the axis is flipped.
+        clockwise: it is a heading clockwise from north.
+        minutes: its last two whole digits and what follows are minutes of a degree, as receivers of NMEA write.
+    """
 
     name: str
     factor: float = 1.0
     clockwise: bool = False
+    minutes: bool = False
+
+
+def named(header: Sequence[str], path: Path, option: str) -> dict[str, Column | None]:
+    """Return the columns that the parameter `columns` names, None of quantities that are not to be read.
+
+    Raises:
+        InputError: it names a column that is not there, or a unit or quantity that is not known.
+    """
+    spelled = {name.strip().lower(): name for name in header} | {normal(name): name for name in header}
+    columns: dict[str, Column | None] = {}
+    for part in listed(option):
+        quantity, _, name = (p.strip() for p in part.partition("="))
+        if quantity == "point":
+            continue
+        if quantity not in NAMES:
+            raise InputError(f"parameter columns: write quantity=column, …; {quantity!r} is none of {', '.join(NAMES)}, point")
+        if name == "none":
+            columns[quantity] = None
+            continue
+        flipped = name.startswith("-") and name.lower() not in spelled
+        own, unit = name[flipped:].strip(), ""
+        if own.lower() not in spelled and ":" in own:
+            own, _, unit = (p.strip() for p in own.rpartition(":"))
+        if own.lower() not in spelled:
+            raise InputError(f"{path} has no column {name!r} (asked for as {quantity}); it has {', '.join(header)}")
+        if unit and unit not in UNITS[quantity] and not (quantity == "time" and FRAMES.fullmatch(unit)):
+            raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
+        column = as_column(quantity, spelled[own.lower()], unit)
+        columns[quantity] = replace(column, factor=-column.factor) if flipped else column
+    return columns
 
 
 def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Column]:
@@ -67,32 +123,20 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
         InputError: a required column is missing, or the parameter names a column that is not there.
     """
     names = {normal(name): name for name in header}
-    columns: dict[str, Column] = {}
-    without: set[str] = set()
-    for part in listed(option):
-        quantity, _, name = (p.strip() for p in part.partition("="))
-        if quantity not in NAMES:
-            raise InputError(f"parameter columns: write quantity=column, …; {quantity!r} is none of {', '.join(NAMES)}")
-        if name == "none":
-            without.add(quantity)
-            continue
-        name, _, unit = (name, "", "") if name.lower() in names else name.rpartition(":")
-        if name.lower() not in names:
-            requested = part.partition("=")[2].strip()
-            raise InputError(f"{path} has no column {requested!r} (asked for as {quantity}); it has {', '.join(names.values())}")
-        if unit and unit not in UNITS[quantity]:
-            raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
-        columns[quantity] = as_column(quantity, names[name.lower()], unit)
+    asked = named(header, path, option)
+    columns = {quantity: column for quantity, column in asked.items() if column is not None}
+    without = asked.keys() - columns.keys()
     if NGSIM["x"][0] in names and NGSIM["speed"][0] in names:
         for quantity, (name, unit) in NGSIM.items():
             if name in names and quantity not in without:
                 columns.setdefault(quantity, as_column(quantity, names[name], unit))
+    joined = {name.replace(" ", "_"): own for name, own in names.items() if " " in name}
     for quantity, aliases in NAMES.items():
         if quantity in columns or quantity in without:
             continue
         suffixes = ("", *(f"_{unit}" for unit in UNITS[quantity]))
-        candidates = (f"{alias}{suffix}" for alias in aliases for suffix in suffixes)
-        match = next((names[candidate] for candidate in candidates if candidate in names), None)
+        candidates = [f"{alias}{suffix}" for alias in aliases for suffix in suffixes]
+        match = next((known[candidate] for known in (names, joined) for candidate in candidates if candidate in known), None)
         if match is not None:
             columns[quantity] = as_column(quantity, match)
     if "heading" in columns and "time" in columns and columns["time"].name.strip().lower() == "gentime":  # basic safety messages
@@ -107,9 +151,14 @@ def normal(name: str) -> str:
     return f"{bracketed[1]}_{SPELLED.get(bracketed[2], bracketed[2])}" if bracketed else name
 
 
-def notes_on(columns: dict[str, Column], option: str) -> list[str]:
-    """Return what there is to say about the columns that were found with the parameter `columns`."""
+def notes_on(columns: dict[str, Column], option: str, header: Sequence[str]) -> list[str]:
+    """Return what there is to say about the columns that were found with the parameter `columns` in a header."""
     notes = []
+    unread = [name for name in header if name not in {column.name for column in columns.values()}]
+    if unread:
+        read = ", ".join(f"{quantity} from {column.name}" for quantity, column in columns.items())
+        more = f" and {len(unread) - SHOWN} more" if len(unread) > SHOWN else ""
+        notes.append(f"columns read: {read}; not read: {', '.join(unread[:SHOWN])}{more}")
     if "speed" not in columns and "speed" not in option:
         notes.append("there is no speed column: speeds are derived from the positions")
     if columns.get("x", Column("")).name.strip().lower() == NGSIM["x"][0]:
@@ -134,7 +183,7 @@ def complete(columns: dict[str, Column], path: Path, names: dict[str, str]) -> d
         what, remedy, quantities = missing
         aliases = {alias for quantity in quantities if quantity not in columns for alias in NAMES[quantity]}
         near = nearest(names.values(), aliases)
-        raise InputError(
+        raise UnknownFormatError(
             f"{path} has no column for {what}; it has {', '.join(names.values())}. "
             f"Rename it, or name it with --set log.columns={remedy}{near}"
         )
@@ -144,13 +193,16 @@ def complete(columns: dict[str, Column], path: Path, names: dict[str, str]) -> d
 
 def nearest(present: Collection[str], aliases: Collection[str]) -> str:
     """Return a question whether one of the columns is meant by an alias; "" if none is near."""
-    found = [(name, did_you_mean(normal(name), aliases)) for name in present if len(name) > 2]
+    others = {alias for own in NAMES.values() for alias in own} - set(aliases)
+    found = [(name, did_you_mean(normal(name), aliases)) for name in present if len(name) > 2 and normal(name) not in others]
     return next((f"; is it {name}?" for name, question in found if question), "")
 
 
 def as_column(quantity: str, name: str, unit: str = "") -> Column:
     """Return the column in the given unit; by default its suffix names the unit."""
     lower = normal(name)
+    if quantity == "time" and (frames := FRAMES.fullmatch(unit)):
+        return Column(name, 1.0 / max(float(frames[1]), 1e-3))
     unit = unit or max((unit for unit in UNITS[quantity] if lower.endswith("_" + unit)), key=len, default="")
     if quantity == "heading":
         base = lower.removesuffix("_" + unit)
@@ -159,4 +211,4 @@ def as_column(quantity: str, name: str, unit: str = "") -> Column:
         return Column(name, UNITS["heading"].get(unit, 1.0))
     if quantity == "time" and not unit and lower == "gentime":
         return Column(name, 1e-6)
-    return Column(name, UNITS[quantity].get(unit, 1.0))
+    return Column(name, UNITS[quantity].get(unit, 1.0), minutes=unit == "ddmm")

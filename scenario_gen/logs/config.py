@@ -11,8 +11,12 @@ from scenario_gen.base.parameters import parameter, Parameters
 
 FORMATS = (
     *("auto", "spmd", "table", "bag", "argoverse2", "interaction", "ind", "highd", "commonroad", "nocturne", "osi"),
-    "omega_prime",
+    *("omega_prime", "bsm", "fcd"),
 )
+
+
+POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
+"""Points of a vehicle, and how many lengths its middle is ahead of them; behind its rear axle a car has a fifth of its length."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,10 @@ class LogConfig(Parameters):
     format: str = parameter(
         "auto", "source format; auto looks at the file's name and content", choices=FORMATS, group="scenario_gen.logs"
     )
-    columns: str = parameter("", "columns of a table whose names are not known, e.g. vehicle=name,time=t_s,speed=v_kmh")
+    columns: str = parameter(
+        "",
+        "columns of a table, e.g. vehicle=who,speed=v:kmh; y=-y flips an axis; point=front, rear or rear_axle of a vehicle",
+    )
     topics: str = parameter("", "topics of a bag to read, separated by commas; empty: all that can be used")
     vehicles: str = parameter("", "vehicles to keep, separated by commas; empty: all")
     start: float = parameter(0.0, "start of the time window, counted from the log's first stamp", unit="s", low=0.0)
@@ -69,6 +76,18 @@ class LogConfig(Parameters):
 def listed(text: str) -> list[str]:
     """Return the parts of a text that are separated by commas, without those that are empty."""
     return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def ahead_of_point(config: LogConfig) -> float:
+    """Return how far the middle of a vehicle is ahead of its recorded positions, in lengths of the vehicle.
+
+    Raises:
+        InputError: `columns` names a point that is not known.
+    """
+    points = [part.partition("=")[2].strip() for part in listed(config.columns) if part.partition("=")[0].strip() == "point"]
+    for unknown in (point for point in points if point not in POINTS):
+        raise InputError(f"parameter columns: point is one of {', '.join(POINTS)}, not {unknown!r}")
+    return POINTS[points[-1]] if points else 0.0
 
 
 def picked(known: Sequence[str], config: LogConfig, where: str) -> list[str]:

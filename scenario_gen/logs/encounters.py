@@ -3,16 +3,16 @@
 
 """From clean tracks to smooth pieces: tracks are cut at long gaps, relocations and reversals."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, select, SLOWEST
-from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, JUMP_SPEED, RELOCATED, select, SLOWEST
+from scenario_gen.logs.config import ahead_of_point, LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
-from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
+from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing, UnreconciledError
 from scenario_gen.numerics import Bools, Floats, runs
 
 TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
@@ -55,14 +55,21 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     seconds = np.diff(track.fix_ns) * 1e-9
     usual = float(np.median(seconds))
     longest = longest_bridge(seconds, config)
-    step = np.hypot(*np.diff(track.fix, axis=0).T)
-    gaps = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
+    gaps = (seconds > longest) | abrupt(seconds, np.hypot(*np.diff(track.fix, axis=0).T))
     back = reversals(track, config)
     cuts = gaps | back | laps(track, config)
     bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
     whole = parts(track, cuts)
-    smoothed = [leaf for part in whole for leaf in steered(part, origin_ns, config)]
-    pieces = [Piece(part, smooth) for part, smooth in smoothed if smooth is not None]
+    smoothed: list[tuple[Observations, Smooth | None]] = []
+    lost = 0.0
+    for part in whole:
+        try:
+            smoothed += steered(part, origin_ns, config)
+        except UnreconciledError:
+            smoothed.append((part, None))
+            lost += float(part.fix_ns[-1] - part.fix_ns[0]) * 1e-9
+    ahead = ahead_of_point(config) * track.length
+    pieces = [Piece(part, moved_ahead(smooth, ahead) if ahead else smooth) for part, smooth in smoothed if smooth is not None]
     smooths = [piece.smooth for piece in pieces]
 
     def joined(name: str) -> Floats:
@@ -91,8 +98,15 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
         noise=max((smooth.noise for smooth in smooths), default=np.nan),
         turned=float(np.median(turned)) if len(turned) else np.nan,
         headings=float(used.mean()) if len(used) else np.nan,
+        lost=lost,
     )
     return pieces, quality
+
+
+def moved_ahead(smooth: Smooth, metres: float) -> Smooth:
+    """Return the motion of a point so far ahead; a vehicle of unknown heading faces east."""
+    heading = np.nan_to_num(smooth.heading)
+    return replace(smooth, position=smooth.position + metres * np.stack([np.cos(heading), np.sin(heading)], axis=-1))
 
 
 def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple[Observations, Smooth | None]]:
@@ -110,6 +124,21 @@ def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple
     cuts = np.zeros(len(part.fix_ns) - 1, dtype=bool)
     cuts[np.clip(np.searchsorted(part.fix_ns, at), 1, len(cuts)) - 1] = True
     return [leaf for half in parts(part, cuts) for leaf in steered(half, origin_ns, config)]
+
+
+def abrupt(seconds: Floats, step: Floats) -> Bools:
+    """Return which steps (F-1,) [m] no vehicle drives, or none that is as fast as this one is just before and after.
+
+    Args:
+        seconds: (F-1,) that each step takes.
+        step: (F-1,) [m].
+    """
+    rate = np.pad(step / seconds, 2, mode="edge")
+    around = (
+        np.max([rate[:-4], rate[1:-3], rate[3:-1], rate[4:]], axis=0) if len(step) >= RELOCATED else np.full(len(step), np.inf)
+    )
+    far: Bools = step > JUMP_SLACK + np.minimum(1.5 * around + JUMP_SPEED, FASTEST) * seconds
+    return far
 
 
 def laps(track: Observations, config: LogConfig) -> Bools:

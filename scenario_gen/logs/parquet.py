@@ -25,23 +25,27 @@ BATCH = 1 << 16  # rows
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # of the units of time in Arrow
 
 
-def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFrame, dict[str, Column]]:
+def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFrame, dict[str, Column], list[str]]:
     """Read the columns that are needed; `before` rows were read from other files.
 
     Returns:
-        A table of numbers and texts, and the columns with the factors to our units; those of times by the type in Arrow.
+        A table of numbers and texts, and the columns with the factors to our units, those of times by the type in Arrow; and
+        the names of all columns.
 
     Raises:
         InputError: the file is damaged or too large, or a column is of no kind that its quantity can have.
     """
     schema = read_schema(path)
     columns = find_columns(list(schema.names), path, config.columns)
-    for quantity, column in columns.items():
+    for quantity, column in list(columns.items()):
         kind = schema.field(column.name).type
+        if quantity == "kind" and not is_text(kind.value_type if pa.types.is_dictionary(kind) else kind):
+            del columns[quantity]  # numbers whose meaning is not known
+            continue
         check_kind(kind, quantity, column, path)
         if quantity == "time" and (factor := unit_of(kind)) is not None:
             columns[quantity] = replace(column, factor=factor)
-    return read_table(path, sorted({column.name for column in columns.values()}), before, config), columns
+    return read_table(path, sorted({column.name for column in columns.values()}), before, config), columns, list(schema.names)
 
 
 def read_schema(path: Path) -> pa.Schema:

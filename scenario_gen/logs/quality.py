@@ -48,6 +48,7 @@ class VehicleQuality:
         noise: standard deviation of the fixes [m], as estimated from the track (or as given); how smooth it is follows from it.
         turned: median difference of recorded and published headings while it moves [rad]; NaN if none is recorded.
         headings: share of the recorded headings that were used; the others contradict the path, or jump.
+        lost: seconds of pieces that are left out, since no motion of a car fits them.
     """
 
     id: str
@@ -67,6 +68,7 @@ class VehicleQuality:
     noise: float = math.nan
     turned: float = math.nan
     headings: float = math.nan
+    lost: float = 0.0
 
 
 @dataclass(frozen=True)

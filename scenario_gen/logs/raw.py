@@ -18,6 +18,10 @@ from scenario_gen.types import Encounter
 LONGEST_HEADER = 65_536  # characters of a table's first line
 
 
+class UnknownFormatError(InputError):
+    """A file is of no format of logs, or has not the columns of one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Observations:
     """Observations of one vehicle, in the order of the log; values may still be NaN, stamps unordered.
@@ -124,9 +128,13 @@ class RawLog:
     dropped: tuple[tuple[str, int], ...] = ()
     encounters: tuple[Encounter, ...] = ()
 
+    def segment(self, row: int) -> Segment:
+        """Return where a row comes from."""
+        return self.segments[bisect_right([s.first for s in self.segments], row) - 1]
+
     def where(self, row: int) -> str:
         """Name the file and line (or topic and message) of a row."""
-        segment = self.segments[bisect_right([s.first for s in self.segments], row) - 1]
+        segment = self.segment(row)
         return f"{renamed(segment.label)}, {segment.unit} {segment.number + row - segment.first}"
 
 
@@ -156,12 +164,11 @@ def check_size(where: str, size: int, rows: int, config: LogConfig) -> None:
     if size > config.size_limit << 20:
         raise InputError(
             f"{where} holds {size / 2**20:.1f} MiB (decompressed, as far as it was read); at most {config.size_limit} MiB are "
-            "read: cut the log, or raise the parameter size_limit"
+            "read: cut the log, or raise --set log.size_limit=…"
         )
     if rows > config.row_limit:
         raise InputError(
-            f"{where} holds {rows} rows or more; at most {config.row_limit} are read: cut the log, or raise the parameter "
-            "row_limit"
+            f"{where} holds {rows} rows or more; at most {config.row_limit} are read: cut the log, or raise --set log.row_limit=…"
         )
 
 
@@ -173,6 +180,6 @@ def check_vehicles(where: str, count: int, config: LogConfig) -> None:
     """
     if count > config.vehicle_limit:
         raise InputError(
-            f"{where}: {count} vehicles, at most {config.vehicle_limit} are read; check the vehicle column (parameter columns), "
-            "or raise the parameter vehicle_limit"
+            f"{where}: {count} vehicles, at most {config.vehicle_limit} are read; check --set log.columns=vehicle=…, "
+            "or raise --set log.vehicle_limit=…"
         )

@@ -18,17 +18,19 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, needs, reading
 from scenario_gen.base.registry import Registry
-from scenario_gen.base.stores import local
+from scenario_gen.base.stores import local, renamed
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
+from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
 from scenario_gen.logs.groups import distances, driven, find_groups, ticks
 from scenario_gen.logs.growing import Group, Meeting
+from scenario_gen.logs.packed import unpacked, without_packing
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
-from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
+from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog, UnknownFormatError
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.logs.units import remarks_on_units
 from scenario_gen.numerics import runs
@@ -39,6 +41,8 @@ MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
 OSI = (b"net.asam.osi", b"osi3.", b"ground_truth")  # what is near the beginning or the end of a trace of OSI
 NEAR = 65_536  # bytes
 FAR_M = 200_000.0  # from an origin that is given: there distances are 0.02 % too long
+BSM_ENDINGS = (".json", ".jsonl", ".ndjson", ".txt")
+MUCH = 0.02  # of the rows: if more are left out, people are told at once
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
 
 
@@ -73,33 +77,35 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
 
 
 class NoEncounterError(InputError):
-    """A log can be read and holds no encounter; the message says how near to one it comes."""
+    """A log can be read and holds no encounter, or one vehicle alone; the message says how near to one it comes."""
 
 
 def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     """Cut a raw log, from files or streams, into encounters, as `read_log` does.
 
     Raises:
-        NoEncounterError: there is no encounter in it; the message says why.
-        InputError: fewer than two vehicles have usable positions.
+        NoEncounterError: there is no encounter in it, or one vehicle alone; the message says why.
+        InputError: the log cannot be used.
     """
     if log.encounters:
         return as_recorded(log, config)
+    check_unit(log, config)
+    log, notes = retimed(log, config)
     tracks, drops = clean(log, config)
+    said_first = (*notes, *notes_on_drops(log, drops), *drops.notes)
     if len({track.id for track in tracks}) < 2:
-        raise InputError(explain_few_vehicles(log, [track.id for track in tracks], drops))
+        raise NoEncounterError(explain_few_vehicles(log, [track.id for track in tracks], drops))
     tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
     dt_ns = round(config.period * 1e9)
     origin_ns = min(int(track.fix_ns[0]) for track in tracks) // dt_ns * dt_ns
     pieces: list[Piece] = []
     vehicles = []
     for track in tracks:
-        try:
-            own, quality = pieces_of(track, origin_ns, config)
-        except InputError as error:
-            raise InputError(f"{log.segments[0].label}, vehicle {track.id}: {error}") from error
+        own, quality = pieces_of(track, origin_ns, config)
         pieces += own
         vehicles.append(quality)
+    if not pieces and any(vehicle.lost for vehicle in vehicles):
+        raise InputError(f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units")
     groups, notes = find_groups(pieces, config)
     if not groups:
         raise NoEncounterError(explain_no_encounter(log, pieces, config))
@@ -119,7 +125,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         dropped=drops.of(log),
         vehicles=tuple(vehicles),
         encounters=tuple(encounter_quality(encounter) for encounter in encounters),
-        notes=(*log.notes, *remarks_on_units(pieces, origin_ns, config), *dict.fromkeys(notes)),
+        notes=(*remarks_on_units(pieces, origin_ns, config), *said_first, *log.notes, *dict.fromkeys(notes)),
     )
     return LogResult(tuple(encounters), summary)
 
@@ -128,6 +134,23 @@ def unusable(log: RawLog, tracks: Sequence[Observations], config: LogConfig) -> 
     """Return the vehicles of a log of which fewer than two positions were left."""
     requested = picked([vehicle.id for vehicle in log.vehicles], config, log.name)
     return sorted(set(requested) - {track.id for track in tracks}, key=natural)
+
+
+def notes_on_drops(log: RawLog, drops: Drops) -> tuple[str, ...]:
+    """Return a note if more than `MUCH` of the rows were left out, with the causes."""
+    if sum(drops.count.values()) <= MUCH * log.rows:
+        return ()
+    return (f"of {log.rows} rows there are left out, or sorted: {'; '.join(map(str, drops.of(log)))}{advice(log, drops)}",)
+
+
+def advice(log: RawLog, drops: Drops) -> str:
+    """Return what to check if most rows were left out for one reason."""
+    units = {
+        "speed is above": "the unit of the speeds (speed=…:kmh, …:cmps)",
+        "position jumps": "the unit of x, y (x=…:cm,y=…:cm)",
+    }
+    checks = [words for why, words in units.items() if any(n > 0.3 * log.rows for own, n in drops.count.items() if why in own)]
+    return f": check {' and '.join(checks)} with --set log.columns=…" if checks else ""
 
 
 def notes_on_origin(tracks: Sequence[Observations], config: LogConfig) -> tuple[str, ...]:
@@ -154,6 +177,9 @@ def notes_on_vehicles(
         notes = [f"vehicle {v.id} is in no encounter; it was recorded for {v.seconds:.1f} s" for v in left]
     if without_positions:
         notes.append(f"fewer than two usable positions: vehicle {', '.join(without_positions)}")
+    notes += [
+        f"vehicle {v.id}: {v.lost:.1f} s are left out, for no motion of a car fits its positions" for v in vehicles if v.lost
+    ]
     return (*notes, *(f"vehicle {name}: its measured speeds contradict its positions and are not used" for name in doubted))
 
 
@@ -243,12 +269,12 @@ def cut_encounter(
 
 def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
     """Return the error message on fewer than two vehicles."""
-    causes = "; ".join(map(str, drops.of(log)))
+    causes = "; ".join((*(note for note in log.notes if note.startswith("who is no")), *map(str, drops.of(log))))
     have = f"only vehicle {names[0]}" if names else "no vehicle"
     return (
         f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock. "
         "Give the files of all vehicles in one command, or check --set log.columns=… and log.vehicles=…"
-        + (f". Left out: {causes}" if causes else "")
+        + (f". {causes}{advice(log, drops)}" if causes else "")
     )
 
 
@@ -319,9 +345,25 @@ def is_spmd(path: Path) -> bool:
         return False
 
 
+def is_bsm(path: Path) -> bool:
+    """Return whether a file is of basic safety messages in JSON, by its name and beginning."""
+    return path.suffix.lower() in BSM_ENDINGS and path.is_file() and b'"coreData"' in beginning(path)
+
+
+def is_fcd(path: Path) -> bool:
+    """Return whether a file is floating-car data of SUMO, by its name and beginning."""
+    return path.suffix.lower() == ".xml" and path.is_file() and b"<fcd-export" in beginning(path)
+
+
+def beginning(path: Path) -> bytes:
+    """Return the first bytes of a file."""
+    with path.open("rb") as file:
+        return file.read(NEAR)
+
+
 def is_table(path: Path) -> bool:
-    """Return whether the name is that of a table."""
-    return path.suffix.lower() in TABLES
+    """Return whether the name is that of a table, also of a packed one."""
+    return without_packing(path).suffix.lower() in TABLES
 
 
 def is_known(path: Path, name: str) -> bool:
@@ -374,6 +416,8 @@ FORMATS = Registry[LogFormat](
         "osi": LogFormat(is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))),
         "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
         "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
+        "bsm": LogFormat(is_bsm, late("adapters.bsm")),
+        "fcd": LogFormat(is_fcd, late("adapters.fcd")),
         "nocturne": LogFormat(is_nocturne, late("adapters.nocturne")),
         "spmd": LogFormat(is_spmd, late("tables", spmd=True)),
         **{
@@ -394,15 +438,24 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
         InputError: nothing is there, no reader accepts it, or the one that does cannot read it.
     """
     with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
-        files = [file for path in paths for file in present(path)]
+        found = [file for path in paths for file in present(path)]
+    with unpacked(found, config) as files:
+        log = _read_files([file for path in files for file in present(path)], config)
+        return replace(log, segments=tuple(replace(one, label=renamed(one.label)) for one in log.segments))
+
+
+def _read_files(files: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read one log from files as `read_raw` does."""
+    with guarded(str(files[0]), OSError):
         if config.format == "auto":
             known = next((known for known in FORMATS.values() if all(map(known.accepts, files))), None)
         else:
             known = FORMATS[config.format]
     if known is None:
-        raise InputError(
-            f"{paths[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad scenarios, scenes of Nocturne and GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3, .bag. "
+        raise UnknownFormatError(
+            f"{files[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
+            "CommonRoad scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and GPUDrive (.json), "
+            "rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
             "If its name misleads: --set log.format=table"
         )
     with reading(files[0]):
@@ -427,4 +480,5 @@ def present(path: Path) -> list[Path]:
         raise InputError(f"{path} is empty (0 bytes); copy it again")
     if path.is_file() or is_bag(path):
         return [path]
-    return sorted(file for file in path.iterdir() if is_table(file) and file.stat().st_size) or [path]
+    tables = {file for file in path.iterdir() if is_table(file) and file.stat().st_size}
+    return sorted(file for file in tables if without_packing(file) == file or without_packing(file) not in tables) or [path]

@@ -37,6 +37,10 @@ SETTLES = 0.3  # s at either end of a stand that are left to the motion: a car c
 STRAIGHT = 3.0  # m: a shorter path has no shape of its own
 
 
+class UnreconciledError(InputError):
+    """No motion of a car fits speeds and positions."""
+
+
 class Motion:
     """How far along its path a vehicle is: a quadratic B-spline on the common clock, fitted by a quadratic program.
 
@@ -93,7 +97,7 @@ class Motion:
             observed: (seconds, values, standard deviations, whether the values are speeds rather than places).
 
         Raises:
-            InputError: the solver finds no solution.
+            UnreconciledError: the solver finds no solution.
         """
         quadratic, linear = self.prior.copy(), np.zeros(self.size + 3)
         for seconds, values, deviation, speed in observed:
@@ -104,9 +108,14 @@ class Motion:
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
         cones = [clarabel.NonnegativeConeT(len(self.bounds))]
-        solution = clarabel.DefaultSolver(upper, -linear[: self.size], self.constraints, self.bounds, cones, settings).solve()
-        if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
-            raise InputError(f"speeds and positions cannot be reconciled ({solution.status}); check their units")
+        for scaled in (True, False):  # fixes seconds apart leave the matrix such that its scaling makes it worse
+            settings.equilibrate_enable = scaled
+            solver = clarabel.DefaultSolver(upper, -linear[: self.size], self.constraints, self.bounds, cones, settings)
+            solution = solver.solve()
+            if solution.status in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+                break
+        else:
+            raise UnreconciledError("speeds and positions cannot be reconciled; check their units")
         merged = np.maximum.accumulate(np.asarray(solution.x))  # within the solver's tolerance it may run backwards
         return np.asarray(merged[self.variable])
 

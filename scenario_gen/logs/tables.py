@@ -3,27 +3,37 @@
 
 """Tables: CSV or Parquet with named columns, and the headerless files of the Safety Pilot Model Deployment (SPMD)."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
+import re
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError, needs
+from scenario_gen.logs.cleaning import LONGEST_M
 from scenario_gen.logs.columns import Column, find_columns, notes_on
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Observations, RawLog, Segment
 from scenario_gen.logs.text import layout_of
 from scenario_gen.numerics import Floats, Ints
 
 PARQUET = (".parquet", ".pq")
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
+NOW = 3e8, 4e9  # s since 1970: from 1979 to 2096
+FEW_ROWS = 10  # of which each may be of a vehicle of its own
+STILL_M = 0.05  # that no vehicle of an encounter drives
 LONGEST_NUMBER = 300  # characters
-LARGEST = 100.0  # m: no vehicle is longer
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
+OTHERS = re.compile(  # a word in the kinds of road users that are no cars, vans, trucks or buses
+    r"(?<![a-z])(ped(estrian)?s?|persons?|people|human|walkers?|adult|child|wheelchair|stroller|skater|vru|(bi|motor)?cycles?|"
+    r"(bi|motor)?cyclists?|(motor)?bikes?|e?scooter|moped|rider|animal|dog|cone)(?![a-z])"
+)
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
     *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
     *("Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"),
@@ -56,12 +66,12 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
         frames.append(read_messages(path, row, config) if spmd else read_columns(path, row, config, notes))
         if "vehicle" not in frames[-1]:
             frames[-1]["vehicle"] = "0" if len(paths) == 1 else path.stem
-        segments.append(segment_of(path, row, header=not spmd))
+        segments.append(segment_of(path, row, header=0 if spmd else 1 + frames[-1].attrs.get("above", 0)))
         row += len(frames[-1])
     if len({"lat" in frame for frame in frames}) > 1:
         raise InputError(f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one")
     log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
-    return replace(log, notes=tuple(dict.fromkeys(notes)))
+    return replace(log, notes=(*dict.fromkeys(notes), *log.notes))
 
 
 def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -> pd.DataFrame:
@@ -80,27 +90,41 @@ def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -
         needs("parquet", "pyarrow")
         from scenario_gen.logs import parquet
 
-        frame, columns = parquet.read_columns(path, before, config)
+        above = 0
+        frame, columns, header = parquet.read_columns(path, before, config)
     else:
         layout = layout_of(path)
         notes += layout.notes
-        form = {"encoding": layout.encoding, "sep": layout.separator, "decimal": layout.decimal}
-        frame = read_text(path, before, config, **form)
-        columns = find_columns([str(name) for name in frame.columns], path, config.columns)
-    notes += notes_on(columns, config.columns)
+        form = {"encoding": layout.encoding, "sep": layout.separator, "decimal": layout.decimal, "skiprows": layout.above}
+        header = [str(name) for name in read_text(path, before, config, **form, nrows=0).columns]
+        columns = find_columns(header, path, config.columns)
+        texts = {columns[quantity].name: object for quantity in ("vehicle", "kind") if quantity in columns}
+        frame = read_text(path, before, config, **form, dtype=texts)  # a number of 64 bits, or in hexadecimal, is no float64
+        above = layout.above
+        if "kind" in columns and pd.to_numeric(frame[columns["kind"].name], errors="coerce").notna().any():
+            del columns["kind"]  # numbers whose meaning is not known
+    notes += notes_on(columns, config.columns, header)
     numbers = to_numbers(frame, columns, path)
-    if "vehicle" not in columns and "vehicle=none" not in config.columns.replace(" ", ""):
-        check_alone(frame, columns, numbers["time"], path)
+    if "vehicle=none" not in config.columns.replace(" ", ""):
+        check_ids(frame, columns, numbers, path)
+    check_degrees(numbers, columns, path)
+    numbers.attrs["above"] = above
     return numbers
 
 
-def check_alone(frame: pd.DataFrame, columns: dict[str, Column], time: "pd.Series[int]", path: Path) -> None:
-    """Check that a table without a column for the vehicle is of one vehicle.
+def check_ids(frame: pd.DataFrame, columns: dict[str, Column], numbers: pd.DataFrame, path: Path) -> None:
+    """Check that a table without a column for the vehicle is of one vehicle, and that such a column does not number the rows.
 
     Raises:
-        InputError: it has most stamps more than once; the message names the columns that could be of the vehicle.
+        InputError: most stamps are there more than once, or each row is another vehicle's; names the columns that could be meant.
     """
-    if time.nunique() > len(time) / 2 + 1:
+    time = numbers["time"]
+    if "vehicle" not in columns:
+        sound, fault = time.nunique() > len(time) / 2 + 1, "several rows have the same time, and no column names the vehicle"
+    else:
+        sound = len(time) < FEW_ROWS or numbers["vehicle"].nunique() < len(time)
+        fault = f"the column {columns['vehicle'].name!r} is another one in each row, and so no vehicle"
+    if sound:
         return
     unused = [name for name in frame.columns if name not in {column.name for column in columns.values()}]
     could = [
@@ -109,11 +133,11 @@ def check_alone(frame: pd.DataFrame, columns: dict[str, Column], time: "pd.Serie
         if 2 <= frame[name].nunique() <= len(frame) / 2 and not pd.DataFrame({"t": time, "v": frame[name]}).duplicated().any()
     ]
     remedy = f"it could be {' or '.join(could)}: --set log.columns=vehicle={could[0]}" if could else "add a column `id`"
-    raise InputError(f"{path}: several rows have the same time, and no column names the vehicle; {remedy}")
+    raise InputError(f"{path}: {fault}; {remedy}")
 
 
-def segment_of(path: Path, row: int, *, header: bool = True) -> Segment:
-    """Return the place of a file's rows, the first of which is `row` of the log; text may have no line of names."""
+def segment_of(path: Path, row: int, *, header: int = 1) -> Segment:
+    """Return the place of a file's rows, the first of which is `row` of the log, after so many lines of text."""
     return Segment(row, str(path), "row", 1) if path.suffix.lower() in PARQUET else Segment(row, str(path), "line", 1 + header)
 
 
@@ -131,13 +155,12 @@ def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.
                 skipinitialspace=True,
                 skip_blank_lines=False,
                 compression=None,
-                nrows=config.row_limit - before + 1,
-                **options,
+                **{"nrows": config.row_limit - before + 1} | options,
             )
         except UnicodeDecodeError as error:
             raise InputError(f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
     check_size(str(path), 0, before + len(frame), config)
-    if frame.empty:
+    if frame.empty and options.get("nrows") != 0:
         raise InputError(f"{path} has a header but no rows")
     if not isinstance(frame.index, pd.RangeIndex):
         raise InputError(f"{path}: the rows have more fields than the header; name every column, and write 0.5, not 0,5")
@@ -156,14 +179,21 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
         if isinstance(values, pd.DataFrame):
             raise InputError(f"{path} has more than one column {column.name!r}; rename all but one")
         if quantity == "vehicle":
-            out["vehicle"] = values.map(vehicle_name).astype(object)
+            out["vehicle"] = vehicle_names(values)
+        elif quantity == "kind":
+            out["kind"] = values.astype(str)
         elif pd.api.types.is_bool_dtype(values):
             raise InputError(f"{path}, column {column.name!r} ({quantity}): true or false is no {quantity}; name another column")
         elif quantity == "time":
             out["time"], out["time_ok"] = nanoseconds(values, column.factor)
+            check_stamps(values, out["time"], out["time_ok"], column, path)
         else:
-            numbers = reals(values) * column.factor
-            out[quantity] = (math.pi / 2.0 - numbers) if column.clockwise else numbers
+            numbers = reals(values)
+            if column.minutes:
+                degrees = np.trunc(numbers / 100.0)
+                numbers = degrees + (numbers - 100.0 * degrees) / 60.0
+            numbers = numbers * abs(column.factor)
+            out[quantity] = math.copysign(1.0, column.factor) * ((math.pi / 2.0 - numbers) if column.clockwise else numbers)
     return out
 
 
@@ -181,6 +211,54 @@ def vehicle_name(value: Any) -> str:
     if isinstance(value, float) and value.is_integer():
         return str(int(value))
     return str(value).strip()
+
+
+def vehicle_names(values: "pd.Series[Any]") -> "pd.Series[Any]":
+    """Return vehicles' names; in a column of texts that are all whole numbers, 017 and 17.0 are 17 too."""
+    names = values.map(vehicle_name).astype(object)
+    known = pd.Series(names.unique(), dtype=object)
+    whole = known.str.fullmatch(r"\d{1,300}(\.0*)?") | (known == "")
+    return names.map({name: name and str(int(name.partition(".")[0])) for name in known}) if whole.all() else names
+
+
+def check_stamps(values: "pd.Series[Any]", time: "pd.Series[int]", known: "pd.Series[bool]", column: Column, path: Path) -> None:
+    """Refuse a column of which no value is a stamp, or most are beyond all times: it is in another unit.
+
+    Raises:
+        InputError: the message shows a value, and says what it looks like.
+    """
+    first = shown(next(iter(values.dropna()), ""))
+    place = f"{path}, column {column.name!r} (time)"
+    if not known.any():
+        raise InputError(f"{place}: a stamp is not a number, nor a date such as 2022-08-31T12:00:00.5, but {first!r}")
+    if (time.abs() >= round(LONGEST * 1e9)).mean() > 0.5:
+        middle = float(reals(values).abs().median())
+        since = [unit for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if NOW[0] < middle * factor < NOW[1]]
+        if since and column.factor == 1.0:
+            raise InputError(
+                f"{place}: {first} looks like {since[0]} since 1970: --set log.columns=time={column.name}:{since[0]}"
+            )
+
+
+def check_degrees(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> None:
+    """Refuse x and y that are degrees: no vehicle moves in them, were they metres, although its speeds say so or it has digits.
+
+    Raises:
+        InputError: they are.
+    """
+    if "x" not in frame or not (frame["x"].abs().max() <= 180.0 and frame["y"].abs().max() <= 90.0):
+        return
+    spread = float(frame.groupby("vehicle" if "vehicle" in frame else frame.index * 0)[["x", "y"]].agg(np.ptp).max().max())
+    if (
+        0.0 < spread < STILL_M
+        and frame[["x", "y"]].abs().max().max() > 1.0
+        and not ("speed" in frame and frame["speed"].max() < 1.0)
+    ):
+        x, y = columns["x"].name, columns["y"].name
+        raise InputError(
+            f"{path}: no vehicle drives farther than {spread:.2g} m by its x and y; they look like degrees of longitude and "
+            f"latitude: --set log.columns=lon={x},lat={y}"
+        )
 
 
 def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int]", "pd.Series[bool]"]:
@@ -217,10 +295,21 @@ def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segme
     position = ("lat", "lon") if geographic else ("x", "y")
     vehicles = []
     frame = frame.assign(row=rows)[usable]
+    frame, notes = without_others(frame)
     for name, group in frame.groupby("vehicle", sort=False):
         vehicles.append(observations(str(name), group, position))
     name = paths[0].stem if len(paths) == 1 else paths[0].parent.name
-    return RawLog(name, geographic, tuple(vehicles), len(rows), segments, dropped=dropped)
+    return RawLog(name, geographic, tuple(vehicles), len(rows), segments, notes, dropped)
+
+
+def without_others(frame: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Return the rows of cars, vans, trucks and buses, and of who is of no kind that is known; and a note on the others."""
+    if "kind" not in frame:
+        return frame, ()
+    counts = frame.groupby(["vehicle", "kind"]).size().sort_values(kind="stable").reset_index()
+    kinds = counts.drop_duplicates("vehicle", keep="last").set_index("vehicle")["kind"].str.lower()
+    others = kinds[kinds.map(lambda kind: OTHERS.search(kind) is not None).astype(bool)]
+    return frame[~frame["vehicle"].isin(others.index)], left_out_note(Counter(others), "car, van, truck or bus")
 
 
 def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> Observations:
@@ -231,7 +320,9 @@ def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> O
 
     def median(quantity: str) -> float:
         values = column(quantity)
-        values = values[np.isfinite(values) & (values > 0.0) & (values < LARGEST)]
+        values = values[np.isfinite(values)]
+        usual = values[(values > 0.0) & (values < LONGEST_M)]
+        values = usual if len(usual) else values  # what is no size is replaced later, and said
         return float(np.median(values)) if len(values) else math.nan
 
     states = np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")])

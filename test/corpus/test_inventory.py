@@ -38,8 +38,12 @@ def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, mon
     (logs / "sub" / "good.csv").write_text((ROOT / "examples" / "my_log.csv").read_text())
     rows = [f"{n},{k / 10:.1f},{500.0 * n + k:.1f},0.0,10.0" for n in (1, 2) for k in range(100)]
     (logs / "apart.csv").write_text("\n".join(["vehicle_id,time,x,y,speed", *rows]) + "\n")
+    (logs / "alone.csv").write_text("\n".join(["vehicle_id,time,x,y,speed", *rows[:100]]) + "\n")
+    (logs / "labels.csv").write_text("name,label\na,1\n")
+    (logs / "notes.txt").write_text("Recorded in May.\nTwo, three, four, five words\n")
     made = mine([logs], tmp_path / "corpus")
     assert made.encounters == 1 and not made.failed
-    assert [one["why"].rpartition("; ")[2] for one in made.refused] == ["--set log.proximity=510 takes two"]
+    assert {one["name"] for one in made.refused} == {"alone", "apart", "labels", "notes"}
+    assert "--set log.proximity=510 takes two" in [one["why"].rpartition("; ")[2] for one in made.refused]
     monkeypatch.setattr("scenario_gen.corpus.encounters.read_log", lambda *_: pytest.fail("it is read again"))
     assert mine([logs], tmp_path / "corpus").encounters == 1

@@ -119,8 +119,8 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     (tmp_path / "in" / "wide.csv").write_text("1," * 100_000)
     (tmp_path / "in" / "packed.csv.gz").write_bytes(b"\x1f\x8b")
     mined = mine([tmp_path / "in"], tmp_path / "out")
-    assert mined.encounters == 0 and len(mined.failed) == 2 and "one.csv" in mined.failed[0] and "no table" in mined.failed[1]
-    assert "packed.csv.gz" in " ".join(mined.notes)
+    assert mined.encounters == 0 and len(mined.failed) == 2 and "one.csv" in mined.failed[0] and "unpacked" in mined.failed[1]
+    assert [one["name"] for one in mined.refused] == ["wide"] and "no table" in mined.refused[0]["why"]
     assert not list((tmp_path / "out").glob("found/*"))
     assert mined.account == {"rows": 4, "left out: no row of 19 fields with numbers": 2, "left out: no vehicle": 1}
 

@@ -7,12 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from dataclasses import replace
 from functools import cache, partial
+import gzip
+import json
 from pathlib import Path
 import struct
 import tempfile
 
 from harness import Target
-from mutators import BYTES, columns, records, TEXT
+from mutators import BYTES, columns, records, TEXT, tree
 import numpy as np
 import pandas as pd
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -101,6 +103,33 @@ def safety_messages(_folder: Path) -> list[bytes]:
     table["Latitude"], table["Longitude"] = rows["latitude"], rows["longitude"]
     table["Speed"], table["Heading"] = cars()["speed_mps"], rows["course"]
     return [table.to_csv(index=False, header=False).encode()]
+
+
+def pilots(_folder: Path) -> list[bytes]:
+    """Basic safety messages in JSON, of Wyoming and of an event of New York."""
+    messages, event = [], []
+    for row in cars().itertuples():
+        core = {"id": row.vehicle_id, "secMark": round(row.t_s * 1000) % 60_000, "speed": row.speed_mps, "heading": 90.0}
+        place = {"position": {"latitude": 48.0 + row.y_m * 1e-5, "longitude": 11.0 + row.x_m * 1e-5}}
+        metadata = {"recordGeneratedAt": f"{pd.Timestamp(row.t_s, unit='s')}"}
+        messages.append(json.dumps({"metadata": metadata, "payload": {"data": {"coreData": core | place}}}))
+        own = {"X_m": row.x_m, "Y_m": row.y_m, "T_s": row.t_s, "speed_mps": row.speed_mps, "heading_deg": 90.0}
+        event.append({"bsmRecord": {"bsmMsg": {"coreData": core | own}}})
+    return ["\n".join(messages).encode(), json.dumps({"bsmList": event}).encode()]
+
+
+def simulated(_folder: Path) -> list[bytes]:
+    """Floating-car data of SUMO."""
+    rows = [
+        f'<timestep time="{row.t_s}"><vehicle id="{row.vehicle_id}" x="{row.x_m}" y="{row.y_m}" angle="90" speed="8"/></timestep>'
+        for row in cars().itertuples()
+    ]
+    return [f"<fcd-export>{''.join(rows)}</fcd-export>".encode()]
+
+
+def packed(_folder: Path) -> list[bytes]:
+    """A table in a .gz."""
+    return [gzip.compress(cars().to_csv(index=False).encode())]
 
 
 def bags(storage: StoragePlugin, folder: Path) -> list[bytes]:
@@ -232,6 +261,9 @@ TARGETS = (
     Target("table_asked", texts, read_as("log.txt", NAMELESS), TEXT, ("table/*.csv",), "log.txt"),
     Target("spmd", safety_messages, read_as("log.csv"), TEXT, ("spmd/*.csv", "spmd_*.csv"), "log.csv"),
     Target("spmd_asked", safety_messages, read_as("log.csv", SPMD), TEXT, ("spmd/*.csv",), "log.csv"),
+    Target("bsm", pilots, read_as("log.json", replace(SHORT, format="bsm")), TEXT),
+    Target("fcd", simulated, read_as("log.xml", replace(SHORT, format="fcd")), (*TEXT, *[tree] * 3)),
+    Target("packed", packed, read_as("log.csv.gz"), BYTES),
     Target("parquet", parquets, read_as("log.parquet"), PARQUET, ("parquet/*", "*.parquet"), "log.parquet"),
     Target("mcap_log", MCAP_BAGS, read_as("log.mcap"), BYTES, ("mcap_reader/*", "*.mcap"), "log.mcap"),
     Target("sqlite_log", SQLITE_BAGS, read_as("log.db3"), SQLITE, ("sqlite/*",), "log.db3"),

@@ -35,8 +35,8 @@ class Line:
     data: bytes
 
 
-def header(stamp):
-    return STORES.types["std_msgs/msg/Header"](stamp=nanoseconds_to_time(stamp), frame_id="map")
+def header(stamp, frame="map"):
+    return STORES.types["std_msgs/msg/Header"](stamp=nanoseconds_to_time(stamp), frame_id=frame)
 
 
 def streams(rows, stamped=True, prefix=""):
@@ -52,7 +52,7 @@ def streams(rows, stamped=True, prefix=""):
     return lines
 
 
-def odometry(rows):
+def odometry(rows, topic="/{}/odom", frame="map"):
     """nav_msgs/Odometry per vehicle."""
     types = STORES.types
     vector, zero = types["geometry_msgs/msg/Vector3"], {"x": 0.0, "y": 0.0, "z": 0.0}
@@ -63,13 +63,13 @@ def odometry(rows):
         pose = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](row.x_m, row.y_m, 0.0), turn)
         twist = types["geometry_msgs/msg/Twist"](vector(**zero | {"x": row.speed_mps}), vector(**zero))
         message = types[ODOMETRY](
-            header=header(round(row.t_s * 1e9)),
+            header=header(round(row.t_s * 1e9), frame.format(row.vehicle_id)),
             child_frame_id="base_link",
             pose=types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
             twist=types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
         )
         lines.append(
-            Line(f"/{row.vehicle_id}/odom", ODOMETRY, round(row.t_s * 1e9), bytes(STORES.serialize_cdr(message, ODOMETRY)))
+            Line(topic.format(row.vehicle_id), ODOMETRY, round(row.t_s * 1e9), bytes(STORES.serialize_cdr(message, ODOMETRY)))
         )
     return lines
 
@@ -210,6 +210,33 @@ def test_odometry(tmp_path):
     assert encounter.origin is None
     np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
     np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.01)
+
+
+@pytest.mark.parametrize("topic", ["/{}/odometry/filtered", "/fleet/vehicle_{}/local/ekf/odom"])
+def test_the_level_in_which_topics_differ_names_the_vehicle(tmp_path, topic):
+    bag = write(tmp_path / "drive", odometry(crossing(), topic))
+    assert [vehicle.id for vehicle in read_log(bag).encounters[0].vehicles] == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("own", "frame", "said"),
+    [
+        (True, "{}/odom", r"begin at 0, 0.*a in 'a/odom', b in 'b/odom'.*one frame"),
+        (True, "odom", "begin at 0, 0"),
+        (False, "{}/odom", None),
+        (False, "a/base_link", "moves with its vehicle"),
+    ],
+)
+def test_odometries_have_one_frame_that_stands(tmp_path, own, frame, said):
+    rows = crossing()
+    if own:
+        rows[["x_m", "y_m"]] -= rows.groupby("vehicle_id")[["x_m", "y_m"]].transform("first")
+    bag = write(tmp_path / "drive", odometry(rows, frame=frame))
+    if said is None:
+        assert "name several frames" in " ".join(read_log(bag).quality.notes)
+    else:
+        with pytest.raises(InputError, match=said):
+            read_log(bag)
 
 
 def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):

@@ -76,8 +76,8 @@ def test_another_unit_of_time_is_recognised(tmp_path, factor, name, unit):
 @pytest.mark.parametrize(
     ("limit", "said"),
     [
-        ({"row_limit": 100}, r"holds \d+ rows or more; at most 100 are read.* parameter row_limit"),
-        ({"vehicle_limit": 2}, "3 vehicles, at most 2 .* parameter vehicle_limit"),
+        ({"row_limit": 100}, r"holds \d+ rows or more; at most 100 are read.*row_limit"),
+        ({"vehicle_limit": 2}, "3 vehicles, at most 2 .*vehicle_limit"),
     ],
 )
 @pytest.mark.parametrize("name", ["log.csv", "log.parquet"])

@@ -83,7 +83,7 @@ def test_swapped_axes_are_noticed_by_the_headings(tmp_path):
 
 def test_speeds_in_another_unit_are_noticed(tmp_path):
     result = read_log(written(plain(crossing()).assign(speed=lambda own: own.speed * 3.6), tmp_path))
-    assert any("3.60 times those of the positions; they look like km/h (name" in note for note in result.quality.notes)
+    assert any("positions in 2 of 2 vehicles; they look like km/h (name" in note for note in result.quality.notes)
 
 
 def test_headings_that_fit_are_not_spoken_of(tmp_path):

@@ -3,7 +3,7 @@
 
 """What a request aims at, and the proposal that gets there, found stage by stage."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
 from scenario_gen.template import closest_crossing, Conflict, conflict_of, find_conflicts
-from scenario_gen.types import Cause, Encounter, join_pieces, Measures, Reaction, Request, Scenario, Target, token, Verdict
+from scenario_gen.types import Cause, Encounter, join_pieces, LOST, Measures, Reaction, Request, Scenario, Target, token, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 
@@ -88,10 +88,23 @@ def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
     return find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
 
 
-def label_of(encounter: Encounter, request: Request, aim: Aim | None, reactions: Sequence[Reaction] = ()) -> Label:
-    """Return what says a scenario's facts: figures of targets, reactions that it keeps, orders if they are not kept."""
-    names = [token(vehicle.id) for vehicle in encounter.vehicles] if reactions else []
-    held = {"reactions": join_pieces(edge.name(names) for edge in reactions)} if reactions else {}
+def label_of(
+    encounter: Encounter,
+    request: Request,
+    aim: Aim | None,
+    reactions: Sequence[Reaction] = (),
+    lost: Iterable[tuple[int, ...]] = (),
+) -> Label:
+    """Return what says a scenario's facts: figures of targets, reactions that it keeps, orders if they are not kept.
+
+    `lost` are the pairs (who, whom) whose reaction, or whose least gap, scenarios are not held to on this road.
+    """
+    names = [token(vehicle.id) for vehicle in encounter.vehicles]
+    pieces = {
+        "reactions": join_pieces(edge.name(names) for edge in reactions),
+        LOST: join_pieces(f"{names[pair[0]]}>{names[pair[1]]}" for pair in lost),
+    }
+    held = {key: text for key, text in pieces.items() if text}
     conflicts = () if request.order == "keep" else _conflicts(encounter)
 
     def label(whole: Scenario) -> dict[str, str]:

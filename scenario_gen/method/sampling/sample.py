@@ -83,7 +83,7 @@ def draw_scenarios(
         sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(encounter, request, aim))
         judge = Judge.of(sampler, check, _enough(config, request))
         kept = tuple(edge for edge in prepared.model.reactions.edges if (edge.who, edge.whom) not in judge.lost)
-        sampler = replace(sampler, label=label_of(encounter, request, aim, kept))
+        sampler = replace(sampler, label=label_of(encounter, request, aim, kept, judge.lost))
         loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.requested, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")

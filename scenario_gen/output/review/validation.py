@@ -30,6 +30,7 @@ from scenario_gen.types import (
     Cause,
     Encounter,
     join_ego,
+    LOST,
     Reaction,
     Road,
     Scenario,
@@ -115,7 +116,7 @@ class Reference:
             required_orders(conflicts, entry.order if entry else "keep"),
             kept_reactions(encounter, entry),
             at_ends(encounter.present, len(encounter.time)),
-            lane_gaps(encounter),
+            kept_gaps(encounter, entry),
         )
 
     def checker(self, scenario: Scenario, limits: Limits | None, requested: BoundaryStates | None) -> Checker:
@@ -194,7 +195,7 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
             states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
         scenario = join_ego(scenario)
         is_lost = k in namespace.unknown and entry is None
-        kept = "" if entry is None else entry.facts.get("reactions", "")
+        kept = () if entry is None else (entry.facts.get("reactions"), entry.facts.get(LOST))
         place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order, kept)
         if place not in references:
             references[place] = _reference(namespace, stamp, entry, is_lost)
@@ -221,6 +222,16 @@ def kept_reactions(encounter: Encounter, entry: ScenarioEntry | None) -> tuple[R
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
     kept = split_pieces(entry.facts.get("reactions", "")) if entry else []
     return tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if kept else ()
+
+
+def kept_gaps(encounter: Encounter, entry: ScenarioEntry | None) -> LaneGaps:
+    """Return the template's gaps in a lane; zeros for the pairs that an entry says its scenario is not held to."""
+    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    lost = split_pieces(entry.facts.get(LOST, "")) if entry else []
+    return {
+        pair: (speed, 0.0 * gap if f"{names[pair[0]]}>{names[pair[1]]}" in lost else gap)
+        for pair, (speed, gap) in lane_gaps(encounter).items()
+    }
 
 
 def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:

@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What others reported of logs: the right value, or one line that says what to do."""
+
+import zipfile
+
+from log_builders import crossing, geographic, save
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.logs import LogConfig, read_log
+
+LONG = 9007199254740992
+
+
+def held(rows):
+    """A fix each second, repeated in the rows between."""
+    fix = rows.groupby("vehicle_id").cumcount() % 10 == 0
+    position = rows[["x_m", "y_m"]].where(fix).groupby(rows["vehicle_id"]).ffill()
+    return rows.assign(x_m=position["x_m"], y_m=position["y_m"])
+
+
+def sparse(rows):
+    """Own slow tracks: a fix every 5 s, and the speeds do not help."""
+    return rows[rows.groupby("vehicle_id").cumcount() % 50 == 0].drop(columns="speed_mps")
+
+
+def with_kind(rows):
+    walker = rows[rows.vehicle_id == "a"].assign(vehicle_id="w", y_m=5.0)
+    names = {"a": "Car", "b": "vehicle.truck", "w": "walker.pedestrian.0007"}
+    return pd.concat([rows, walker]).assign(type=lambda own: own.vehicle_id.map(names))
+
+
+def mirrored(rows):
+    return rows.assign(y_m=-rows.y_m, yaw_deg=np.where(rows.vehicle_id == "a", 0.0, -90.0))
+
+
+def nmea(rows):
+    out = geographic(rows)
+    for name in ("lat_deg", "lon_deg"):
+        whole = np.trunc(out[name])
+        out[name] = 100.0 * whole + 60.0 * (out[name] - whole)
+    return out
+
+
+def swapped(rows):
+    return geographic(rows).rename(columns={"lat_deg": "lon_deg", "lon_deg": "lat_deg"})
+
+
+def ahead(rows, metres):
+    east = rows.vehicle_id == "a"
+    return rows.assign(x_m=rows.x_m + metres * east, y_m=rows.y_m + metres * ~east, heading=np.where(east, 0.0, np.pi / 2.0))
+
+
+def sized(rows, length, width):
+    return rows.assign(length=length, width=width)
+
+
+READ = {  # name: what is changed, columns, what is said
+    "held fixes": (held, "", "position repeated while the vehicle moves"),
+    "held fixes without speeds": (
+        lambda rows: held(rows).drop(columns="speed_mps"),
+        "",
+        "position repeated while the vehicle moves",
+    ),
+    "before 1970": (lambda rows: rows.assign(t_s=rows.t_s - 1006.0), "", "6 s are added to all"),
+    "frames for time": (
+        lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 10).rename(columns={"t_s": "frame"}),
+        "time=frame:10fps",
+        "",
+    ),
+    "minutes": (lambda rows: rows.assign(t_min=rows.pop("t_s") / 60.0), "", ""),
+    "a left-handed frame": (mirrored, "y=-y_m,heading=-yaw_deg", ""),
+    "the front's position": (lambda rows: ahead(rows, 2.4), "point=front", ""),
+    "the rear axle's position": (lambda rows: ahead(rows, -1.44), "point=rear_axle", ""),
+    "pedestrians": (with_kind, "", "1 × walker.pedestrian.0007"),
+    "columns not read": (lambda rows: rows.assign(lane=3), "", "not read: lane"),
+    "brackets": (lambda rows: rows.rename(columns={"x_m": "Ost X [m]", "y_m": "Nord [y] "}), "x=Ost X [m],y=Nord [y]", ""),
+    "spaces": (lambda rows: rows.rename(columns={"x_m": "Pos X [m]", "y_m": "Pos Y [m]"}), "", ""),
+    "feet": (lambda rows: sized(rows, 15.0, 6.0), "", "in feet"),
+    "zero": (lambda rows: sized(rows, 0.0, 0.0), "", "0 m long"),
+    "length and width swapped": (lambda rows: sized(rows, 1.8, 4.5), "", "it looks swapped"),
+    "lat and lon swapped": (swapped, "lat=lon_deg,lon=lat_deg", ""),
+    "degrees and minutes": (nmea, "lat=lat_deg:ddmm,lon=lon_deg:ddmm", ""),
+}
+
+
+@pytest.mark.parametrize(("change", "columns", "said"), READ.values(), ids=READ)
+def test_it_is_read_as_it_was_driven(tmp_path, change, columns, said):
+    (plain,) = read_log(save(crossing(), tmp_path)).encounters
+    result = read_log(save(change(crossing()), tmp_path, "other.csv"), LogConfig(columns=columns))
+    (encounter,) = result.encounters
+    assert [(one.id, one.length, one.width) for one in encounter.vehicles] == [("a", 4.8, 1.9), ("b", 4.8, 1.9)]
+    count = min(len(encounter.time), len(plain.time))
+    for name in ("position", "speed"):
+        mine, right = getattr(encounter, name)[:, :count], getattr(plain, name)[:, :count]
+        origin = mine[:, :1] - right[:, :1] if encounter.origin and name == "position" else 0.0
+        np.testing.assert_allclose(mine - origin, right, atol=0.7 if "repeated" in said else 0.25)
+    assert said in " ".join(result.quality.notes) + " ".join(map(str, result.quality.dropped))
+
+
+SAID = {  # what is read, but looks otherwise
+    "swapped": (swapped, "if lat and lon were swapped"),
+    "frames": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 24, speed_mps=rows.speed_mps), "24fps"),
+    "knots": (lambda rows: rows.assign(speed_mps=rows.speed_mps * 3600 / 1852), "knots (speed_kn)"),
+    "y down": (lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)), "y=-…"),
+}
+
+
+@pytest.mark.parametrize(("change", "said"), SAID.values(), ids=SAID)
+def test_what_looks_otherwise_is_said_once(tmp_path, change, said):
+    notes = read_log(save(change(crossing()), tmp_path), LogConfig(travel=0.0)).quality.notes
+    assert sum(said in note for note in notes) == 1
+
+
+@pytest.mark.parametrize("back", [0.5, 1.0])
+def test_a_clock_set_back_cuts(tmp_path, back):
+    rows = crossing(seconds=14.0)
+    rows["t_s"] -= np.where(rows["t_s"] > 1006.0, back, 0.0)
+    result = read_log(save(rows, tmp_path))
+    assert len(result.encounters) == 2 and max(encounter.speed.max() for encounter in result.encounters) < 8.2
+    assert "the clock starts anew" in " ".join(result.quality.notes)
+
+
+def test_runs_that_begin_anew_are_apart(tmp_path):
+    again = crossing().assign(x_m=lambda own: own.x_m + 50.0)
+    found = read_log(save(pd.concat([crossing(), again]), tmp_path))
+    assert len(found.encounters) == 2 and "the clock starts anew" in " ".join(found.quality.notes)
+
+
+def test_a_jump_without_speeds_is_not_driven(tmp_path):
+    rows = crossing(seconds=16.0, rate=2.0).drop(columns="speed_mps")
+    rows.loc[(rows.vehicle_id == "a") & (rows.t_s > 1008.0), "y_m"] += 30.0
+    result = read_log(save(rows, tmp_path))
+    assert max(encounter.speed.max() for encounter in result.encounters) < 8.5
+
+
+def test_fixes_seconds_apart_do_not_refuse_the_log(tmp_path):
+    points = [(7.9, -3.4), (12.4, -4.2), (21.5, -6.4), (28.8, -0.8), (46.2, -9.2), (55.1, -13.5), (61.4, -23.0), (57.3, -47.5)]
+    rows = [(5.0 * k, name, x, y + off) for k, (x, y) in enumerate(points) for name, off in (("1", 0.0), ("2", 8.0))]
+    assert read_log(save(pd.DataFrame(rows, columns=["t", "id", "x", "y"]), tmp_path)).encounters
+
+
+@pytest.mark.parametrize("ids", [(LONG, LONG + 1), ("1e5", "100000"), ("12e3", "120e2")])
+def test_ids_stay_what_they_are(tmp_path, ids):
+    rows = crossing().assign(vehicle_id=lambda own: own.vehicle_id.map(dict(zip("ab", map(str, ids), strict=True))))
+    rows.loc[4, "vehicle_id"] = None
+    (encounter,) = read_log(save(rows, tmp_path)).encounters
+    assert {vehicle.id for vehicle in encounter.vehicles} == set(map(str, ids))
+
+
+@pytest.mark.parametrize("above", ["# ours\n# ego: 1\n", "sep=,\n", "\n"])
+def test_lines_above_the_header(tmp_path, above):
+    rows = crossing()
+    rows.loc[3, "x_m"] = np.nan
+    (tmp_path / "log.csv").write_text(above + rows.to_csv(index=False))
+    result = read_log(tmp_path / "log.csv")
+    assert str(result.quality.dropped[0]).endswith(f"log.csv, line {above.count(chr(10)) + 5}")
+
+
+@pytest.mark.parametrize("ending", ["gz", "zip"])
+def test_packed_logs(tmp_path, ending):
+    crossing().to_csv(tmp_path / f"log.csv.{ending}", index=False, compression=None if ending == "zip" else "gzip")
+    if ending == "zip":
+        with zipfile.ZipFile(tmp_path / "log.csv.zip", "w") as archive:
+            archive.writestr("drive/log.csv", crossing().to_csv(index=False))
+    (plain,) = read_log(save(crossing(), tmp_path, "plain.csv")).encounters
+    path = tmp_path / f"log.csv.{ending}"
+    np.testing.assert_array_equal(read_log(path).encounters[0].position, plain.position)
+    with pytest.raises(InputError, match=rf"log\.csv\.{ending}.* at most 100 are read"):
+        read_log(path, LogConfig(row_limit=100))
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(InputError, match=rf"log\.csv\.{ending} cannot be unpacked"):
+        read_log(path)
+
+
+REFUSED = {
+    "ms since 1970": (
+        lambda rows: rows.assign(t_s=((rows.t_s + 1.66e9) * 1000).round()),
+        "looks like ms since 1970: --set log.columns=time=t_s:ms",
+    ),
+    "dates of another order": (
+        lambda rows: rows.assign(t_s="31.08.2022 12:00"),
+        "nor a date such as 2022-08-31T12:00:00.5, but '31.08.2022 12:00'",
+    ),
+    "x, y in degrees": (
+        lambda rows: geographic(rows).rename(columns={"lat_deg": "Y", "lon_deg": "X"}),
+        "--set log.columns=lon=X,lat=Y",
+    ),
+    "ids that number the rows": (
+        lambda rows: rows.rename(columns={"vehicle_id": "tracker"}).assign(id=range(len(rows))),
+        "--set log.columns=vehicle=tracker",
+    ),
+    "hours": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0), "the time may be in h: --set log.columns=time="),
+    "degrees and minutes": (nmea, "lat=…:ddmm"),
+    "1e-7 degrees": (lambda rows: geographic(rows).assign(lat_deg=4.8e8, lon_deg=1.1e8), "lat=…:e7"),
+    "a pedestrian": (lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "pedestrian"})), "1 × pedestrian"),
+    "another unknown point": (lambda rows: rows, "point is one of centre, front"),
+}
+
+
+@pytest.mark.parametrize(("change", "said"), REFUSED.values(), ids=REFUSED)
+def test_what_it_looks_like_is_said(tmp_path, change, said):
+    columns = "point=roof" if said.startswith("point") else ""
+    with pytest.raises(InputError) as error:
+        read_log(save(change(crossing()), tmp_path), LogConfig(columns=columns))
+    assert said in str(error.value)
