@@ -158,7 +158,8 @@ def test_the_template_is_replayed_without_overlap_in_its_order_and_speed(recorde
             step = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=1), 2, 0)) / np.diff(encounter.time[fit.anchor_index])
             recorded_speed = encounter.speed[:, fit.anchor_index]
             middle = (recorded_speed[:, 1:] + recorded_speed[:, :-1]) / 2.0
-            assert np.median(np.abs(step - fit.scale * middle)) < 0.1, (name, road_name)
+            scale = np.array([[vehicle.scale] for vehicle in fit.fitted])
+            assert np.median(np.abs(step - scale * middle)) < 0.1, (name, road_name)
 
 
 def crossing_pair():
