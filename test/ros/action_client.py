@@ -3,7 +3,7 @@
 
 """A client of the action: python action_client.py GOALS, a JSON list; it prints a JSON list of how each went.
 
-A goal is {"parameters": {…}, "wait": s, "cancel": …, "then": a node to activate when it waits for tracks}; all are sent at once.
+A goal is {"parameters": {…}, "wait": s, "cancel": …, "then": a node to activate when it waits for tracks}; each is sent once the one before is accepted.
 "cancel" is how many scenarios it has found, which position in the queue it has, and which others have ended when it is cancelled.
 It is a program of its own, for the libraries of an interface package are looked for where LD_LIBRARY_PATH said at the start.
 """
@@ -66,6 +66,8 @@ def main(goals: list[dict]) -> list[dict]:
         def accepted(future) -> None:
             told["handle"] = future.result()
             told["handle"].get_result_async().add_done_callback(done)
+            if k + 1 < len(goals):  # so that they arrive in their order
+                send(k + 1, goals[k + 1])
 
         def done(future) -> None:
             answer = future.result()
@@ -84,8 +86,7 @@ def main(goals: list[dict]) -> list[dict]:
         message = Generate.Goal(parameters=given, wait=float(goal.get("wait", 60.0)))
         client.send_goal_async(message, feedback_callback=heard).add_done_callback(accepted)
 
-    for k, goal in enumerate(goals):
-        send(k, goal)
+    send(0, goals[0])
     while len(ended) < len(goals):
         rclpy.spin_once(node, timeout_sec=1.0)
     spare = time.monotonic()
