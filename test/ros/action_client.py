@@ -3,7 +3,8 @@
 
 """A client of the action: python action_client.py GOALS, a JSON list; it prints a JSON list of how each went.
 
-A goal is {"parameters": {…}, "wait": s, "cancel": …, "then": a node to activate when it waits for tracks}; each is sent once the one before is accepted.
+A goal is {"parameters": {…}, "wait": s, "cancel": …, "then": a node to activate when it waits for tracks}; each is sent
+once the one before is accepted.
 "cancel" is how many scenarios it has found, which position in the queue it has, and which others have ended when it is cancelled.
 It is a program of its own, for the libraries of an interface package are looked for where LD_LIBRARY_PATH said at the start.
 """
