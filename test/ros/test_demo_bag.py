@@ -65,7 +65,7 @@ def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
     for message in read_messages(demo):
         recorded.setdefault(message.topic, []).append(message.data)
     sim_time = ["-p", "use_sim_time:=true"]
-    topics = "/case_./(tracks|map|road/entries|road/exits)"
+    topics = "/case_./(tracks|map|road/(entries|exits|lanes|info))"
     played = {"bag": demo, "topics": topics, "rate": 1000.0, "clock": "true", "stay": "true"}
     nodes = {
         "player": [word for name, value in played.items() for word in ("-p", f"{name}:={value}")],
