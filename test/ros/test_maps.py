@@ -50,6 +50,9 @@ def _another_road(client: Client, width: float) -> str:
 
 def test_nothing_of_an_old_map_is_said_beside_the_new_one(suite, client):
     client.hear("/scenarios/info", "/map", "/fit/info")
+    heard_by = client.node.get_subscriptions_info_by_topic
+    for topic in ("/map", "/road/lanes", "/tracks", "/fit/info", "/scenarios", "/scenarios/info"):
+        client.until(lambda topic=topic: any(one.node_name == "recorder" for one in heard_by(topic)), f"the recorder on {topic}")
     hashes = [hash_of("map", client.wait("/map")[0])]
     for k in range(LOADS):
         if k % 3 == 0:  # amid its publication; else while the planner or the sampler is at work, or before
