@@ -3,6 +3,7 @@
 
 """Every topic of the suite: its type and its quality of service, in one table (in words: docs/interfaces.md)."""
 
+from functools import lru_cache
 import re
 
 from msg_conventions import (
@@ -70,6 +71,7 @@ def vehicle_topic(token: str, name: str) -> str:
     return f"vehicle_{token}/{name}"
 
 
+@lru_cache(maxsize=1024)
 def topic_entry(topic: str) -> tuple[str, Quality]:
     """Return type and quality of a topic of the suite, with or without namespace before it; the longest name that fits counts.
 

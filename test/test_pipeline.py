@@ -48,7 +48,7 @@ def printed(case):
 
 def written(case, folder):
     """The page, and the figures of the case."""
-    write_results(folder, [case], seed=3, title="", quality=(), provenance={})
+    write_results(folder, [case], title="", quality=(), provenance={})
     (figures,) = json.loads((folder / "evaluation.json").read_text())["cases"]
     return (folder / "report.html").read_text(encoding="utf-8"), figures
 

@@ -123,7 +123,6 @@ def generate_folder(
         write_results(
             folder,
             cases,
-            seed=requested.seed,
             title=requested.title or ", ".join(path.stem for path in requested.logs),
             quality=[*quality, *refusals, *unlooking],
             provenance=provenance_of(

@@ -170,7 +170,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     gap = [float(np.where(drive.here[i], footprint_distance(driven, ego, i), np.inf).min()) for i in others]
     braking = np.maximum(-drive.accelerations, 0.0)
     way = known.cells[ego, :, 7]
-    reached = float(np.interp(drive.clock[ego, -1], np.arange(len(way)) * 0.1, way))
+    reached = float(np.interp(drive.clock[ego, -1], np.arange(len(way)) * known.cell, way))
     whole = float(way[-1])
     progress = 1.0 if not math.isnan(goal) or whole <= 0.0 else min(reached / whole, 1.0)
     road = road_use(drive, loop.road, config.off_road_depth)

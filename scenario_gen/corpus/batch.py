@@ -136,7 +136,11 @@ def run_batch(
     needs("corpus", "duckdb", "pyarrow")
     check_out(out, [corpus])
     tables = tables_of(corpus)
-    rows = [(table, k) for table in tables for k, _ in enumerate(rows_of([table], ["name"]))]
+    rows: list[tuple[Place, int]] = []
+    hashes = []
+    for table, here in each_fetched(tables):
+        rows += [(table, k) for k, _ in enumerate(rows_of([here], ["name"]))]
+        hashes.append(sha256_of(here))
     rows = rows[: templates or None]
     if not rows:
         raise InputError(f"{corpus} holds no encounter")
@@ -146,7 +150,7 @@ def run_batch(
             build_road(road, first, request.config.road)
     document = {
         "format": 1,
-        "corpus": [sha256_of(here) for _, here in each_fetched(tables)],
+        "corpus": hashes,
         "roads": list(roads),
         "count": request.count,
         "seed": request.seed,

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.bags.storage.files import SUFFIXES
 from scenario_gen.base.documents import COUNT, read_json
 from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.folders import scratch
@@ -58,7 +59,6 @@ ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
         "notes": {"type": "array", "items": {"type": "string"}},
     },
 }
-LOOSE_BAGS = (".mcap", ".db3", ".bag")  # endings of files that are bags without a folder
 HEAD = 16_384  # bytes of an object by which its format is recognised
 MOST_DRAWN = 20  # encounters of a kind on the page
 MOST_SHOWN = 20  # failures and files that are named; the corpus holds all
@@ -246,7 +246,7 @@ def _of_files(archive: Path) -> Files:
     tables, rest = _parted(
         rest, lambda path: any(is_log(path) for is_log in (is_table, is_commonroad, is_nocturne, is_bsm, is_fcd))
     )
-    loose, others = _parted(rest, lambda path: path.suffix in LOOSE_BAGS)
+    loose, others = _parted(rest, lambda path: path.suffix in SUFFIXES)
     if tables and not (spmd or bags or loose) and all(path.parent == archive and is_table(path) for path in tables):
         logs = [tables]  # one log in several tables
     else:

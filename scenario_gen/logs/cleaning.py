@@ -294,7 +294,7 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
             f"track; {hint}name the unit with the parameter columns, time=<column>:{likely[0][1] if likely else '<unit>'}"
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
-    ticks = round(sum(int(span) for span in spans) / (config.period * 1e9))
+    ticks = round(sum(spans) / (config.period * 1e9))
     if ticks > config.tick_limit:
         longest = vehicles[int(np.argmax(spans))]
         after = int(np.argmax(np.diff(longest.fix_ns))) + 1

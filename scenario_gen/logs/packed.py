@@ -51,9 +51,7 @@ def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
 def _unpack(path: Path, target: Path, room: int, config: LogConfig) -> int:
     """Unpack a file to a file, or a .zip to a folder; return the bytes written, at most `room`."""
     size = 0
-    with guarded(
-        f"{path} cannot be unpacked", OSError, EOFError, zlib.error, zipfile.BadZipFile, RuntimeError, NotImplementedError
-    ):
+    with guarded(f"{path} cannot be unpacked", *DAMAGE):
         if path.suffix.lower() == ".gz":
             with gzip.open(path) as source:
                 size = _copy(source, target, room)

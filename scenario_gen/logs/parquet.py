@@ -17,12 +17,11 @@ import pyarrow as pa
 from pyarrow import compute, parquet
 
 from scenario_gen.base.errors import guarded, InputError
-from scenario_gen.logs.columns import Column, find_columns
+from scenario_gen.logs.columns import Column, find_columns, UNITS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size
 
 BATCH = 1 << 16  # rows
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # of the units of time in Arrow
 
 
 def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFrame, dict[str, Column], list[str]]:
@@ -116,9 +115,9 @@ def is_text(kind: pa.DataType) -> bool:
 def unit_of(kind: pa.DataType) -> float | None:
     """Return the seconds of a date's or timestamp's unit, None for other types."""
     if pa.types.is_timestamp(kind):
-        return SECONDS[kind.unit]
+        return UNITS["time"][kind.unit]
     if pa.types.is_date(kind):
-        return 86400.0 if pa.types.is_date32(kind) else SECONDS["ms"]
+        return 86400.0 if pa.types.is_date32(kind) else UNITS["time"]["ms"]
     return None
 
 

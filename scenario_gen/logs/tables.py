@@ -17,7 +17,7 @@ import pandas as pd
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.cleaning import LONGEST_M
-from scenario_gen.logs.columns import Column, find_columns, notes_on
+from scenario_gen.logs.columns import Column, find_columns, notes_on, UNITS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Observations, RawLog, Segment
 from scenario_gen.logs.text import layout_of
@@ -275,7 +275,7 @@ def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int
     if numbers.isna().all():
         dates = pd.to_datetime(values, errors="coerce", utc=True, format="ISO8601")
         ticks = dates.fillna(pd.Timestamp(0, tz="UTC")).astype(np.int64)
-        return nanoseconds(ticks, {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[dates.dt.unit])[0], dates.notna()
+        return nanoseconds(ticks, UNITS["time"][dates.dt.unit])[0], dates.notna()
     inside = numbers.abs() * factor < LONGEST
     return (numbers.where(inside, LONGEST / factor) * (factor * 1e9)).round().astype(np.int64), numbers.notna()
 

@@ -27,7 +27,6 @@ def write_results(
     folder: Path,
     cases: Sequence[GenerationResult],
     *,
-    seed: int,
     title: str,
     quality: Sequence[str],
     provenance: Mapping[str, str],
@@ -37,7 +36,6 @@ def write_results(
     Args:
         folder: that `replaced_folder` gives; if it has a bag already, which was recorded, that one stays.
         cases: one per encounter and road; with several, each has its own namespace in the bag.
-        seed: of the request.
         title: heading of the report.
         quality: the log's data-quality summary, in lines.
         provenance: what is needed to do it again.

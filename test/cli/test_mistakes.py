@@ -16,7 +16,6 @@ ROAD = ("--road", "four_way", "--count", "2")
 GENERATE = ("generate", "my log ü.csv", *ROAD)
 PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
 DRIVE = ("drive", "made/bag", "--planner", PLANNER)
-SEARCH = ("search", "made/bag", "--planner", PLANNER)
 
 
 @pytest.fixture(scope="module")

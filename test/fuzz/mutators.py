@@ -18,13 +18,13 @@ import tempfile
 from typing import Any
 from xml.etree import ElementTree
 
+from harness import Mutator
 import numpy as np
 import pyarrow as pa
 from pyarrow import parquet as pq
 from rosbags.typesys import get_typestore, Stores
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-Mutator = Callable[[random.Random, bytes, Sequence[bytes]], bytes]
 
 TEXTS = """nan NaN inf -inf 1e308 -1e308 1e-320 -0 0 1 -1 None null NA True false 9223372036854775807 9223372036854775808
     -9223372036854775809 18446744073709551616 1e400 0x10 1_000 1,5 12:30:05 2024-02-30 9999-12-31 0001-01-01T00:00:00Z

@@ -30,7 +30,6 @@ DAY0 = date(1899, 12, 30)  # from which the names of the files count
 PLACE = (42.28, -83.74)  # degrees, around which all lies
 TILE, STREET, BLOCK, COLUMN = 2000.0, 300.0, 60.0, 30_000.0  # m: an encounter's own ground; between lone drives, wide and narrow
 ROWS_PER_FILE = 1_000_000
-NEVER = 9e9
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,7 @@ def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path)
     case = replace(case, fit=replace(case.fit, lost=(lost,), fitted=fitted), routes=routes)
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(summary([case]))
-    write_results(tmp_path, [case], seed=1, title="", quality=(), provenance={})
+    write_results(tmp_path, [case], title="", quality=(), provenance={})
     figures = json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]
     for text in (console.export_text(), (tmp_path / "report.html").read_text(encoding="utf-8")):
         assert lost.message in text and "vehicle south: its route passes 2.2 m from its fitted path" in text
