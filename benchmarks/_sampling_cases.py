@@ -23,8 +23,8 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads import build_road
-from scenario_gen.template.answers import conflict_of
-from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, Wait
+from scenario_gen.template.answers import conflict_of, conflicts_in
+from scenario_gen.template.interaction import Conflict, find_waits, Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.road import Road
@@ -80,7 +80,7 @@ def prepared(encounter: Encounter, road_name: str, name: str) -> Prepared:
         ScenarioGenError: that is not possible.
     """
     segmentation = segment(encounter)
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+    conflicts = conflicts_in(encounter)
     road = build_road(road_name, encounter)
     fit = fit_template(encounter, segmentation, road)
     return Prepared(name, road_name, encounter, segmentation, road, fit, plan_routes(road, fit), conflicts, find_waits(encounter))

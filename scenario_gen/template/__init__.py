@@ -3,7 +3,7 @@
 
 """What is about the recorded encounter on its own ground: tracks, path coordinates, stops, conflicts."""
 
-from scenario_gen.template.answers import conflict_of, departure, lag_behind, lane_gaps, Motion, passing, time_gaps
+from scenario_gen.template.answers import conflict_of, conflicts_in, departure, lag_behind, lane_gaps, Motion, passing, time_gaps
 from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine, to_frenet
 from scenario_gen.template.interaction import (
     closest_crossing,
@@ -41,6 +41,7 @@ __all__ = [
     "clean_tracks",
     "closest_crossing",
     "conflict_of",
+    "conflicts_in",
     "departure",
     "find_conflicts",
     "find_waits",

@@ -55,6 +55,11 @@ def conflict_of(motion: Motion, a: int, b: int) -> Conflict | None:
     return _conflicts(motion).get((min(a, b), max(a, b)))
 
 
+def conflicts_in(motion: Motion) -> tuple[Conflict, ...]:
+    """Return the conflicts of a motion, as `find_conflicts` does; they are looked for once."""
+    return tuple(_conflicts(motion).values())
+
+
 @once_per_object
 def _conflicts(motion: Motion) -> dict[tuple[int, int], Conflict]:
     """Return the conflict of each pair of vehicles that has one."""

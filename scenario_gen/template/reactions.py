@@ -19,8 +19,8 @@ from scipy import ndimage
 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.template.answers import ALIKE, bumper_gaps, is_behind, LANE, passing, SLOWEST
-from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, WAIT_SPEED
+from scenario_gen.template.answers import ALIKE, bumper_gaps, conflicts_in, is_behind, LANE, passing, SLOWEST
+from scenario_gen.template.interaction import Conflict, find_waits, WAIT_SPEED
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, ReactionGraph, YIELD
 
@@ -62,7 +62,7 @@ class _Seen:
 def reactions_of(encounter: Encounter) -> ReactionGraph:
     """Return who reacts to whom."""
     seen, leaders = _nearest_leaders(encounter)
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+    conflicts = conflicts_in(encounter)
     passes = [found for conflict in conflicts if (found := _passes(encounter, conflict)) is not None]
     led = {edge.who: edge for edge in leaders}
     met = {pair for one in conflicts for pair in ((one.first, one.second), (one.second, one.first))}

@@ -12,7 +12,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
-from scenario_gen.template import Conflict, find_conflicts, in_words, keeps, Track, turn_of, turns_to_keep
+from scenario_gen.template import Conflict, conflicts_in, find_conflicts, in_words, keeps, Track, turn_of, turns_to_keep
 from scenario_gen.types import Encounter, Loss, Road
 
 CONFLICT, FOLLOWING = "conflict", "following"  # kinds of losses
@@ -118,7 +118,7 @@ def _recorded(track: Track) -> float:
 
 def _lost_conflicts(encounter: Encounter, poses: Floats) -> list[Loss]:
     vehicles, time = encounter.vehicles, encounter.time
-    before = _by_pair(find_conflicts(vehicles, time, encounter.position, encounter.heading, encounter.present))
+    before = _by_pair(conflicts_in(encounter))
     after = _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], encounter.present))
     lost = []
     for pair in sorted(before.keys() | after.keys()):

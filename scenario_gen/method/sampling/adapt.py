@@ -13,7 +13,7 @@ from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, PATIEN
 from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
-from scenario_gen.template import closest_crossing, Conflict, conflict_of, find_conflicts
+from scenario_gen.template import closest_crossing, Conflict, conflict_of, conflicts_in
 from scenario_gen.types import Cause, Encounter, join_pieces, LOST, Measures, Reaction, Request, Scenario, Target, token, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
@@ -70,7 +70,7 @@ def aim_of(encounter: Encounter, request: Request, measures: Measures | None) ->
     """
     targets, beyond, note = request.targets, 0.0, ""
     if request.order == "swap":
-        closest = closest_crossing(_conflicts(encounter))
+        closest = closest_crossing(conflicts_in(encounter))
         if closest is not None:
             names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
             targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
@@ -82,10 +82,6 @@ def aim_of(encounter: Encounter, request: Request, measures: Measures | None) ->
     if measures is None:
         raise InputError("a target or another order is asked for, but nothing is given that measures scenarios (`measures`)")
     return Aim.of(targets, encounter, measures.figure, beyond, note)
-
-
-def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
-    return find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
 
 
 def label_of(
@@ -105,7 +101,7 @@ def label_of(
         LOST: join_pieces(f"{names[pair[0]]}>{names[pair[1]]}" for pair in lost),
     }
     held = {key: text for key, text in pieces.items() if text}
-    conflicts = () if request.order == "keep" else _conflicts(encounter)
+    conflicts = () if request.order == "keep" else conflicts_in(encounter)
 
     def label(whole: Scenario) -> dict[str, str]:
         facts = dict(held)

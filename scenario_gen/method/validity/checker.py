@@ -19,7 +19,7 @@ from scenario_gen.method.validity.presence import driven_on
 from scenario_gen.method.validity.reactions import broken_reactions, LaneGaps, tailgaters
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.roads import drives_against, RuleCheck
-from scenario_gen.template import Conflict, conflict_of, find_conflicts, lane_gaps, required_orders, Wait
+from scenario_gen.template import Conflict, conflict_of, conflicts_in, lane_gaps, required_orders, Wait
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
@@ -101,7 +101,7 @@ class Checker:
         Raises:
             RefusedError: an order is to be swapped, and there is none.
         """
-        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+        conflicts = conflicts_in(encounter)
         own = (limits or Limits()).for_template(encounter)
         ends = at_ends(encounter.present, len(encounter.time))
         return cls(
@@ -325,8 +325,7 @@ class Checker:
         """Stop lines that are run, and rights of way that are taken."""
         if self._rules is None or not self._rules.rules:
             return
-        arrays = scenario.time, scenario.position, scenario.heading, scenario.present
-        for breach in self._rules.breaches(scenario, find_conflicts(scenario.vehicles, *arrays)):
+        for breach in self._rules.breaches(scenario, conflicts_in(scenario)):
             message = f"vehicle {scenario.vehicles[breach.vehicles[0]].id}: {breach.message}"
             yield Violation(Cause.TRAFFIC_RULE, breach.time, breach.vehicles, message)
 

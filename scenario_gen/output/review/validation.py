@@ -23,7 +23,7 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, LaneGaps, Limits
 from scenario_gen.numerics import Bools
-from scenario_gen.template import Conflict, find_conflicts, find_waits, lane_gaps, reactions_of, required_orders, Wait
+from scenario_gen.template import Conflict, conflicts_in, find_waits, lane_gaps, reactions_of, required_orders, Wait
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
@@ -104,7 +104,7 @@ class Reference:
         cls, encounter: Encounter, segmentation: Segmentation | None, road: Road | None, entry: ScenarioEntry | None
     ) -> "Reference":
         """Return what a scenario with this entry is held against; without a segmentation its waits are not known."""
-        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+        conflicts = conflicts_in(encounter)
         waits: tuple[Wait, ...] | None = None
         if segmentation is not None:
             waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()

@@ -18,7 +18,7 @@ from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import at_home, crossing_spots, find_spots
 from scenario_gen.roads.vector.street import along_streets
-from scenario_gen.template import Conflict, find_conflicts, separate, Track
+from scenario_gen.template import conflicts_in, separate, Track
 from scenario_gen.types import LaneNetwork, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
@@ -109,7 +109,7 @@ class _Judged:
     def __init__(self, network: LaneNetwork, tracks: tuple[Track, ...]) -> None:
         self._check = RuleCheck(network)
         self._tracks = tracks
-        met = (conflict for conflict in _conflicts(_motion(tracks)) if not conflict.following)
+        met = (conflict for conflict in conflicts_in(_motion(tracks)) if not conflict.following)
         self._met = {frozenset((conflict.first, conflict.second)) for conflict in met}
 
     def broken(self, placement: Match, scale: float) -> str:
@@ -117,7 +117,7 @@ class _Judged:
         if not self._check.rules:
             return ""
         motion = _motion(tracks_on(placement, self._tracks, scale))
-        breach = next(iter(self._check.breaches(motion, _conflicts(motion))), None)
+        breach = next(iter(self._check.breaches(motion, conflicts_in(motion))), None)
         if breach is None:
             return ""
         return f"vehicle {motion.vehicles[breach.vehicles[0]].id} {breach.message}; road.traffic_rules=ignored allows it"
@@ -127,13 +127,9 @@ class _Judged:
         if not self._met and not self._check.rules:
             return 0, True
         motion = _motion(tracks_on(placement, self._tracks, scale))
-        conflicts = _conflicts(motion)
+        conflicts = conflicts_in(motion)
         lost = self._met - {frozenset((conflict.first, conflict.second)) for conflict in conflicts}
         return len(lost), not self._check.kept_orders(motion, conflicts)
-
-
-def _conflicts(motion: Scenario) -> tuple[Conflict, ...]:
-    return find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present)
 
 
 def _motion(tracks: Sequence[Track]) -> Scenario:

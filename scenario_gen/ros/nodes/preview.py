@@ -23,7 +23,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.ros.plumbing.topics import create_frames_publisher
-from scenario_gen.template import find_conflicts
+from scenario_gen.template import conflicts_in
 from scenario_gen.types import Scenario, tokens
 
 HIGH = 1.2  # metres of a letter
@@ -119,9 +119,9 @@ class Preview(StageNode):
 
 def conflicts_of(scenario: Scenario) -> tuple[tuple[tuple[float, float, float], str], ...]:
     """Return where paths meet, and who goes first there."""
-    vehicles, time, names = scenario.vehicles, scenario.time, tokens(vehicle.id for vehicle in scenario.vehicles)
+    time, names = scenario.time, tokens(vehicle.id for vehicle in scenario.vehicles)
     found = []
-    for conflict in find_conflicts(vehicles, time, scenario.position, scenario.heading, scenario.present):
+    for conflict in conflicts_in(scenario):
         n = conflict.second
         x, y, yaw = (float(np.interp(conflict.entry_second, time, row)) for row in (*scenario.position[n].T, scenario.heading[n]))
         first, second = names[conflict.first], names[n]
