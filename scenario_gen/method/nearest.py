@@ -17,9 +17,10 @@ from scenario_gen.method.fitting import LostConflictError
 from scenario_gen.method.sampling import Cancelled, TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, suitable_roads, with_suitable_roads
-from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import angle_between
 from scenario_gen.roads import draw_route, footprint_fits, nearest_pose_with_room, road_and_template
 from scenario_gen.types import Encounter, ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
 
@@ -248,7 +249,7 @@ class _Search:
                 request, end, name, moved(state, route.at((1.0 - share if end == "goals" else share) * route.length))
             )
         if base is not None:
-            turn = float(wrap_angle(base[2:3] - state[2])[0])
+            turn = angle_between(base[2], state[2])
             step = np.array([base[0] - state[0], base[1] - state[1], turn])
             yield lambda share: with_state(request, end, name, moved(state, np.array(state[:3]) + share * step))
 

@@ -118,7 +118,7 @@ def to_frenet(tracks: tuple[Track, ...]) -> FrenetTracks:
                 f"that is a junction's manoeuvre, not one along a road"
             )
     lines = [_reference_line(tracks, base) for base in _reference_candidates(tracks)]
-    line, direction = min(lines, key=lambda line_and_direction: _cost_of_line(tracks, *line_and_direction))
+    line, direction = min(lines, key=lambda pair: _cost_of_line(tracks, pair[0]))
     station, offset = np.empty((len(tracks), len(tracks[0].progress))), np.empty((len(tracks), len(tracks[0].progress)))
     for i, track in enumerate(tracks):
         poses = track.poses
@@ -155,7 +155,7 @@ def _reference_candidates(tracks: tuple[Track, ...]) -> list[int]:
     return [i for i in order if tracks[i].travelled >= tracks[order[0]].travelled / 2.0]
 
 
-def _cost_of_line(tracks: tuple[Track, ...], line: Curve, direction: Ints) -> tuple[int, float]:
+def _cost_of_line(tracks: tuple[Track, ...], line: Curve) -> tuple[int, float]:
     """How many vehicles change lanes as seen from a line, and how much the line itself turns, per metre.
 
     Seen from the path of a vehicle that changes lanes, all others seem to do so.

@@ -19,6 +19,7 @@ from scipy import ndimage
 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
+from scenario_gen.numerics.plane import angle_between
 from scenario_gen.template.answers import ALIKE, bumper_gaps, conflicts_in, is_behind, LANE, passing, SLOWEST
 from scenario_gen.template.interaction import Conflict, find_waits, WAIT_SPEED
 from scenario_gen.template.tracks import clean_tracks
@@ -198,7 +199,7 @@ def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, gaps: Flo
 def _soon(lag: float, duration: float) -> float:
     """The probability that a departure so long behind an event [s] answers it, and is not anywhere in the record [s]."""
     off = (lag - _HUMAN_LAG) / _HUMAN_SPREAD
-    soon = float(np.exp(np.array(-0.5 * off * off))) / (_HUMAN_SPREAD * math.sqrt(2.0 * math.pi))
+    soon = float(np.exp(-0.5 * off * off)) / (_HUMAN_SPREAD * math.sqrt(2.0 * math.pi))
     return soon / (soon + 1.0 / max(duration, 1.0))
 
 
@@ -258,7 +259,7 @@ def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
     clears, enters = passing(encounter, conflict, merges=conflict.following)
     gap = enters - clears
     yaw, other_yaw = (float(np.interp(at, encounter.time, encounter.heading[n])) for n, at in ((who, enters), (whom, clears)))
-    turned = abs(float(wrap_angle(np.array(yaw - other_yaw))))
+    turned = abs(angle_between(yaw, other_yaw))
     apart = max(gap, 0.0) if gap > -ANTICIPATES and (conflict.following or _ALONG < turned < _HEAD_ON) else math.inf
     near = _closeness(apart, PASSES)
     since, until, stands = _slow_before(encounter, who, clears, enters)

@@ -11,6 +11,7 @@ import numpy as np
 
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
+from scenario_gen.numerics.plane import angle_between
 from scenario_gen.template import Equation, path_crossing, Track
 
 _SAME_LANE = 1.75  # metres
@@ -63,7 +64,7 @@ def _on_path(pose: Floats, track: Track) -> float | None:
     """The station [m] at which a pose (3,) is on a track's path, heading the same way; None if it is not."""
     station, offset = track.curve.project(pose[None, :2])
     s = float(station[0])
-    turned = abs(float(wrap_angle(np.asarray(track.curve.at(s)[2] - pose[2]))))
+    turned = abs(angle_between(track.curve.at(s)[2], pose[2]))
     on = abs(float(offset[0])) < _SAME_LANE and turned < _SAME_WAY and 0.0 <= s <= track.travelled
     return s if on else None
 

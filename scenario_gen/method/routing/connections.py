@@ -10,7 +10,8 @@ import numpy as np
 
 from scenario_gen.method.routing.search.dubins import Pose, shortest_curve, TURNS
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.plane import angle_between, unit
 from scenario_gen.types import Road, Vehicle
 
 SPACING = 0.2  # [m]
@@ -47,7 +48,7 @@ def hermite(start: Floats, end: Floats, stretch: float, limit: float) -> Floats 
     chord = float(np.hypot(*(end - start)[:2]))
     count = max(int(np.ceil(chord / SPACING)) + 1, 8)
     t = np.linspace(0.0, 1.0, count)[:, None]
-    a, b = (stretch * chord * np.array([np.cos(pose[2]), np.sin(pose[2])]) for pose in (start, end))
+    a, b = (stretch * chord * unit(pose[2]) for pose in (start, end))
     rise = end[:2] - start[:2]
     points = start[:2] + rise * np.square(t) * (3 - 2 * t) + a * t * np.square(1 - t) + b * np.square(t) * (t - 1)
     first = 6.0 * rise * t * (1 - t) + a * (1 - t) * (1 - 3 * t) + b * t * (3 * t - 2)
@@ -63,7 +64,7 @@ def hermite(start: Floats, end: Floats, stretch: float, limit: float) -> Floats 
 
 def _by_an_arc(start: Floats, end: Floats, limit: float) -> Iterator[Floats]:
     """A straight line, an arc and a straight line, from the widest arc to the tightest."""
-    turn = float(wrap_angle(np.asarray(end[2] - start[2])))
+    turn = angle_between(end[2], start[2])
     if not PARALLEL < abs(turn) < np.pi - PARALLEL:
         return
     d = end[:2] - start[:2]

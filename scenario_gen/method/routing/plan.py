@@ -27,6 +27,7 @@ from scenario_gen.method.routing.search.pose_planner import PlansPoses, PoseQuer
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
 from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics.plane import edge_lengths, edge_yaws
 from scenario_gen.roads import clearance_field, footprint_fits, nearest_pose_with_room, own_ground
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, Vehicle
 
@@ -299,8 +300,8 @@ def _fitted_piece(task: _Task, start: Floats, end: Floats) -> Floats | None:
     poses = np.vstack([start[None], path[first + 1 : last], end[None]])
     if max(distances_to_line(np.stack([start, end]), path)) > ON_PATH:
         return None
-    step = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    bend = np.abs(wrap_angle(np.diff(path[first : last + 1, 2]))) / np.hypot(*np.diff(path[first : last + 1, :2], axis=0).T)
+    step = edge_lengths(poses[:, :2])
+    bend = np.abs(wrap_angle(np.diff(path[first : last + 1, 2]))) / edge_lengths(path[first : last + 1, :2])
     if bend.max() > task.config.max_curvature or step.min() < 1e-6:
         return None
     free = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
@@ -434,9 +435,8 @@ def _polyline(task: _Task, waypoints: list[int]) -> Route:
     """The planner's bare path through the waypoints: shortest, with corners; only its ends have the requested headings."""
     legs = [_searched(task, a, b) for a, b in itertools.pairwise(waypoints)]
     path = np.concatenate([legs[0]] + [leg[1:] for leg in legs[1:]])
-    edge = np.diff(path, axis=0)
-    at = np.concatenate(([0.0], np.cumsum(np.hypot(*edge.T))))
-    yaw = np.unwrap(np.arctan2(edge[:, 1], edge[:, 0]))
+    at = np.concatenate(([0.0], np.cumsum(edge_lengths(path))))
+    yaw = np.unwrap(edge_yaws(path))
 
     def poses_at(length: Floats) -> Floats:
         which = np.clip(np.searchsorted(at, length, side="right") - 1, 0, len(yaw) - 1)

@@ -19,6 +19,7 @@ from scenario_gen.method.routing.config import PlanningConfig
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.numerics import Floats, Ints, wrap_angle
+from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.roads import clearance_field
 from scenario_gen.types import Road, Vehicle
 
@@ -95,7 +96,7 @@ def smooth(
     """
     disc = (np.arange(DISCS) - 0.5 * (DISCS - 1)) * vehicle.length / DISCS
     cover = float(np.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS))
-    headings = np.stack([_ahead(start), _ahead(end)])
+    headings = np.stack([unit(start[2]), unit(end[2])])
     guess = resampled(guess, config.spacing)
     points = guess.points
     points[0], points[-1] = start[:2], end[:2]
@@ -136,31 +137,26 @@ def _room(road: Road, points: Floats, disc: Floats) -> Floats:
     return np.where(inside, clearance_field(road)[row, column], 0.0)
 
 
-def _ahead(pose: Floats) -> Floats:
-    """Unit vector of a pose's heading."""
-    return np.array([np.cos(pose[2]), np.sin(pose[2])])
-
-
 def _wished(road: Road, disc: Floats, wish: float, start: Floats, end: Floats, spacing: float, count: int) -> Floats:
     """Clearance wanted along the band (count,): what there is at its ends, rising from there by 5 cm per metre to `wish`."""
     field = clearance_field(road)
     along = np.arange(count) * spacing
     room = np.full(count, wish)
     for pose, distance in ((start, along), (end, along[::-1])):
-        row, column, _ = road.cells(pose[:2] + disc[:, None] * _ahead(pose))
+        row, column, _ = road.cells(pose[:2] + disc[:, None] * unit(pose[2]))
         room = np.minimum(room, field[row, column].min() + TAPER * distance)
     return room
 
 
 def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: Floats) -> Curve:
     """Lay the clamped spline through the band (G, 2) [m], from pose to pose (3,), and measure it."""
-    knots = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    spline = CubicSpline(knots, points, bc_type=((1, _ahead(start)), (1, _ahead(end))))
+    knots = np.concatenate(([0.0], np.cumsum(edge_lengths(points))))
+    spline = CubicSpline(knots, points, bc_type=((1, unit(start[2])), (1, unit(end[2]))))
     u = np.linspace(0.0, knots[-1], int(np.ceil(knots[-1] / CHECK)) + 1)
     first, second = spline(u, 1), spline(u, 2)
     bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.hypot(*first.T) ** 3
     poses = np.column_stack((spline(u), np.arctan2(first[:, 1], first[:, 0])))
-    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(np.hypot(*np.diff(poses[:, :2], axis=0).T), 1e-6)
+    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(edge_lengths(poses[:, :2]), 1e-6)
     bend[1:] = np.maximum(bend[1:], turned)  # a cusp on a straight line has no curvature, but turns round
     poses[0], poses[-1] = start, end
     fits = sweep_is_free(road, poses, vehicle.length, vehicle.width)[:, 0] > 0.0
@@ -169,7 +165,7 @@ def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: F
 
 def resampled(guess: Guess, spacing: float, count: int | None = None) -> Guess:
     """The polyline at equal distances of about `spacing` (or with `count` points)."""
-    step = np.hypot(*np.diff(guess.points, axis=0).T)
+    step = edge_lengths(guess.points)
     at = np.concatenate(([0.0], np.cumsum(step)))
     count = count or max(int(np.ceil(at[-1] / spacing)) + 1, 8)
     s = np.linspace(0.0, at[-1], count)

@@ -18,6 +18,7 @@ from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
 from scenario_gen.method.validity.reactions import broken_reactions, LaneGaps, tailgaters
 from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import drives_against, RuleCheck
 from scenario_gen.template import Conflict, conflict_of, conflicts_in, lane_gaps, required_orders, Wait
 from scenario_gen.types import (
@@ -152,7 +153,7 @@ class Checker:
             *self._waits(scenario),
         ]
         conflicts = [conflict_of(scenario, conflict.first, conflict.second) for conflict in self.conflicts or ()]
-        wrong, present, absent = self._passing_orders(scenario, conflicts)
+        wrong, present, absent = self._passing_orders(conflicts)
         reactions = [*broken_reactions(scenario, conflicts, self.reactions, self._limits)]
         if self.lane_gaps is not None:
             reactions += tailgaters(scenario, self.lane_gaps, self._limits)
@@ -329,7 +330,7 @@ class Checker:
             message = f"vehicle {scenario.vehicles[breach.vehicles[0]].id}: {breach.message}"
             yield Violation(Cause.TRAFFIC_RULE, breach.time, breach.vehicles, message)
 
-    def _passing_orders(self, scenario: Scenario, conflicts: Sequence[Conflict | None]) -> tuple[list[Violation], int, int]:
+    def _passing_orders(self, conflicts: Sequence[Conflict | None]) -> tuple[list[Violation], int, int]:
         """Violations, and how many of the template's conflicts are present and absent in the scenario, which has `conflicts`."""
         wrong, present = [], 0
         for recorded, first, conflict in zip(self.conflicts or (), self._first, conflicts, strict=True):
@@ -380,7 +381,7 @@ class Checker:
     def _slow(self, scenario: Scenario, i: int, limit: float) -> list[tuple[int, int]]:
         """First and last sample of each stretch in which neither published speed nor displacement reaches the limit [m/s]."""
         slow = scenario.speed[i] < limit
-        moved = np.hypot(*np.diff(scenario.position[i], axis=0).T)
+        moved = edge_lengths(scenario.position[i])
         still = slow[:-1] & slow[1:] & (moved < limit * np.diff(scenario.time))
         still &= scenario.there[i, :-1] & scenario.there[i, 1:]
         return runs(still)  # of T - 1 steps: a step's end is a sample

@@ -6,6 +6,7 @@
 import numpy as np
 
 from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.plane import unit
 from scenario_gen.types import Scenario
 
 SAME = 0.5e-9  # s, instants are whole nanoseconds
@@ -35,6 +36,6 @@ def driven_on(scenario: Scenario, margin: float) -> tuple[Floats, Floats, Floats
             half = 0.5 * rate * since
             chord = speed[i, end] * since * np.where(half == 0.0, 1.0, np.sin(half) / np.where(half == 0.0, 1.0, half))
             middle = heading[i, end] + half
-            position[i, beyond] = position[i, end] + chord[:, None] * np.stack((np.cos(middle), np.sin(middle)), axis=-1)
+            position[i, beyond] = position[i, end] + chord[:, None] * unit(middle)
             heading[i, beyond] = heading[i, end] + rate * since
     return position, heading, speed, present

@@ -81,23 +81,24 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
 
 def _not_kept(network: LaneNetwork, scenarios: Sequence[Scenario]) -> dict[str, Curve]:
     """Return the paths, by id, of vehicles that leave the lanes or drive across them."""
-    area = union_all(make_valid([Polygon(lane.outline) for lane in network.lanes]))
+    shapes = [Polygon(lane.outline) for lane in network.lanes]
+    area = union_all(make_valid(shapes))
     prepare(area)
     missing: dict[str, Curve] = {}
     for scenario in scenarios:
         for n, vehicle in enumerate(scenario.vehicles):
             if vehicle.id not in missing:
                 path = driven_path(scenario, n)
-                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, network) > CUT:
+                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, network, shapes) > CUT:
                     missing[vehicle.id] = path
     return missing
 
 
-def _unled(path: Curve, network: LaneNetwork) -> float:
-    """Return the metres of a path on which no lane has nearly its direction."""
+def _unled(path: Curve, network: LaneNetwork, shapes: Sequence[Polygon]) -> float:
+    """Return the metres of a path on which no lane, of these shapes, has nearly its direction."""
     led = np.zeros(len(path.points), dtype=np.bool_)
-    for lane in network.lanes:
-        inside = np.flatnonzero(~led & contains_xy(Polygon(lane.outline), path.points[:, :2]))
+    for lane, shape in zip(network.lanes, shapes, strict=True):
+        inside = np.flatnonzero(~led & contains_xy(shape, path.points[:, :2]))
         if len(inside):
             middle = Curve.through(lane.centre)
             yaw = middle.at(middle.project(path.points[inside, :2])[0])[:, 2]

@@ -16,6 +16,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics.plane import angle_between
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.xml import add, comment, Element, serialized
 from scenario_gen.types import Lane
@@ -180,7 +181,7 @@ def _pieces(reference: Floats) -> Iterator[tuple[float, Curve3 | None]]:
         cos, sin = float(np.cos(yaw0)), float(np.sin(yaw0))
         u = float((x1 - x0) * cos + (y1 - y0) * sin)
         v = float((y1 - y0) * cos - (x1 - x0) * sin)
-        turn = float(wrap_angle(np.asarray(yaw1 - yaw0)))
+        turn = angle_between(yaw1, yaw0)
         chord = float(np.hypot(u, v))
         if abs(turn) < STRAIGHT and abs(v) < STRAIGHT * chord:
             yield chord, None

@@ -131,13 +131,13 @@ def lanes_of(root: Element) -> MapLanes:
     for junction in root.all("junction"):
         joints.through(junction)
     notes = (f"OpenDRIVE {version}: {_projection(header)}", *joints.notes())
-    rules = [*_signal_rules(root, roads, faults), *_priorities(root, roads)]
+    rules = [*_signal_rules(roads, faults), *_priorities(root, roads)]
     signals = [signal for road in roads.values() for group in road.element.all("signals") for signal in group.all("signal")]
     others = [signal for signal in signals if signal.attributes.get("type") not in _READ and not _kind_of_signal(signal)]
     return MapLanes(list(_drafts(roads, joints)), notes, faults=faults, rules=rules, other_signs=len(others))
 
 
-def _signal_rules(root: Element, roads: dict[str, _Road], faults: Faults) -> Iterator[DraftRule]:
+def _signal_rules(roads: dict[str, _Road], faults: Faults) -> Iterator[DraftRule]:
     """Yield the rules of signals: where they stand, and where roads refer to them."""
     kinds: dict[str, RuleKind] = {}
     placed: list[tuple[_Road, Element]] = []

@@ -18,6 +18,7 @@ from scenario_gen.method.routing.search.sweep import car_scene, NOWHERE, Prices
 from scenario_gen.method.routing.search.tree_samples import Rules
 from scenario_gen.method.routing.search.two_trees import Search
 from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics.plane import edge_lengths, edge_yaws
 from scenario_gen.roads import (
     clearance_in_cells,
     common_component,
@@ -266,12 +267,10 @@ def _shortened(search: Search, shortcuts: int) -> tuple[Floats, float]:
 
 def along(line: Floats, spacing: float) -> Floats:
     """Poses (M, 3) about `spacing` apart on a polyline (P, 2) [m]."""
-    edge = np.diff(line, axis=0)
-    size = np.hypot(*edge.T)
+    size, yaw = edge_lengths(line), edge_yaws(line)
     at = np.concatenate(([0.0], np.cumsum(size)))
     s = np.linspace(0.0, at[-1], max(int(np.ceil(at[-1] / spacing)) + 1, 2))
-    yaw = np.arctan2(edge[:, 1], edge[:, 0])
-    which = np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(edge) - 1)
+    which = np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(yaw) - 1)
     return np.column_stack((np.interp(s, at, line[:, 0]), np.interp(s, at, line[:, 1]), yaw[which]))
 
 
