@@ -3,18 +3,23 @@
 
 """A reaction: who answers to whom in an encounter, how late and how strongly, and how sure that is."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
 
-from scenario_gen.types.pieces import split_pieces
+from scenario_gen.types.pieces import join_pieces, split_pieces
 
 FOLLOW, YIELD = "follow", "yield"
 DOUBTFUL = 0.5  # confidence below which an edge is called doubtful
 _FOLLOWS, _YIELDS = " follows ", " yields to "  # of names
 LOST = "reactions_lost"  # the fact of a scenario that names the pairs, "who>whom", which it is not held to
 NOT_KEPT = "on this road a reaction is not kept"  # begins the sentence of a set's adaptations that gives the figures
+
+
+def pair_name(names: Sequence[str], pair: Sequence[int]) -> str:
+    """Return how the fact LOST names a pair (who, whom) of vehicles with these names."""
+    return f"{names[pair[0]]}>{names[pair[1]]}"
 
 
 @dataclass(frozen=True)
@@ -128,3 +133,9 @@ def yielders_of(names: str, ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Return (who, whom) of the yielding reactions that an entry names ("2 yields to 1; 3 follows 2"), of vehicles `ids`."""
     pairs = [name.split(_YIELDS) for name in split_pieces(names) if _YIELDS in name]
     return tuple((ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids)
+
+
+def reaction_facts(names: Sequence[str], kept: Sequence[Reaction], lost: Iterable[Sequence[int]]) -> dict[str, str]:
+    """Return the facts that name the reactions that a scenario keeps, and the pairs (who, whom) that it is not held to."""
+    pieces = {"reactions": [edge.name(names) for edge in kept], LOST: [pair_name(names, pair) for pair in lost]}
+    return {key: join_pieces(found) for key, found in pieces.items() if found}

@@ -80,7 +80,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         notes = [*network.notes, *(_note(c, t, network) for c, t in zip(match.courses, tracks, strict=True))]
         if scale != 1.0:
             notes.append(f"scaled by {scale:g} to fit the lanes")
-        placement = Placement.of(tracks_on(match, tracks, scale), scale, notes, map(_manoeuvre, match.courses))
+        placement = Placement.of(tracks_on(match, tracks), scale, notes, map(_manoeuvre, match.courses))
         try:
             if network.drawn:
                 refuse_lost_turns(tracks, placement.tracks, road.name)

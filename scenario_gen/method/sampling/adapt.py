@@ -14,7 +14,7 @@ from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
 from scenario_gen.template import closest_crossing, Conflict, conflict_of, conflicts_in
-from scenario_gen.types import Cause, Encounter, join_pieces, LOST, Measures, Reaction, Request, Scenario, Target, token, Verdict
+from scenario_gen.types import Cause, Encounter, Measures, Reaction, reaction_facts, Request, Scenario, Target, token, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 
@@ -96,11 +96,7 @@ def label_of(
     `lost` are the pairs (who, whom) whose reaction, or whose least gap, scenarios are not held to on this road.
     """
     names = [token(vehicle.id) for vehicle in encounter.vehicles]
-    pieces = {
-        "reactions": join_pieces(edge.name(names) for edge in reactions),
-        LOST: join_pieces(f"{names[pair[0]]}>{names[pair[1]]}" for pair in lost),
-    }
-    held = {key: text for key, text in pieces.items() if text}
+    held = reaction_facts(names, reactions, lost)
     conflicts = () if request.order == "keep" else conflicts_in(encounter)
 
     def label(whole: Scenario) -> dict[str, str]:

@@ -31,6 +31,7 @@ from scenario_gen.types import (
     Encounter,
     join_ego,
     LOST,
+    pair_name,
     Reaction,
     Road,
     Scenario,
@@ -229,8 +230,7 @@ def kept_gaps(encounter: Encounter, entry: ScenarioEntry | None) -> LaneGaps:
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
     lost = split_pieces(entry.facts.get(LOST, "")) if entry else []
     return {
-        pair: (speed, 0.0 * gap if f"{names[pair[0]]}>{names[pair[1]]}" in lost else gap)
-        for pair, (speed, gap) in lane_gaps(encounter).items()
+        pair: (speed, 0.0 * gap if pair_name(names, pair) in lost else gap) for pair, (speed, gap) in lane_gaps(encounter).items()
     }
 
 

@@ -19,7 +19,7 @@ from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import at_home, crossing_spots, find_spots
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
-from scenario_gen.types import LaneNetwork, Scenario
+from scenario_gen.types import LaneNetwork, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
@@ -67,7 +67,7 @@ def placements(
     judged = _Judged(network, tracks)
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
-        broken = own.reason or judged.broken(own, 1.0)
+        broken = own.reason or judged.broken(own)
         if not broken:
             yield own, 1.0
         elif not own.reason:
@@ -85,10 +85,10 @@ def placements(
                 reasons[placement.reason or "vehicles would be too far from where they are in the template"] += 1
             else:
                 matches.append(placement)
-        broken_by = [judged.broken(placement, scale) for placement in matches]
+        broken_by = [judged.broken(placement) for placement in matches]
         broken_rules.update(filter(None, broken_by))
         matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
-        matches.sort(key=lambda placement: (*judged.rank(placement, scale), round(placement.cost, 3)))
+        matches.sort(key=lambda placement: (*judged.rank(placement), round(placement.cost, 3)))
         pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
         placed = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
         yield from placed
@@ -112,24 +112,30 @@ class _Judged:
         met = (conflict for conflict in conflicts_in(_motion(tracks)) if not conflict.following)
         self._met = {frozenset((conflict.first, conflict.second)) for conflict in met}
 
-    def broken(self, placement: Match, scale: float) -> str:
+    def broken(self, placement: Match) -> str:
         """Return what a placement breaks; "" if nothing."""
         if not self._check.rules:
             return ""
-        motion = _motion(tracks_on(placement, self._tracks, scale))
+        motion = _laid(placement, self._tracks)
         breach = next(iter(self._check.breaches(motion, conflicts_in(motion))), None)
         if breach is None:
             return ""
         return f"vehicle {motion.vehicles[breach.vehicles[0]].id} {breach.message}; road.traffic_rules=ignored allows it"
 
-    def rank(self, placement: Match, scale: float) -> tuple[int, bool]:
+    def rank(self, placement: Match) -> tuple[int, bool]:
         """Return how many that meet in the template do not, and whether nobody gives way who has to."""
         if not self._met and not self._check.rules:
             return 0, True
-        motion = _motion(tracks_on(placement, self._tracks, scale))
+        motion = _laid(placement, self._tracks)
         conflicts = conflicts_in(motion)
         lost = self._met - {frozenset((conflict.first, conflict.second)) for conflict in conflicts}
         return len(lost), not self._check.kept_orders(motion, conflicts)
+
+
+@once_per_object
+def _laid(placement: Match, tracks: tuple[Track, ...]) -> Scenario:
+    """The motion of a template at a placement."""
+    return _motion(tracks_on(placement, tracks))
 
 
 def _motion(tracks: Sequence[Track]) -> Scenario:
@@ -146,7 +152,7 @@ def _motion(tracks: Sequence[Track]) -> Scenario:
     )
 
 
-def tracks_on(placement: Match, tracks: Sequence[Track], scale: float) -> tuple[Track, ...]:
+def tracks_on(placement: Match, tracks: Sequence[Track]) -> tuple[Track, ...]:
     """The template's tracks on their courses."""
     placed = []
     for course, track in zip(placement.courses, tracks, strict=True):
@@ -186,9 +192,9 @@ def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int]
         NoPlaceError: there is none.
     """
     reason, found = "", False
-    for placement, scale in placements(network, tracks, lanes):
+    for placement, _ in placements(network, tracks, lanes):
         try:
-            separate(tracks_on(placement, tracks, scale), 0.0, _SHIFT, sideways=0.0)
+            separate(tracks_on(placement, tracks), 0.0, _SHIFT, sideways=0.0)
         except RefusedError as error:
             reason = reason or str(error)
             continue

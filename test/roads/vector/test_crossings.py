@@ -43,8 +43,8 @@ def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
     assert meet(tracks)
     placed = list(islice(placements(read_network(write(tmp_path, suffix)), tracks), 2))
     assert placed
-    for match, scale in placed:
-        assert meet(tracks_on(match, tracks, scale))
+    for match, _ in placed:
+        assert meet(tracks_on(match, tracks))
 
 
 @pytest.mark.recorded
@@ -53,5 +53,5 @@ def test_a_recorded_left_turn_crosses_the_oncoming_lane(recorded, name):
     """Of a wide crossroads: as one piece it resembles right turns of a narrow one more."""
     log = next((recorded / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
     tracks = clean_tracks(read_log(log).encounters[0])
-    match, scale = next(placements(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr"), tracks))
-    assert meet(tracks_on(match, tracks, scale))
+    match, _ = next(placements(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr"), tracks))
+    assert meet(tracks_on(match, tracks))
