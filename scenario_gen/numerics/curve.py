@@ -54,7 +54,7 @@ class Curve:
         pose[..., 1] += beyond * np.sin(pose[..., 2])
         return pose
 
-    def beside(self, station: Floats, offset: Floats) -> Floats:
+    def beside(self, station: Floats, offset: Floats | float) -> Floats:
         """Poses (..., 3) at arc lengths and offsets [m, left positive]; the yaw is the curve's own."""
         pose = self.at(station)
         pose[..., 0] -= offset * np.sin(pose[..., 2])

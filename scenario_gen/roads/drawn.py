@@ -154,10 +154,10 @@ class _Drawing:
         wider = np.zeros(len(along), dtype=np.bool_)
         for side, count in ((-self._sign, arm.inward), (self._sign, arm.outward)):
             edge = side * (count * width + 1.5 * self._road.resolution)
-            wider |= self._road.drivable_at(line.beside(along, np.full(len(along), edge))[:, :2])
+            wider |= self._road.drivable_at(line.beside(along, edge)[:, :2])
         steady = np.array(
             [wider[n : n + _STEADY].all() for n in range(len(wider) - _STEADY)]
-        )  # not a slanted kerb's single cells
+        )  # no single cells of a slanted kerb
         mouth = float(along[int(np.argmax(steady))]) if steady.any() else line.length
         if self._plan.ring:
             away = float(np.hypot(*(arm.pose[:2] - self._centre)))
@@ -174,7 +174,7 @@ class _Drawing:
         line = self._lines[k].cut(0.0, self._mouths[k], _STEP_M)
         side = -self._sign if inward else self._sign
         offsets = side * self._config.lane_width * np.arange(count + 1)
-        borders = [line.beside(line.station, np.full(len(line.points), offset))[:, :2] for offset in offsets]
+        borders = [line.beside(line.station, offset)[:, :2] for offset in offsets]
         return borders if inward else [border[::-1] for border in borders]
 
     def _ways(self) -> dict[Way, Curve]:
@@ -211,7 +211,7 @@ class _Drawing:
         elif self._plan.axis is not None and max(a, b) < 2 and i == j:
             line = self._plan.axis if a == 0 else self._plan.axis.reversed()
             line = line.cut(self._mouths[a], line.length - self._mouths[b], _STEP_M)
-            way = Curve(line.beside(line.station, np.full(len(line.points), -self._sign * (i + 0.5) * width)))
+            way = Curve(line.beside(line.station, -self._sign * (i + 0.5) * width))
         else:
             way = draw_route(start, goal, lambda _: True)
         if way is None or not self._road.drivable_at(way.points[:, :2]).all():

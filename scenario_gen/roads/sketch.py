@@ -38,7 +38,7 @@ class Sketch:
     def strip(self, line: Curve, right: float, left: float) -> None:
         """Add what lies between `right` and `left` metres to the left of a line (right < left)."""
         s = np.linspace(0.0, line.length, max(int(np.ceil(line.length / _STEP)), 1) + 1)
-        right_edge, left_edge = (line.beside(s, np.full(len(s), offset))[:, :2] for offset in (right, left))
+        right_edge, left_edge = (line.beside(s, offset)[:, :2] for offset in (right, left))
         if abs(line.points[-1, 2] - line.points[0, 2]) < 1e-9 and len(line.points) == 2:
             self.drivable.append(np.array([right_edge[0], right_edge[-1], left_edge[-1], left_edge[0]]))
         else:

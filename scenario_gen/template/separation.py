@@ -136,7 +136,7 @@ def _place(track: Track, shift: Floats) -> Track:
         step = 1.0 if track.still else 0.5
         curve = curve.cut(shift[0], shift[0] + max(curve.length, step), step)
     if abs(shift[1]) > 0.0:
-        beside = Curve(curve.beside(curve.station, np.full(len(curve.station), shift[1])))
+        beside = Curve(curve.beside(curve.station, shift[1]))
         progress = np.interp(progress, curve.station, beside.station)
         curve = beside
     return replace(track, curve=curve, progress=frozen(progress))

@@ -17,17 +17,7 @@ from scenario_gen.types.names import token, tokens, vehicle_index
 from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
 from scenario_gen.types.presence import ALWAYS, always, at_ends, canonical_presence, cut, mask, together
 from scenario_gen.types.qos import Quality
-from scenario_gen.types.reaction import (
-    FOLLOW,
-    LOST,
-    NOT_KEPT,
-    pair_name,
-    Reaction,
-    reaction_facts,
-    ReactionGraph,
-    YIELD,
-    yielders_of,
-)
+from scenario_gen.types.reaction import FOLLOW, lost_pairs, NOT_KEPT, Reaction, reaction_facts, ReactionGraph, YIELD, yielders_of
 from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
 from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
 from scenario_gen.types.route import Route, routes_in_words
@@ -47,14 +37,14 @@ from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 from scenario_gen.types.target import Pair, Reached, Target, UNITS
 
 __all__ = [
-    "ALWAYS", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LOST", "MIRRORED", "NARROW", "NOT_KEPT",
-    "ORACLE", "ORDERS", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates",
-    "Cause", "CheckCounts", "Coverage", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult",
-    "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality",
-    "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario", "ScenarioSet",
+    "ALWAYS", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "MIRRORED", "NARROW", "NOT_KEPT", "ORACLE",
+    "ORDERS", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause",
+    "CheckCounts", "Coverage", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult", "Interval",
+    "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality", "Reached",
+    "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario", "ScenarioSet",
     "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "Vehicle", "Verdict", "Violation", "always",
     "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut", "formatted", "height", "is_truck", "join_ego",
-    "join_pieces", "mask", "once_per_object", "pair_name", "reaction_facts", "read_numbers", "read_states", "rear_axle",
+    "join_pieces", "lost_pairs", "mask", "once_per_object", "reaction_facts", "read_numbers", "read_states", "rear_axle",
     "routes_in_words", "shifted", "split_off", "split_pieces", "together", "token", "tokens", "vehicle_index", "with_witness",
     "yielders_of",
 ]  # fmt: skip

@@ -3,7 +3,7 @@
 
 """A reaction: who answers to whom in an encounter, how late and how strongly, and how sure that is."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -15,11 +15,6 @@ DOUBTFUL = 0.5  # confidence below which an edge is called doubtful
 _FOLLOWS, _YIELDS = " follows ", " yields to "  # of names
 LOST = "reactions_lost"  # the fact of a scenario that names the pairs, "who>whom", which it is not held to
 NOT_KEPT = "on this road a reaction is not kept"  # begins the sentence of a set's adaptations that gives the figures
-
-
-def pair_name(names: Sequence[str], pair: Sequence[int]) -> str:
-    """Return how the fact LOST names a pair (who, whom) of vehicles with these names."""
-    return f"{names[pair[0]]}>{names[pair[1]]}"
 
 
 @dataclass(frozen=True)
@@ -137,5 +132,11 @@ def yielders_of(names: str, ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
 
 def reaction_facts(names: Sequence[str], kept: Sequence[Reaction], lost: Iterable[Sequence[int]]) -> dict[str, str]:
     """Return the facts that name the reactions that a scenario keeps, and the pairs (who, whom) that it is not held to."""
-    pieces = {"reactions": [edge.name(names) for edge in kept], LOST: [pair_name(names, pair) for pair in lost]}
+    pieces = {"reactions": [edge.name(names) for edge in kept], LOST: [f"{names[who]}>{names[whom]}" for who, whom in lost]}
     return {key: join_pieces(found) for key, found in pieces.items() if found}
+
+
+def lost_pairs(facts: Mapping[str, str], ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
+    """Return the pairs (who, whom) that facts say a scenario is not held to, of vehicles `ids`."""
+    pairs = [name.split(">") for name in split_pieces(facts.get(LOST, ""))]
+    return tuple((ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids)

@@ -268,7 +268,7 @@ def _placeholder(root: Element, lane: Lane, steps: int) -> None:
     """Append a problem that is solved by standing still, near the beginning of the first lane, on its run-out."""
     middle = lane.centre
     at = min(int(np.searchsorted(Curve.through(middle).station, 5.0)), len(middle) - 2)
-    yaw = float(np.arctan2(*(middle[at + 1] - middle[at])[::-1]))
+    yaw = float(lane.yaw[at])
     x, y = middle[at].tolist()
     problem = add(root, "planningProblem", id=PROBLEM)
     state = add(problem, "initialState")

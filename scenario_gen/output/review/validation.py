@@ -30,8 +30,7 @@ from scenario_gen.types import (
     Cause,
     Encounter,
     join_ego,
-    LOST,
-    pair_name,
+    lost_pairs,
     Reaction,
     Road,
     Scenario,
@@ -196,7 +195,7 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
             states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
         scenario = join_ego(scenario)
         is_lost = k in namespace.unknown and entry is None
-        kept = () if entry is None else (entry.facts.get("reactions"), entry.facts.get(LOST))
+        kept = () if entry is None else tuple(text for key, text in entry.facts.items() if key.startswith("reactions"))
         place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order, kept)
         if place not in references:
             references[place] = _reference(namespace, stamp, entry, is_lost)
@@ -228,10 +227,8 @@ def kept_reactions(encounter: Encounter, entry: ScenarioEntry | None) -> tuple[R
 def kept_gaps(encounter: Encounter, entry: ScenarioEntry | None) -> LaneGaps:
     """Return the template's gaps in a lane; zeros for the pairs that an entry says its scenario is not held to."""
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    lost = split_pieces(entry.facts.get(LOST, "")) if entry else []
-    return {
-        pair: (speed, 0.0 * gap if pair_name(names, pair) in lost else gap) for pair, (speed, gap) in lane_gaps(encounter).items()
-    }
+    lost = lost_pairs(entry.facts, names) if entry else ()
+    return {pair: (speed, 0.0 * gap if pair in lost else gap) for pair, (speed, gap) in lane_gaps(encounter).items()}
 
 
 def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:

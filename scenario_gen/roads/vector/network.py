@@ -384,11 +384,7 @@ def _cut(points: Floats, inner: int, outer: int, box: Floats) -> float:
 
 def lane_ends(network: LaneNetwork) -> tuple[Floats, Floats]:
     """Entries (E, 3) and exits (X, 3): x, y [m], yaw [rad] of the centre line at the begin or end of those lanes."""
-
-    def pose(lane: Lane, at: int, edge: int) -> list[float]:
-        step = lane.centre[edge + 1] - lane.centre[edge]
-        return [*lane.centre[at].tolist(), float(np.arctan2(step[1], step[0]))]
-
-    entries = [pose(network.lanes[k], 0, 0) for k in network.entries]
-    exits = [pose(network.lanes[k], -1, len(network.lanes[k].centre) - 2) for k in network.exits]
+    lanes = network.lanes
+    entries = [[*lanes[k].centre[0].tolist(), float(lanes[k].yaw[0])] for k in network.entries]
+    exits = [[*lanes[k].centre[-1].tolist(), float(lanes[k].yaw[-1])] for k in network.exits]
     return np.array(entries).reshape(-1, 3), np.array(exits).reshape(-1, 3)
