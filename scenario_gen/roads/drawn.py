@@ -155,9 +155,8 @@ class _Drawing:
         for side, count in ((-self._sign, arm.inward), (self._sign, arm.outward)):
             edge = side * (count * width + 1.5 * self._road.resolution)
             wider |= self._road.drivable_at(line.beside(along, edge)[:, :2])
-        steady = np.array(
-            [wider[n : n + _STEADY].all() for n in range(len(wider) - _STEADY)]
-        )  # no single cells of a slanted kerb
+        # a slanted kerb's single cells do not count
+        steady = np.array([wider[n : n + _STEADY].all() for n in range(len(wider) - _STEADY)])
         mouth = float(along[int(np.argmax(steady))]) if steady.any() else line.length
         if self._plan.ring:
             away = float(np.hypot(*(arm.pose[:2] - self._centre)))
