@@ -11,7 +11,7 @@ import typer
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.cli.options import configured, ParametersOption, remind, SetOption, takes
-from scenario_gen.cli.output import bars, Commands, give, say, status
+from scenario_gen.cli.output import bars, Commands, give, is_verbose, say, status
 
 if TYPE_CHECKING:
     from scenario_gen.types import GenerationResult
@@ -206,8 +206,8 @@ def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) ->
     from scenario_gen.output.results import BAG, FIGURES, REPORT
 
     give(report=out / REPORT, bag=out / BAG, figures=out / FIGURES, cases=[case_of(case) for case in cases], refusals=refusals)
-    say(summary(cases), wrap=True)
-    say(f"report: {out / REPORT}\nbag:    {out / BAG}")
+    say(summary(cases, verbose=is_verbose()), wrap=True)
+    say(f"report: {out / REPORT}\nbag:    {out / BAG}\nnext:   open the report; `scenario-gen drive --help` tests a planner on the bag")
     if refusals:
         raise RefusedError("part of the request could not be generated:\n" + "\n".join(refusals))
 
