@@ -55,7 +55,11 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
     """The name of a case, and below it a row for each question; what is not as recorded is yellow."""
     result, recorded = case.generated, case.encounter
     refused = ", ".join(f"{count} {words}" for words, count in causes_in_words(result.refused))
-    tried = f"{result.candidates - len(result)} of {result.candidates} candidates were refused{refused and f': {refused}'}"
+    tried = (
+        f"{result.refused.total()} of {result.candidates} candidates were refused: {refused}"
+        if refused
+        else "no candidate was refused"
+    )
     complete = len(result) >= result.requested
     table = Table.grid(padding=(0, 1))
     table.add_row("", "recording", f"{len(recorded.vehicles)} vehicles for {recorded.duration:.1f} s")
@@ -67,11 +71,14 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
         table.add_row("", "variety", varied)
     row = case.evaluation.row(WITH)
     vanished = [] if row is None else _vanished(row.values)
-    for message in (*(f"{message} (lost on this road)" for message in case.lost), *vanished, *case.lost_reactions):
-        table.add_row("", Text("not kept", style=FAILED), Text(printable(message), style=FAILED))
+    losses = case.fit.lost if case.fit else ()
+    lost = [loss.message for loss in losses if loss.kind != "arm"]
     remark = case.segmentation.remark(recorded.duration)
-    for message in (*case.route_remarks, *([remark] if remark else [])):
-        table.add_row("", Text("note", style=FAILED), Text(printable(message), style=FAILED))
+    unused = [loss.message for loss in losses if loss.kind == "arm"]
+    for message in (*lost, *vanished, *case.lost_reactions):
+        table.add_row("", Text("not kept", style=FAILED), Text(printable(message), style=FAILED))
+    for message in (*unused, *case.route_remarks, *([remark] if remark else [])):
+        table.add_row("", "note", printable(message))
     title: list[RenderableType] = [Text(printable(case.title), style="bold"), table]
     return [*title, *_details(case, row)] if verbose else title
 
