@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The demo: three encounters with a reaction, in this process and, if asked, by the ROS nodes over DDS, which must agree byte for byte."""
+"""The demo: three reactions, in this process and, if asked, by the ROS nodes over DDS, which must agree byte for byte."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager

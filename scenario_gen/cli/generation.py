@@ -207,9 +207,8 @@ def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) ->
 
     give(report=out / REPORT, bag=out / BAG, figures=out / FIGURES, cases=[case_of(case) for case in cases], refusals=refusals)
     say(summary(cases, verbose=is_verbose()), wrap=True)
-    say(
-        f"report: {out / REPORT}\nbag:    {out / BAG}\nnext:   open the report; `scenario-gen drive --help` tests a planner on the bag"
-    )
+    say(f"report: {out / REPORT}\nbag:    {out / BAG}")
+    say("next:   open the report; `scenario-gen drive --help` tests a planner on the bag")
     if refusals:
         raise RefusedError("part of the request could not be generated:\n" + "\n".join(refusals))
 

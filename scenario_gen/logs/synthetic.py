@@ -11,7 +11,7 @@ RESOURCES = Path(__file__).resolve().parents[1] / "resources"
 
 
 def bundled(case: str) -> Path:
-    """Return the path of a bundled log: the paper's "a", "b" or "c", a bag, or "left_turn", "follower" or "all_way_stop", a table.
+    """Return the path of a bundled log: the bag of a case of `CASES`, or the table of one of `DEMO`.
 
     Raises:
         ValueError: there is no such case.
