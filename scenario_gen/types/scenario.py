@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.numerics import Bools, canonical_heading, canonical_poses, Floats, freeze, frozen, Ints
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.encounter import columns_of, Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
@@ -104,24 +104,10 @@ def dataframe(scenarios: Iterable[Scenario]) -> "DataFrame":
     """Return scenarios as one table, as `Scenario.to_dataframe` does."""
     import pandas as pd
 
-    tables = []
-    for scenario in scenarios:
-        n, at = np.nonzero(scenario.there)
-        ids = np.array([vehicle.id for vehicle in scenario.vehicles], dtype=object)
-        tables.append(
-            pd.DataFrame(
-                {
-                    "scenario": scenario.index,
-                    "vehicle": ids[n],
-                    "time": scenario.time[at],
-                    "x": scenario.position[n, at, 0],
-                    "y": scenario.position[n, at, 1],
-                    "heading": scenario.heading[n, at],
-                    "speed": scenario.speed[n, at],
-                    "acceleration": scenario.acceleration[n, at],
-                }
-            )
-        )
+    tables = [
+        pd.DataFrame({"scenario": one.index} | columns_of(one) | {"acceleration": one.acceleration[one.there]})
+        for one in scenarios
+    ]
     names = ("scenario", "vehicle", "time", "x", "y", "heading", "speed", "acceleration")
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(names))
 
