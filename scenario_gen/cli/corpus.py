@@ -178,3 +178,28 @@ def library(
     give(summary=built.lines())
     say(*built.lines(), sep="\n")
     conclude(built.failed, source / "library")
+
+
+@commands.command()
+def coverage(
+    bags: Annotated[list[Path], typer.Argument(help="Bags of `generate`, of at least two recordings.")],
+    templates: Annotated[
+        list[int] | None, typer.Option(min=1, help="Recorded encounters to draw as templates. Repeatable; default: 5, 10, 20.")
+    ] = None,
+    draws: Annotated[int, typer.Option(min=1, help="Draws of templates, for the intervals.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the draws.")] = 0,
+    out: Annotated[Path, typer.Option(help="The page to write, HTML.")] = Path("coverage.html"),
+) -> None:
+    """Measure how much unseen traffic recordings and the scenarios generated from them stand for."""
+    from scenario_gen.corpus.coverage import results_of, write_coverage
+    from scenario_gen.method.evaluation.population import population_of
+
+    if out.suffix.lower() != ".html" or (out.exists() and not out.read_bytes()[:15].lower().startswith(b"<!doctype html>")):
+        raise InputError(f"--out {out}: name a new file that ends with .html")
+    results = results_of(bags)
+    found = population_of(results, templates or (5, 10, 20), draws=draws, seed=seed)
+    write_coverage(out, results, found)
+    give(population=found, page=out)
+    say(found.lead)
+    say_rows(*found.table())
+    say(*found.remarks(), f"page: {out}", sep="\n")
