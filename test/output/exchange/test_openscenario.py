@@ -156,15 +156,20 @@ def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
 
 def test_how_a_maps_lanes_are_joined_and_signed_comes_back(tmp_path):
     def lane(name, begin, end, after=(), junction=""):
-        borders = [np.linspace(begin, end, 12) + (0.0, aside) for aside in (1.75, -1.75)]
+        borders = [np.linspace(begin, end, 12) + np.array([0.0, aside]) for aside in (1.75, -1.75)]
         return Lane(name, *borders, after, speed_limit=10.0, junction=junction)
 
     lanes = (
-        lane("before", (0, 0), (50, 0), (1, 2)), lane("on", (50, 0), (80, 0), (3,), "J"), lane("off", (50, 0), (80, -20), (4,), "J"),
-        lane("after", (80, 0), (120, 0), (5, 6)), lane("aside", (80, -20), (120, -20), (7,)),
-        lane("fork left", (120, 0), (160, 4)), lane("fork right", (120, 0), (160, -4), (8,)),
-        lane("longer", (120, -20), (160, -20)), lane("at the end", (160, -4), (200, -4)),
-    )  # fmt: skip
+        lane("before", (0, 0), (50, 0), (1, 2)),
+        lane("on", (50, 0), (80, 0), (3,), "J"),
+        lane("off", (50, 0), (80, -20), (4,), "J"),
+        lane("after", (80, 0), (120, 0), (5, 6)),
+        lane("aside", (80, -20), (120, -20), (7,)),
+        lane("fork left", (120, 0), (160, 4)),
+        lane("fork right", (120, 0), (160, -4), (8,)),
+        lane("longer", (120, -20), (160, -20)),
+        lane("at the end", (160, -4), (200, -4)),
+    )
     line = np.array([[48.0, 1.75], [48.0, -1.75]])
     network = LaneNetwork("town", lanes, rules=(TrafficRule("s", RuleKind.STOP, (0,), (), line),))
     path = tmp_path / "town.xodr"
