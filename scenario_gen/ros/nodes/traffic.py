@@ -107,6 +107,8 @@ class Traffic(Node):  # type: ignore[misc]
             InputError: the bag cannot be read, or has no such vehicle or scenario; autoware_perception_msgs is not there.
         """
         config = self.config
+        if config.results:  # else the first drive's verdict would be lost
+            Path(config.results).mkdir(parents=True, exist_ok=True)
         if config.autoware:
             self._autoware = (OBJECTS, EGO)
             self._out |= {topic: create_publisher(self, topic) for topic in self._autoware}
