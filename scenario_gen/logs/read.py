@@ -35,7 +35,7 @@ from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog,
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.logs.units import remarks_on_units
 from scenario_gen.numerics import runs
-from scenario_gen.types import cut, Encounter, Vehicle
+from scenario_gen.types import cut, Encounter, tokens, Vehicle
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -261,6 +261,7 @@ def cut_encounter(
             notes.append(f"vehicle {piece.track.id} never moves and its heading is not recorded: taken as east")
             facing = np.zeros(len(facing))
         heading.append(facing)
+    tokens(member.track.id for member in members)  # refuses ids that are one name in ROS, before anything is made of them
     dt_ns = round(config.period * 1e9)
     encounter = Encounter(
         name=name,

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
 
-FACTS = ("weight", "target.", "order", "passing_order", "reactions", "search.")
+NEARNESS = {"closest_approach": "gap", "pet": "pet"}
+"""Facts that say how near vehicles come [m, s], and the figures (`UNITS`) that they are, of the most critical pair."""
+FACTS = (*NEARNESS, "weight", "target.", "order", "passing_order", "reactions", "search.")
 """How the names of a scenario's facts begin."""
 
 
@@ -44,8 +46,8 @@ class Scenario:
         present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
         witness: of a scenario with an ego slot: a trajectory of the vehicle that was left out, as a scenario of that vehicle
             alone on the same clock. Both together were proven valid, so the slot can be driven.
-        facts: what else its entry in `scenarios/info` says: `weight`, `target.…`, `order`, `passing_order`, `reactions`,
-            `search.…` (FACTS).
+        facts: what else its entry in `scenarios/info` says: `closest_approach`, `pet`, `weight`, `target.…`, `order`,
+            `passing_order`, `reactions`, `search.…` (FACTS).
     """
 
     vehicles: tuple[Vehicle, ...]
