@@ -110,7 +110,10 @@ def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic
 
 
 def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, client):
-    process = traffic(patience=0.2)
+    from rcl_interfaces.srv import SetParameters
+    from rclpy.parameter import Parameter
+
+    process = traffic(patience=60.0)
     far = np.array([1e5, 0.0, 0.0, 0.0])
     frame = hand_made_run().road.frame_id
     wrong = {
@@ -123,6 +126,8 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     for topic, data in wrong.values():
         client.say(topic, data)
         step(client)
+    short = SetParameters.Request(parameters=[Parameter("patience", value=0.1).to_parameter_msg()])
+    assert client.call(SetParameters, "/traffic/set_parameters", short).results[0].successful
     for _ in range(8):
         step(client)  # silent
     found = set()
