@@ -40,7 +40,7 @@ def test_the_player_lists_its_parameters():
 )
 def test_what_ros_cannot_read_is_one_line(words, said):
     process = start_nodes("suite" if "-r" in words else "player", "--ros-args", *words)
-    output, _ = process.communicate(60.0)
+    output, _ = process.communicate(180.0)
     (line,) = output.splitlines()
     assert process.returncode == 2 and line.startswith("error: ") and said in line and "/src/" not in line
 
