@@ -99,10 +99,12 @@ def main(goals: list[dict]) -> list[dict]:
     send(0, goals[0])
     while len(ended) < len(goals):
         rclpy.spin_once(node, timeout_sec=1.0)
-    due, spare = sum(one["published"] for one in ended), time.monotonic()
-    while time.monotonic() - max([spare, *scenarios[-1:]]) < (
-        1.0 if len(scenarios) >= due else 180.0
-    ):  # what is still on its way
+    published, all_ended = sum(one["published"] for one in ended), time.monotonic()
+
+    def silence() -> float:
+        return time.monotonic() - max([all_ended, *scenarios[-1:]])
+
+    while silence() < (1.0 if len(scenarios) >= published else 60.0):  # what is still on its way
         rclpy.spin_once(node, timeout_sec=0.05)
     first = scenarios[0] - begun if scenarios else None
     return [*ended, {"heard": len(scenarios), "first": first, "digests": digests}]
