@@ -20,7 +20,7 @@ from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
-from scenario_gen.method.fitting import LostConflictError
+from scenario_gen.method.fitting import LostEncounterError
 
 pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")
@@ -162,7 +162,7 @@ def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
 
 def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypatch):
     def lost(attempt):
-        raise LostConflictError(f"road {attempt.road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
+        raise LostEncounterError(f"road {attempt.road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
 
     monkeypatch.setattr(batches.Chain, "run", lost)
     made = run_batch(corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1))

@@ -191,6 +191,13 @@ def at_home(network: LaneNetwork, tracks: tuple[Track, ...]) -> Spot:
     return Spot(float((_field(network).squared(poses[:, :2], poses[:, 2]) * weight).sum()), 0.0, 0.0, 0.0)
 
 
+def drawn_for(network: LaneNetwork, tracks: tuple[Track, ...], frame: Floats) -> Spot:
+    """The template where its frame (3,) x, y [m], yaw [rad] lies."""
+    poses, weight = _samples(tracks)
+    turned = np.array([frame[2], frame[0], frame[1]])
+    return Spot(float(_costs(_field(network), poses, weight, np.array([[frame[0], frame[1], frame[2]]]))[0]), *turned.tolist())
+
+
 def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
     """Poses (P, 3) along all paths, and their weights (P,), whose sum is one for all vehicles alike."""
     poses, weight = [], []

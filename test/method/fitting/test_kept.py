@@ -13,7 +13,7 @@ from reaction_scenes import crossing, lane_encounter
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostConflictError
+from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostEncounterError
 from scenario_gen.method.fitting.kept import keeps_conflicts
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.nearest import suggest_nearest
@@ -44,7 +44,7 @@ def place(monkeypatch):
 def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
     place(apart(CROSSING, 120.0))
     with pytest.raises(
-        LostConflictError, match=r"vehicles 1 and 2 have crossing or merging paths .* fitting\.allow=lost_conflict"
+        LostEncounterError, match=r"vehicles 1 and 2 have crossing or merging paths .* fitting\.allow=lost_conflict"
     ):
         fit_template(CROSSING, SEGMENTATION, OPEN)
     taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"))
@@ -55,7 +55,7 @@ def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place)
     place(apart(CROSSING, 0.0))
     ends = {name: apart(CROSSING, 120.0).tracks[1].curve.points[k] for name, k in (("starts", 0), ("goals", -1))}
     request = Request(**{name: f"2: {x:.2f} {y:.2f} {yaw:.4f}" for name, (x, y, yaw) in ends.items()})
-    with pytest.raises(LostConflictError, match=r"fitting\.allow=lost_conflict"):
+    with pytest.raises(LostEncounterError, match=r"fitting\.allow=lost_conflict"):
         fit_template(CROSSING, SEGMENTATION, OPEN, request=request)
     taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"), request=request)
     assert [loss.kind for loss in taken.lost] == ["conflict"]
@@ -78,8 +78,8 @@ def test_a_lost_leader_is_said_and_not_refused(place):
 
 
 def test_the_refusal_names_roads_that_keep_it():
-    answer = suggest_nearest(LostConflictError("lost"), Chain(CROSSING, SEGMENTATION, OPEN, PipelineConfig()))
-    assert isinstance(answer, LostConflictError)
+    answer = suggest_nearest(LostEncounterError("lost"), Chain(CROSSING, SEGMENTATION, OPEN, PipelineConfig()))
+    assert isinstance(answer, LostEncounterError)
     assert re.match(r"lost\. Nearest possible: road (t_intersection|four_way)", str(answer))
 
 
