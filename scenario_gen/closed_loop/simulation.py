@@ -19,7 +19,7 @@ from scenario_gen.closed_loop.advance import advance, ego_hits
 from scenario_gen.closed_loop.certified import world_of
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.driver import Manner
-from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
+from scenario_gen.closed_loop.ego import Command, EgoState, misplaced, move, Pose
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.roads import footprint_fits
@@ -134,6 +134,16 @@ class Drive:
     accelerations: Floats
     forced: int
     faults: tuple[tuple[int, str], ...]
+
+    @property
+    def jumps(self) -> tuple[int, ...]:
+        """The instants before which the ego jumped."""
+        return tuple(step for step, fault in self.faults if misplaced(fault))
+
+    @property
+    def driven(self) -> int:
+        """How many instants there are before the first jump."""
+        return min((*self.jumps, len(self.motion.time)))
 
 
 WAITS = 1.0  # metres; a witness that drives no farther waits throughout

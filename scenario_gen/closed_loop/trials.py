@@ -28,7 +28,7 @@ from scenario_gen.closed_loop.bounded import bounded, Decisions, Timed, TooLongE
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
-from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
+from scenario_gen.closed_loop.verdict import DriveVerdict, judge
 from scenario_gen.method.evaluation import clustered_wilson
 from scenario_gen.types import GenerationResult, Interval, join_ego, Road, Scenario, token
 
@@ -61,7 +61,7 @@ class Bars(Parameters):
     collisions: float = parameter(0.0, "largest share of drives with a collision", low=0.0, high=1.0)
     off_road: float = parameter(0.0, "largest share of drives that leave the road", low=0.0, high=1.0)
     goals: float = parameter(0.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
-    at_fault: float = parameter(0.0, "largest share of drives in which the ego itself ran into another", low=0.0, high=1.0)
+    at_fault: float = parameter(0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0)
     jumps: float = parameter(0.0, "largest share of drives in which the ego jumps", low=0.0, high=1.0)
     progress: float = parameter(
         0.9, "smallest share of drives with progress: 20 % of the witness' way, as in nuPlan; who never moves has none",
@@ -213,17 +213,31 @@ def run_trials(
         InputError: the planner is not found, or fails; the message names the scenario.
     """
     outcomes: list[Outcome] = []
-    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run:
-        try:
-            for outcome in run(trials):
-                outcomes.append(outcome)
-                progress(len(outcomes), len(trials))
-        except InputError as error:
-            if not outcomes:
-                raise
-            found = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
-            raise InputError(f"{error}\nof the {len(outcomes)} drives before: {found}") from error
+    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run, saying_what_was_before(outcomes):
+        for outcome in run(trials):
+            outcomes.append(outcome)
+            progress(len(outcomes), len(trials))
     return outcomes
+
+
+@contextmanager
+def saying_what_was_before(outcomes: Sequence[Outcome]) -> Iterator[None]:
+    """Add to an InputError what the drives before it came to."""
+    try:
+        yield
+    except InputError as error:
+        if not outcomes:
+            raise
+        found = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
+        raise InputError(f"{error}\nof the {len(outcomes)} drives before: {found}") from error
+
+
+def too_long(trial: Trial, config: ClosedLoopConfig) -> InputError:
+    """Return the error of a planner that takes too long for a drive."""
+    return InputError(
+        f"scenario {trial.name}: the planner did not come to an end in {config.drive_time:g} s (drive_time): it hangs, or "
+        "needs more time for a drive"
+    )
 
 
 @contextmanager
@@ -272,10 +286,7 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
         with bounded(config.drive_time):
             drive = loop.drive(timed)
     except TooLongError as error:
-        raise InputError(
-            f"scenario {trial.name}: the planner did not come to an end in {config.drive_time:g} s (drive_time): it hangs, or "
-            "needs more time for a drive"
-        ) from error
+        raise too_long(trial, config) from error
     except InputError as error:
         raise InputError(f"scenario {trial.name}: {error}") from error
     except ScenarioGenError:
@@ -311,7 +322,7 @@ class Rate:
 
 
 def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
-    """Return how often what happened: failures of any kind, collisions, at_fault (the ego itself ran into another), and so on.
+    """Return how often what happened: failures of any kind, collisions, those by the ego's fault, and so on.
 
     Drives of one encounter are alike, so intervals are for encounters that are drawn at random; with one encounter alone they
     hold for that one, and copies of one scenario count as one.
@@ -320,7 +331,8 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
     flags = {
         "failures": [not v.passed for v in verdicts],
         "collisions": [v.collision is not None for v in verdicts],
-        "at_fault": [v.collision is not None and v.collision.ran is not Runner.OTHER for v in verdicts],
+        "at_fault": [v.at_fault for v in verdicts],
+        "at_fault_nuplan": [v.terms.no_at_fault_collision == 0.0 for v in verdicts],
         "off_road": [not math.isnan(v.off_road) for v in verdicts],
         "jumps": [v.jumps > 0 for v in verdicts],
         "goals": [not math.isnan(v.goal) for v in verdicts],

@@ -19,7 +19,7 @@ from scipy import ndimage
 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.numerics.plane import angle_between
+from scenario_gen.numerics.plane import ahead_and_left, angle_between
 from scenario_gen.template.answers import ALIKE, bumper_gaps, conflicts_in, is_behind, LANE, passing, SLOWEST
 from scenario_gen.template.interaction import Conflict, find_waits, WAIT_SPEED
 from scenario_gen.template.tracks import clean_tracks
@@ -66,10 +66,15 @@ def reactions_of(encounter: Encounter) -> ReactionGraph:
     conflicts = conflicts_in(encounter)
     passes = [found for conflict in conflicts if (found := _passes(encounter, conflict)) is not None]
     led = {edge.who: edge for edge in leaders}
-    met = {pair for one in conflicts for pair in ((one.first, one.second), (one.second, one.first))}
-    met |= {(found.who, found.whom) for found in seen}
+    met = {
+        pair
+        for one in conflicts
+        for pair in ((one.first, one.second), (one.second, one.first))
+        if _turned(encounter, (one.first, one.exit_first), (one.second, one.entry_second)) < _HEAD_ON
+    }
+    met |= {(found.who, found.whom) for found in [*seen, *(one for one in passes if one.edge)]}
     pairs = [pair for pair in permutations(range(len(encounter.vehicles)), 2) if pair not in met]
-    short = [edge for pair in pairs if (edge := _stops_short(encounter, *pair)) is not None]
+    short = [edge for pair in pairs if (edge := _gives_way(encounter, *pair)) is not None]
     best: dict[tuple[int, float], Reaction] = {}
     for edge in [*short, *(found.edge for found in passes if found.edge is not None)]:
         if not _explained(edge, led.get(edge.who), encounter):  # of several that a wait is for, the last to clear lets it go
@@ -83,7 +88,9 @@ def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
     """Say why nobody is seen to react."""
     nearest = min(seen, key=lambda found: found.apart, default=None)
     if nearest is None or nearest.apart == math.inf:
-        return "none drives behind another one in its lane, or crosses its way"
+        stand = [vehicle.id for n, vehicle in enumerate(encounter.vehicles) if np.all(encounter.speed[n] < WAIT_SPEED)]
+        standing = f"; {' and '.join(f'vehicle {name}' for name in stand)} stands throughout" if stand else ""
+        return f"none drives behind another one in its lane, or crosses its way{standing}"
     who, whom = (encounter.vehicles[n].id for n in (nearest.who, nearest.whom))
     least = math.floor(10.0 * nearest.apart) / 10.0
     return f"the nearest are vehicle {who} and vehicle {whom}, and they are never within {least:.1f} s of each other"
@@ -258,8 +265,7 @@ def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
         return None
     clears, enters = passing(encounter, conflict, merges=conflict.following)
     gap = enters - clears
-    yaw, other_yaw = (float(np.interp(at, encounter.time, encounter.heading[n])) for n, at in ((who, enters), (whom, clears)))
-    turned = abs(angle_between(yaw, other_yaw))
+    turned = _turned(encounter, (who, enters), (whom, clears))
     apart = max(gap, 0.0) if gap > -ANTICIPATES and (conflict.following or _ALONG < turned < _HEAD_ON) else math.inf
     near = _closeness(apart, PASSES)
     since, until, stands = _slow_before(encounter, who, clears, enters)
@@ -283,15 +289,28 @@ def _from_aside(encounter: Encounter, conflict: Conflict) -> bool:
     return bool(((station > 0.0) & ((np.abs(left) > LANE) | (np.abs(turned) > ALIKE))).any())
 
 
-def _stops_short(encounter: Encounter, who: int, whom: int) -> Reaction | None:
-    """The edge of one who slows down to the record's end for another that would else be in its way."""
+def _turned(encounter: Encounter, *passed: tuple[int, float]) -> float:
+    """The angle [rad] between the headings of two vehicles, each when [s] it passes."""
+    return abs(angle_between(*(float(np.interp(at, encounter.time, encounter.heading[n])) for n, at in passed)))
+
+
+def _gives_way(encounter: Encounter, who: int, whom: int) -> Reaction | None:
+    """The edge of one who slows down for another that it does not come behind: it stops before it, or lets it pass close by."""
+    between = encounter.position[whom] - encounter.position[who]
+    ahead, aside = ahead_and_left(between, encounter.heading[who])
+    both = np.flatnonzero(encounter.there[who] & encounter.there[whom])
     rows = np.flatnonzero(encounter.there[who])
-    speed, until = encounter.speed[who, rows], float(encounter.time[rows[-1]])
-    top = int(np.argmax(speed))
-    if speed[-1] > SLOWEST or speed[top] - speed[-1] < _SLOWS_BY or (need := _need(encounter, who, whom)) < SURE:
+    if len(both) == 0:
         return None
-    since = float(encounter.time[rows[top]])
-    return Reaction(YIELD, who, whom, 0.0, 1.0, _OWN_LAG, need, since, until, gap=math.inf, stands=True)
+    stops = bool(encounter.speed[who, rows[-1]] <= SLOWEST and ahead[both[-1]] > 0.0)
+    if not stops:  # until they pass each other
+        rows = rows[rows <= both[int(np.argmin(np.hypot(ahead, aside)[both]))]]
+    speed = encounter.speed[who, rows]
+    top = int(np.argmax(speed))
+    if speed[top] - speed[-1] < _SLOWS_BY or (need := _need(encounter, who, whom)) < SURE:
+        return None
+    since, until = (float(encounter.time[k]) for k in (rows[top], rows[-1]))
+    return Reaction(YIELD, who, whom, 0.0, 1.0, _OWN_LAG, need, since, until, gap=math.inf, stands=stops)
 
 
 def _slow_before(encounter: Encounter, who: int, clears: float, enters: float) -> tuple[float, float, bool]:

@@ -4,7 +4,10 @@
 """Messages of vehicles that arrive late or leave early: no phantoms, and the same scenario again."""
 
 from dataclasses import replace
+import hashlib
 import json
+from pathlib import Path
+import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -146,3 +149,24 @@ def test_tracks_in_which_a_vehicle_comes_back_are_refused():
     there[1, 10:20] = False
     with pytest.raises(InputError, match="vehicle v1 is there 2 times"):
         decode_tracks(encode(replace(heard, there=there)))
+
+
+def test_scenarios_and_entries_are_joined_as_the_documentation_says():
+    """The lines of docs/interfaces.md, with an entry that comes before its scenario, which has several messages."""
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rclpy.serialization import deserialize_message
+
+    made = scenario([(0, 40), (5, 30), (0, 40)])
+    data, asked = encode_scenario(made, 5), BoundaryStates(np.zeros((3, 4)), np.zeros((3, 4)))
+    recorded = (replace(made.vehicles[0], length=12.0), *made.vehicles[1:])
+    entry = scenario_entry(made, data, "1", "/x", template=recorded, asked=asked)
+    text = (Path(__file__).resolve().parents[2] / "docs" / "interfaces.md").read_text()
+    consumer = {"hashlib": hashlib, "json": json}
+    exec(re.search(r"```python\n(scenarios, entries = .*?)```", text, re.DOTALL)[1], consumer)
+    consumer["take_info"](deserialize_message(encode_info(entry, 5), DiagnosticArray))
+    (own,) = consumer["entries"]
+    assert json.loads(own["sizes"]) == [[4.8, 1.9]] * 3, "they are not those of the tracks"
+    for message in messages_of(data):
+        assert consumer["scenario_of"](own) is None
+        consumer["take_scenario"](message)
+    assert consumer["scenario_of"](own) == list(messages_of(data))

@@ -138,6 +138,6 @@ def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_dri
 def test_roads_without_a_template_are_of_their_kind():
     assert ring_of(build_road("roundabout"))[1] == pytest.approx(13.0, abs=0.1)
     curve = build_road("curve")
-    assert abs(np.degrees(curve.exits[1, 2] - curve.entries[0, 2])) == pytest.approx(20.0, abs=1.0)
+    assert abs(np.degrees(curve.exits[0, 2] - curve.entries[0, 2])) == pytest.approx(20.0, abs=1.0)
     merge = build_road("merge")
     assert len(merge.entries) == 3 and len(merge.exits) == 2

@@ -104,6 +104,8 @@ def test_goals_wait_for_the_inputs_and_their_place_and_one_that_does_not_wait_is
 def test_what_is_wrong_is_said_with_its_code_and_what_is_at_work_or_waits_is_cancelled(environment, suite):
     wrong = [{"parameters": values} for values in ({"cout": 3}, {"count": 0}, {"request": "1 2"}, {"goals": "1: 9999 0 0 5"})]
     many = {"parameters": {"count": 100_000}}
+    hasty, *_ = ask(environment, *[many | {"cancel": [0, 0, []]}] * 6)  # before, while and after their work begins
+    assert [(one["status"], one["code"]) for one in hasty] == [(CANCELED, Code.CANCELLED)] * 6
     goals = [*[many | {"cancel": [1, 0, [GpSampler.THREADS]]}] * GpSampler.THREADS, many | {"cancel": [0, 1, []]}, *wrong]
     answers, heard, _ = ask(environment, *goals, {"parameters": {"count": 3, "seed": 9}})
     (*running, waiting), refused, last = answers[: GpSampler.THREADS + 1], answers[GpSampler.THREADS + 1 : -1], answers[-1]

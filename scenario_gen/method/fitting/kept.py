@@ -157,7 +157,7 @@ def _differs(own: float, there: float, farthest: float) -> bool:
 
 
 def _aside(track: Track, other: Track, end: int) -> float:
-    """How far [m, left positive] another vehicle starts (`end` 0) or ends (1) beside a path that leads there; NaN if it does not."""
+    """How far [m, left positive] beside a path another vehicle starts (`end` 0) or ends (1); NaN if it does not lead there."""
     pose = other.curve.at(other.progress[other.present[end]])
     station, offset = track.curve.project(pose[None, :2])
     beyond = max(-float(station[0]), float(station[0]) - track.travelled)

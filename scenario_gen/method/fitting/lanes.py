@@ -71,11 +71,12 @@ def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
         RefusedError: it does.
     """
     ways = list(ways_through(road).values()) or [Curve.through(lane.centre) for lane in _lanes_of(road).lanes]
-    possible = [float(angle) for way in ways for angle in (way.points[:, 2].min(), way.points[:, 2].max()) - way.points[0, 2]]
+    yaws = [way.points[:, 2] for way in ways]
+    left = max(float((yaw - np.minimum.accumulate(yaw)).max()) for yaw in yaws)
+    right = max(float((np.maximum.accumulate(yaw) - yaw).max()) for yaw in yaws)
     for track in tracks:
-        turn = turn_of(track)
-        if not min(possible) - MOST_CHANGE <= turn <= max(possible) + MOST_CHANGE:
-            raise RefusedError(f"vehicle {track.vehicle.id} {in_words(turn)}: road {road.name} has no way for that")
+        if not -right - MOST_CHANGE <= turn_of(track) <= left + MOST_CHANGE:
+            raise RefusedError(f"vehicle {track.vehicle.id} {in_words(turn_of(track))}: road {road.name} has no way for that")
 
 
 def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> float:

@@ -162,7 +162,7 @@ def middle(points: Floats) -> Curve:
     return Curve.through(even[index[:, None] + np.clip(offset, -room, room)].mean(axis=1))
 
 
-def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.0) -> Match:
+def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.0, ends: Sequence[tuple[str, str]] = ()) -> Match:
     """Give every vehicle its course near a placement of the template as one piece.
 
     Args:
@@ -170,10 +170,11 @@ def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.
         tracks: the template.
         spot: where it lies.
         scale: s of eq 9, of the distances driven.
+        ends: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be; (): any for all.
     """
     courses = []
-    for track in tracks:
-        course = _course(chains, track, spot, scale)
+    for track, (first, last) in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
+        course = _course(chains, track, _placed(track, spot), scale, first, last)
         if course is None:
             return Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
         courses.append(course)
@@ -187,12 +188,13 @@ def _placed(track: Track, spot: Spot) -> Floats:
     return np.column_stack((spot.moved(poses[:, :2]), poses[:, 2] + spot.yaw))
 
 
-def _course(chains: Chains, track: Track, spot: Spot, scale: float) -> Course | None:
-    """The chain of lanes that resembles a vehicle's path most."""
-    poses = _placed(track, spot)
+def _course(chains: Chains, track: Track, poses: Floats, scale: float, enters: str, leaves: str) -> Course | None:
+    """The chain of lanes that resembles a vehicle's path (K, 3) most, of those that come and go by lanes that are named."""
+    lanes, exits = chains.network.lanes, {k for k, lane in enumerate(chains.network.lanes) if not leaves or lane.id == leaves}
+    firsts = [k for k, lane in enumerate(lanes) if lane.id == enters] or chains.near(poses[0])
     driven = scale * track.travelled
     tried: dict[tuple[int, ...], tuple[float, Curve, Floats]] = {}
-    candidates = (chain for first in chains.near(poses[0]) for chain in chains.from_lane(first, driven))
+    candidates = (chain for first in firsts for chain in chains.from_lane(first, driven) if exits.intersection(chain))
     for chain in dict.fromkeys(islice(candidates, _MOST_TRIED)):
         curve = _around(chains.curve(chain), poses, driven)
         misses = _misses(curve, poses)
@@ -322,7 +324,7 @@ def _starts_to_stop(network: LaneNetwork, course: Course, track: Track, scale: f
 
 
 def _start_to_turn(course: Course, track: Track) -> float | None:
-    """The begin [m] nearest to a course's own from which it turns as the vehicle does, where it does not anyway, if there is one."""
+    """The begin [m] nearest to a course's own from which it turns as the vehicle does; None if it does anyway, or from none."""
     if abs(turned_more(course, track)) < _OTHERWISE:
         return None
     driven = float(course.progress[-1])

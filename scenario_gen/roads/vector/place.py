@@ -15,7 +15,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import at_home, crossing_spots, drawn_for, find_spots
+from scenario_gen.roads.vector.search import crossing_spots, find_spots, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
 from scenario_gen.types import LaneNetwork, once_per_object, Scenario
@@ -60,7 +60,7 @@ def placements(
         NoPlaceError: there is none; says what stands against the template where it was recorded, else where it came farthest.
     """
     chains = chains_of(network)
-    home = at_home(network, tracks)
+    home = spot_at(network, tracks, np.zeros(3))
     judged = _Judged(network, tracks)
     failures: list[tuple[bool, bool, float, str]] = []
     if lanes is None and home.cost <= _HOME:
@@ -69,7 +69,8 @@ def placements(
         if not broken:
             yield own, 1.0
         failures += [(False, False, own.cost, f"where it was recorded, {broken}")] if broken else []
-    sized = None if network.template is None else drawn_for(network, tracks, network.template)
+    drawn_for = network.drawn_for
+    sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
     spots = [] if sized is None else [sized]
     spots += find_spots(network, tracks, lanes)[:_SPOTS]
     spots += crossing_spots(network, tracks)[:_SPOTS] if lanes is None else []
@@ -79,7 +80,8 @@ def placements(
         matches = list(streets) if scale == 1.0 else []
         for spot in spots:
             stop_if_cancelled()
-            placement = match(chains, tracks, spot, scale)
+            ends = drawn_for.lanes if drawn_for is not None and spot is sized else ()
+            placement = match(chains, tracks, spot, scale, ends)
             far = placement.cost > _WORST and spot is not sized
             if placement.reason or far:
                 failures.append((True, True, placement.cost, placement.reason or "vehicles would be too far from where they are"))

@@ -149,7 +149,7 @@ def test_margins_are_zero_or_less_in_failures_alone(bag):
         for outcome in outcomes:
             response, verdict = Objective.parsed(text).response(outcome), outcome.verdict
             failed = {
-                "at_fault": verdict.collision is not None and verdict.collision.ran.value != "other",
+                "at_fault": verdict.at_fault,
                 "collision": verdict.collision is not None,
                 "off_road": not math.isnan(verdict.off_road),
                 "goal": math.isnan(verdict.goal),

@@ -12,6 +12,7 @@ from reaction_scenes import answering, crossing, lane_encounter, wander
 
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.method.chain import Chain
+from scenario_gen.method.evaluation.measures import figures_of
 from scenario_gen.method.sampling import kept_reactions, Plan, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.joint import advance, lateness, Mixing
@@ -94,8 +95,12 @@ def test_what_is_published_answers_as_the_template_does(case):
     (edge,) = made.generated.reactions
     named = "2 follows 1" if edge.kind == FOLLOW else "2 yields to 1"
     assert {scenario.facts["reactions"] for scenario in made.generated.scenarios} == {named}
-    assert free.generated.reactions == () and free.generated.scenarios[0].facts == {}
+    assert free.generated.reactions == () and "reactions" not in free.generated.scenarios[0].facts
     assert len(made.generated.scenarios) == 40
+    for scenario in made.generated.scenarios[:3]:
+        (figures,) = figures_of(scenario)
+        assert float(scenario.facts["closest_approach"]) == pytest.approx(figures.gap, abs=5e-4)
+        assert float(scenario.facts.get("pet", "nan")) == pytest.approx(figures.pet, abs=5e-4, nan_ok=True)
     if edge.kind == FOLLOW:
         seen, before = (following(edge, encounter, one.generated.scenarios) for one in (made, free))
         assert seen.slope > 0.75 > before.slope
