@@ -17,7 +17,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.builtin import junction_centre
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import Arm, draw_plan, Driven, Plan
+from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLACK
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route
@@ -94,7 +94,8 @@ def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> R
     Raises:
         RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
     """
-    directions = _directions(name, tracks, junction_centre(tracks))
+    centre = junction_centre(tracks)
+    directions = _directions(name, tracks, centre)
     longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
     turn = np.pi - longest.yaw  # the longest arm leads west
     lane_of: dict[tuple[int, bool], tuple[int, int]] = {}  # arm and lane of each end
@@ -117,7 +118,8 @@ def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> R
             way = draw_route(*ends, lambda _: True, sharpness_of(track))
             if way is not None:
                 driven.append(Driven((a, first, b, last), way, track.vehicle.length, track.vehicle.width + 2.0 * _SWEPT))
-    return draw_plan(Plan(arms, driven=driven), name, config)
+    aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
+    return draw_plan(Plan(arms, driven=driven, drawn_for=aim), name, config)
 
 
 def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -129,6 +131,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     radius, fastest, length, wide = _RING[0], 0.0, 5.0, 2.0
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
+    centre = np.zeros(2)
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
@@ -158,7 +161,9 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         way = draw_ring_route(*ends, np.zeros(2), radius, lambda _: True)
         if way is not None:
             driven.append(Driven((a, 0, b, 0), way, length, wide + 2.0 * _SWEPT))
-    return draw_plan(Plan(arms, driven=driven, ring=radius), name, config)
+    lane_of = {end.key: (a, 0) for a, direction in enumerate(directions) for end in direction.members}
+    aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
+    return draw_plan(Plan(arms, driven=driven, ring=radius, drawn_for=aim), name, config)
 
 
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float]:

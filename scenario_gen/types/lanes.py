@@ -109,6 +109,22 @@ class TrafficRule:
 
 
 @dataclass(frozen=True, eq=False)
+class DrawnFor:
+    """How a road was drawn for a template.
+
+    Attributes:
+        frame: (3,) x, y [m], yaw [rad] on the road of the origin of the template's frame.
+        lanes: of each vehicle the lanes by which it comes and goes, -1 where any may be.
+    """
+
+    frame: Floats
+    lanes: tuple[tuple[int, int], ...]
+
+    def __post_init__(self) -> None:
+        freeze(self, frame=frozen(self.frame))
+
+
+@dataclass(frozen=True, eq=False)
 class LaneNetwork:
     """The lanes of a road that cars may use, those of a map or of a part of it; in metres in the road's own frame.
 
@@ -119,6 +135,7 @@ class LaneNetwork:
         rules: its signs, lights and rights of way.
         rules_kept: whether scenarios keep to the rules.
         drawn: whether it was drawn with its road: it is shown and exported, and nobody is held to it.
+        drawn_for: how it was drawn for a template; None: for none, or without a place for it.
     """
 
     name: str
@@ -127,6 +144,7 @@ class LaneNetwork:
     rules: tuple[TrafficRule, ...] = ()
     rules_kept: bool = True
     drawn: bool = False
+    drawn_for: DrawnFor | None = None
 
     def __post_init__(self) -> None:
         count = len(self.lanes)
