@@ -7,6 +7,7 @@ Each arm has its dividing line and lanes where the recorded vehicles were, to th
 with the template's own curvature, is swept into the road, so there is room for it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -21,8 +22,8 @@ from scenario_gen.roads.drawn import Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLACK
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route
-from scenario_gen.template import clean_tracks, sharpness_of, Track, turn_of
-from scenario_gen.types import Encounter, Road
+from scenario_gen.template import clean_tracks, reactions_of, sharpness_of, Track, turn_of
+from scenario_gen.types import Encounter, Road, YIELD
 
 _RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
 _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
@@ -83,17 +84,18 @@ class _Direction:
         return max([end.away + tracks[end.vehicle].vehicle.length / 2.0 for end in self.members], default=0.0)
 
 
-def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Road:
+def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
     """Draw a junction whose arms are where the template comes and goes.
 
     Args:
         name: `t_intersection` or `four_way`.
-        tracks: the template's.
+        encounter: the template.
         config: how it is drawn.
 
     Raises:
         RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
     """
+    tracks = clean_tracks(encounter)
     directions = _directions(name, tracks, junction_centre(tracks))
     longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
     turn = np.pi - longest.yaw  # the longest arm leads west
@@ -117,7 +119,23 @@ def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> R
             way = draw_route(*ends, lambda _: True, sharpness_of(track))
             if way is not None:
                 driven.append(Driven((a, first, b, last), way, track.vehicle.length, track.vehicle.width + 2.0 * _SWEPT))
-    return draw_plan(Plan(arms, driven=driven), name, config)
+    came_by = {vehicle: arm for (vehicle, inward), (arm, _) in lane_of.items() if inward}
+    return draw_plan(Plan(arms, driven=driven, yielding=_yielding_arms(encounter, came_by, config)), name, config)
+
+
+def _yielding_arms(encounter: Encounter | None, came_by: Mapping[int, int], config: RoadConfig) -> set[int]:
+    """Return the arms of those who yield to others of other arms, but for those to whom somebody yields.
+
+    Args:
+        encounter: the template, None if there is none.
+        came_by: the arm by which a vehicle comes, by its index.
+        config: whether priorities are shown.
+    """
+    if encounter is None or config.priority != "auto":
+        return set()
+    edges = [edge for edge in reactions_of(encounter).edges if edge.kind == YIELD and {edge.who, edge.whom} <= came_by.keys()]
+    pairs = [(came_by[edge.who], came_by[edge.whom]) for edge in edges if came_by[edge.who] != came_by[edge.whom]]
+    return {arm for arm, _ in pairs} - {arm for _, arm in pairs}
 
 
 def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -158,7 +176,9 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         way = draw_ring_route(*ends, np.zeros(2), radius, lambda _: True)
         if way is not None:
             driven.append(Driven((a, 0, b, 0), way, length, wide + 2.0 * _SWEPT))
-    return draw_plan(Plan(arms, driven=driven, ring=radius), name, config)
+    came_by = {end.vehicle: k for k, direction in enumerate(directions) for end in direction.members if end.inward}
+    yielding = set(range(len(arms))) - set(came_by.values()) | _yielding_arms(encounter, came_by, config)
+    return draw_plan(Plan(arms, driven=driven, ring=radius, yielding=yielding), name, config)
 
 
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float]:

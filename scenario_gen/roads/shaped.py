@@ -17,8 +17,8 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, ROOM, SHORTEST, SIDE_ARMS, SLACK
 from scenario_gen.roads.ways import draw_route, extended
-from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, sharpness_of, to_frenet, Track
-from scenario_gen.types import Encounter, Road
+from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, reactions_of, sharpness_of, to_frenet, Track
+from scenario_gen.types import Encounter, Road, YIELD
 
 _RAMP_ANGLE = np.radians(12.0)
 _BEND = np.radians(20.0)  # of a curve whose template does not bend
@@ -69,7 +69,7 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it,
             or the template needs a junction.
     """
-    lanes, before, after, sharpness = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 0.02
+    lanes, before, after, sharpness, yields = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 0.02, True
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
@@ -82,6 +82,7 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         join = float(np.median([along * frenet.station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
         before, after = join - low, high - join
         sharpness = max(sharpness_of(tracks[i]) for i in who)
+        yields = any(edge.kind == YIELD and edge.who in who for edge in reactions_of(encounter).edges)
     reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after)]
     width = config.lane_width
     side = -1.0 if config.traffic_side == "right" else 1.0  # of the dividing line on which the traffic to the east drives
@@ -92,7 +93,8 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
     axis = Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]]))
     way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), lambda _: True, sharpness)
     driven = () if way is None else (Driven((2, 0, 1, lanes - 1), way, 1.0, width),)
-    return draw_plan(Plan([*arms, Arm.ramp(ramp, config)], axis, driven), name, config)
+    plan = Plan([*arms, Arm.ramp(ramp, config)], axis, driven, yielding=(2,) if yields else ())
+    return draw_plan(plan, name, config)
 
 
 def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:

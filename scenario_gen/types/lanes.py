@@ -50,10 +50,6 @@ class Lane:
         if not (np.isfinite(self.left).all() and np.isfinite(self.right).all()):
             raise InputError(f"lane {self.id}: a border is not finite")
 
-    def moved(self, by: Floats) -> "Lane":
-        """The same lane (2,) [m] farther."""
-        return replace(self, left=self.left + by, right=self.right + by)
-
     @cached_property
     def centre(self) -> Floats:
         """(M, 2) metres, the middle of each cross-section."""
@@ -136,6 +132,12 @@ class LaneNetwork:
         for lane in self.lanes:
             if any(not 0 <= k < count for k in (*lane.successors, *lane.beside)):
                 raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")
+
+    def moved(self, by: Floats) -> "LaneNetwork":
+        """The same lanes (2,) [m] farther."""
+        lanes = (replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.lanes)
+        rules = (replace(rule, line=rule.line + by) for rule in self.rules)
+        return replace(self, lanes=tuple(lanes), rules=tuple(rules))
 
     @cached_property
     def predecessors(self) -> tuple[tuple[int, ...], ...]:
