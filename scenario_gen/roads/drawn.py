@@ -18,12 +18,13 @@ from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import angle_between, unit, unit_left
+from scenario_gen.numerics.plane import angle_between, place, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.pavement import drivable_beside, Inside, inside, paved, ring, strip, swept
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.roads.ways import draw_route, reverse
-from scenario_gen.types import Lane, LaneNetwork, Road, RuleKind, TrafficRule
+from scenario_gen.template import Track
+from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road, RuleKind, TrafficRule
 
 Way = tuple[int, int, int, int]
 """Arm and lane that a way comes from, arm and lane that it leads to; lanes count from the dividing line."""
@@ -97,6 +98,7 @@ class Plan:
         driven: ways through the junction.
         ring: radius [m] of the lane of a roundabout about the origin; 0: it is none.
         yielding: the arms that give way, if priorities are shown.
+        drawn_for: where the template that it is drawn for lies, about the same origin.
     """
 
     arms: Sequence[Arm]
@@ -104,6 +106,30 @@ class Plan:
     driven: Sequence[Driven] = ()
     ring: float = 0.0
     yielding: Collection[int] = ()
+    drawn_for: DrawnFor | None = None
+
+
+def lane_id(arm: int, lane: int, *, inward: bool) -> str:
+    """The id of lane `lane`, counted from the dividing line, of an arm."""
+    return f"{arm + 1}.{-lane - 1 if inward else lane + 1}"
+
+
+def aligned(
+    tracks: Sequence[Track], lane_of: Mapping[tuple[int, bool], tuple[int, int]], pose: Floats, at: Floats
+) -> DrawnFor | None:
+    """Where the template of a road lies of which a pose (3,) in its own frame is one on the road; None without a template.
+
+    Args:
+        tracks: the template's.
+        lane_of: arm and lane of the ends of its tracks, as far as they are known, by vehicle and whether it comes in.
+        pose: x, y [m], yaw [rad] in the template's frame.
+        at: the same on the road, about the plan's origin.
+    """
+    turn = at[2] - pose[2]
+    ids = {key: lane_id(*place, inward=key[1]) for key, place in lane_of.items()}
+    lanes = tuple((ids.get((i, True), ""), ids.get((i, False), "")) for i in range(len(tracks)))
+    moved = place(np.array([*at[:2], turn]), -pose[0], -pose[1])
+    return DrawnFor(np.array([*moved, turn]), lanes) if tracks else None
 
 
 def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = None) -> Road:
@@ -120,7 +146,14 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
     """
     drawing = _Drawing(plan, config)
     lanes, surface = drawing.drawn()
-    network = LaneNetwork(name, lanes, rules=tuple(drawing.rules(lanes)), rules_kept=config.traffic_rules == "kept", drawn=True)
+    network = LaneNetwork(
+        name,
+        lanes,
+        rules=tuple(drawing.rules(lanes)),
+        rules_kept=config.traffic_rules == "kept",
+        drawn=True,
+        drawn_for=plan.drawn_for,
+    )
     if box is None:
         box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
         box[0] = np.floor(box[0])
@@ -167,7 +200,7 @@ class _Drawing:
                     left, right = (inner, outer) if self._sign > 0.0 else (outer, inner)
                     beside = tuple(first + other for other in (n - 1, n + 1) if 0 <= other < count)
                     index[k, inward, n] = len(lanes)
-                    lanes.append(Lane(f"{k + 1}.{-n - 1 if inward else n + 1}", left, right, (), beside))
+                    lanes.append(Lane(lane_id(k, n, inward=inward), left, right, (), beside))
         if not self._joined:
             return tuple(lanes), self._surface
         ways = [(index[a, True, i], index[b, False, j], way) for (a, i, b, j), way in self._ways().items()]

@@ -18,7 +18,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.builtin import junction_centre
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import Arm, draw_plan, Driven, Plan
+from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLACK
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route
@@ -96,7 +96,8 @@ def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
         RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
     """
     tracks = clean_tracks(encounter)
-    directions = _directions(name, tracks, junction_centre(tracks))
+    centre = junction_centre(tracks)
+    directions = _directions(name, tracks, centre)
     longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
     turn = np.pi - longest.yaw  # the longest arm leads west
     lane_of: dict[tuple[int, bool], tuple[int, int]] = {}  # arm and lane of each end
@@ -119,23 +120,24 @@ def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
             way = draw_route(*ends, lambda _: True, sharpness_of(track))
             if way is not None:
                 driven.append(Driven((a, first, b, last), way, track.vehicle.length, track.vehicle.width + 2.0 * _SWEPT))
-    came_by = {vehicle: arm for (vehicle, inward), (arm, _) in lane_of.items() if inward}
-    return draw_plan(Plan(arms, driven=driven, yielding=_yielding_arms(encounter, came_by, config)), name, config)
+    aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
+    yielding = _yielding_arms(encounter, lane_of, config)
+    return draw_plan(Plan(arms, driven=driven, yielding=yielding, drawn_for=aim), name, config)
 
 
-def _yielding_arms(encounter: Encounter | None, came_by: Mapping[int, int], config: RoadConfig) -> set[int]:
+def _yielding_arms(encounter: Encounter, lane_of: Mapping[tuple[int, bool], tuple[int, int]], config: RoadConfig) -> set[int]:
     """Return the arms of those who yield to others of other arms, but for those to whom somebody yields.
 
     Args:
-        encounter: the template, None if there is none.
-        came_by: the arm by which a vehicle comes, by its index.
+        encounter: the template.
+        lane_of: arm and lane of the ends of its tracks, by vehicle and whether it comes in.
         config: whether priorities are shown.
     """
-    if encounter is None or config.priority != "auto":
-        return set()
-    edges = [edge for edge in reactions_of(encounter).edges if edge.kind == YIELD and {edge.who, edge.whom} <= came_by.keys()]
-    pairs = [(came_by[edge.who], came_by[edge.whom]) for edge in edges if came_by[edge.who] != came_by[edge.whom]]
-    return {arm for arm, _ in pairs} - {arm for _, arm in pairs}
+    came_by = {vehicle: arm for (vehicle, inward), (arm, _) in lane_of.items() if inward}
+    edges = reactions_of(encounter).edges if config.priority == "auto" else ()
+    ways = [(came_by[e.who], came_by[e.whom]) for e in edges if e.kind == YIELD and {e.who, e.whom} <= came_by.keys()]
+    pairs = [(arm, other) for arm, other in ways if arm != other]
+    return {arm for arm, _ in pairs} - {other for _, other in pairs}
 
 
 def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -147,11 +149,12 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     radius, fastest, length, wide = _RING[0], 0.0, 5.0, 2.0
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
+    centre = np.zeros(2)
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
-        centre, driven = _ring_driven(tracks, config)
-        radius, fastest = _ring(tracks, centre, driven)
+        centre, recorded = _ring_driven(tracks, config)
+        radius, fastest = _ring(tracks, centre, recorded)
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
     if fastest > np.sqrt(_RING_FASTEST * radius):
@@ -176,9 +179,11 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         way = draw_ring_route(*ends, np.zeros(2), radius, lambda _: True)
         if way is not None:
             driven.append(Driven((a, 0, b, 0), way, length, wide + 2.0 * _SWEPT))
-    came_by = {end.vehicle: k for k, direction in enumerate(directions) for end in direction.members if end.inward}
-    yielding = set(range(len(arms))) - set(came_by.values()) | _yielding_arms(encounter, came_by, config)
-    return draw_plan(Plan(arms, driven=driven, ring=radius, yielding=yielding), name, config)
+    lane_of = {end.key: (a, 0) for a, direction in enumerate(directions) for end in direction.members}
+    aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
+    yielding = set(range(len(arms))) - {arm for (_, inward), (arm, _) in lane_of.items() if inward}
+    yielding |= set() if encounter is None else _yielding_arms(encounter, lane_of, config)
+    return draw_plan(Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim), name, config)
 
 
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float]:
