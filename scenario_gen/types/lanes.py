@@ -50,10 +50,6 @@ class Lane:
         if not (np.isfinite(self.left).all() and np.isfinite(self.right).all()):
             raise InputError(f"lane {self.id}: a border is not finite")
 
-    def moved(self, by: Floats) -> "Lane":
-        """The same lane (2,) [m] farther."""
-        return replace(self, left=self.left + by, right=self.right + by)
-
     @cached_property
     def centre(self) -> Floats:
         """(M, 2) metres, the middle of each cross-section."""
@@ -113,12 +109,12 @@ class DrawnFor:
     """How a road was drawn for a template.
 
     Attributes:
-        frame: (3,) x, y [m], yaw [rad] on the road of the origin of the template's frame.
-        lanes: of each vehicle the lanes by which it comes and goes, -1 where any may be.
+        frame: (3,) x, y [m], yaw [rad] on the road of the template's own frame.
+        lanes: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be.
     """
 
     frame: Floats
-    lanes: tuple[tuple[int, int], ...]
+    lanes: tuple[tuple[str, str], ...]
 
     def __post_init__(self) -> None:
         freeze(self, frame=frozen(self.frame))
@@ -154,6 +150,13 @@ class LaneNetwork:
         for lane in self.lanes:
             if any(not 0 <= k < count for k in (*lane.successors, *lane.beside)):
                 raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")
+
+    def moved(self, by: Floats) -> "LaneNetwork":
+        """The same lanes (2,) [m] farther."""
+        lanes = (replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.lanes)
+        rules = (replace(rule, line=rule.line + by) for rule in self.rules)
+        aim = self.drawn_for and replace(self.drawn_for, frame=self.drawn_for.frame + np.array([*by, 0.0]))
+        return replace(self, lanes=tuple(lanes), rules=tuple(rules), drawn_for=aim)
 
     @cached_property
     def predecessors(self) -> tuple[tuple[int, ...], ...]:
