@@ -60,7 +60,7 @@ class Bars(Parameters):
 
     collisions: float = parameter(0.0, "largest share of drives with a collision", low=0.0, high=1.0)
     off_road: float = parameter(0.0, "largest share of drives that leave the road", low=0.0, high=1.0)
-    goals: float = parameter(0.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
+    goals: float = parameter(1.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
     at_fault: float = parameter(0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0)
     jumps: float = parameter(0.0, "largest share of drives in which the ego jumps", low=0.0, high=1.0)
     progress: float = parameter(

@@ -29,13 +29,6 @@ def table(path, change=lambda rows: rows):
     return path
 
 
-def test_a_log_that_once_broke_a_reader_is_refused_in_a_line(run, crashes):
-    for name in ("spmd_grid_memoryerror_22GiB.csv", "table_ms_as_s_slow.csv", "table_grid_memoryerror_596GiB.parquet"):
-        code, said = run("generate", crashes / name, "--road", "straight")
-        assert code == 2 and "Traceback" not in said
-        assert name in "".join(said.split()), said
-
-
 def test_generate_leaves_bag_report_and_figures_and_is_reproducible(ran, made, tmp_path):
     code, said, err = ran("generate", LOG, *QUICK, "--seed", 7, "--out", "out", "--json")
     answer = json.loads(said, parse_constant=pytest.fail)

@@ -28,7 +28,7 @@ from scenario_gen.method.fitting import LostEncounterError
 pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")
 REQUEST, TEMPLATES = BatchRequest(count=3, seed=5), 3
-PATIENCE = 120.0  # seconds in which a process is at work
+PATIENCE = 300.0  # seconds in which a process is at work
 interruptible = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell may have it ignored
 
 

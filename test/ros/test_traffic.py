@@ -111,7 +111,10 @@ def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic
 
 
 def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, client):
-    process = traffic(patience=0.2)
+    from rcl_interfaces.srv import SetParameters
+    from rclpy.parameter import Parameter
+
+    process = traffic(patience=60.0)
     far = np.array([1e5, 0.0, 0.0, 0.0])
     frame = hand_made_run().road.frame_id
     wrong = {
@@ -127,6 +130,8 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     for data in (encode_twist(1.0, 0.0), encode_twist(2.0, 0.0)):
         client.say("ego/cmd_vel", data)
     client.until(lambda: any("2 replies to one state" in status.message for status in client.statuses()), "a second reply")
+    short = SetParameters.Request(parameters=[Parameter("patience", value=0.1).to_parameter_msg()])
+    assert client.call(SetParameters, "/traffic/set_parameters", short).results[0].successful
     for _ in range(9):
         step(client)  # silent
     found = set()
