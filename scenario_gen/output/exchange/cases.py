@@ -73,6 +73,7 @@ class Case:
         scenarios: those asked for.
         lane_map: of the road; the same whichever scenarios are asked for.
         other_lanes: derived ones, where those are of a vector map.
+        origin: of the frame, as of `LaneNetwork`.
     """
 
     number: int
@@ -82,6 +83,7 @@ class Case:
     scenarios: tuple[Exported, ...]
     lane_map: LaneMap
     other_lanes: LaneMap | None = None
+    origin: tuple[float, ...] = ()
 
     @property
     def strips(self) -> LaneMap:
@@ -204,4 +206,5 @@ def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, in
         scenarios=tuple(exported for exported in group.scenarios if not indices or exported.index in indices),
         lane_map=lane_map_of(road, everybody, width, export.run_out),
         other_lanes=derived_lanes(everybody, road, width, export.run_out) if road and road.map_lanes else None,
+        origin=road.lanes.origin if road and road.lanes else (),
     )
