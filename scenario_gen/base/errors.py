@@ -11,7 +11,7 @@ from importlib.util import find_spec
 import sys
 
 LONGEST = 500  # characters of a message about an input: what is quoted from a broken file may be of any length
-LONGEST_REFUSAL = 2_000  # characters of a refusal, which may join the reasons of several
+LONGEST_REFUSAL = 2_000  # characters of a refusal, which may join several reasons
 JOIN, MOST_PARTS = "; ", 3  # of a message; so many from its beginning, and from its end, are kept
 ROOM = "; make room there, or name a place on another disk"
 
@@ -111,10 +111,15 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
+def shown_error(error: Exception) -> str:
+    """Return the message of an error as it is printed; of one of many lines, say a refusal each, every line is presentable."""
+    return "\n".join(presentable(line, LONGEST_REFUSAL) for line in str(error).split("\n"))
+
+
 def print_error(error: ScenarioGenError | OSError) -> int:
     """Print the error on standard error; return the exit code."""
     own = of_system(error) if isinstance(error, OSError) else error
-    print(f"error: {presentable(str(own), LONGEST_REFUSAL)}", file=sys.stderr)
+    print(f"error: {shown_error(own)}", file=sys.stderr)
     return own.exit_code
 
 

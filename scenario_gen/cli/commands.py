@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from scenario_gen.base.errors import did_you_mean, InputError, of_system, presentable, ScenarioGenError
+from scenario_gen.base.errors import did_you_mean, InputError, of_system, ScenarioGenError, shown_error
 from scenario_gen.cli import bags, corpus, generation, output, testing
 
 app = typer.Typer(
@@ -156,7 +156,7 @@ def fail(error: ScenarioGenError) -> NoReturn:
     from scenario_gen.base.terminal import Terminal
 
     with suppress(OSError):
-        Terminal(stderr=True).print(Text("error:", style="bold red"), presentable(str(error)), soft_wrap=True)
+        Terminal(stderr=True).print(Text("error:", style="bold red"), shown_error(error), soft_wrap=True)
     try:
         sys.stdout.flush()
     except OSError:  # the disk is full or the reader has gone: what is left to print is dropped

@@ -18,7 +18,7 @@ import webbrowser
 import typer
 from typer.core import TyperGroup
 
-from scenario_gen.base.errors import InputError, LONGEST_REFUSAL, presentable, printable, ScenarioGenError
+from scenario_gen.base.errors import InputError, printable, ScenarioGenError, shown_error
 from scenario_gen.base.stores import renamed
 from scenario_gen.cli import places
 
@@ -57,7 +57,7 @@ class Program(TyperGroup):
             ended["exit_code"] = end.exit_code
             raise
         except (ScenarioGenError, OSError) as error:
-            ended |= {"exit_code": getattr(error, "exit_code", 2), "error": presentable(str(error), LONGEST_REFUSAL)}
+            ended |= {"exit_code": getattr(error, "exit_code", 2), "error": shown_error(error)}
             raise
         except Exception:  # a wrong option, which the caller reports
             _current.as_json = False

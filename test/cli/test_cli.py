@@ -114,5 +114,5 @@ def test_a_road_with_no_way_through_is_refused(run, tmp_path):
     (tmp_path / "walled.yaml").write_text(yaml.safe_dump(facts))
     code, printed = run("generate", table(tmp_path / "log.csv"), "--road", tmp_path / "walled.yaml", "--out", "out")
     assert code == 2
-    assert "walled" in printed and "does not fit" in printed
+    assert "walled" in printed and "is larger than the map" in printed
     assert not (tmp_path / "out").exists()
