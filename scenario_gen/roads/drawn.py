@@ -8,7 +8,7 @@ the template drives is the one that the road was drawn for, another one the clot
 wider than a lane, as far as the road is.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
@@ -18,12 +18,13 @@ from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import angle_between, unit, unit_left
+from scenario_gen.numerics.plane import angle_between, place, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.pavement import drivable_beside, Inside, inside, paved, ring, strip, swept
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.roads.ways import draw_route, reverse
-from scenario_gen.types import Lane, LaneNetwork, Road
+from scenario_gen.template import Track
+from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road, RuleKind, TrafficRule
 
 Way = tuple[int, int, int, int]
 """Arm and lane that a way comes from, arm and lane that it leads to; lanes count from the dividing line."""
@@ -96,12 +97,39 @@ class Plan:
         axis: the dividing line from the end of the first arm to that of the second; None: these are arms as the others.
         driven: ways through the junction.
         ring: radius [m] of the lane of a roundabout about the origin; 0: it is none.
+        yielding: the arms that give way, if priorities are shown.
+        drawn_for: where the template that it is drawn for lies, about the same origin.
     """
 
     arms: Sequence[Arm]
     axis: Curve | None = None
     driven: Sequence[Driven] = ()
     ring: float = 0.0
+    yielding: Collection[int] = ()
+    drawn_for: DrawnFor | None = None
+
+
+def lane_id(arm: int, lane: int, *, inward: bool) -> str:
+    """The id of lane `lane`, counted from the dividing line, of an arm."""
+    return f"{arm + 1}.{-lane - 1 if inward else lane + 1}"
+
+
+def aligned(
+    tracks: Sequence[Track], lane_of: Mapping[tuple[int, bool], tuple[int, int]], pose: Floats, at: Floats
+) -> DrawnFor | None:
+    """Where the template of a road lies of which a pose (3,) in its own frame is one on the road; None without a template.
+
+    Args:
+        tracks: the template's.
+        lane_of: arm and lane of the ends of its tracks, as far as they are known, by vehicle and whether it comes in.
+        pose: x, y [m], yaw [rad] in the template's frame.
+        at: the same on the road, about the plan's origin.
+    """
+    turn = at[2] - pose[2]
+    ids = {key: lane_id(*place, inward=key[1]) for key, place in lane_of.items()}
+    lanes = tuple((ids.get((i, True), ""), ids.get((i, False), "")) for i in range(len(tracks)))
+    moved = place(np.array([*at[:2], turn]), -pose[0], -pose[1])
+    return DrawnFor(np.array([*moved, turn]), lanes) if tracks else None
 
 
 def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = None) -> Road:
@@ -116,17 +144,24 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
     Raises:
         RefusedError: it has more cells than are allowed.
     """
-    lanes, surface = _Drawing(plan, config).drawn()
+    drawing = _Drawing(plan, config)
+    lanes, surface = drawing.drawn()
+    network = LaneNetwork(
+        name,
+        lanes,
+        rules=tuple(drawing.rules(lanes)),
+        rules_kept=config.traffic_rules == "kept",
+        drawn=True,
+        drawn_for=plan.drawn_for,
+    )
     if box is None:
         box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
         box[0] = np.floor(box[0])
     low = box[0]
-    return draw_lanes(
-        [lane.moved(-low) for lane in lanes], shapely.transform(surface, lambda xy: xy - low), name, config, box - low
-    )
+    return draw_lanes(network.moved(-low), shapely.transform(surface, lambda points: points - low), config, box - low)
 
 
-def draw_lanes(lanes: Sequence[Lane], surface: BaseGeometry, name: str, config: RoadConfig, box: Floats | None = None) -> Road:
+def draw_lanes(network: LaneNetwork, surface: BaseGeometry, config: RoadConfig, box: Floats | None = None) -> Road:
     """Return the road of lanes and of what is paved about them, in metres; `box` of its grid, or all and a verge.
 
     Raises:
@@ -135,7 +170,7 @@ def draw_lanes(lanes: Sequence[Lane], surface: BaseGeometry, name: str, config: 
     if box is None:
         box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
     whole = surface.buffer(_KERB_M, join_style="mitre")
-    return road_of(LaneNetwork(name, tuple(lanes), drawn=True), box, config, whole)
+    return road_of(network, box, config, whole)
 
 
 class _Drawing:
@@ -165,7 +200,7 @@ class _Drawing:
                     left, right = (inner, outer) if self._sign > 0.0 else (outer, inner)
                     beside = tuple(first + other for other in (n - 1, n + 1) if 0 <= other < count)
                     index[k, inward, n] = len(lanes)
-                    lanes.append(Lane(f"{k + 1}.{-n - 1 if inward else n + 1}", left, right, (), beside))
+                    lanes.append(Lane(lane_id(k, n, inward=inward), left, right, (), beside))
         if not self._joined:
             return tuple(lanes), self._surface
         ways = [(index[a, True, i], index[b, False, j], way) for (a, i, b, j), way in self._ways().items()]
@@ -181,6 +216,23 @@ class _Drawing:
         return tuple(
             replace(lane, successors=tuple(after.get(k, lane.successors))) for k, lane in enumerate(lanes)
         ), self._surface
+
+    def rules(self, lanes: Sequence[Lane]) -> Iterator[TrafficRule]:
+        """What signs say at the mouths of arms: to stop, or to give way to the other arms, and to who is on the ring."""
+        arms = range(len(self._plan.arms)) if self._joined and self._config.priority != "none" else ()
+        mouths = [k for k, lane in enumerate(lanes) if not lane.junction]
+        into = [[k for k in mouths if lanes[k].id.startswith(f"{arm + 1}.-")] for arm in arms]
+        stop = self._config.priority == "all_way_stop" and not self._plan.ring and all(arm.outward for arm in self._plan.arms)
+        for arm in arms:
+            if not into[arm] or not (stop or arm in self._plan.yielding):
+                continue
+            over = [k for other in arms if other != arm and other not in self._plan.yielding for k in into[other]]
+            if self._plan.ring:
+                over = [k for k, lane in enumerate(lanes) if lane.junction and not lane.id.startswith(f"{arm + 1}.")]
+            ends = [edge for k in into[arm] for edge in (lanes[k].left[-1], lanes[k].right[-1])]
+            line = np.stack((ends[0], ends[-1]) if self._sign > 0.0 else (ends[1], ends[-2]))
+            kind = RuleKind.STOP if stop else RuleKind.GIVE_WAY
+            yield TrafficRule(f"arm {arm + 1}", kind, tuple(into[arm]), () if stop else tuple(over), line)
 
     def _pieces(self) -> Iterator[BaseGeometry]:
         """What is paved for certain: the arms, the ring, and where a vehicle drives through the junction."""
