@@ -8,7 +8,7 @@ points. `text` is a JSON object: `name`, `notes`, and of every lane its `id`, th
 `beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Where the map has traffic rules there are also
 `rules`, of each its `id`, `kind`, `lanes`, `over` (places in the list of lanes) and `line` (points of the stop line), and
 `rules_kept`. Lanes that were drawn with a built-in road have `drawn` true, and those that were drawn for a template `drawn_for`:
-the `frame` of the template (x, y [m], yaw [rad] on the road) and of every vehicle the ids of the `lanes` by which it comes and goes.
+the `frame` of the template (x, y [m], yaw [rad] on the road) and of every vehicle the ids of its first and last of the `lanes`.
 Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. QoS: reliable, transient_local, depth 1.
 """
 

@@ -336,7 +336,7 @@ class _Drawing:
             own = way.beside(way.station, sign * (self._width / 2.0 + wider))[:, :2]
             edges.append(own + (1.0 - share) * (ends[0] - own[0]) + share * (ends[1] - own[-1]))
             edges[-1][[0, -1]] = ends
-        return Lane(f"{start.id}>{goal.id}", *edges, junction="1")
+        return Lane(f"{start.id}>{goal.id}", edges[0], edges[1], junction="1")
 
 
 def ways_through(road: Road) -> dict[tuple[int, int], Curve]:
