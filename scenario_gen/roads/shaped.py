@@ -95,7 +95,7 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
     joined = np.array([0.0, side * (lanes - 0.5) * width])
     ramp = np.array([*(joined + reach[0] * unit(yaw)), yaw + np.pi])
     axis = Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]]))
-    way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), lambda _: True, sharpness)
+    way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), sharpness=sharpness)
     driven = () if way is None else (Driven((2, 0, 1, lanes - 1), way, 1.0, width),)
     lane_of = {(i, inward): (2, 0) if inward else (1, lanes - 1) for i in who for inward in (True, False)}
     aim = aligned(tracks, lane_of, joins, np.array([*joined, 0.0]))
