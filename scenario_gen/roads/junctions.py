@@ -218,9 +218,10 @@ def _ring(tracks: tuple[Track, ...], centre: Floats, least: float) -> tuple[floa
     speed = np.concatenate([track.speed[own] for track, own in zip(tracks, there, strict=True)])
     place = np.concatenate([track.poses[own, :2] for track, own in zip(tracks, there, strict=True)])
     away = np.hypot(*(place - centre).T)
+    lateral = _RING_FASTEST if least > _RING[0] else _RING_LATERAL  # a ring that was recorded is drawn as it was
     for radius in np.append(np.arange(max(least, _RING[0]), _RING[1], 0.25), _RING[1]):
         fastest = float(speed[away < radius + _NEAR_RING].max(initial=0.0))
-        if np.square(fastest) <= _RING_LATERAL * radius:
+        if np.square(fastest) <= lateral * radius:
             break
     return float(radius), fastest
 

@@ -18,7 +18,7 @@ from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.fitting.requested import refuse_impossible, refuse_misfits
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.numerics import Floats
-from scenario_gen.template import clean_tracks
+from scenario_gen.template import clean_tracks, refuse_reversing
 from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation
 
 _AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
@@ -53,6 +53,7 @@ def fit_template(
         RefusedError: it does not fit, or a requested state cannot be had; the message says why, with figures.
         InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
     """
+    refuse_reversing(encounter)
     request.ego_of(encounter)  # no such vehicle: refused before anything is placed
     if request.moves:
         return _fit_request(encounter, segmentation, road, config, request, max_speed)

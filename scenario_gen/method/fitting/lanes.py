@@ -20,6 +20,7 @@ from scenario_gen.template import in_words, MOST_CHANGE, to_frenet, Track, turn_
 from scenario_gen.types import LaneNetwork, Road
 
 _END_ROOM = 1.0  # metres kept between a footprint and the end of the road
+_ASTRAY = 0.3  # metres that a footprint may be from room on the best place
 _TRIED, _MORE = 12, 40  # placements that are looked at cell by cell; where something is lost on all of these, more
 
 
@@ -48,16 +49,16 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         placement = Placement.of(tracks_on(match, laid), scale * shortened, notes, map(_manoeuvre, match.courses))
         try:
             placement = separated(placement, config, sideways=0.0, own=own)
-            max_repair(placement.tracks, road, config.max_move)
+            astray = max_repair(placement.tracks, road, config.max_move) > _ASTRAY
         except RefusedError as error:
             reason = reason or str(error)
             continue
         lost = find_losses(tracks, placement.tracks)
-        count = len(refused_losses(lost, config.allow))
-        if best is None or count < best[0]:
+        lacks = len(refused_losses(lost, config.allow)), astray
+        if best is None or lacks < best[0]:
             unused = find_unused(road, (k for course in match.courses for k in course.lanes))
-            best = count, replace(placement, unused=unused)
-        if count == 0:
+            best = lacks, replace(placement, unused=unused)
+        if not any(lacks):
             break
     if best is None:
         raise RefusedError(f"the template does not fit the lanes of road {road.name}: {reason}")
@@ -65,11 +66,13 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
 
 
 def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
-    """Refuse a template of which a vehicle turns as no way of a drawn road does.
+    """Refuse a template of which a vehicle turns as no way of a drawn road does, or that needs a junction where that has none.
 
     Raises:
         RefusedError: it does.
     """
+    if not any(lane.junction for lane in _lanes_of(road).lanes):
+        to_frenet(tracks)
     ways = list(ways_through(road).values()) or [Curve.through(lane.centre) for lane in _lanes_of(road).lanes]
     yaws = [way.points[:, 2] for way in ways]
     left = max(float((yaw - np.minimum.accumulate(yaw)).max()) for yaw in yaws)
