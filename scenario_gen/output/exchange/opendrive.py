@@ -129,7 +129,7 @@ class _Network:
 
     def __init__(self, lane_map: LaneMap) -> None:
         network = lane_map.network
-        strips = lane_map.strips if network.drawn else [((k,), ()) for k in range(len(network.lanes))]
+        strips = lane_map.strips
         self.strips = [_Strip.of(lane_map, *strip) for strip in strips]
         self.places = {
             k: _Place(n, side, m, k in strips[n][0])
