@@ -135,8 +135,8 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
-        centre, driven = _ring_driven(tracks, config)
-        radius, fastest = _ring(tracks, centre, driven)
+        centre, recorded = _ring_driven(tracks, config)
+        radius, fastest = _ring(tracks, centre, recorded)
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
     if fastest > np.sqrt(_RING_FASTEST * radius):

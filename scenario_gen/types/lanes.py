@@ -113,12 +113,12 @@ class DrawnFor:
     """How a road was drawn for a template.
 
     Attributes:
-        frame: (3,) x, y [m], yaw [rad] on the road of the origin of the template's frame.
-        lanes: of each vehicle the lanes by which it comes and goes, -1 where any may be.
+        frame: (3,) x, y [m], yaw [rad] on the road of the template's own frame.
+        lanes: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be.
     """
 
     frame: Floats
-    lanes: tuple[tuple[int, int], ...]
+    lanes: tuple[tuple[str, str], ...]
 
     def __post_init__(self) -> None:
         freeze(self, frame=frozen(self.frame))
