@@ -16,7 +16,7 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import Arm, draw_lanes, draw_plan, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
-from scenario_gen.types import Encounter, Road
+from scenario_gen.types import Encounter, LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells
@@ -162,4 +162,4 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
         )
         for name, names in shared.items()
     ]
-    return draw_lanes(lanes, paved(surface, 0.0), name, config)
+    return draw_lanes(LaneNetwork(name, tuple(lanes), drawn=True), paved(surface, 0.0), config)

@@ -8,7 +8,7 @@ the template drives is the one that the road was drawn for, another one the clot
 wider than a lane, as far as the road is.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
@@ -24,7 +24,7 @@ from scenario_gen.roads.pavement import drivable_beside, Inside, inside, paved, 
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.roads.ways import draw_route, reverse
 from scenario_gen.template import Track
-from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road
+from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road, RuleKind, TrafficRule
 
 Way = tuple[int, int, int, int]
 """Arm and lane that a way comes from, arm and lane that it leads to; lanes count from the dividing line."""
@@ -97,6 +97,7 @@ class Plan:
         axis: the dividing line from the end of the first arm to that of the second; None: these are arms as the others.
         driven: ways through the junction.
         ring: radius [m] of the lane of a roundabout about the origin; 0: it is none.
+        yielding: the arms that give way, if priorities are shown.
         drawn_for: where the template that it is drawn for lies, about the same origin.
     """
 
@@ -104,6 +105,7 @@ class Plan:
     axis: Curve | None = None
     driven: Sequence[Driven] = ()
     ring: float = 0.0
+    yielding: Collection[int] = ()
     drawn_for: DrawnFor | None = None
 
 
@@ -142,21 +144,24 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
     Raises:
         RefusedError: it has more cells than are allowed.
     """
-    lanes, surface = _Drawing(plan, config).drawn()
+    drawing = _Drawing(plan, config)
+    lanes, surface = drawing.drawn()
+    network = LaneNetwork(
+        name,
+        lanes,
+        rules=tuple(drawing.rules(lanes)),
+        rules_kept=config.traffic_rules == "kept",
+        drawn=True,
+        drawn_for=plan.drawn_for,
+    )
     if box is None:
         box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
         box[0] = np.floor(box[0])
     low = box[0]
-    road = draw_lanes(
-        [lane.moved(-low) for lane in lanes], shapely.transform(surface, lambda xy: xy - low), name, config, box - low
-    )
-    if plan.drawn_for is None or road.lanes is None:
-        return road
-    drawn_for = replace(plan.drawn_for, frame=plan.drawn_for.frame - np.array([*low, 0.0]))
-    return replace(road, lanes=replace(road.lanes, drawn_for=drawn_for))
+    return draw_lanes(network.moved(-low), shapely.transform(surface, lambda points: points - low), config, box - low)
 
 
-def draw_lanes(lanes: Sequence[Lane], surface: BaseGeometry, name: str, config: RoadConfig, box: Floats | None = None) -> Road:
+def draw_lanes(network: LaneNetwork, surface: BaseGeometry, config: RoadConfig, box: Floats | None = None) -> Road:
     """Return the road of lanes and of what is paved about them, in metres; `box` of its grid, or all and a verge.
 
     Raises:
@@ -165,7 +170,7 @@ def draw_lanes(lanes: Sequence[Lane], surface: BaseGeometry, name: str, config: 
     if box is None:
         box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
     whole = surface.buffer(_KERB_M, join_style="mitre")
-    return road_of(LaneNetwork(name, tuple(lanes), drawn=True), box, config, whole)
+    return road_of(network, box, config, whole)
 
 
 class _Drawing:
@@ -211,6 +216,23 @@ class _Drawing:
         return tuple(
             replace(lane, successors=tuple(after.get(k, lane.successors))) for k, lane in enumerate(lanes)
         ), self._surface
+
+    def rules(self, lanes: Sequence[Lane]) -> Iterator[TrafficRule]:
+        """What signs say at the mouths of arms: to stop, or to give way to the other arms, and to who is on the ring."""
+        arms = range(len(self._plan.arms)) if self._joined and self._config.priority != "none" else ()
+        mouths = [k for k, lane in enumerate(lanes) if not lane.junction]
+        into = [[k for k in mouths if lanes[k].id.startswith(f"{arm + 1}.-")] for arm in arms]
+        stop = self._config.priority == "all_way_stop" and not self._plan.ring and all(arm.outward for arm in self._plan.arms)
+        for arm in arms:
+            if not into[arm] or not (stop or arm in self._plan.yielding):
+                continue
+            over = [k for other in arms if other != arm and other not in self._plan.yielding for k in into[other]]
+            if self._plan.ring:
+                over = [k for k, lane in enumerate(lanes) if lane.junction and not lane.id.startswith(f"{arm + 1}.")]
+            ends = [edge for k in into[arm] for edge in (lanes[k].left[-1], lanes[k].right[-1])]
+            line = np.stack((ends[0], ends[-1]) if self._sign > 0.0 else (ends[1], ends[-2]))
+            kind = RuleKind.STOP if stop else RuleKind.GIVE_WAY
+            yield TrafficRule(f"arm {arm + 1}", kind, tuple(into[arm]), () if stop else tuple(over), line)
 
     def _pieces(self) -> Iterator[BaseGeometry]:
         """What is paved for certain: the arms, the ring, and where a vehicle drives through the junction."""

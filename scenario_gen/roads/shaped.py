@@ -17,8 +17,8 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, ROOM, SHORTEST, SIDE_ARMS, SLACK
 from scenario_gen.roads.ways import draw_route, extended
-from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, sharpness_of, to_frenet, Track
-from scenario_gen.types import Encounter, Road
+from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, reactions_of, sharpness_of, to_frenet, Track
+from scenario_gen.types import Encounter, Road, YIELD
 
 _RAMP_ANGLE = np.radians(12.0)
 _BEND = np.radians(20.0)  # of a curve whose template does not bend
@@ -69,7 +69,7 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it,
             or the template needs a junction.
     """
-    lanes, before, after, sharpness = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 0.02
+    lanes, before, after, sharpness, yields = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 0.02, True
     tracks: tuple[Track, ...] = ()
     who, joins = list[int](), np.zeros(3)  # where the template's vehicles join, heading as they do
     if encounter is not None:
@@ -84,6 +84,7 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         join = float(np.median([along * frenet.station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
         before, after = join - low, high - join
         sharpness = max(sharpness_of(tracks[i]) for i in who)
+        yields = any(edge.kind == YIELD and edge.who in who for edge in reactions_of(encounter).edges)
         joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
         joins[2] += 0.0 if along > 0.0 else np.pi
     reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after)]
@@ -98,7 +99,8 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
     driven = () if way is None else (Driven((2, 0, 1, lanes - 1), way, 1.0, width),)
     lane_of = {(i, inward): (2, 0) if inward else (1, lanes - 1) for i in who for inward in (True, False)}
     aim = aligned(tracks, lane_of, joins, np.array([*joined, 0.0]))
-    return draw_plan(Plan([*arms, Arm.ramp(ramp, config)], axis, driven, drawn_for=aim), name, config)
+    plan = Plan([*arms, Arm.ramp(ramp, config)], axis, driven, yielding=(2,) if yields else (), drawn_for=aim)
+    return draw_plan(plan, name, config)
 
 
 def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:

@@ -38,6 +38,7 @@ _APART, _MARGIN = 0.5, 1.0  # m and s by which a footprint is kept away from ano
 _LOOKS = 0.5, 0.2  # s, between the instants at which a driver looks ahead, and between those that it sees
 _SMOOTH = 1.0  # s
 _SIGNIFICANT = 2.6  # standard errors of a correlation, the best of some lags
+_DRIVERS_LAG, _PERFECT = (1.2, 0.6), 0.999  # s, mean and standard deviation of followers' lags; greatest correlation
 _STEADY = 0.3  # m/s, spread of a leader's speed below which no gain can be seen
 _GAINS = 0.3, 1.0
 _OWN = 0.05, 0.15  # of the gap, least and greatest own residual of a follower
@@ -217,29 +218,28 @@ def _smoothed(speed: Floats, dt: float) -> Floats:
 
 
 def _best_lag(own: Floats, other: Floats, behind: Bools, dt: float) -> tuple[float, float]:
-    """Lag [s] at which the other's acceleration (T,) explains the own best, and the share of variance that it explains.
+    """Lag [s] at which the other's acceleration (T,) explains the own most likely, and the share of variance that it explains.
 
-    0 where the correlation could be that of two that know nothing of each other: its standard error is Bartlett's, of two series
-    with the autocorrelations that these have.
+    How likely a lag is, is how likely the correlation is there, and how likely a driver has it. The share is 0 where the greatest
+    correlation could be that of two that know nothing of each other: its standard error is Bartlett's, of two series with the
+    autocorrelations that these have.
     """
-    best = 0.0, _STANDARD_LAG
-    error = 1.0
+    pairs = []
     for steps in range(max(round(LAGS[0] / dt), 1), round(LAGS[1] / dt) + 1):
         rows = np.flatnonzero(behind[steps:]) + steps
         if len(rows) * dt < LONG_ENOUGH:
             break
         a, b = own[rows] - own[rows].mean(), other[rows - steps] - other[rows - steps].mean()
         size = float(np.sqrt(np.square(a).mean() * np.square(b).mean()))
-        correlation = float((a * b).mean()) / size if size > 1e-4 else 0.0
-        if correlation > best[0]:
-            best, error = (correlation, steps * dt), _standard_error(a, b)
-    explained, lag = best
-    if explained <= _SIGNIFICANT * error:
-        return _STANDARD_LAG, 0.0
-    return lag, explained * explained
-
-
-_STANDARD_LAG = 1.2  # s, of a follower whose record does not show it
+        pairs.append((steps * dt, float((a * b).mean()) / size if size > 1e-4 else 0.0, a, b))
+    _, greatest, a, b = max(pairs, key=lambda pair: pair[1], default=(0.0, 0.0, own, other))
+    if greatest <= 0.0:
+        return _DRIVERS_LAG[0], 0.0
+    error = _standard_error(a, b)
+    lag, correlation = np.array([pair[:2] for pair in pairs]).T
+    explained = np.square(np.clip(correlation, 0.0, _PERFECT))
+    likely = -0.5 * np.log1p(-explained) / (error * error) - 0.5 * np.square((lag - _DRIVERS_LAG[0]) / _DRIVERS_LAG[1])
+    return float(lag[int(np.argmax(likely))]), greatest * greatest if greatest > _SIGNIFICANT * error else 0.0
 
 
 def _standard_error(a: Floats, b: Floats) -> float:

@@ -22,6 +22,7 @@ from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
 from scenario_gen.closed_loop.ego import Pose
 from scenario_gen.closed_loop.results import as_junit
+from scenario_gen.closed_loop.trials import read_trials
 
 PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
 
@@ -42,6 +43,11 @@ def test_a_bag_is_driven_and_the_bars_decide_the_exit_code(bag, tmp_path):
         assert told.exit_code == (0 if reached else 1) and ("bars not kept: goals" in told.output) != reached, told.output
         assert len(said["drives"]) == 2 and said["parameters"]["overtime"] == 1.0
         assert (tmp_path / "out" / "junit.xml").is_file() and (tmp_path / "out" / "drives.html").is_file()
+
+
+def test_scenarios_on_one_road_share_it(bag):
+    roads = {id(trial.road) for trial in read_trials(bag)}
+    assert len(read_trials(bag)) > len(roads) == 1
 
 
 class Still:

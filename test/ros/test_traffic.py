@@ -183,9 +183,11 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
         other.destroy_node()
     ahead = (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     stale = encode(VELOCITY_STAMPED, stamp=FIRST_STAMP, frame_id="base_link", twist=ahead)  # of the drive's begin
-    said = {"over": False}
-    while not said["over"]:
+    for _ in range(12):
         client.say("ego/cmd_vel_stamped", stale)
+        said = step(client)
+    while not said["over"]:
+        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
         said = step(client)
     values = decode_diagnostics(client.wait("verdicts")[-1])[1][0].values
     faults = str(values["first_faults"])
