@@ -239,7 +239,7 @@ def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int]
         where = ", ".join(f"junction {name}" for name in names if name) or f"lane {first.id}"
         yield Place(frozen(box), where, placement.cost, paths)
     if not found:
-        raise NoPlaceError(f"the template fits no place on map {network.name}: {recorded}{reason}")
+        raise NoPlaceError(f"the template fits no place on map {network.name}: {reason}")
 
 
 def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> tuple[Floats, str]:
