@@ -215,17 +215,31 @@ def run_trials(
         InputError: the planner is not found, or fails; the message names the scenario.
     """
     outcomes: list[Outcome] = []
-    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run:
-        try:
-            for outcome in run(trials):
-                outcomes.append(outcome)
-                progress(len(outcomes), len(trials))
-        except InputError as error:
-            if not outcomes:
-                raise
-            found = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
-            raise InputError(f"{error}\nof the {len(outcomes)} drives before: {found}") from error
+    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run, saying_what_was_before(outcomes):
+        for outcome in run(trials):
+            outcomes.append(outcome)
+            progress(len(outcomes), len(trials))
     return outcomes
+
+
+@contextmanager
+def saying_what_was_before(outcomes: Sequence[Outcome]) -> Iterator[None]:
+    """Add to an InputError what the drives before it came to."""
+    try:
+        yield
+    except InputError as error:
+        if not outcomes:
+            raise
+        found = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
+        raise InputError(f"{error}\nof the {len(outcomes)} drives before: {found}") from error
+
+
+def too_long(trial: Trial, config: ClosedLoopConfig) -> InputError:
+    """Return the error of a planner that takes too long for a drive."""
+    return InputError(
+        f"scenario {trial.name}: the planner did not come to an end in {config.drive_time:g} s (drive_time): it hangs, or "
+        "needs more time for a drive"
+    )
 
 
 @contextmanager
@@ -289,10 +303,7 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
         with bounded(config.drive_time):
             drive = loop.drive(timed)
     except TooLongError as error:
-        raise InputError(
-            f"scenario {trial.name}: the planner did not come to an end in {config.drive_time:g} s (drive_time): it hangs, or "
-            "needs more time for a drive"
-        ) from error
+        raise too_long(trial, config) from error
     except InputError as error:
         raise InputError(f"scenario {trial.name}: {error}") from error
     except ScenarioGenError:

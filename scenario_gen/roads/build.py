@@ -148,7 +148,7 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings: a junction's template
         if name in ("t_intersection", "four_way") and not any(track.makes_u_turn for track in tracks):
-            return draw_junction(name, tracks, config)
+            return draw_junction(name, encounter, config)
     else:
         main = main_line(frenet, tracks)
         if bends(name, main):

@@ -133,8 +133,8 @@ def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, w
 
 def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
     Hangs.drives = 0
-    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 1 s") as caught:
-        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=1", "overtime=1"])
+    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 5 s") as caught:
+        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=5", "overtime=1"])
         drive_bag(request, tmp_path / "out", run=in_processes(1))
     assert "of the 1 drives before: failures 1, collisions" in str(caught.value) and not (tmp_path / "out").exists()
 

@@ -268,7 +268,7 @@ def _page(result: SearchResult, request: SearchRequest) -> str:
     outcomes, trials = [one.outcome for one in ordered], [one.trial for one in ordered]
     return render_page(
         "search.html.j2",
-        ("scene.js", "drives.js"),
+        ("scene.js", "drives.js", "tables.js"),
         drawings(outcomes, trials, range(len(ordered))),
         planner=request.planner,
         objective=str(request.objective),

@@ -359,12 +359,22 @@ def _searched_poses(
         except BudgetSpentError:
             error = RefusedError(
                 f"no drivable route for vehicle {vehicle.id} on road {task.road.name!r} {where}: none with a curvature of at "
-                f"most {limit:.3f} 1/m was found in {patience * config.iterations} iterations; planning.iterations allows more"
+                f"most {limit:.3f} 1/m was found in {patience * config.iterations} iterations{_off_road(task)}"
             )
         except BlockedError as reason:  # of the larger footprint: the anchors themselves have room
             error = RefusedError(f"{task.name(a if reason.end == 'start' else b)} is blocked: {reason}")
     assert error is not None
     raise error
+
+
+def _off_road(task: _Task) -> str:
+    """Where the fitted path of a vehicle leaves the road; what to do where it does not."""
+    path = task.fitted.path
+    off = path[~footprint_fits(task.road, path, task.vehicle.length, task.vehicle.width)]
+    if not len(off):
+        return "; planning.iterations allows more"
+    x, y = off[len(off) // 2, :2]
+    return f"; where the template was placed its footprint leaves the road, at {x:.2f}, {y:.2f} m: no search mends that"
 
 
 def _sides(config: PlanningConfig, against: float, away: float) -> tuple[float, float]:

@@ -22,7 +22,6 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.output.exchange.osi import write_osi
@@ -70,12 +69,10 @@ class ExportFormat:
         closing: files about all scenarios, by name: of the first file and the `content` of each.
         takes_map: whether `ExportConfig.map` is written in place of lanes.
         maps: endings of the names of such maps.
-        own_lanes: whether the lanes of a vector map are written; if not, ones derived from the scenarios are in their place.
     """
 
     write: Callable[[Path, Case, Exported, ExportConfig], Written]
     shared: Callable[[Case, ExportConfig], Mapping[str, bytes]] = _nothing_shared
-    own_lanes: bool = False
     takes_map: bool = False
     maps: tuple[str, ...] = MAPS
     closing: Callable[[Sequence[tuple[str, Any]]], Mapping[str, bytes]] = _nothing_at_the_end
@@ -117,7 +114,7 @@ def export_bag(
     with replaced_folder(out, EXPORTED, [bag]) as folder:
         for case in cases:
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
-            notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, to, export)}")
+            notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, export)}")
             for name, data in to.shared(case, export).items():
                 (folder / name).write_bytes(data)
             for exported in case.scenarios:
@@ -128,7 +125,7 @@ def export_bag(
                     notes.append(f"{about}: left out: {error}")
                     continue
                 notes += [f"{about}, scenario {exported.index}: {sentence}" for sentence in written.notes]
-                entries.append(_entry(case, exported, written.names, to, export))
+                entries.append(_entry(case, exported, written.names, export))
                 contents.append((written.names[0], written.content))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
@@ -155,24 +152,19 @@ def _format(target: str, road: str) -> ExportFormat:
     return to
 
 
-def _lanes(case: Case, to: ExportFormat) -> LaneMap:
-    """Return the lanes that a format is given."""
-    return case.lane_map if to.own_lanes else case.strips
-
-
-def _origin(case: Case, to: ExportFormat, export: ExportConfig) -> str:
+def _origin(case: Case, export: ExportConfig) -> str:
     if export.map:
         return "; ".join((f"the lanes of {Path(export.map).name}", *read_network(Path(export.map)).notes))
-    return _lanes(case, to).origin
+    return case.lane_map.origin
 
 
-def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFormat, export: ExportConfig) -> dict[str, object]:
+def _entry(case: Case, exported: Exported, names: tuple[str, ...], export: ExportConfig) -> dict[str, object]:
     """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
     return {
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
-        "lanes": "derived" if _lanes(case, to).derived and not export.map else "true",
+        "lanes": "derived" if case.lane_map.derived and not export.map else "true",
         "index": exported.index,
         "seed": exported.seed,
         "sha256": exported.sha256,
@@ -222,7 +214,7 @@ def _roads(case: Case, export: ExportConfig) -> Mapping[str, bytes]:
     if export.map:
         refuse_other_map(case, Path(export.map))
         return {_road_file(case, export): Path(export.map).read_bytes()}
-    return {_road_file(case, export): write_opendrive(case.strips, case.road_name, case.start_ns)}
+    return {_road_file(case, export): write_opendrive(case.lane_map, case.road_name, case.start_ns)}
 
 
 def refuse_other_map(case: Case, path: Path) -> None:
@@ -245,11 +237,11 @@ def refuse_other_map(case: Case, path: Path) -> None:
 EXPORTS = Registry[ExportFormat](
     "scenario_gen.exports",
     {
-        "commonroad": ExportFormat(_to_commonroad, own_lanes=True),
+        "commonroad": ExportFormat(_to_commonroad),
         "openscenario": ExportFormat(_to_openscenario, _roads, takes_map=True),
         "osi": ExportFormat(_to_osi, _roads, takes_map=True, maps=(".xodr",)),
         "autoware": ExportFormat(_to_autoware),
-        "scenarionet": ExportFormat(_to_scenarionet, own_lanes=True, closing=dataset_files),
+        "scenarionet": ExportFormat(_to_scenarionet, closing=dataset_files),
     },
     ExportFormat,
 )

@@ -3,7 +3,6 @@
 
 """Where on a map a template goes: all ways of laying it on lanes, the best first, and the part of the map around one."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -16,7 +15,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import at_home, crossing_spots, find_spots
+from scenario_gen.roads.vector.search import crossing_spots, find_spots, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
 from scenario_gen.types import LaneNetwork, once_per_object, Scenario
@@ -58,49 +57,51 @@ def placements(
         scales: s of eq 9, tried in this order where none before could be had.
 
     Raises:
-        NoPlaceError: there is none; says what is lost most often.
+        NoPlaceError: there is none; says what stands against the template where it was recorded, else where it came farthest.
     """
     chains = chains_of(network)
-    home = at_home(network, tracks)
-    reasons: Counter[str] = Counter()
-    broken_rules: Counter[str] = Counter()
+    home = spot_at(network, tracks, np.zeros(3))
     judged = _Judged(network, tracks)
+    failures: list[tuple[bool, bool, float, str]] = []
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
         broken = own.reason or judged.broken(own)
         if not broken:
             yield own, 1.0
-        elif not own.reason:
-            broken_rules[broken] += 1
-    spots = find_spots(network, tracks, lanes)[:_SPOTS]
+        failures += [(False, False, own.cost, f"where it was recorded, {broken}")] if broken else []
+    drawn_for = network.drawn_for
+    sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
+    spots = [] if sized is None else [sized]
+    spots += find_spots(network, tracks, lanes)[:_SPOTS]
     spots += crossing_spots(network, tracks)[:_SPOTS] if lanes is None else []
     streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
-    pressed: list[tuple[Match, float]] = []
+    others: list[tuple[Match, float]] = []
     for scale in scales:
         matches = list(streets) if scale == 1.0 else []
         for spot in spots:
             stop_if_cancelled()
-            placement = match(chains, tracks, spot, scale)
-            if placement.reason or placement.cost > _WORST:
-                reasons[placement.reason or "vehicles would be too far from where they are in the template"] += 1
+            ends = drawn_for.lanes if drawn_for is not None and spot is sized else ()
+            placement = match(chains, tracks, spot, scale, ends)
+            far = placement.cost > _WORST and spot is not sized
+            if placement.reason or far:
+                failures.append((True, True, placement.cost, placement.reason or "vehicles would be too far from where they are"))
             else:
                 matches.append(placement)
         broken_by = [judged.broken(placement) for placement in matches]
-        broken_rules.update(filter(None, broken_by))
+        failures += [(True, False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken]
         matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
         matches.sort(key=lambda placement: (*judged.rank(placement), round(placement.cost, 3)))
-        pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
-        placed = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
-        yield from placed
+        placed = [p for p in matches if p.aside <= _PRESSED and judged.rank(p)[0] == 0]
+        others += [(p, scale) for p in matches if p not in placed]
+        yield from ((placement, scale) for placement in placed)
         if placed:
             break
-    yield from pressed
-    if pressed or placed:
+    yield from sorted(others, key=lambda other: (other[0].aside > _PRESSED, judged.rank(other[0])[0]))
+    if others or placed:
         return
-    named = [*broken_rules.most_common(1), *reasons.most_common(2)]
-    why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in named)
     what = "road" if network.drawn else "map"
-    raise NoPlaceError(f"the template fits no place on {what} {network.name}: {why or 'it has no lanes of its directions'}")
+    *_, reason = min(failures, default=("it has no lanes of its directions",))
+    raise NoPlaceError(f"the template fits no place on {what} {network.name}: {reason}")
 
 
 class _Judged:
