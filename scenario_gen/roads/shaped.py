@@ -84,12 +84,8 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         join = float(np.median([along * frenet.station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
         before, after = join - low, high - join
         sharpness = max(sharpness_of(tracks[i]) for i in who)
-<<<<<<< ours
         yields = any(edge.kind == YIELD and edge.who in who for edge in reactions_of(encounter).edges)
-        joins = frenet.line.beside(along * join, float(np.mean(frenet.offset[who, -1])))
-=======
         joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
->>>>>>> theirs
         joins[2] += 0.0 if along > 0.0 else np.pi
     reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after)]
     width = config.lane_width
