@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from scenario_gen.base.parameters import parameter, Parameters
 
 REPLAY, REACTIVE, COMMITTED = "replay", "reactive", "committed"
-FORESIGHT = {REACTIVE: 5.0, COMMITTED: 1.5}
-"""Seconds that drivers look ahead for the ego. Who is committed keeps its course until the ego can hardly stop any more."""
+FORESIGHT = {REACTIVE: 5.0, COMMITTED: 0.5}
+"""Seconds that drivers look ahead for the ego. To the committed a conflict is evident 1.5 s before it; they brake 1 s later."""
 TEMPLATE, NEVER = "template", "never"
 
 

@@ -4,13 +4,18 @@
 """Sets for testing: planners that look at nobody fail in them, others than those by which they were chosen, too."""
 
 from driving_scenes import crossing
+import numpy as np
 import pytest
+from test_verdict import straight
 from typer.testing import CliRunner
 
+from benchmarks._driving_worlds import as_scenario
 from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, RouteFollower, Unlooking, WitnessFollower
+from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import read_trials, run_trials
 from scenario_gen.closed_loop.verdict import judge
@@ -36,7 +41,7 @@ def generated(out, *words):
 def bag(tmp_path_factory):
     out = tmp_path_factory.mktemp("testing") / "out"
     done = generated(out, "--ego", "auto")
-    assert done.exit_code == 0 and "3/3 valid" in done.output, done.output
+    assert done.exit_code == 0 and "3 of 3 scenarios" in done.output, done.output
     said = "synthetic_b on t_intersection: a planner that looks at nobody, in place of 2, passes"
     assert said in " ".join(done.output.split()) and said in (out / "report.html").read_text()
     return out / "bag"
@@ -72,10 +77,20 @@ def test_without_an_ego_it_is_refused(tmp_path):
 
 def test_who_is_committed_does_not_rescue_an_ego_that_looks_at_nobody():
     """A driver with priority brakes for one that crosses out of turn when it looks ahead far enough, and not in time else."""
-    passed = {}
+    witness, other = straight(0.0, -48.0, np.pi / 2, 4.0), straight(-96.0, 0.0, 0.0, 12.0)
+    verdicts = {}
     for policy in ("reactive", "committed", "replay"):
-        scenario = crossing(first_speed=8.0, second_speed=7.0, second_start=-45.0)
-        loop = ClosedLoop(scenario, 1, config=ClosedLoopConfig(policy=policy))
-        verdict = judge(loop, loop.drive(ConstantSpeed(speed=11.0)))
-        passed[policy] = verdict.collision is None
-    assert passed == {"reactive": True, "committed": False, "replay": False}
+        loop = ClosedLoop(as_scenario([witness, other], len(witness[1])), 0, config=ClosedLoopConfig(policy=policy))
+        verdicts[policy] = judge(loop, loop.drive(ConstantSpeed(speed=6.2)))
+    assert verdicts["reactive"].collision is None and verdicts["committed"].at_fault and verdicts["replay"].at_fault
+    assert verdicts["committed"].collision.speed < verdicts["replay"].collision.speed - 0.5  # it brakes, too late
+
+
+def test_a_set_that_hardly_tests_says_so(tmp_path):
+    trials = [Trial(str(k), crossing(), 0, None) for k in range(3)]
+    outcomes = run_trials(trials, Unlooking)
+    drives = Drives(outcomes, "p:C", ClosedLoopConfig(), unlooking=outcomes)
+    drives.write(tmp_path)
+    said = "one that looks at nobody passes 3 of 3"
+    assert said in drives.easy and said in (tmp_path / "junit.xml").read_text() and drives.easy in drives.notes()
+    assert 'name="policy" value="reactive"' in (tmp_path / "junit.xml").read_text()
