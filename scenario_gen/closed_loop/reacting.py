@@ -96,7 +96,11 @@ def reacting(sampled: GenerationResult, count: int, config: ClosedLoopConfig = C
         probed = drawn.scenarios[:PROBED]
         others = {one: found for one, found in reactions(sampled, probed, config).items() if found and one != ego}
         better = ", ".join(f"{one} in {found} of {len(probed)}" for one, found in others.items())
-        note += f"; has to react as ego: {better}" if better else "; nor has another vehicle: take another road or encounter"
+        note += (
+            f"; has to react as ego: {better}"
+            if better
+            else "; nor has another vehicle: take another road or encounter, or `search`, where the ego's own motion varies, too"
+        )
     chosen = replace(
         drawn, requested=count, scenarios=tuple(kept), adaptations=(*drawn.adaptations, note), chosen=tried
     )  # fmt: skip
