@@ -15,6 +15,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
 
+LEVEL = 2.5  # metres between the heights of two lanes of which one lies above the other
 MIRRORED = "the template is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
 _ONCOMING = -0.9  # cosine between directions of traffic
 
@@ -31,6 +32,7 @@ class Lane:
         beside: indices of the lanes of the same direction to which its traffic may change.
         speed_limit: m/s; NaN where the map does not say.
         junction: the junction that it is part of, "" if none.
+        height: (M,) metres, of each cross-section; NaN where it is not known, as where none is given.
     """
 
     id: str
@@ -40,9 +42,11 @@ class Lane:
     beside: tuple[int, ...] = ()
     speed_limit: float = math.nan
     junction: str = ""
+    height: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        freeze(self, left=frozen(self.left), right=frozen(self.right))
+        height = self.height if len(self.height) == len(self.left) else np.full(len(self.left), np.nan)
+        freeze(self, left=frozen(self.left), right=frozen(self.right), height=frozen(height))
         if self.left.shape != self.right.shape or self.left.ndim != 2 or self.left.shape[1] != 2 or len(self.left) < 2:
             raise InputError(
                 f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed"
@@ -132,6 +136,7 @@ class LaneNetwork:
         rules_kept: whether scenarios keep to the rules.
         drawn: whether it was drawn with its road: it is shown and exported, and nobody is held to it.
         drawn_for: how it was drawn for a template; None: for none, or without a place for it.
+        origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map says metres.
     """
 
     name: str
@@ -141,8 +146,11 @@ class LaneNetwork:
     rules_kept: bool = True
     drawn: bool = False
     drawn_for: DrawnFor | None = None
+    origin: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        if len(self.origin) not in (0, 2):
+            raise InputError(f"lanes of {self.name!r}: origin {self.origin}; latitude and longitude are needed")
         count = len(self.lanes)
         for rule in self.rules:
             if any(not 0 <= k < count for k in (*rule.lanes, *rule.over)):
@@ -157,6 +165,12 @@ class LaneNetwork:
         rules = (replace(rule, line=rule.line + by) for rule in self.rules)
         aim = self.drawn_for and replace(self.drawn_for, frame=self.drawn_for.frame + np.array([*by, 0.0]))
         return replace(self, lanes=tuple(lanes), rules=tuple(rules), drawn_for=aim)
+
+    @cached_property
+    def has_levels(self) -> bool:
+        """Whether some lanes may lie above others."""
+        height = np.concatenate([lane.height[np.isfinite(lane.height)] for lane in self.lanes]) if self.lanes else np.zeros(0)
+        return bool(len(height) and np.ptp(height) > LEVEL)
 
     @cached_property
     def predecessors(self) -> tuple[tuple[int, ...], ...]:

@@ -108,6 +108,7 @@ class Chains:
         self.length = [float(edge_lengths(lane.centre).sum()) for lane in network.lanes]
         self.points = np.concatenate([lane.centre[:-1] for lane in network.lanes])
         self.yaws = np.concatenate([lane.yaw for lane in network.lanes])
+        self.height = np.concatenate([lane.height[:-1] for lane in network.lanes])
         self.owner = np.repeat(np.arange(len(network.lanes)), [len(lane.yaw) for lane in network.lanes])
         self._curves: dict[tuple[int, ...], Curve] = {}
 

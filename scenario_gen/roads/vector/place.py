@@ -6,9 +6,12 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import islice
+from itertools import combinations, islice
+import math
 
 import numpy as np
+from scipy.spatial import KDTree
+from scipy.spatial.distance import cdist
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
@@ -18,7 +21,7 @@ from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import crossing_spots, find_spots, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
-from scenario_gen.types import LaneNetwork, once_per_object, Scenario
+from scenario_gen.types import LaneNetwork, LEVEL, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
@@ -28,6 +31,7 @@ _WORST = 40.0  # m²: what resembles the template less is no place for it
 _PRESSED = 4.2  # m/s² across, a little less than scenarios may have: where more is forced, another scale is tried first
 _BESIDE = 12.0  # metres of the map around what is driven, and
 _FORTH = 20.0  # metres of the lanes before and after it
+_LOOK, _OVER = 2.0, 5.0  # metres between places at which heights are compared; between two of which one may lie above the other
 _SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
 
 
@@ -105,9 +109,10 @@ def placements(
 
 
 class _Judged:
-    """Whether placements keep the traffic rules of a network."""
+    """Whether placements keep the traffic rules of a network, and lie on one level where vehicles meet."""
 
     def __init__(self, network: LaneNetwork, tracks: tuple[Track, ...]) -> None:
+        self._network = network
         self._check = RuleCheck(network)
         self._tracks = tracks
         met = (conflict for conflict in conflicts_in(_motion(tracks)) if not conflict.following)
@@ -115,6 +120,8 @@ class _Judged:
 
     def broken(self, placement: Match) -> str:
         """Return what a placement breaks; "" if nothing."""
+        if self._network.has_levels and (above := self._above(placement)):
+            return above
         if not self._check.rules:
             return ""
         motion = _laid(placement, self._tracks)
@@ -122,6 +129,23 @@ class _Judged:
         if breach is None:
             return ""
         return f"vehicle {motion.vehicles[breach.vehicles[0]].id} {breach.message}; road.traffic_rules=ignored allows it"
+
+    def _above(self, placement: Match) -> str:
+        """Say which two vehicles a placement lays above each other, as on a bridge and under it; "" if none."""
+        lanes = self._network.lanes
+        driven = []
+        for course in placement.courses:
+            count = max(math.ceil((course.end - course.start) / _LOOK), 1) + 1
+            places = course.curve.at(np.linspace(course.start, course.end, count))[:, :2]
+            middles = KDTree(np.concatenate([lanes[k].centre for k in course.lanes]))
+            height = np.concatenate([lanes[k].height for k in course.lanes])[middles.query(places)[1]]
+            driven.append((places, height))
+        for (i, (one, low)), (j, (other, high)) in combinations(enumerate(driven), 2):
+            apart = np.abs(low[:, None] - high) > LEVEL
+            if (apart & (cdist(one, other) < _OVER)).any():
+                first, second = (self._tracks[n].vehicle.id for n in (i, j))
+                return f"vehicles {first} and {second} would be above each other, as on a bridge, and not meet"
+        return ""
 
     def rank(self, placement: Match) -> tuple[int, bool]:
         """Return how many that meet in the template do not, and whether nobody gives way who has to."""

@@ -20,6 +20,7 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.vector.match import bending, Chains, changed_curve, Course, Match, pressed_aside, speeding, turned_more
 from scenario_gen.template import FrenetTracks, to_frenet, Track
+from scenario_gen.types import LEVEL
 
 _ROOM = 1.0  # metres between a footprint and the end of the road
 _FORTH = 25.0  # metres of road before and after what is driven, where it has them
@@ -203,9 +204,11 @@ def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:
     start = poses[0 if sign > 0 else -1]
     yaw = start[2] + (0.0 if sign > 0 else np.pi)
     away = np.hypot(chains.points[:, 0] - start[0], chains.points[:, 1] - start[1])
-    near = np.flatnonzero((away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL))
+    own = np.flatnonzero(np.isin(chains.owner, stretch.chain))
+    level = chains.height[own[np.argmin(away[own])]]
+    near = (away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL) & ~(np.abs(chains.height - level) > LEVEL)
     sides: list[_Side] = []
-    for first in sorted(set(chains.owner[near].tolist())):
+    for first in np.unique(chains.owner[near]).tolist():
         chain = _beside(chains, first, poses[::sign], sign)
         back = chains.network.predecessors[first]
         chain = (back[0], *chain) if back and back[0] not in chain else chain
