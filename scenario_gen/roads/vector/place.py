@@ -18,7 +18,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import crossing_spots, find_spots, spot_at
+from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
 from scenario_gen.types import LaneNetwork, LEVEL, once_per_object, Scenario
@@ -66,33 +66,28 @@ def placements(
     chains = chains_of(network)
     home = spot_at(network, tracks, np.zeros(3))
     judged = _Judged(network, tracks)
-    failures: list[tuple[bool, bool, float, str]] = []
+    failures: list[tuple[bool, float, str]] = []
+    recorded = ""
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
         broken = own.reason or judged.broken(own)
         if not broken:
             yield own, 1.0
-        failures += [(False, False, own.cost, f"where it was recorded, {broken}")] if broken else []
-    drawn_for = network.drawn_for
-    sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
-    spots = [] if sized is None else [sized]
-    spots += find_spots(network, tracks, lanes)[:_SPOTS]
-    spots += crossing_spots(network, tracks)[:_SPOTS] if lanes is None else []
+        recorded = f"where it was recorded, {broken}; elsewhere, " if broken else ""
+    spots = _spots(network, tracks, lanes)
     streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
     others: list[tuple[Match, float]] = []
     for scale in scales:
         matches = list(streets) if scale == 1.0 else []
-        for spot in spots:
+        for spot, ends in spots:
             stop_if_cancelled()
-            ends = drawn_for.lanes if drawn_for is not None and spot is sized else ()
             placement = match(chains, tracks, spot, scale, ends)
-            far = placement.cost > _WORST and spot is not sized
-            if placement.reason or far:
-                failures.append((True, True, placement.cost, placement.reason or "vehicles would be too far from where they are"))
+            if placement.reason or (placement.cost > _WORST and not ends):
+                failures.append((True, placement.cost, placement.reason or "vehicles would be too far from where they are"))
             else:
                 matches.append(placement)
         broken_by = [judged.broken(placement) for placement in matches]
-        failures += [(True, False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken]
+        failures += [(False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken]
         matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
         matches.sort(key=lambda placement: (*judged.rank(placement), round(placement.cost, 3)))
         placed = [p for p in matches if p.aside <= _PRESSED and judged.rank(p)[0] == 0]
@@ -105,7 +100,19 @@ def placements(
         return
     what = "road" if network.drawn else "map"
     *_, reason = min(failures, default=("it has no lanes of its directions",))
-    raise NoPlaceError(f"the template fits no place on {what} {network.name}: {reason}")
+    raise NoPlaceError(f"the template fits no place on {what} {network.name}: {recorded}{reason}")
+
+
+def _spots(
+    network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None
+) -> list[tuple[Spot, tuple[tuple[str, str], ...]]]:
+    """Placements as one piece that are looked at closely, first that which a road was drawn for, with the lanes of its ends."""
+    spots = find_spots(network, tracks, lanes)[:_SPOTS]
+    spots += crossing_spots(network, tracks)[:_SPOTS] if lanes is None else []
+    drawn_for = network.drawn_for
+    if drawn_for is None or len(drawn_for.lanes) != len(tracks):
+        return [(spot, ()) for spot in spots]
+    return [(spot_at(network, tracks, drawn_for.frame), drawn_for.lanes), *((spot, ()) for spot in spots)]
 
 
 class _Judged:
