@@ -5,7 +5,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import combinations, islice
 import math
@@ -19,14 +19,14 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import at_home, crossing_spots, find_spots
+from scenario_gen.roads.vector.search import at_home, crossing_spots, find_spots, Spot
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
 from scenario_gen.types import LaneNetwork, LEVEL, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
-_STREETS = 8  # stretches of road that are looked at closely
+_STREETS = 8  # stretches of road that are looked at closely at a time
 _SCALES = (1.0, 0.9, 1.1)
 _WORST = 40.0  # m²: what resembles the template less is no place for it
 _PRESSED = 4.2  # m/s² across, a little less than scenarios may have: where more is forced, another scale is tried first
@@ -64,21 +64,57 @@ def placements(
     Raises:
         NoPlaceError: there is none; says what is lost most often.
     """
-    chains = chains_of(network)
-    home = at_home(network, tracks)
-    reasons: Counter[str] = Counter()
-    broken_rules: Counter[str] = Counter()
-    judged = _Judged(network, tracks)
+    chains, judged, lost = chains_of(network), _Judged(network, tracks), _Lost()
+    home, found = at_home(network, tracks), False
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
         broken = own.reason or judged.broken(own)
         if not broken:
+            found = True
             yield own, 1.0
         elif not own.reason:
-            broken_rules[broken] += 1
-    spots = find_spots(network, tracks, lanes)[:_SPOTS]
-    spots += crossing_spots(network, tracks)[:_SPOTS] if lanes is None else []
-    streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
+            lost.rules[broken] += 1
+    spots = find_spots(network, tracks, lanes)
+    crossed = crossing_spots(network, tracks) if lanes is None else []
+    streets = along_streets(chains, tracks, lanes)
+    for k in range(0, max(len(spots), len(crossed), 1), _SPOTS):  # where nobody takes the first ones, the next are looked at
+        if k and not found:
+            break
+        some = spots[k : k + _SPOTS] + crossed[k : k + _SPOTS]
+        for placement in _near(some, list(islice(streets, _STREETS)), chains, tracks, scales, judged, lost):
+            found = True
+            yield placement
+    if not found:
+        what, why = "road" if network.drawn else "map", lost.named or "it has no lanes of its directions"
+        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {why}")
+
+
+@dataclass(frozen=True)
+class _Lost:
+    """Why placements were left out: how many broke a rule, and how many are none for another reason."""
+
+    rules: Counter[str] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def named(self) -> str:
+        """The most frequent reasons."""
+        named = [*self.rules.most_common(1), *self.reasons.most_common(2)]
+        return "; ".join(
+            f"{reason} ({count} of {self.rules.total() + self.reasons.total()} placements)" for reason, count in named
+        )
+
+
+def _near(
+    spots: Sequence[Spot],
+    streets: Sequence[Match],
+    chains: Chains,
+    tracks: tuple[Track, ...],
+    scales: Sequence[float],
+    judged: "_Judged",
+    lost: _Lost,
+) -> Iterator[tuple[Match, float]]:
+    """Yield the ways of laying a template on lanes near some spots or along streets, the best first."""
     pressed: list[tuple[Match, float]] = []
     for scale in scales:
         matches = list(streets) if scale == 1.0 else []
@@ -86,11 +122,11 @@ def placements(
             stop_if_cancelled()
             placement = match(chains, tracks, spot, scale)
             if placement.reason or placement.cost > _WORST:
-                reasons[placement.reason or "vehicles would be too far from where they are in the template"] += 1
+                lost.reasons[placement.reason or "vehicles would be too far from where they are in the template"] += 1
             else:
                 matches.append(placement)
         broken_by = [judged.broken(placement) for placement in matches]
-        broken_rules.update(filter(None, broken_by))
+        lost.rules.update(filter(None, broken_by))
         matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
         matches.sort(key=lambda placement: (*judged.rank(placement), round(placement.cost, 3)))
         pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
@@ -99,12 +135,6 @@ def placements(
         if placed:
             break
     yield from pressed
-    if pressed or placed:
-        return
-    named = [*broken_rules.most_common(1), *reasons.most_common(2)]
-    why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in named)
-    what = "road" if network.drawn else "map"
-    raise NoPlaceError(f"the template fits no place on {what} {network.name}: {why or 'it has no lanes of its directions'}")
 
 
 class _Judged:
