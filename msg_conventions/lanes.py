@@ -8,8 +8,10 @@ points. `text` is a JSON object: `name`, `notes`, and of every lane its `id`, th
 `beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Where the map has traffic rules there are also
 `rules`, of each its `id`, `kind`, `lanes`, `over` (places in the list of lanes) and `line` (points of the stop line), and
 `rules_kept`. Where lanes lie above others each has `height` [m] of its points. `origin` is the latitude and longitude of the
-frame's origin, where the map has it. Lanes that were drawn with a built-in road have `drawn` true. Action 2 (delete) means
-that the road has no lanes. Stamp and frame: the map's. QoS: reliable, transient_local, depth 1.
+frame's origin, where the map has it. Lanes that were drawn with a built-in road have `drawn` true, and those that were drawn
+for a template `drawn_for`: the `frame` of the template (x, y [m], yaw [rad] on the road) and of every vehicle the ids of the
+`lanes` by which it comes and goes. Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. QoS: reliable,
+transient_local, depth 1.
 """
 
 from collections.abc import Iterator
@@ -25,7 +27,7 @@ from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
+from scenario_gen.types import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
 
 TOPIC = "road/lanes"
 TAIL = 1  # bytes by which the message ends behind a multiple of 4
@@ -55,8 +57,9 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
     ]
     document: dict[str, Any] = {"name": network.name, "notes": network.notes, "lanes": lanes}
     document |= {"rules": rules, "rules_kept": network.rules_kept} if rules else {}
-    document |= {"origin": network.origin} if network.origin else {}
-    return document | ({"drawn": True} if network.drawn else {})
+    document |= ({"drawn": True} if network.drawn else {}) | ({"origin": network.origin} if network.origin else {})
+    aim = network.drawn_for
+    return document | ({} if aim is None else {"drawn_for": {"frame": aim.frame.tolist(), "lanes": aim.lanes}})
 
 
 def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | None]:
@@ -81,10 +84,16 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
         notes = tuple(str(note) for note in document["notes"])
         rules = tuple(map(_rule, document.get("rules", ())))
         kept, drawn = document.get("rules_kept", True) is not False, document.get("drawn", False) is True
+        aim = _drawn_for(document["drawn_for"]) if "drawn_for" in document else None
         origin = tuple(map(float, document.get("origin", ())))
-        return frame_id, LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn, origin)
+        return frame_id, LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn, aim, origin)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}") from None
+
+
+def _drawn_for(document: dict[str, Any]) -> DrawnFor:
+    x, y, yaw = (float(value) for value in document["frame"])
+    return DrawnFor(np.array([x, y, yaw]), tuple((str(first), str(last)) for first, last in document["lanes"]))
 
 
 def _rule(document: dict[str, Any]) -> TrafficRule:

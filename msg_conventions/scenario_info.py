@@ -29,6 +29,7 @@ INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
 REACTION, CUT = "reaction.", "reaction.cut."  # who reacts to whom in the template, JSON; those cut because they closed a circle
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
+SIZES = "sizes"  # length and width of its vehicles [m], where they are not those of the template
 FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the requested states
 EGO_WITNESS = "ego_witness"  # of one with an ego slot
 Values = Mapping[str, str]
@@ -258,6 +259,7 @@ def scenario_entry(
     ids = [vehicle.id for vehicle in template]
     rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
     several = messages_of(data) if not scenario.all_present else ()
+    sizes = [[vehicle.length, vehicle.width] for vehicle in scenario.vehicles]
     spans = [[float(scenario.time[first]), float(scenario.time[last])] for first, last in scenario.present.tolist()]
     values = {
         "request": request,
@@ -267,6 +269,7 @@ def scenario_entry(
         "achieved_start": _states_text(scenario, 0),
         "achieved_end": _states_text(scenario, -1),
         **({} if scenario.all_present else {PRESENT: json.dumps(spans)}),
+        **({SIZES: json.dumps(sizes)} if sizes != [[template[n].length, template[n].width] for n in rows] else {}),
         **({MESSAGES: json.dumps([digest(message) for message in several])} if len(several) > 1 else {}),
         **(about or {}),
         **scenario.facts,

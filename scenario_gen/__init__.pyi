@@ -23,9 +23,17 @@ from scenario_gen.method.evaluation import (
 from scenario_gen.method.fitting import fit_template as fit_template, FittingConfig as FittingConfig
 from scenario_gen.method.routing import plan_routes as plan_routes, PlanningConfig as PlanningConfig
 from scenario_gen.method.sampling import sample_scenarios as sample_scenarios, SamplingConfig as SamplingConfig
-from scenario_gen.method.segmentation import segment as segment, SegmentationConfig as SegmentationConfig
+from scenario_gen.method.segmentation import (
+    segment as segment,
+    segment_track as segment_track,
+    SegmentationConfig as SegmentationConfig,
+    StickyHDPHMM as StickyHDPHMM,
+)
 from scenario_gen.method.validity import Checker as Checker, Limits as Limits
+from scenario_gen.output.exchange.export import export_bag as export_bag
 from scenario_gen.output.plot import plot as plot
+from scenario_gen.output.results import report as report
+from scenario_gen.output.review.regenerate import regenerate_scenario as regenerate_scenario
 from scenario_gen.output.table import filter_scenarios as filter_scenarios, measures as measures
 from scenario_gen.pipeline import generate as generate
 from scenario_gen.roads import build_road as build_road, RoadConfig as RoadConfig

@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from scenario_gen.base.errors import ScenarioGenError
-
 _is_cancelled: ContextVar[Callable[[], bool]] = ContextVar("cancelled", default=lambda: False)
 
 
-class CancelledError(ScenarioGenError):
-    """The work was cancelled: nobody waits for its result."""
+class CancelledError(BaseException):
+    """The work was cancelled: nobody waits for its result.
+
+    As asyncio's, it is no Exception: what takes an error for a refusal, and goes on, lets it pass.
+    """
 
 
 @contextmanager

@@ -6,10 +6,14 @@
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
+import errno
 from importlib.util import find_spec
 import sys
 
 LONGEST = 500  # characters of a message about an input: what is quoted from a broken file may be of any length
+LONGEST_REFUSAL = 2_000  # characters of a refusal, which may join the reasons of several
+JOIN, MOST_PARTS = "; ", 3  # of a message; so many from its beginning, and from its end, are kept
+ROOM = "; make room there, or name a place on another disk"
 
 
 class ScenarioGenError(Exception):
@@ -52,13 +56,33 @@ def needs(extra: str, *modules: str) -> None:
         raise MissingExtraError(f"{', '.join(missing)} not installed; `pip install 'scenario_gen[{extra}]'` brings it")
 
 
-def presentable(text: str) -> str:
-    """Return a message with at most `LONGEST` characters, all of which print, or are line breaks."""
-    if len(text) > LONGEST:  # a first cut, for a quoted field may hold megabytes
-        text = text[:LONGEST] + text[-LONGEST:]
+def presentable(text: str, longest: int = LONGEST) -> str:
+    """Return a message with at most `longest` characters, all of which print, or are line breaks.
+
+    Of a long one each part (a reason, a remedy; they are joined by `; `) has its share, and loses its middle where that is less.
+    """
+    if len(text) > 4 * longest:  # a first cut, for a quoted field may hold megabytes
+        text = text[: 2 * longest] + text[-2 * longest :]
     text = printable(text)
-    half = LONGEST // 2
-    return text if len(text) <= LONGEST else f"{text[: half - 3]} … {text[-half:]}"
+    if len(text) <= longest:
+        return text
+    parts = text.split(JOIN)
+    if len(parts) > 2 * MOST_PARTS:
+        parts = [*parts[:MOST_PARTS], "…", *parts[-MOST_PARTS:]]
+    room = longest - len(JOIN) * (len(parts) - 1)
+    shortest_first = sorted(range(len(parts)), key=lambda k: len(parts[k]))
+    for done, k in enumerate(shortest_first):
+        parts[k] = _without_middle(parts[k], room // (len(parts) - done))
+        room -= len(parts[k])
+    return JOIN.join(parts)
+
+
+def _without_middle(text: str, longest: int) -> str:
+    """Return a text with at most `longest` characters, cut between words where it has any."""
+    if len(text) <= longest:
+        return text
+    half = (longest - 3) // 2
+    return f"{text[:half].rsplit(' ', 1)[0]} … {text[-half:].split(' ', 1)[-1]}"
 
 
 class RefusedError(ScenarioGenError):
@@ -76,6 +100,8 @@ def of_system(error: OSError, name: object = None, advice: str = "") -> InputErr
     """Return an error of the operating system as one of ours: file (`name`, or the one it names itself), reason, advice."""
     file = error.filename if name is None else name
     place = "" if file is None else f"{file}: "
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        advice = advice or ROOM
     reason = "is a folder; name a file" if isinstance(error, IsADirectoryError) else error.strerror or error
     return InputError(f"{place}{reason}{advice}")
 
@@ -88,7 +114,7 @@ def printable(text: str) -> str:
 def print_error(error: ScenarioGenError | OSError) -> int:
     """Print the error on standard error; return the exit code."""
     own = of_system(error) if isinstance(error, OSError) else error
-    print(f"error: {presentable(str(own))}", file=sys.stderr)
+    print(f"error: {presentable(str(own), LONGEST_REFUSAL)}", file=sys.stderr)
     return own.exit_code
 
 
@@ -133,7 +159,7 @@ def reading(path: object) -> Iterator[None]:
         ) from error
 
 
-def describe(error: Exception) -> str:
+def describe(error: BaseException) -> str:
     """Return the message of an error in one line, with its class where the message is a single word or empty."""
     if isinstance(error, MemoryError):
         return "asks for more memory than there is"

@@ -138,8 +138,6 @@ class Worker:
                     job(cancelled)
                 if not cancelled():
                     self._done(name)
-            except CancelledError:
-                raise
             except Exception as error:
                 stop_if_abandoned()
                 self._failed(name, error)

@@ -44,12 +44,15 @@ def options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Of any command: print errors only.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Of `generate` and `demo`: routes and the comparison with the recording, too.")
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Of any command: print one JSON object to standard output, messages to standard error.")
     ] = False,
 ) -> None:
     """Turn recorded encounters of vehicles into new, valid ones on other roads."""
-    del version, quiet, as_json  # which `output.Program` takes
+    del version, quiet, verbose, as_json  # which `output.Program` takes
 
 
 @installation.command()

@@ -45,7 +45,7 @@ def conclude(failed: Sequence[str], out: Place) -> None:
     """
     give(out=out, failed=failed)
     if failed:
-        raise RefusedError(f"{len(failed)} tasks failed, see above; the results of the others are in {out}")
+        raise RefusedError(f"{len(failed)} tasks failed, see above; the rest is in {out}; the same command tries them again")
 
 
 @commands.command(urls=("archive", "out"))
@@ -122,7 +122,7 @@ def shown(value: object) -> str:
 def find(
     batch: Annotated[Path, typer.Argument(help="A batch, finished or not; or s3://….")],
     condition: Annotated[str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")] = "true",
-    limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list. 0: all.")] = 20,
+    limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list here. 0: all.")] = 20,
     bag: Annotated[
         Path | None, typer.Option(help="Write the scenarios found to this bag, with their templates and roads.")
     ] = None,
@@ -138,9 +138,12 @@ def find(
     if report is not None and bag is None:
         raise InputError("--report needs --bag: the page shows the bag of the scenarios found; give both")
     source = place(batch)
-    found = finding.find(source, condition, limit)
+    found = finding.find(source, condition)
     give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
-    say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in found.rows], names=3)
+    listed = found.rows[: limit or None]
+    say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3)
+    rest = f", the first {len(listed)} are listed; --limit 0 lists all" if len(listed) < len(found.rows) else ""
+    say(f"{len(found.rows)} scenarios found{rest}")
     say(*finding.coverage_lines(found, source), sep="\n")
     if again:
         for row in found.rows:
@@ -178,3 +181,28 @@ def library(
     give(summary=built.lines())
     say(*built.lines(), sep="\n")
     conclude(built.failed, source / "library")
+
+
+@commands.command()
+def coverage(
+    bags: Annotated[list[Path], typer.Argument(help="Bags of `generate`, of at least two recordings.")],
+    templates: Annotated[
+        list[int] | None, typer.Option(min=1, help="Recorded encounters to draw as templates. Repeatable; default: 5, 10, 20.")
+    ] = None,
+    draws: Annotated[int, typer.Option(min=1, help="Draws of templates, for the intervals.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the draws.")] = 0,
+    out: Annotated[Path, typer.Option(help="The page to write, HTML.")] = Path("coverage.html"),
+) -> None:
+    """Measure how much unseen traffic recordings and the scenarios generated from them stand for."""
+    from scenario_gen.corpus.coverage import results_of, write_coverage
+    from scenario_gen.method.evaluation.population import population_of
+
+    if out.suffix.lower() != ".html" or (out.exists() and not out.read_bytes()[:15].lower().startswith(b"<!doctype html>")):
+        raise InputError(f"--out {out}: name a new file that ends with .html")
+    results = results_of(bags)
+    found = population_of(results, templates or (5, 10, 20), draws=draws, seed=seed)
+    write_coverage(out, results, found)
+    give(population=found, page=out)
+    say(found.lead)
+    say_rows(*found.table())
+    say(*found.remarks(), f"page: {out}", sep="\n")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The demo: the paper's three cases, in this process and, if asked, by the ROS nodes over DDS, which must agree byte for byte."""
+"""The demo: three reactions, in this process and, if asked, by the ROS nodes over DDS, which must agree byte for byte."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -17,9 +17,9 @@ from scenario_gen.output.results import namespaces
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types import GenerationResult
 
-ROADS = {"a": "t_intersection", "b": "t_intersection", "c": "straight"}
-"""The cases of the bundled log, and the road of each."""
-TITLE = "Demo: new encounters from the bundled synthetic log"
+ROADS = {"left_turn": "four_way", "follower": "curve", "all_way_stop": "four_way"}
+"""The bundled encounters, and the road of each."""
+TITLE = "Demo: new encounters from three invented ones"
 
 
 def run_demo(
@@ -31,7 +31,7 @@ def run_demo(
     progress: Callable[[], AbstractContextManager[Advance]],
     status: Callable[[], AbstractContextManager[Callable[[str], None]]],
 ) -> tuple[list[GenerationResult], list[str]]:
-    """Generate scenarios of the bundled log to a folder, as `generate_folder` does, with sets to compare with.
+    """Generate scenarios of the bundled encounters to a folder, as `generate_folder` does, with sets to compare with.
 
     Args:
         out: the folder.

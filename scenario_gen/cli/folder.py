@@ -163,7 +163,7 @@ def faults_of(cases: Sequence[GenerationResult]) -> list[str]:
 
 def notes_of(readings: Sequence[LogResult]) -> list[str]:
     """Return what there is to say about how logs were read, at most `NOTES` lines; the report has all."""
-    notes = [f"{log.quality.name}: {note}" for log in readings for note in log.quality.notes]
+    notes = [f"{log.quality.name}: {note}" for log in readings for note in log.quality.remarks()]
     more = len(notes) - NOTES
     return notes if more <= 0 else [*notes[:NOTES], f"{more} more notes on the log are in the report"]
 

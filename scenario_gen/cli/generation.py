@@ -11,7 +11,7 @@ import typer
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.cli.options import configured, ParametersOption, remind, SetOption, takes
-from scenario_gen.cli.output import bars, Commands, give, say, status
+from scenario_gen.cli.output import bars, Commands, give, is_verbose, say, status
 
 if TYPE_CHECKING:
     from scenario_gen.types import GenerationResult
@@ -186,7 +186,7 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo"),
     ros: Annotated[bool, typer.Option("--ros", help="Let the ROS nodes generate the scenarios, over DDS.")] = False,
 ) -> None:
-    """Generate scenarios from the bundled synthetic log: three cases, on a T-intersection and a straight road."""
+    """Generate scenarios from three bundled encounters: a left turn that waits, a follower, and an all-way stop."""
     from scenario_gen.cli.demo import run_demo
 
     cases, refusals = run_demo(out, count=count, seed=seed, ros=ros, progress=bars, status=status)
@@ -206,8 +206,9 @@ def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) ->
     from scenario_gen.output.results import BAG, FIGURES, REPORT
 
     give(report=out / REPORT, bag=out / BAG, figures=out / FIGURES, cases=[case_of(case) for case in cases], refusals=refusals)
-    say(summary(cases), wrap=True)
+    say(summary(cases, verbose=is_verbose()), wrap=True)
     say(f"report: {out / REPORT}\nbag:    {out / BAG}")
+    say("next:   open the report; `scenario-gen drive --help` tests a planner on the bag")
     if refusals:
         raise RefusedError("part of the request could not be generated:\n" + "\n".join(refusals))
 

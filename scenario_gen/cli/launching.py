@@ -8,6 +8,7 @@ What is given on the command line beats the parameter file named there, which be
 
 import atexit
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, Field
 from pathlib import Path
 import re
@@ -122,7 +123,7 @@ def read(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
     for name, text in texts.items():
         if name in known and text:
             try:
-                values[name] = text if isinstance(known[name].default, str) else parse_yaml(text, "its value")
+                values[name] = _unquoted(text) if isinstance(known[name].default, str) else parse_yaml(text, "its value")
                 check_value(name, known[name], values[name])
             except InputError as error:
                 raise InputError(f"{name}:={shown(text)}: {error}") from error
@@ -132,7 +133,7 @@ def read(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
         {arguments[name][0]: value for name, value in values.items() if name in arguments and (name, value) != ("log", LIVE)},
         OfLaunch(**{name: value for name, value in values.items() if name in LAUNCH}),
     )
-    _check(launch)
+    _check(launch, of_suite="log" in arguments)
     if "log" in arguments and not (values.get("log") or launch.own.params):
         raise InputError(
             f"no log is given: write log:=FILE, or log:={LIVE} to wait for tracks, or fixes and speeds, of other nodes"
@@ -140,16 +141,37 @@ def read(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
     return launch
 
 
-def _check(launch: Launch) -> None:
+def _unquoted(text: str) -> str:
+    """Return a text without the quotes that `ros2 run -p` needs around `1: 10 2 0`; `ros2 launch` takes it as it is."""
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"" else text
+
+
+def _check(launch: Launch, *, of_suite: bool) -> None:
     """Raise InputError if the namespace, a path or a node that is to be left out cannot be."""
     own, given = launch.own, launch.given
     if own.namespace and not NAMESPACE.fullmatch(own.namespace):
         raise InputError(f"namespace:={shown(own.namespace)}: write names of letters, digits and underscores, separated by /")
-    for name, path in (("params", own.params), ("log", given.get("log_path"))):
+    written = "bag" if of_suite else "results"
+    for name, path in (("params", own.params), ("log", given.get("log_path")), ("bag", "" if of_suite else given.get("bag"))):
         if path and not Path(path).exists():
             raise InputError(f"{name}:={shown(path)}: it does not exist; check the name and the folder")
+    if path := given.get(written):
+        _check_folder(f"{written}:={shown(path)}", Path(path), new=of_suite)
     if own.params and "ros__parameters" not in Path(own.params).read_text(encoding="utf-8", errors="replace"):
         raise InputError(f"params:={own.params}: not a parameter file; it has no ros__parameters")
     for name in launch.left_out:
         if name not in NODES:
             raise InputError(f"without:={name}: choose of {', '.join(NODES)}{did_you_mean(name, NODES)}")
+
+
+def _check_folder(what: str, folder: Path, *, new: bool) -> None:
+    """Raise InputError if a folder cannot be created, or is there where a `new` one is needed; it is removed again."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=not new)
+    except OSError as error:
+        raise InputError(f"{what}: {error.strerror}; name another folder") from error
+    finally:
+        for path in missing:
+            with suppress(OSError):
+                path.rmdir()

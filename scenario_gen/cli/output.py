@@ -18,7 +18,7 @@ import webbrowser
 import typer
 from typer.core import TyperGroup
 
-from scenario_gen.base.errors import InputError, presentable, printable, ScenarioGenError
+from scenario_gen.base.errors import InputError, LONGEST_REFUSAL, presentable, printable, ScenarioGenError
 from scenario_gen.base.stores import renamed
 from scenario_gen.cli import places
 
@@ -28,16 +28,17 @@ class Output:
     """How the running command prints, and its results so far."""
 
     quiet: bool = False
+    verbose: bool = False
     as_json: bool = False
     results: dict[str, Any] = field(default_factory=dict)
 
 
 _current = Output()
-FLAGS = ("--quiet", "-q", "--json")
+FLAGS = ("--quiet", "-q", "--verbose", "-v", "--json")
 
 
 class Program(TyperGroup):
-    """The program: takes --quiet and --json before and behind a command's name, and prints what --json asks for."""
+    """The program: takes --quiet, --verbose and --json before and behind a command's name, and prints what --json asks for."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Take the flags of all commands, wherever they stand before a `--`."""
@@ -48,7 +49,7 @@ class Program(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the command; with --json, print its results as the last line of standard output, also after an error."""
         global _current  # noqa: PLW0603 - the command line runs one command in a process
-        _current = Output(ctx.params["quiet"], ctx.params["as_json"])
+        _current = Output(ctx.params["quiet"], ctx.params["verbose"], ctx.params["as_json"])
         ended: dict[str, Any] = {"exit_code": 0}
         try:
             return super().invoke(ctx)
@@ -56,7 +57,7 @@ class Program(TyperGroup):
             ended["exit_code"] = end.exit_code
             raise
         except (ScenarioGenError, OSError) as error:
-            ended |= {"exit_code": getattr(error, "exit_code", 2), "error": presentable(str(error))}
+            ended |= {"exit_code": getattr(error, "exit_code", 2), "error": presentable(str(error), LONGEST_REFUSAL)}
             raise
         except Exception:  # a wrong option, which the caller reports
             _current.as_json = False
@@ -125,6 +126,11 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, (bool, int)):
         return value
     return printable(renamed(str(value)))
+
+
+def is_verbose() -> bool:
+    """Return whether --verbose was given."""
+    return _current.verbose
 
 
 def say(*what: Any, sep: str = " ", wrap: bool = False) -> None:

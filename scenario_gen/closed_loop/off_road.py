@@ -19,7 +19,7 @@ from scenario_gen.method.validity import control_points
 from scenario_gen.numerics import Bools, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
 from scenario_gen.numerics.plane import edge_lengths, unit
-from scenario_gen.roads import clearance_in_cells, distance_transform, to_cells
+from scenario_gen.roads import clearance_in_cells, distance_transform, footprint_fits, to_cells
 from scenario_gen.types import once_per_object, Road, Scenario
 
 FARTHEST = 10.0  # metres; margins and depths beyond are told as this
@@ -46,21 +46,20 @@ class RoadUse(NamedTuple):
 
 
 def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
-    """Measure a drive; off the road is whoever was at least `limit` [m] deep outside, and outside at all."""
-    if road is None:
+    """Measure a drive up to its first jump; off the road is whoever was `limit` [m] deep outside, and outside at all."""
+    if road is None or drive.driven < 2:
         return RoadUse(math.nan, 0.0, math.nan)
-    motion, ego = drive.motion, [drive.ego]
-    vehicle = motion.vehicles[drive.ego]
-    control, out = np.empty((1, len(motion.time) - 1, 4, 2)), np.empty((1, 2))
-    control_points(motion.time, motion.position[ego], motion.heading[ego], motion.speed[ego], control)
-    half = vehicle.half
-    inside.first_exits(motion.time, control, motion.heading[ego], np.array([half]), inside.Ground.of(road), RESOLUTION, out)
+    motion, ego, until = drive.motion, [drive.ego], slice(drive.driven)
+    half, time, heading = motion.vehicles[drive.ego].half, motion.time[until], motion.heading[ego, until]
+    control, out = np.empty((1, len(time) - 1, 4, 2)), np.empty((1, 2))
+    control_points(time, motion.position[ego, until], heading, motion.speed[ego, until], control)
+    inside.first_exits(time, control, heading, np.array([half]), inside.Ground.of(road), RESOLUTION, out)
     if out[0, 0] == inside.PROVEN:
-        poses = np.column_stack([motion.position[drive.ego], motion.heading[drive.ego]])
+        poses = np.column_stack([motion.position[drive.ego, until], heading[0]])
         room = _measured(road, poses, half, outside=False)[:, 0].min()
         return RoadUse(max(float(room), RESOLUTION), 0.0, math.nan)
     deepest, most, begin = 0.0, 0.0, math.nan
-    for k in range(len(motion.time) - 1):
+    for k in range(len(time) - 1):
         parts = np.linspace(0.0, 1.0, _parts(motion, drive.ego, k) + 1)
         found = _measured(road, poses_in(motion, ego, k, parts)[0], half, outside=True)
         if math.isnan(begin) and (found[:, 0] > 0.0).any() and found[:, 0].max() >= limit:
@@ -72,6 +71,13 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
             break  # nothing more is told
         deepest, most = max(deepest, float(found[:, 0].max())), max(most, float(found[:, 1].max()))
     return RoadUse(-deepest, most, begin)
+
+
+def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: float) -> bool:
+    """Whether a footprint at a pose (3,) is at least `limit` [m] deep off the road, as `road_use` has it."""
+    if footprint_fits(road, pose, 2.0 * half[0], 2.0 * half[1])[0]:
+        return False
+    return bool(_measured(road, pose[None], half, outside=True)[0, 0] >= limit)
 
 
 def poses_in(motion: Scenario, rows: list[int], k: int, u: Floats) -> Floats:

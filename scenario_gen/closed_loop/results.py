@@ -119,7 +119,7 @@ class Drives:
         order = self.by_severity()
         return render_page(
             "drives.html.j2",
-            ("scene.js", "drives.js"),
+            ("scene.js", "drives.js", "tables.js"),
             drawings(self.outcomes, self.trials, order[:MOST_DRAWN]),
             planner=self.planner,
             found=rates(self.outcomes),

@@ -49,8 +49,8 @@ class Terms:
     """Each from 0 to 1.
 
     Attributes:
-        no_at_fault_collision: 0 if the ego hit one that stood, or hit one with its front, or was off the road when it was hit at
-            the side; not if it stood or was hit from behind.
+        no_at_fault_collision: 0 if, as nuPlan has it, the ego hit one that stood, or hit one with its front, or was off the road
+            when it was hit at the side; not if it stood or was hit from behind. `Collision.reason` has another definition.
         drivable_area: 0 if the footprint was deeper than 0.3 m outside; 1 where no road is known.
         making_progress: 0 below 20 % of the witness' way.
         ttc: 0 if the time to collision with one that is not behind was less than 0.95 s.
@@ -106,9 +106,9 @@ def not_behind(drive: Drive, other: int) -> Floats:
 
 def _at_fault(drive: Drive, who: int, time: float, *, off_road: bool) -> bool:
     ego, other = state_at(drive, drive.ego, time), state_at(drive, who, time)
-    if ego.speed <= STOPPED:
+    if abs(ego.speed) <= STOPPED:
         return False
-    if other.speed <= STOPPED:
+    if abs(other.speed) <= STOPPED:
         return True
     vehicles = drive.motion.vehicles
     if _touches_front(ego, vehicles[drive.ego], other, vehicles[who]):

@@ -19,10 +19,9 @@ from scenario_gen.closed_loop.advance import advance, ego_hits
 from scenario_gen.closed_loop.certified import world_of
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.driver import Manner
-from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
+from scenario_gen.closed_loop.ego import Command, EgoState, misplaced, move, Pose
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
-from scenario_gen.roads import footprint_fits
 from scenario_gen.types import Road, Scenario, Vehicle
 
 
@@ -134,6 +133,16 @@ class Drive:
     accelerations: Floats
     forced: int
     faults: tuple[tuple[int, str], ...]
+
+    @property
+    def jumps(self) -> tuple[int, ...]:
+        """The instants before which the ego jumped."""
+        return tuple(step for step, fault in self.faults if misplaced(fault))
+
+    @property
+    def driven(self) -> int:
+        """How many instants there are before the first jump."""
+        return min((*self.jumps, len(self.motion.time)))
 
 
 WAITS = 1.0  # metres; a witness that drives no farther waits throughout
@@ -258,12 +267,6 @@ class ClosedLoop:
     def hit(self, state: State) -> bool:
         """Whether the ego overlaps another at this instant."""
         return bool(ego_hits(state.vehicles, self.world.half, state.here, self.ego))
-
-    def off_road(self, state: State) -> bool:
-        """Whether the ego's footprint covers a cell that is not drivable at this instant; False if no road is known."""
-        length, width = self._sizes[self.ego].tolist()
-        pose = state.vehicles[self.ego, None, :3]
-        return self.road is not None and not bool(footprint_fits(self.road, pose, length, width)[0])
 
     def at_goal(self, state: State) -> bool:
         """Whether the ego is at its goal at this instant."""

@@ -8,10 +8,12 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 import math
 import multiprocessing
 import os
 from pathlib import Path
+import pickle
 import pkgutil
 import sys
 from typing import Any
@@ -28,9 +30,9 @@ from scenario_gen.closed_loop.bounded import bounded, Decisions, Timed, TooLongE
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
-from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
+from scenario_gen.closed_loop.verdict import DriveVerdict, judge
 from scenario_gen.method.evaluation import clustered_wilson
-from scenario_gen.types import GenerationResult, Interval, join_ego, Road, Scenario, token
+from scenario_gen.types import GenerationResult, Interval, join_ego, once_per_object, Road, Scenario, token
 
 MakePlanner = Callable[[], Planner]
 
@@ -60,8 +62,8 @@ class Bars(Parameters):
 
     collisions: float = parameter(0.0, "largest share of drives with a collision", low=0.0, high=1.0)
     off_road: float = parameter(0.0, "largest share of drives that leave the road", low=0.0, high=1.0)
-    goals: float = parameter(0.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
-    at_fault: float = parameter(0.0, "largest share of drives in which the ego itself ran into another", low=0.0, high=1.0)
+    goals: float = parameter(1.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
+    at_fault: float = parameter(0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0)
     jumps: float = parameter(0.0, "largest share of drives in which the ego jumps", low=0.0, high=1.0)
     progress: float = parameter(
         0.9, "smallest share of drives with progress: 20 % of the witness' way, as in nuPlan; who never moves has none",
@@ -213,17 +215,31 @@ def run_trials(
         InputError: the planner is not found, or fails; the message names the scenario.
     """
     outcomes: list[Outcome] = []
-    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run:
-        try:
-            for outcome in run(trials):
-                outcomes.append(outcome)
-                progress(len(outcomes), len(trials))
-        except InputError as error:
-            if not outcomes:
-                raise
-            found = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
-            raise InputError(f"{error}\nof the {len(outcomes)} drives before: {found}") from error
+    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run, saying_what_was_before(outcomes):
+        for outcome in run(trials):
+            outcomes.append(outcome)
+            progress(len(outcomes), len(trials))
     return outcomes
+
+
+@contextmanager
+def saying_what_was_before(outcomes: Sequence[Outcome]) -> Iterator[None]:
+    """Add to an InputError what the drives before it came to."""
+    try:
+        yield
+    except InputError as error:
+        if not outcomes:
+            raise
+        found = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
+        raise InputError(f"{error}\nof the {len(outcomes)} drives before: {found}") from error
+
+
+def too_long(trial: Trial, config: ClosedLoopConfig) -> InputError:
+    """Return the error of a planner that takes too long for a drive."""
+    return InputError(
+        f"scenario {trial.name}: the planner did not come to an end in {config.drive_time:g} s (drive_time): it hangs, or "
+        "needs more time for a drive"
+    )
 
 
 @contextmanager
@@ -236,18 +252,16 @@ def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: 
     if isinstance(planner, str):
         find_planner(planner)  # what is wrong with it is reported before there are processes
 
-    def tasks(trials: Sequence[Trial]) -> list[tuple[Trial, MakePlanner | str, ClosedLoopConfig]]:
-        return [(trial, planner, config) for trial in trials]
-
     if workers <= 1:
-        yield lambda trials: map(_run, tasks(trials))
+        yield lambda trials: map(_run, ((trial, planner, config) for trial in trials))
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
 
         def run(trials: Sequence[Trial]) -> Iterator[Outcome]:
+            tasks = ((replace(trial, road=None), _packed(trial.road) if trial.road else b"", planner, config) for trial in trials)
             with starting():
-                results = pool.map(_run, tasks(trials), chunksize=min(max(len(trials) // workers, 1), 4))
+                results = pool.map(_run_packed, tasks, chunksize=min(max(len(trials) // workers, 1), 4))
             done = 0
             try:
                 for outcome in results:
@@ -263,6 +277,23 @@ def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: 
         yield run
 
 
+@once_per_object
+def _packed(road: Road) -> bytes:
+    return pickle.dumps(road)
+
+
+@lru_cache(maxsize=4)
+def _unpacked(road: bytes) -> Road:
+    """Return the road of a task: one object for all tasks, so that what is derived from it is derived once."""
+    known: Road = pickle.loads(road)
+    return known
+
+
+def _run_packed(task: tuple[Trial, bytes, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
+    trial, road, planner, config = task
+    return _run((replace(trial, road=_unpacked(road)) if road else trial, planner, config))
+
+
 def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
     trial, planner, config = task
     make = find_planner(planner) if isinstance(planner, str) else planner
@@ -272,10 +303,7 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
         with bounded(config.drive_time):
             drive = loop.drive(timed)
     except TooLongError as error:
-        raise InputError(
-            f"scenario {trial.name}: the planner did not come to an end in {config.drive_time:g} s (drive_time): it hangs, or "
-            "needs more time for a drive"
-        ) from error
+        raise too_long(trial, config) from error
     except InputError as error:
         raise InputError(f"scenario {trial.name}: {error}") from error
     except ScenarioGenError:
@@ -311,7 +339,7 @@ class Rate:
 
 
 def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
-    """Return how often what happened: failures of any kind, collisions, at_fault (the ego itself ran into another), and so on.
+    """Return how often what happened: failures of any kind, collisions, those by the ego's fault, and so on.
 
     Drives of one encounter are alike, so intervals are for encounters that are drawn at random; with one encounter alone they
     hold for that one, and copies of one scenario count as one.
@@ -320,7 +348,8 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
     flags = {
         "failures": [not v.passed for v in verdicts],
         "collisions": [v.collision is not None for v in verdicts],
-        "at_fault": [v.collision is not None and v.collision.ran is not Runner.OTHER for v in verdicts],
+        "at_fault": [v.at_fault for v in verdicts],
+        "at_fault_nuplan": [v.terms.no_at_fault_collision == 0.0 for v in verdicts],
         "off_road": [not math.isnan(v.off_road) for v in verdicts],
         "jumps": [v.jumps > 0 for v in verdicts],
         "goals": [not math.isnan(v.goal) for v in verdicts],

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.closed_loop.ego import misplaced
 from scenario_gen.closed_loop.off_road import PARTS, poses_in, RESOLUTION, road_use
-from scenario_gen.closed_loop.reasons import Reason, reason_of, Runner, STANDS, state_at
+from scenario_gen.closed_loop.reasons import CutIn, Reason, reason_of, Runner, STANDS, state_at
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.method.evaluation import footprint_distance, Motion, time_to_collision
@@ -20,6 +19,7 @@ from scenario_gen.method.validity import control_points
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit
 from scenario_gen.template import find_conflicts
+from scenario_gen.types import Scenario
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
 
@@ -29,13 +29,29 @@ STANDING = 5.0  # seconds at its end for which a drive has stood, if that is why
 
 @dataclass(frozen=True)
 class Collision:
-    """The first contact of the ego: when [s], with whom, at which relative speed [m/s], who ran into whom, and why they met."""
+    """The first contact of the ego.
+
+    Attributes:
+        time: when [s]; vehicle: with whom; speed: relative [m/s].
+        ran: who closed the gap; that says nothing of fault.
+        reason: why they met, and so whose fault it was.
+        cut_in: how the ego came into the other's way ahead of it or beside it, if it did and both drove the same way.
+    """
 
     time: float
     vehicle: str
     speed: float
     ran: Runner
     reason: Reason
+    cut_in: CutIn | None = None
+
+    @property
+    def why(self) -> str:
+        """The reason and whose fault it was, in words."""
+        words = self.reason.value.replace("_", " ")
+        if self.cut_in is not None and self.reason in (Reason.CUT_IN, Reason.OTHER_RAN_INTO_EGO):
+            words = f"{words}, came in {self.cut_in.gap:.1f} m ahead; RSS asks for {self.cut_in.safe_gap:.1f} m"
+        return f"{words}; {'' if self.reason.at_fault else 'not '}at fault"
 
 
 @dataclass(frozen=True)
@@ -96,18 +112,25 @@ class DriveVerdict:
         return self.collision is None and math.isnan(self.off_road) and not math.isnan(self.goal) and not self.jumps
 
     @property
+    def at_fault(self) -> bool:
+        """Whether it met another by its own fault, as `Reason` says."""
+        return self.collision is not None and self.collision.reason.at_fault
+
+    @property
     def failure(self) -> str:
-        """The gravest thing that went wrong: collision, off_road, jump, goal; "" if it passed."""
+        """What went wrong first of these: jump, collision, off_road, goal; "" if it passed."""
         if self.passed:
             return ""
+        if self.jumps:
+            return "jump"
         if self.collision is not None:
             return "collision"
-        return "off_road" if not math.isnan(self.off_road) else "jump" if self.jumps else "goal"
+        return "off_road" if not math.isnan(self.off_road) else "goal"
 
     @property
     def fault(self) -> str:
-        """Why it failed: the reason of a collision, off_road, jump, standing, or goal (missed otherwise); "" if it passed."""
-        if self.collision is not None:
+        """Why it failed: jump, the reason of a collision, off_road, standing, or goal (missed otherwise); "" if it passed."""
+        if self.collision is not None and not self.jumps:
             return self.collision.reason.value
         stands = self.failure == "goal" and self.stood >= STANDING
         return "standing" if stands else self.failure
@@ -127,8 +150,7 @@ class DriveVerdict:
                 Runner.OTHER: f"{hit.vehicle} ran into the ego",
                 Runner.BOTH: f"the ego and {hit.vehicle} ran into each other",
             }
-            why = hit.reason.value.replace("_", " ")
-            messages.append(f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({why})")
+            messages.append(f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({hit.why})")
         if not math.isnan(self.off_road):
             depth = f"{-self.road_margin:.2f} m deep, {self.off_road_area:.1f} m² of its footprint"
             messages.append(f"left the road at {self.off_road:.2f} s ({depth})")
@@ -145,7 +167,8 @@ class DriveVerdict:
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON's types; null for what there is not."""
-        plain = asdict(self) | {"passed": self.passed, "fault": self.fault, "sentence": self.sentence()}
+        plain = asdict(self) | {"passed": self.passed, "at_fault": self.at_fault, "fault": self.fault}
+        plain["sentence"] = self.sentence()
         plain["terms"] |= {"nuplan": self.terms.nuplan, "pdms": self.terms.pdms}
         return {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in plain.items()}
 
@@ -153,7 +176,8 @@ class DriveVerdict:
 def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     """Judge one drive.
 
-    Collisions and the road are looked at in continuous time, by the motion that `Scenario` defines between two instants.
+    Collisions and the road are looked at in continuous time, by the motion that `Scenario` defines between two instants. A jump
+    is no motion: nobody is met on the way, and what comes after it reaches no goal and leaves no road.
     """
     motion, ego = drive.motion, drive.ego
     time, n = motion.time, len(motion.vehicles)
@@ -197,7 +221,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         road_margin=road.margin,
         off_road_depth=config.off_road_depth,
         off_road_area=road.area,
-        jumps=len([1 for _, fault in drive.faults if misplaced(fault)]),
+        jumps=len(drive.jumps),
         stood=_stood(motion.speed[ego], config.step),
         terms=terms(drive, None if who < 0 else (who, first), road.margin, progress, min(close, default=math.inf)),
     )
@@ -211,12 +235,18 @@ def _stood(speed: Floats, step: float) -> float:
 
 def _contact(drive: Drive, i: int, j: int) -> float | None:
     """Time [s] of the first contact of two vehicles while both are on the scene, None if they never touch."""
-    motion = drive.motion
     both = np.flatnonzero(drive.here[i] & drive.here[j])
-    if len(both) < 2:
-        return None
-    span = slice(both[0], both[-1] + 1)
-    pair, vehicles = [i, j], (motion.vehicles[i], motion.vehicles[j])
+    parts = np.split(both, np.searchsorted(both, drive.jumps)) if drive.ego in (i, j) else [both]
+    times = (_contact_in(drive.motion, [i, j], slice(part[0], part[-1] + 1)) for part in parts if len(part))
+    return next((time for time in times if time is not None), None)
+
+
+def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
+    """Return the time [s] of the first contact of two vehicles in a span of instants, None if they do not touch in it."""
+    vehicles = (motion.vehicles[pair[0]], motion.vehicles[pair[1]])
+    if span.stop - span.start < 2:
+        there = Motion(vehicles, 1.0, motion.position[pair][:, span], motion.heading[pair][:, span], motion.speed[pair][:, span])
+        return float(motion.time[span.start]) if footprint_distance(there, 0, 1)[0] <= 0.0 else None
     time, position = motion.time[span], motion.position[pair][:, span]
     heading, speed = motion.heading[pair][:, span], motion.speed[pair][:, span]
     control, out = np.empty((2, len(time) - 1, 4, 2)), np.empty((1, 3))
@@ -225,10 +255,7 @@ def _contact(drive: Drive, i: int, j: int) -> float | None:
     apart.first_contacts(time, control, heading, half, 0.0, RESOLUTION, out)
     if out[0, 0] == apart.PROVEN:
         return None
-    found, step = (
-        float(out[0, 1]),
-        float(motion.time[1]),
-    )  # any instant of the contact
+    found, step = float(out[0, 1]), float(motion.time[1])  # any instant of the contact
     k = min(int(found / step + 1e-9), len(motion.time) - 2)
     start = float(motion.time[k])
     u = np.linspace(0.0, max(found - start, 0.0) / step, PARTS + 1)
@@ -239,7 +266,7 @@ def _contact(drive: Drive, i: int, j: int) -> float | None:
 
 
 def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision:
-    """Say how fast and by whom: the speeds of both towards each other, along the line of their centres."""
+    """Say how fast they met, who closed the gap, by both speeds along the line of their centres, and why."""
     ego, other = (state_at(drive, i, at) for i in (drive.ego, who))
     velocity, its_velocity = ego.speed * unit(ego.yaw), other.speed * unit(other.yaw)
     away = np.subtract(other[:2], ego[:2])
@@ -247,13 +274,14 @@ def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision
     mine, its = float(velocity @ towards), float(-its_velocity @ towards)
     ran = Runner.EGO if mine > 2.0 * max(its, 0.0) else Runner.OTHER if its > 2.0 * max(mine, 0.0) else Runner.BOTH
     speed = math.hypot(*(velocity - its_velocity))
-    return Collision(at, drive.motion.vehicles[who].id, speed, ran, reason_of(loop, drive, who, at, ran))
+    return Collision(at, drive.motion.vehicles[who].id, speed, ran, *reason_of(loop, drive, who, at))
 
 
 def _goal_time(loop: ClosedLoop, drive: Drive) -> float:
-    """Time [s] of the first instant at which the ego is at its goal, NaN if it never is."""
-    motion, ego = drive.motion, drive.ego
-    reached = loop.reached(motion.time, np.column_stack([motion.position[ego], motion.heading[ego]]))
+    """Time [s] of the first instant before any jump at which the ego is at its goal, NaN if it never is."""
+    motion, ego, until = drive.motion, drive.ego, slice(drive.driven)
+    poses = np.column_stack([motion.position[ego, until], motion.heading[ego, until]])
+    reached = loop.reached(motion.time[until], poses)
     return float(motion.time[np.argmax(reached)]) if reached.any() else math.nan
 
 

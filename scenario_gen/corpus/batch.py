@@ -18,6 +18,8 @@ from hashlib import sha256
 from itertools import groupby
 import json
 from pathlib import Path
+import re
+from textwrap import shorten
 from typing import Any
 
 from scenario_gen.bags.recordings.write import add_results, scenario_bytes
@@ -32,13 +34,14 @@ from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, 
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import at_period, criticality
-from scenario_gen.method.fitting import LostConflictError
+from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.types import GenerationResult
 
 BATCH = "batch.json"
 TEMPLATES = 10  # of one task
+LONGEST_CAUSE = 80  # characters under which refusals are counted
 LOST_CONFLICT = "lost conflict"  # the cause of every case whose encounter is lost, whatever the road
 
 
@@ -225,7 +228,7 @@ def _generate_case(
         segmentation = segment(encounter, request.config.segmentation, seed)
         result = Chain(encounter, segmentation, road, request.config, count=request.count, seed=seed).run()
     except (RefusedError, InputError) as error:
-        message = LOST_CONFLICT if isinstance(error, LostConflictError) else str(error).partition(":")[0]
+        message = LOST_CONFLICT if isinstance(error, LostEncounterError) else str(error)
         cause = message if isinstance(error, RefusedError) else "input"
         return case | {"cause": _cause(cause), "why": str(error)}, None
     generated = result.generated
@@ -244,8 +247,9 @@ def _generate_case(
 
 
 def _cause(text: str) -> str:
-    """A reason without the numbers and names that make each its own."""
-    return " ".join(word for word in text.split() if not any(c.isdigit() for c in word))[:80]
+    """A reason without the numbers and names that make each its own, and without what explains it."""
+    words = [word if not any(c.isdigit() for c in word) else "…" for word in re.split(r"[:;(]", text)[0].split()]
+    return shorten(" ".join(words), LONGEST_CAUSE, placeholder=" …")
 
 
 def _scenario_rows(case: Mapping[str, Any], result: GenerationResult, task: PartTask) -> list[dict[str, Any]]:

@@ -30,14 +30,13 @@ class Hits:
     coverage: list[tuple[str, str, str, int]]
 
 
-def find(batch: Place, condition: str = "true", limit: int = 0) -> Hits:
+def find(batch: Place, condition: str = "true") -> Hits:
     """Return the scenarios of a batch for which a condition holds, the most critical first.
 
     Args:
         batch: that `run_batch` wrote, finished or not.
         condition: SQL over the columns template, kind, road, vehicles, index, seed, seconds [s], distance [m], ttc [s],
             pet [s], speed [m/s], braking [m/s²], sha256.
-        limit: at most so many; 0: all.
 
     Raises:
         InputError: there is no batch, or the condition is none.
@@ -57,7 +56,6 @@ def find(batch: Place, condition: str = "true", limit: int = 0) -> Hits:
         base.execute("SET enable_external_access = false")  # a condition reads no files
         found = base.table("scenarios").filter(condition).order("pet NULLS LAST, ttc, template, road, index")  # one expression
         names = found.columns
-        found = found.limit(limit) if limit else found
         rows = [dict(zip(names, row, strict=True)) for row in found.fetchall()]
         coverage = base.execute(
             f"SELECT kind, road, {CLASSES} AS pet, count(*) FROM scenarios GROUP BY ALL ORDER BY ALL"

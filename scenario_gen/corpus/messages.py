@@ -24,7 +24,7 @@ from scenario_gen.logs.tables import COLUMNS
 
 HOUR = 3_600_000_000  # µs
 MOST_WRONG = 0.5  # of a file's rows whose clocks differ: beyond, the second clock is something else and is not used
-SMALLER = "see the parameters memory, task_rows and range_size"
+SMALLER = "make room where the results go, or see the parameters memory, task_rows and range_size"
 NAMED_DAY = re.compile(r"_(4\d{4})(?:_|\.)")
 DAY_OF_2004 = 37_987  # 2004-01-01 as the names of the files count days
 TYPES = {

@@ -11,6 +11,7 @@ from markupsafe import Markup
 import numpy as np
 
 from scenario_gen.base.folders import write_text
+from scenario_gen.method.evaluation.population import Population
 from scenario_gen.output.report.html import render_page
 from scenario_gen.types import Encounter
 
@@ -46,6 +47,27 @@ def sketch(encounter: Encounter, span: tuple[int, int] | None = None) -> Markup:
     metre = 10.0 * scale
     parts.append(f'<path d="M6,{HEIGHT - 6:.0f} h{metre:.1f}" stroke="#888" stroke-width="2"/>')
     parts.append(f'<text x="{metre + 9:.0f}" y="{HEIGHT - 3:.0f}" font-size="9" fill="#888">10 m</text>')
+    return Markup(f'<svg width="{WIDTH:.0f}" height="{HEIGHT:.0f}" role="img">{"".join(parts)}</svg>')
+
+
+def curve(found: Population) -> Markup:
+    """Return a drawing of coverage by number of templates: templates alone, and with what is generated, 5 to 95 %."""
+    most = max((point.templates for point in found.curve), default=1)
+    across, down = WIDTH - 2.0 * BORDER, HEIGHT - 2.0 * BORDER
+
+    def height(share: float) -> str:
+        return f"{BORDER + down * (1.0 - share):.1f}"
+
+    parts = [f'<path d="M{BORDER},{BORDER} v{down} h{across}" fill="none" stroke="#888"/>']
+    for colour, name in zip(COLOURS, ("alone", "generated"), strict=False):
+        at = [(BORDER + across * point.templates / most, getattr(point, name)) for point in found.curve]
+        line = " ".join(f"{x:.1f},{height(share.value)}" for x, share in at)
+        parts.append(f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2"/>')
+        parts += [f'<path d="M{x:.1f},{height(share.high)} V{height(share.low)}" stroke="{colour}"/>' for x, share in at]
+    parts.append(
+        f'<text x="{BORDER + 4}" y="{BORDER + 8}" font-size="9" fill="#888">1.0; red: with generated, blue: alone</text>'
+    )
+    parts.append(f'<text x="{WIDTH - BORDER - 70}" y="{HEIGHT - 2}" font-size="9" fill="#888">{most} templates</text>')
     return Markup(f'<svg width="{WIDTH:.0f}" height="{HEIGHT:.0f}" role="img">{"".join(parts)}</svg>')
 
 

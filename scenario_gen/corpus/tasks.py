@@ -24,7 +24,7 @@ from typing import Any, Protocol, TypeVar
 from uuid import uuid4
 
 from scenario_gen.base.documents import read_json
-from scenario_gen.base.errors import describe, InputError, needs, ScenarioGenError
+from scenario_gen.base.errors import describe, InputError, needs, of_system, ScenarioGenError
 from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_text
 from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
 from scenario_gen.base.interrupts import ending, starting
@@ -235,7 +235,9 @@ def _guarded(function: Callable[[Any], Any], task: Any) -> str:
     """Run one task; an error of its own input is a sentence, and does not end the others."""
     try:
         function(task)
-    except (ScenarioGenError, OSError, MemoryError) as error:
+    except OSError as error:
+        return f"{getattr(task, 'name', task)}: {of_system(error)}"
+    except (ScenarioGenError, MemoryError) as error:
         return f"{getattr(task, 'name', task)}: {describe(error)}"
     except Exception as error:  # a fault of ours, or of a library: of this case, and its place is said for who mends it
         *_, (frame, line) = traceback.walk_tb(error.__traceback__)

@@ -80,6 +80,12 @@ class Overlap:
     share: float
     area: float
 
+    def __str__(self) -> str:
+        return (
+            f"recorded footprints of {self.first} and {self.second} overlap {100 * self.share:.0f} % of the time "
+            f"(up to {self.area:.1f} m²)"
+        )
+
 
 @dataclass(frozen=True)
 class EncounterQuality:
@@ -111,6 +117,11 @@ class Quality:
     encounters: tuple[EncounterQuality, ...]
     notes: tuple[str, ...] = ()
 
+    def remarks(self) -> tuple[str, ...]:
+        """Return what a person should know before anything is made of the log."""
+        overlaps = [f"encounter {encounter.name}: {overlap}" for encounter in self.encounters for overlap in encounter.overlaps]
+        return (*self.notes, *overlaps)
+
     def lines(self) -> tuple[str, ...]:
         """Return the summary for people, one fact per line."""
         out = [f"{self.name}: {self.rows} rows of {len(self.vehicles)} vehicles, {len(self.encounters)} encounter(s)"]
@@ -122,11 +133,7 @@ class Quality:
                 out.append(
                     "    vehicle " + ", vehicle ".join(f"{name} from {a:.1f} to {b:.1f} s" for name, a, b in encounter.partly)
                 )
-            out += [
-                f"    recorded footprints of {overlap.first} and {overlap.second} overlap {100 * overlap.share:.0f} % of the time"
-                f" (up to {overlap.area:.1f} m²)"
-                for overlap in encounter.overlaps
-            ]
+            out += [f"    {overlap}" for overlap in encounter.overlaps]
         return (*out, *(f"  {note}" for note in self.notes))
 
 

@@ -10,21 +10,22 @@ from importlib import import_module
 from itertools import combinations
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, needs, reading
+from scenario_gen.base.folders.scratch import scratch
 from scenario_gen.base.registry import Registry
-from scenario_gen.base.stores import local, renamed
+from scenario_gen.base.stores import local, naming_objects, renamed, temporary
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import LogConfig, picked
-from scenario_gen.logs.encounters import Piece, pieces_of
+from scenario_gen.logs.encounters import driven_backwards, Piece, pieces_of
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
 from scenario_gen.logs.groups import distances, driven, find_groups, ticks
 from scenario_gen.logs.growing import Group, Meeting
@@ -34,7 +35,10 @@ from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog,
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.logs.units import remarks_on_units
 from scenario_gen.numerics import runs
-from scenario_gen.types import cut, Encounter, Vehicle
+from scenario_gen.types import cut, Encounter, tokens, Vehicle
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
@@ -43,6 +47,7 @@ NEAR = 65_536  # bytes
 FAR_M = 200_000.0  # from an origin that is given: there distances are 0.02 % too long
 BSM_ENDINGS = (".json", ".jsonl", ".ndjson", ".txt")
 MUCH = 0.02  # of the rows: if more are left out, people are told at once
+TABLE = "dataframe.csv"  # as which a DataFrame is read
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
 
 
@@ -54,11 +59,11 @@ class LogResult:
     quality: Quality
 
 
-def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogConfig()) -> LogResult:
+def read_log(path: "Path | str | Sequence[Path | str] | DataFrame", config: LogConfig = LogConfig()) -> LogResult:
     """Read a log and cut it into encounters.
 
     Args:
-        path: a file, a bag or a folder of files; or several files that share one clock.
+        path: a file, a bag or a folder of files; or several files that share one clock; or a table with the columns of a file.
         config: how to read, clean and cut.
 
     Returns:
@@ -67,6 +72,10 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
     Raises:
         InputError: the log cannot be used; the message names the file and the row or topic, and what to do.
     """
+    if hasattr(path, "to_csv"):
+        with scratch(temporary()) as folder, naming_objects({str(folder / TABLE): "the DataFrame"}):
+            path.to_csv(folder / TABLE, index=False)
+            return read_log(folder / TABLE, config)
     paths = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
     try:
         return encounters_of(read_raw(paths, config), config)
@@ -106,9 +115,17 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         vehicles.append(quality)
     if not pieces and any(vehicle.lost for vehicle in vehicles):
         raise InputError(f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units")
+    backwards = driven_backwards(pieces)
+    pieces = [piece for piece in pieces if piece not in backwards]
+    left_out = tuple(
+        f"vehicle {piece.track.id} drives backwards for {(piece.last - piece.first) * config.period:.1f} s, by its recorded "
+        "headings; that is left out, for only driving forwards is generated"
+        for piece in backwards
+    )
     groups, notes = find_groups(pieces, config)
     if not groups:
-        raise NoEncounterError(explain_no_encounter(log, pieces, config))
+        raise NoEncounterError("; ".join((*left_out, explain_no_encounter(log, pieces, config))))
+    notes += left_out
     notes += notes_on_origin(tracks, config)
     notes += notes_on_vehicles(
         vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.spans}, config
@@ -252,6 +269,7 @@ def cut_encounter(
             notes.append(f"vehicle {piece.track.id} never moves and its heading is not recorded: taken as east")
             facing = np.zeros(len(facing))
         heading.append(facing)
+    tokens(member.track.id for member in members)  # refuses ids that are one name in ROS, before anything is made of them
     dt_ns = round(config.period * 1e9)
     encounter = Encounter(
         name=name,

@@ -1,20 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bundled logs: the paper's three cases (V-A, Fig. 3), invented and called synthetic everywhere (docs/logs.md)."""
+"""The bundled logs: the paper's three cases (V-A, Fig. 3) and the demo's encounters, all invented (docs/logs.md)."""
 
 from pathlib import Path
 
 CASES = ("a", "b", "c")
+DEMO = ("left_turn", "follower", "all_way_stop")  # drawn by docs/demo_encounters.py
 RESOURCES = Path(__file__).resolve().parents[1] / "resources"
 
 
 def bundled(case: str) -> Path:
-    """Return the path of the bundled bag of case "a", "b" or "c".
+    """Return the path of a bundled log: the bag of a case of `CASES`, or the table of one of `DEMO`.
 
     Raises:
         ValueError: there is no such case.
     """
-    if case not in CASES:
-        raise ValueError(f"there is no case {case!r}; choose one of {', '.join(CASES)}")
-    return RESOURCES / f"synthetic_{case}"
+    if case not in CASES + DEMO:
+        raise ValueError(f"there is no case {case!r}; choose one of {', '.join(CASES + DEMO)}")
+    return RESOURCES / "demo" / f"{case}.csv" if case in DEMO else RESOURCES / f"synthetic_{case}"

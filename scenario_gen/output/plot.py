@@ -9,7 +9,8 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.base.errors import needs
-from scenario_gen.types import Encounter, GenerationResult, Road, Scenario
+from scenario_gen.types import GenerationResult, Road, Scenario
+from scenario_gen.types.encounter import Tracks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 _MOST = 200  # scenarios drawn: with more, one hides the other
 
 
-def plot(shown: GenerationResult | Scenario | Encounter, ax: "Axes | None" = None, *, road: Road | None = None) -> "Axes":
+def plot(shown: GenerationResult | Scenario | Tracks, ax: "Axes | None" = None, *, road: Road | None = None) -> "Axes":
     """Draw the paths of all vehicles from above, each vehicle in a colour of its own; a dot is where it starts.
 
     Args:
@@ -32,7 +33,7 @@ def plot(shown: GenerationResult | Scenario | Encounter, ax: "Axes | None" = Non
     import matplotlib.pyplot as plt
 
     axes = plt.subplots()[1] if ax is None else ax
-    drawn: Sequence[Scenario | Encounter] = list(shown)[:_MOST] if isinstance(shown, GenerationResult) else [shown]
+    drawn: Sequence[Scenario | Tracks] = list(shown)[:_MOST] if isinstance(shown, GenerationResult) else [shown]
     road = shown.road if isinstance(shown, GenerationResult) and road is None else road
     if road is not None:
         _draw_road(axes, road)
@@ -62,7 +63,7 @@ def _draw_road(axes: "Axes", road: Road) -> None:
     axes.imshow(shade, cmap="gray", vmin=0.0, vmax=1.0, origin="lower", extent=(x, x + width, y, y + height), zorder=0)
 
 
-def _title(shown: GenerationResult | Scenario | Encounter) -> str:
+def _title(shown: GenerationResult | Scenario | Tracks) -> str:
     if isinstance(shown, GenerationResult):
         return f"{len(shown)} scenarios, {shown.title}" + (f" (the first {_MOST})" if len(shown) > _MOST else "")
     return f"scenario {shown.index}" if isinstance(shown, Scenario) else f"encounter {shown.name}"

@@ -13,7 +13,7 @@ from scenario_gen.bags.recordings.read import INFO, read_recording
 from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
-from scenario_gen.base.folders import Kind, sha256_of, write_text
+from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
 from scenario_gen.base.provenance import what_makes_it_again
 from scenario_gen.output.report.page import ReportInput, write_report
 from scenario_gen.pipeline import PipelineConfig
@@ -21,6 +21,17 @@ from scenario_gen.types import as_markdown, GenerationResult, Request
 
 BAG, REPORT, FIGURES, TABLE = "bag", "report.html", "evaluation.json", "evaluation.md"
 GENERATED, EVALUATED = Kind("generated"), Kind("evaluated")
+
+
+def report(folder: Path | str, *cases: GenerationResult, title: str = "") -> Path:
+    """Write bag, page and figures of results to a folder, as `scenario-gen generate` does; return the page.
+
+    Raises:
+        InputError: the folder holds something else.
+    """
+    with replaced_folder(Path(folder), GENERATED) as place:
+        write_results(place, cases, title=title or cases[0].title, quality=(), provenance=cases[0].provenance)
+    return Path(folder) / REPORT
 
 
 def write_results(

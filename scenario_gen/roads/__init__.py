@@ -3,6 +3,7 @@
 
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
+from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.build import build_road, BUILT_IN, DrawRoad, road_and_template, ROADS
 from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.roads.clearance import (
@@ -21,8 +22,9 @@ from scenario_gen.roads.clearance import (
 )
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.connectivity import common_component, component_cells
-from scenario_gen.roads.drawn import drivable_beside, ways_through
+from scenario_gen.roads.drawn import ways_through
 from scenario_gen.roads.obstacles import read_obstacles
+from scenario_gen.roads.pavement import drivable_beside
 from scenario_gen.roads.vector.ground import along_lanes, drives_against, own_ground
 from scenario_gen.roads.vector.match import Course
 from scenario_gen.roads.vector.network import FAULTY
@@ -35,7 +37,7 @@ __all__ = [
     "BUILT_IN", "CONTACT", "FAULTY", "ROADS", "Course", "DrawRoad", "NoPlaceError", "Place", "RoadConfig", "RuleCheck",
     "along_lanes", "blocked_before", "build_road", "clearance_field", "clearance_in_cells", "common_component",
     "component_cells", "distance_transform", "draw", "draw_route", "draw_u_turn", "drivable_beside", "drives_against",
-    "footprint_fits", "free_length", "is_vector_map", "layout_for", "nearest_pose_with_room", "own_ground", "placements",
-    "places", "read_network", "read_obstacles", "relative", "road_and_template", "segment_free", "segments_free", "split",
-    "to_cells", "to_metres", "tracks_on", "ways_through",
+    "footprint_fits", "free_length", "is_vector_map", "lane_along", "layout_for", "nearest_pose_with_room", "own_ground",
+    "placements", "places", "read_network", "read_obstacles", "relative", "road_and_template", "segment_free",
+    "segments_free", "sharing_lanes", "split", "to_cells", "to_metres", "tracks_on", "ways_through",
 ]  # fmt: skip

@@ -1,26 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Roads drawn cell by cell, as large as a template needs: straight arms that meet at right angles; the corridor of its paths."""
+"""Roads as large as a template needs: straight arms that meet at right angles; the corridor of its paths."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.numerics.boxes import corners
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import unit
-from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
-from scenario_gen.roads.drawn import Plan, PlannedArm, road_of
-from scenario_gen.roads.sketch import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, Sketch, SLACK
+from scenario_gen.roads.along import lane_along, sharing_lanes
+from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.drawn import Arm, draw_lanes, draw_plan, Plan
+from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
-from scenario_gen.types import Encounter, Road
+from scenario_gen.types import Encounter, LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells
-_OUTWARD = {"west": np.pi, "east": 0.0, "south": -np.pi / 2.0, "north": np.pi / 2.0}
 _U_TURN = 12.0  # metres between the lanes of a U-turn
 _SAME_WAY = np.radians(25.0)
 _WIDEST = 12.0
@@ -47,36 +46,14 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
         layout: its sizes.
         config: lane width, corner radius, resolution, traffic side.
     """
-    side_arms = ("south", "north")[: ARM_COUNT[name] - 2]
-    half = layout.lanes * config.lane_width
+    sides, half, cell = SIDE_ARMS[: ARM_COUNT[name] - 2], layout.lanes * config.lane_width, config.resolution
+    arms = [Arm.towards(yaw, layout.main, layout.lanes) for yaw in (np.pi, 0.0)]
+    arms += [Arm.towards(yaw, layout.side, layout.lanes) for yaw in sides]
+    axis = Curve(np.array([[-layout.main, 0.0, 0.0], [layout.main, 0.0, 0.0]]))
     verge = layout.side if config.paper else half + _VERGE
-    south, north = (layout.side if arm in side_arms else verge for arm in ("south", "north"))
-    cell = config.resolution
+    south, north = (layout.side if side in sides else verge for side in SIDE_ARMS)
     low = -half - cell * np.ceil((np.array([layout.main, south]) - half) / cell - 1e-6)  # kerbs on cell edges
-    width, height = np.ceil((np.array([layout.main, north]) - low) / cell - 1e-6).astype(np.int64).tolist()
-    refuse_too_many_cells(name, width, height, config)
-    x = low[0] + (np.arange(width) + 0.5) * cell
-    y = low[1] + (np.arange(height) + 0.5) * cell
-    drivable = np.repeat(np.abs(y)[:, None] < half, width, axis=1)
-    for arm in side_arms:
-        along = (-y if arm == "south" else y)[:, None]
-        drivable |= (np.abs(x) < half) & (along > 0.0)
-        for across in (-x, x):
-            drivable |= _corner(across - half, along - half, config.corner_radius)
-    arms = []
-    for arm in ("west", "east", *side_arms):
-        yaw = _OUTWARD[arm]
-        reach = layout.side if arm in side_arms else layout.main
-        arms.append(PlannedArm(np.array([*(unit(yaw) * reach), yaw]), layout.lanes, layout.lanes))
-    west, east = (arm.pose[:2] for arm in arms[:2])
-    axis = Curve(np.array([[*west, 0.0], [*east, 0.0]]))
-    return road_of(Plan(arms, axis), name, low, drivable, config)
-
-
-def _corner(u: Floats, v: Floats, radius: float) -> Bools:
-    """Cells of the rounded corner between two kerbs, u and v metres beyond each of them."""
-    inside = (u >= 0.0) & (v >= 0.0) & (u < radius) & (v < radius)
-    return np.asarray(inside & (np.hypot(u - radius, v - radius) > radius))
+    return draw_plan(Plan(arms, axis), name, config, np.array([low, [layout.main, north]]))
 
 
 def draw_paper(name: str, config: RoadConfig) -> Road:
@@ -88,7 +65,7 @@ def draw_paper(name: str, config: RoadConfig) -> Road:
     if name not in ("straight", "t_intersection"):
         raise InputError(f"road {name} has no paper version; choose straight or t_intersection")
     cells = replace(config, lane_width=_PAPER_LANE, corner_radius=50.0, resolution=1.0)
-    return replace(draw(name, Layout(main=500.0, side=500.0, lanes=1), cells), lanes=None)  # its lengths are cells
+    return draw(name, Layout(main=500.0, side=500.0, lanes=1), cells)
 
 
 def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Layout:
@@ -160,8 +137,9 @@ def _parallel_lanes(tracks: tuple[Track, ...], lane_width: float) -> int:
 def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
     """Draw the corridor of a template's cleaned and separated paths, in the template's frame.
 
-    Every moving vehicle's path is continued straight on at both ends by `corridor_run_out`; entries and exits stand there.
-    A vehicle that stands throughout gets the room that its footprint and the margin need.
+    Every moving vehicle's path is continued straight on at both ends by `corridor_run_out`; there its lane begins and ends. Who
+    drives in another one's lane has none of its own. A vehicle that stands throughout gets the room that its footprint and the
+    margin need.
 
     Raises:
         InputError: there is no template.
@@ -169,14 +147,19 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
     """
     if encounter is None:
         raise InputError(f"road {name} is drawn around a template; give a log too")
-    sketch = Sketch()
-    entries, exits = [], []
+    surface, paths, widths = list[BaseGeometry](), dict[str, Curve](), dict[str, float]()
     for track in own_paths(encounter).tracks:
         reach = config.corridor_margin if track.still else config.corridor_run_out
-        poses = track.curve.cut(-reach, track.travelled + reach, _STEP).points
-        sketch.drivable.extend(corners(poses, track.vehicle.length, track.vehicle.width + 2.0 * config.corridor_margin))
+        path = track.curve.cut(-reach, track.travelled + reach, _STEP)
+        widths[track.vehicle.id] = track.vehicle.width + 2.0 * config.corridor_margin
+        surface.append(swept(path, track.vehicle.length, widths[track.vehicle.id]))
         if not track.still:
-            entries.append(poses[0])
-            exits.append(poses[-1])
-    low, drivable = sketch.grid(name, config)
-    return Road(name, drivable, config.resolution, low, np.array(entries), np.array(exits))
+            paths[track.vehicle.id] = path
+    shared = sharing_lanes(paths)
+    lanes = [
+        lane_along(
+            f"along vehicle {name}", paths[name].cut(0.0, paths[name].length, 1.0), max(widths[own] for own in names) / 2.0
+        )
+        for name, names in shared.items()
+    ]
+    return draw_lanes(LaneNetwork(name, tuple(lanes), drawn=True), paved(surface, 0.0), config)

@@ -1,42 +1,51 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The lanes of a drawn road: along its arms from their ends to the junction, and ways through that from lane to lane.
+"""A road that is drawn: its arms, the lanes along them and from lane to lane through the junction, and the grid of all that.
 
 An arm has its lanes from its end to its mouth, where the road grows wider than the lanes or somebody begins to turn. A way that
 the template drives is the one that the road was drawn for, another one the clothoid that routes are made of; where it bends it is
 wider than a lane, as far as the road is.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import angle_between, unit, unit_left
+from scenario_gen.numerics.plane import angle_between, place, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.ways import draw_ring_route, draw_route, flare_begins, reverse
-from scenario_gen.types import Lane, LaneNetwork, Road
+from scenario_gen.roads.pavement import drivable_beside, Inside, inside, paved, ring, strip, swept
+from scenario_gen.roads.vector.raster import road_of
+from scenario_gen.roads.ways import draw_route, reverse
+from scenario_gen.template import Track
+from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road, RuleKind, TrafficRule
 
 Way = tuple[int, int, int, int]
 """Arm and lane that a way comes from, arm and lane that it leads to; lanes count from the dividing line."""
 
 _STEP_M, _WAY_STEP_M = 1.0, 0.5  # between cross-sections, of arms and of ways
+_VERGE_M = 2.0  # of the grid around what is paved, at least
+_KERB_M = 1e-3  # by which a kerb may lie inside the middle of a cell that is drivable
 _BEFORE_M = 1.0  # that a mouth lies before the place where the road is wider
-_STEADY = 5  # cells along an arm for which the road is wider
+_WIDER_THAN_LANES_M = 0.3
+_LOOK_M = 0.2  # between the places along an arm where it is looked how wide the road is
 _SHORTEST_M = 0.5  # of an arm
 _TURN_BACK = np.radians(150.0)  # a way that turns by more is none but for who drives it
 _STRAIGHT_ON = np.radians(10.0)  # a way that turns by less is no wider than its lanes
 _WIDER_M = 1.0  # by which each border of a bent way lies outside at most
 _INNER = 0.1  # of the most by which a bent way is wider, from which on it is looked whether the road is, too
 _BENT = np.radians(0.1)
+_RING_ROOM_M = 0.5  # that a roundabout's lane is wider on each side
 
 
 @dataclass(frozen=True, eq=False)
-class PlannedArm:
+class Arm:
     """The end (3,) of an arm's dividing line, heading out, and its numbers of lanes in and out."""
 
     pose: Floats
@@ -44,7 +53,12 @@ class PlannedArm:
     outward: int
 
     @classmethod
-    def ramp(cls, entry: Floats, config: RoadConfig) -> "PlannedArm":
+    def towards(cls, yaw: float, reach: float, lanes: int, aside: float = 0.0) -> "Arm":
+        """The arm that leads from the origin in a direction [rad], `reach` metres long, its dividing line `aside` to the left."""
+        return cls(np.array([*(reach * unit(yaw) + aside * unit_left(yaw)), yaw]), lanes, lanes)
+
+    @classmethod
+    def ramp(cls, entry: Floats, config: RoadConfig) -> "Arm":
         """The arm of one lane, by which nobody leaves, whose traffic comes in at a pose (3,)."""
         out = reverse(entry)
         aside = 0.5 * config.lane_width * (1.0 if config.traffic_side == "right" else -1.0)
@@ -57,61 +71,124 @@ class PlannedArm:
         return np.array([*(self.pose[:2] + left * unit_left(yaw)), yaw + np.pi if inward else yaw])
 
 
-def lane_ends(arms: Sequence[PlannedArm], config: RoadConfig) -> tuple[Floats, Floats]:
-    """The entries (E, 3) and exits (X, 3) [m, m, rad] of some arms."""
-    entries = [arm.lane(k, config, inward=True) for arm in arms for k in range(arm.inward)]
-    return np.array(entries), np.array([arm.lane(k, config, inward=False) for arm in arms for k in range(arm.outward)])
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """A way through the junction that a road is drawn for, from the end of one lane to that of another.
+
+    Attributes:
+        places: the lanes.
+        curve: the way.
+        length: metres of the vehicle that drives it.
+        width: metres that it needs.
+    """
+
+    places: Way
+    curve: Curve
+    length: float
+    width: float
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What is known of a road when it is drawn.
+    """What is known of a road when it is drawn; its arms lead away from the origin.
 
     Attributes:
         arms: its arms; one by which nobody leaves is a ramp.
         axis: the dividing line from the end of the first arm to that of the second; None: these are arms as the others.
-        ways: the ways through the junction that it was drawn for, from the end of one lane to that of another.
+        driven: ways through the junction.
         ring: radius [m] of the lane of a roundabout about the origin; 0: it is none.
+        yielding: the arms that give way, if priorities are shown.
+        drawn_for: where the template that it is drawn for lies, about the same origin.
     """
 
-    arms: Sequence[PlannedArm]
+    arms: Sequence[Arm]
     axis: Curve | None = None
-    ways: Mapping[Way, Curve] = field(default_factory=dict)
+    driven: Sequence[Driven] = ()
     ring: float = 0.0
+    yielding: Collection[int] = ()
+    drawn_for: DrawnFor | None = None
 
 
-def road_of(plan: Plan, name: str, low: Floats, drivable: Bools, config: RoadConfig) -> Road:
-    """Return a road with its lanes.
+def lane_id(arm: int, lane: int, *, inward: bool) -> str:
+    """The id of lane `lane`, counted from the dividing line, of an arm."""
+    return f"{arm + 1}.{-lane - 1 if inward else lane + 1}"
+
+
+def aligned(
+    tracks: Sequence[Track], lane_of: Mapping[tuple[int, bool], tuple[int, int]], pose: Floats, at: Floats
+) -> DrawnFor | None:
+    """Where the template of a road lies of which a pose (3,) in its own frame is one on the road; None without a template.
+
+    Args:
+        tracks: the template's.
+        lane_of: arm and lane of the ends of its tracks, as far as they are known, by vehicle and whether it comes in.
+        pose: x, y [m], yaw [rad] in the template's frame.
+        at: the same on the road, about the plan's origin.
+    """
+    turn = at[2] - pose[2]
+    ids = {key: lane_id(*place, inward=key[1]) for key, place in lane_of.items()}
+    lanes = tuple((ids.get((i, True), ""), ids.get((i, False), "")) for i in range(len(tracks)))
+    moved = place(np.array([*at[:2], turn]), -pose[0], -pose[1])
+    return DrawnFor(np.array([*moved, turn]), lanes) if tracks else None
+
+
+def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = None) -> Road:
+    """Return a road with its lanes, and the grid of what is paved.
 
     Args:
         plan: its arms, in metres.
         name: of the road.
-        low: (2,) [m] the lower-left corner of the grid, which is the road's origin.
-        drivable: (H, W) its cells.
-        config: lane width, resolution, traffic side.
+        config: lane width, resolution, traffic side, radius of corners.
+        box: (2, 2) [m] lowest and highest x, y of the grid, of which the lowest become 0; None: all and a verge.
+
+    Raises:
+        RefusedError: it has more cells than are allowed.
     """
-    shift = np.array([*low, 0.0])
-    arms = [replace(arm, pose=arm.pose - shift) for arm in plan.arms]
-    entries, exits = (ends - shift for ends in lane_ends(plan.arms, config))
-    road = Road(name, drivable, config.resolution, np.zeros(2), entries, exits)
-    axis = None if plan.axis is None else Curve(plan.axis.points - shift)
-    ways = {places: Curve(way.points - shift) for places, way in plan.ways.items()}
-    lanes = _Drawing(road, Plan(arms, axis, ways, plan.ring), -low, config).lanes()
-    return replace(road, lanes=LaneNetwork(name, lanes, drawn=True)) if lanes else road
+    drawing = _Drawing(plan, config)
+    lanes, surface = drawing.drawn()
+    network = LaneNetwork(
+        name,
+        lanes,
+        rules=tuple(drawing.rules(lanes)),
+        rules_kept=config.traffic_rules == "kept",
+        drawn=True,
+        drawn_for=plan.drawn_for,
+    )
+    if box is None:
+        box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
+        box[0] = np.floor(box[0])
+    low = box[0]
+    return draw_lanes(network.moved(-low), shapely.transform(surface, lambda points: points - low), config, box - low)
+
+
+def draw_lanes(network: LaneNetwork, surface: BaseGeometry, config: RoadConfig, box: Floats | None = None) -> Road:
+    """Return the road of lanes and of what is paved about them, in metres; `box` of its grid, or all and a verge.
+
+    Raises:
+        RefusedError: it has more cells than are allowed.
+    """
+    if box is None:
+        box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
+    whole = surface.buffer(_KERB_M, join_style="mitre")
+    return road_of(network, box, config, whole)
 
 
 class _Drawing:
     """The lanes of a road, arm by arm and way by way."""
 
-    def __init__(self, road: Road, plan: Plan, centre: Floats, config: RoadConfig) -> None:
-        self._road, self._plan, self._centre, self._config = road, plan, centre, config
+    def __init__(self, plan: Plan, config: RoadConfig) -> None:
+        self._plan, self._config, self._width = plan, config, config.lane_width
         self._sign = 1.0 if config.traffic_side == "right" else -1.0  # lanes in lie so many times their offset to the right
+        self._joined = len(plan.arms) > 2 or plan.axis is None
         self._lines = [self._line(k) for k in range(len(plan.arms))]
-        self._joined = len(plan.arms) > 2
+        rounded = self._joined and not plan.ring and all(arm.outward for arm in plan.arms)
+        self._corner_radius = config.corner_radius if rounded else 0.0
+        self._surface = paved(self._pieces(), self._corner_radius)
+        self._drivable: Inside = inside(self._surface)
         self._mouths = [self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)]
 
-    def lanes(self) -> tuple[Lane, ...]:
-        """All lanes, those of the arms first; none if some lane leads nowhere or is led to by none."""
+    def drawn(self) -> tuple[tuple[Lane, ...], BaseGeometry]:
+        """All lanes, those of the arms first, and what is paved."""
         arms, lanes = self._plan.arms, list[Lane]()
         index: dict[tuple[int, bool, int], int] = {}
         for k, arm in enumerate(arms[: None if self._joined else 1]):
@@ -123,46 +200,75 @@ class _Drawing:
                     left, right = (inner, outer) if self._sign > 0.0 else (outer, inner)
                     beside = tuple(first + other for other in (n - 1, n + 1) if 0 <= other < count)
                     index[k, inward, n] = len(lanes)
-                    lanes.append(Lane(f"{k + 1}.{-n - 1 if inward else n + 1}", left, right, (), beside))
+                    lanes.append(Lane(lane_id(k, n, inward=inward), left, right, (), beside))
         if not self._joined:
-            return tuple(lanes)
+            return tuple(lanes), self._surface
+        ways = [(index[a, True, i], index[b, False, j], way) for (a, i, b, j), way in self._ways().items()]
+        narrow = [self._way_lane(way, lanes[start], lanes[goal], 0.0) for start, goal, way in ways]
+        outlines = shapely.make_valid([shapely.Polygon(lane.outline) for lane in narrow])
+        self._surface = paved([self._surface, *outlines], self._corner_radius)
+        self._drivable = inside(self._surface)
         after: dict[int, list[int]] = {}
-        for (a, i, b, j), way in self._ways().items():
-            start, goal = index[a, True, i], index[b, False, j]
+        for start, goal, way in ways:
             after.setdefault(start, []).append(len(lanes))
-            left, right = self._edges(way, lanes[start], lanes[goal])
-            lanes.append(Lane(f"{lanes[start].id}>{lanes[goal].id}", left, right, (goal,), junction="1"))
-        ends = {k for key, k in index.items() if not key[1]}
-        if set(after) != set(index.values()) - ends or {lane.successors[0] for lane in lanes if lane.junction} != ends:
-            return ()
-        return tuple(replace(lane, successors=tuple(after.get(k, lane.successors))) for k, lane in enumerate(lanes))
+            lane = self._way_lane(way, lanes[start], lanes[goal], self._wider(way))
+            lanes.append(replace(lane, successors=(goal,)))
+        return tuple(
+            replace(lane, successors=tuple(after.get(k, lane.successors))) for k, lane in enumerate(lanes)
+        ), self._surface
+
+    def rules(self, lanes: Sequence[Lane]) -> Iterator[TrafficRule]:
+        """What signs say at the mouths of arms: to stop, or to give way to the other arms, and to who is on the ring."""
+        arms = range(len(self._plan.arms)) if self._joined and self._config.priority != "none" else ()
+        mouths = [k for k, lane in enumerate(lanes) if not lane.junction]
+        into = [[k for k in mouths if lanes[k].id.startswith(f"{arm + 1}.-")] for arm in arms]
+        stop = self._config.priority == "all_way_stop" and not self._plan.ring and all(arm.outward for arm in self._plan.arms)
+        for arm in arms:
+            if not into[arm] or not (stop or arm in self._plan.yielding):
+                continue
+            over = [k for other in arms if other != arm and other not in self._plan.yielding for k in into[other]]
+            if self._plan.ring:
+                over = [k for k, lane in enumerate(lanes) if lane.junction and not lane.id.startswith(f"{arm + 1}.")]
+            ends = [edge for k in into[arm] for edge in (lanes[k].left[-1], lanes[k].right[-1])]
+            line = np.stack((ends[0], ends[-1]) if self._sign > 0.0 else (ends[1], ends[-2]))
+            kind = RuleKind.STOP if stop else RuleKind.GIVE_WAY
+            yield TrafficRule(f"arm {arm + 1}", kind, tuple(into[arm]), () if stop else tuple(over), line)
+
+    def _pieces(self) -> Iterator[BaseGeometry]:
+        """What is paved for certain: the arms, the ring, and where a vehicle drives through the junction."""
+        for arm, line in zip(self._plan.arms, self._lines, strict=True):
+            right, left = (arm.inward, arm.outward) if self._sign > 0.0 else (arm.outward, arm.inward)
+            yield strip(line, -right * self._width, left * self._width)
+        if self._plan.ring:
+            yield ring(self._plan.ring, self._width / 2.0 + _RING_ROOM_M)
+        for way in self._plan.driven:
+            if self._plan.ring and way.places[0] != way.places[2]:
+                continue  # who turns back drives all of the ring
+            inner = way.curve.cut(way.length / 2.0, way.curve.length - way.length / 2.0)
+            yield swept(inner, way.length, way.width)
 
     def _line(self, k: int) -> Curve:
-        """The dividing line of an arm from its end inwards; of a road through, from end to end."""
+        """The dividing line of an arm from its end to the junction's middle; of a road through, from end to end."""
         axis = self._plan.axis
         if axis is not None and k < 2:
             line = axis if k == 0 else axis.reversed()
-            return line if len(self._plan.arms) == 2 else line.cut(0.0, line.length / 2.0, _STEP_M)
+            return line.cut(0.0, float(line.project(np.zeros((1, 2)))[0][0]), _STEP_M) if self._joined else line
         start = reverse(self._plan.arms[k].pose)
-        length = self._road.resolution * float(sum(self._road.drivable.shape))
+        length = -float((start[:2] * unit(start[2])).sum()) - self._plan.ring
         return Curve(np.array([start, [*(start[:2] + length * unit(start[2])), start[2]]]))
 
     def _mouth(self, k: int) -> float:
         """How far [m] from its end an arm has its lanes."""
-        arm, line, width = self._plan.arms[k], self._lines[k], self._config.lane_width
-        along = np.arange(0.0, line.length, self._road.resolution)
+        arm, line = self._plan.arms[k], self._lines[k]
+        along = np.arange(0.0, line.length, _LOOK_M)
         wider = np.zeros(len(along), dtype=np.bool_)
         for side, count in ((-self._sign, arm.inward), (self._sign, arm.outward)):
-            edge = side * (count * width + 1.5 * self._road.resolution)
-            wider |= self._road.drivable_at(line.beside(along, edge)[:, :2])
-        # a slanted kerb's single cells do not count
-        steady = np.array([wider[n : n + _STEADY].all() for n in range(len(wider) - _STEADY)])
-        mouth = float(along[int(np.argmax(steady))]) if steady.any() else line.length
-        if self._plan.ring:
-            away = float(np.hypot(*(arm.pose[:2] - self._centre)))
-            mouth = min(mouth, away - flare_begins(self._plan.ring, width / 2.0))
-        for (a, _, b, _), way in self._plan.ways.items():
-            for own, curve in ((a, way), (b, way.reversed())):
+            edge = side * (count * self._width + _WIDER_THAN_LANES_M)
+            wider |= self._drivable(line.beside(along, edge)[:, :2])
+        mouth = float(along[int(np.argmax(wider))]) if wider.any() else line.length
+        for way in self._plan.driven:
+            a, _, b, _ = way.places
+            for own, curve in ((a, way.curve), (b, way.curve.reversed())):
                 bent = np.abs(curve.points[:, 2] - curve.points[0, 2]) > _BENT
                 if own == k and bent.any():
                     mouth = min(mouth, float(curve.station[max(int(np.argmax(bent)) - 1, 0)]))
@@ -172,75 +278,65 @@ class _Drawing:
         """The borders of an arm's lanes in or out from the dividing line outwards, in the direction of traffic."""
         line = self._lines[k].cut(0.0, self._mouths[k], _STEP_M)
         side = -self._sign if inward else self._sign
-        offsets = side * self._config.lane_width * np.arange(count + 1)
-        borders = [line.beside(line.station, offset)[:, :2] for offset in offsets]
+        borders = [line.beside(line.station, side * self._width * n)[:, :2] for n in range(count + 1)]
         return borders if inward else [border[::-1] for border in borders]
 
     def _ways(self) -> dict[Way, Curve]:
         """The ways of the template, those from each lane straight on to the same lane of each other arm, and those that lack."""
         arms = self._plan.arms
-        pairs = [(a, b) for a, b in product(range(len(arms)), repeat=2) if a != b or self._plan.ring]
+        pairs = [(a, b) for a, b in product(range(len(arms)), repeat=2) if a != b]
         usual = [
             (a, i, b, j)
             for a, b in pairs
             for i in range(arms[a].inward)
             if 0 <= (j := i if arms[a].outward else i + arms[b].outward - arms[a].inward) < arms[b].outward
         ]
-        ways = {places: way for places in dict.fromkeys((*self._plan.ways, *usual)) if (way := self._way(places)) is not None}
+        driven = {way.places: way.curve for way in reversed(self._plan.driven)}
+        ways = {places: way for places in dict.fromkeys((*driven, *usual)) if (way := self._way(places, driven)) is not None}
         for a, b in pairs:
             lacking = [(a, i, b, arms[b].outward - 1) for i in range(arms[a].inward) if all(w[:2] != (a, i) for w in ways)]
             lacking += [(a, arms[a].inward - 1, b, j) for j in range(arms[b].outward) if all(w[2:] != (b, j) for w in ways)]
             for places in lacking:
-                if min(places) >= 0 and (way := self._way(places)) is not None:
+                if min(places) >= 0 and (way := self._way(places, driven)) is not None:
                     ways[places] = way
         return ways
 
-    def _way(self, places: Way) -> Curve | None:
-        """The way from the middle of one lane at its mouth to another's; None if no car could drive it there."""
+    def _way(self, places: Way, driven: Mapping[Way, Curve]) -> Curve | None:
+        """The way from the middle of one lane at its mouth to another's; None if no car could drive it."""
         a, i, b, j = places
-        width, driven = self._config.lane_width, self._plan.ways.get(places)
-        start = self._middle(a, -self._sign * (i + 0.5))
-        goal = reverse(self._middle(b, self._sign * (j + 0.5)))
-        if driven is not None:
-            way: Curve | None = driven.cut(self._mouths[a], driven.length - self._mouths[b], _WAY_STEP_M)
-        elif self._plan.ring:
-            way = draw_ring_route(start, goal, self._centre, self._plan.ring, lambda _: True)
-        elif abs(angle_between(goal[2], start[2])) > _TURN_BACK:
-            return None
-        elif self._plan.axis is not None and max(a, b) < 2 and i == j:
+        begin, end = self._mouths[a], self._mouths[b]
+        if places in driven:
+            return driven[places].cut(begin, driven[places].length - end, _WAY_STEP_M)
+        start = self._lines[a].beside(np.array([begin]), -self._sign * (i + 0.5) * self._width)[0]
+        goal = reverse(self._lines[b].beside(np.array([end]), self._sign * (j + 0.5) * self._width)[0])
+        if self._plan.axis is not None and max(a, b) < 2 and i == j:
             line = self._plan.axis if a == 0 else self._plan.axis.reversed()
-            line = line.cut(self._mouths[a], line.length - self._mouths[b], _STEP_M)
-            way = Curve(line.beside(line.station, -self._sign * (i + 0.5) * width))
-        else:
-            way = draw_route(start, goal, lambda _: True)
-        if way is None or not self._road.drivable_at(way.points[:, :2]).all():
+            line = line.cut(begin, line.length - end, _WAY_STEP_M)
+            return Curve(line.beside(line.station, -self._sign * (i + 0.5) * self._width))
+        if abs(angle_between(goal[2], start[2])) > _TURN_BACK:
             return None
-        return way.cut(0.0, way.length, _WAY_STEP_M)
+        way = draw_route(start, goal, lambda _: True)
+        return None if way is None else way.cut(0.0, way.length, _WAY_STEP_M)
 
-    def _middle(self, k: int, lanes: float) -> Floats:
-        """The pose (3,) at an arm's mouth so many lanes to the left of its dividing line, heading inwards."""
-        pose: Floats = self._lines[k].beside(np.array([self._mouths[k]]), np.array([lanes * self._config.lane_width]))[0]
-        return pose
+    def _wider(self, way: Curve) -> Floats | float:
+        """How many metres the borders of a way lie outside of a lane's: as far as the road is wide, if the way bends."""
+        if np.ptp(way.points[:, 2]) <= _STRAIGHT_ON:
+            return 0.0
+        swell = np.square(np.sin(np.pi * way.station / way.length))
+        half = self._width / 2.0
+        beside = (drivable_beside(self._drivable, way, sign, half + _WIDER_M, _LOOK_M / 2.0) for sign in (1.0, -1.0))
+        inner, free = swell > _INNER, np.minimum(*beside) - half
+        return np.asarray(swell * float(np.clip((free[inner] + _LOOK_M) / swell[inner], 0.0, _WIDER_M).min()))
 
-    def _edges(self, way: Curve, start: Lane, goal: Lane) -> tuple[Floats, Floats]:
-        """The borders of a way, which begin and end at those of the lanes that it joins."""
-        width, share = self._config.lane_width, way.station / way.length
-        wider = np.zeros(len(share))
-        if np.ptp(way.points[:, 2]) > _STRAIGHT_ON:
-            swell = np.square(np.sin(np.pi * share))
-            free = (
-                np.minimum(*(drivable_beside(self._road, way, sign, width / 2.0 + _WIDER_M) for sign in (1.0, -1.0)))
-                - width / 2.0
-            )
-            inner = swell > _INNER
-            wider = swell * float(np.clip((free[inner] + self._road.resolution) / swell[inner], 0.0, _WIDER_M).min())
+    def _way_lane(self, way: Curve, start: Lane, goal: Lane, wider: Floats | float) -> Lane:
+        """The lane along a way, whose borders begin and end at those of the lanes that it joins."""
+        share = (way.station / way.length)[:, None]
         edges = []
         for sign, ends in ((1.0, (start.left[-1], goal.left[0])), (-1.0, (start.right[-1], goal.right[0]))):
-            own = way.beside(way.station, sign * (width / 2.0 + wider))[:, :2]
-            off = np.stack((ends[0] - own[0], ends[1] - own[-1]))
-            edges.append(own + (1.0 - share[:, None]) * off[0] + share[:, None] * off[1])
+            own = way.beside(way.station, sign * (self._width / 2.0 + wider))[:, :2]
+            edges.append(own + (1.0 - share) * (ends[0] - own[0]) + share * (ends[1] - own[-1]))
             edges[-1][[0, -1]] = ends
-        return edges[0], edges[1]
+        return Lane(f"{start.id}>{goal.id}", *edges, junction="1")
 
 
 def ways_through(road: Road) -> dict[tuple[int, int], Curve]:
@@ -253,12 +349,3 @@ def ways_through(road: Road) -> dict[tuple[int, int], Curve]:
             line = np.concatenate([network.lanes[k].centre for k in (first, way, last)])
             ways[e, network.exits.index(last)] = Curve.through(line)
     return ways
-
-
-def drivable_beside(road: Road, line: Curve, sign: float, most: float) -> Floats:
-    """Return (M,) how far [m] a road is drivable to the left (`sign` 1) or right (-1) of a line's points, at most `most`."""
-    distance = np.arange(0.0, most, road.resolution / 2.0)
-    station = np.repeat(line.station[:, None], len(distance), axis=1)
-    drivable = road.drivable_at(line.beside(station, sign * distance[None, :])[..., :2])
-    free = np.logical_and.accumulate(drivable, axis=1).sum(axis=1) * road.resolution / 2.0
-    return np.asarray(np.minimum(free, most))

@@ -7,23 +7,23 @@ Each arm has its dividing line and lanes where the recorded vehicles were, to th
 with the template's own curvature, is swept into the road, so there is room for it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
-import shapely
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.builtin import junction_centre
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import lane_ends, Plan, PlannedArm, Way
+from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
+from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLACK
 from scenario_gen.roads.shaped import fitting_width
-from scenario_gen.roads.sketch import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, Sketch, SLACK
 from scenario_gen.roads.ways import draw_ring_route, draw_route
-from scenario_gen.template import clean_tracks, sharpness_of, Track, turn_of
-from scenario_gen.types import Encounter, Road
+from scenario_gen.template import clean_tracks, reactions_of, sharpness_of, Track, turn_of
+from scenario_gen.types import Encounter, Road, YIELD
 
 _RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
 _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
@@ -33,7 +33,6 @@ _WIDEST_RING = 60.0  # metres of its radius, in the template
 _LEAST_ARC = 15.0  # metres that are driven about it
 _OFF_RING = 2.5  # metres to its lane
 _FLARED = np.radians(15.0)  # by which those who come or go turn away from it
-_RING_ROOM = 0.5  # metres that a roundabout's lane is wider on each side
 _SAME_ARM = np.radians(30.0)  # directions that differ by less are those of one arm
 _MERGED = np.radians(45.0)  # and by so much if the road has too few arms otherwise
 _PART = np.radians(75.0)  # a vehicle that is still turning may go on by so much to an arm
@@ -42,7 +41,6 @@ _THROUGH = np.radians(20.0)  # who turns by less goes straight through, on one l
 _SURE = 5.0  # metres of such a path from which on its direction is sure
 _MOST_BETWEEN = 4  # lanes left free between the two directions, at most
 _MOST_LANES = 8
-_WIDE_JUNCTION = 30.0  # metres from the middle to a corner between two arms that belongs to the junction
 _SWEPT = 0.6  # metres of room beside a footprint on its way through the junction
 
 
@@ -86,22 +84,24 @@ class _Direction:
         return max([end.away + tracks[end.vehicle].vehicle.length / 2.0 for end in self.members], default=0.0)
 
 
-def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Road:
+def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
     """Draw a junction whose arms are where the template comes and goes.
 
     Args:
         name: `t_intersection` or `four_way`.
-        tracks: the template's.
+        encounter: the template.
         config: how it is drawn.
 
     Raises:
         RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
     """
-    directions = _directions(name, tracks, junction_centre(tracks))
+    tracks = clean_tracks(encounter)
+    centre = junction_centre(tracks)
+    directions = _directions(name, tracks, centre)
     longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
     turn = np.pi - longest.yaw  # the longest arm leads west
     lane_of: dict[tuple[int, bool], tuple[int, int]] = {}  # arm and lane of each end
-    arms: list[PlannedArm] = []
+    arms: list[Arm] = []
     for direction in directions:
         offset, lanes = _lanes(direction, config)
         reach = config.arm_length or max(direction.reach(tracks) + ROOM + SLACK, SHORTEST)
@@ -109,20 +109,35 @@ def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> R
         most = [_most(lanes, inward=inward) + 1 for inward in (True, False)]
         if max(most) > _MOST_LANES:
             raise RefusedError(f"road {name} would need {max(most)} lanes in one direction; {_MOST_LANES} are drawn at most")
-        pose = np.array([*(reach * unit(yaw) + offset * unit(yaw + np.pi / 2.0)), yaw])
-        arms.append(PlannedArm(pose, *(max(count, config.lanes) for count in most)))
+        arm = Arm.towards(yaw, reach, 0, offset)
+        arms.append(Arm(arm.pose, *(max(count, config.lanes) for count in most)))
         lane_of.update({key: (len(arms) - 1, lane) for key, lane in lanes.items()})
-    sketch, ways = Sketch(), dict[Way, Curve]()
-    _draw_arms(sketch, arms, config)
+    driven = []
     for i, track in enumerate(tracks):
         if (i, True) in lane_of and (i, False) in lane_of and not track.still:
             (a, first), (b, last) = lane_of[i, True], lane_of[i, False]
             ends = arms[a].lane(first, config, inward=True), arms[b].lane(last, config, inward=False)
             way = draw_route(*ends, lambda _: True, sharpness_of(track))
             if way is not None:
-                _sweep(sketch, way, track.vehicle.length, track.vehicle.width)
-                ways.setdefault((a, first, b, last), way)
-    return sketch.road(name, Plan(arms, ways=ways), config)
+                driven.append(Driven((a, first, b, last), way, track.vehicle.length, track.vehicle.width + 2.0 * _SWEPT))
+    aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
+    yielding = _yielding_arms(encounter, lane_of, config)
+    return draw_plan(Plan(arms, driven=driven, yielding=yielding, drawn_for=aim), name, config)
+
+
+def _yielding_arms(encounter: Encounter, lane_of: Mapping[tuple[int, bool], tuple[int, int]], config: RoadConfig) -> set[int]:
+    """Return the arms of those who yield to others of other arms, but for those to whom somebody yields.
+
+    Args:
+        encounter: the template.
+        lane_of: arm and lane of the ends of its tracks, by vehicle and whether it comes in.
+        config: whether priorities are shown.
+    """
+    came_by = {vehicle: arm for (vehicle, inward), (arm, _) in lane_of.items() if inward}
+    edges = reactions_of(encounter).edges if config.priority == "auto" else ()
+    ways = [(came_by[e.who], came_by[e.whom]) for e in edges if e.kind == YIELD and {e.who, e.whom} <= came_by.keys()]
+    pairs = [(arm, other) for arm, other in ways if arm != other]
+    return {arm for arm, _ in pairs} - {other for _, other in pairs}
 
 
 def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -134,11 +149,12 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     radius, fastest, length, wide = _RING[0], 0.0, 5.0, 2.0
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
+    centre = np.zeros(2)
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
-        centre, driven = _ring_driven(tracks, config)
-        radius, fastest = _ring(tracks, centre, driven)
+        centre, recorded = _ring_driven(tracks, config)
+        radius, fastest = _ring(tracks, centre, recorded)
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
     if fastest > np.sqrt(_RING_FASTEST * radius):
@@ -148,7 +164,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
             f"{possible:.1f} m/s; choose four_way or curve"
         )
     turn = np.pi - directions[0].yaw
-    sketch, arms, width = Sketch(), [], config.lane_width
+    arms = []
     for direction in directions:
         straight = replace(direction, members=[end for end in direction.members if end.steady >= 2.0 * _SURE])
         most = max(_lanes(straight, config)[1].values(), default=0)
@@ -156,20 +172,18 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
             raise RefusedError(f"road roundabout has one lane, and the template drives in {most + 1} beside each other")
         reach = config.arm_length or max(direction.reach(tracks) + ROOM + 2.0 * SLACK, radius + SHORTEST)
         yaw = direction.yaw + turn
-        arm = PlannedArm(np.array([*(reach * unit(yaw)), yaw]), 1, 1)
-        sketch.strip(Curve(np.array([[*(radius * unit(yaw)), yaw], arm.pose])), -width, width)
-        arms.append(arm)
-    around = unit(np.linspace(0.0, 2.0 * np.pi, 97))
-    half = width / 2.0 + _RING_ROOM
-    sketch.drivable.append((radius + half) * around)
-    sketch.islands.append((radius - half) * around)
-    entries, exits = lane_ends(arms, config)
-    for entry in entries:
-        for leave in exits:
-            way = draw_ring_route(entry, leave, np.zeros(2), radius, lambda _: True)
-            if way is not None:
-                _sweep(sketch, way, length, wide)
-    return sketch.road(name, Plan(arms, ring=radius), config)
+        arms.append(Arm.towards(yaw, reach, 1))
+    driven = []
+    for a, b in product(range(len(arms)), repeat=2):
+        ends = arms[a].lane(0, config, inward=True), arms[b].lane(0, config, inward=False)
+        way = draw_ring_route(*ends, np.zeros(2), radius, lambda _: True)
+        if way is not None:
+            driven.append(Driven((a, 0, b, 0), way, length, wide + 2.0 * _SWEPT))
+    lane_of = {end.key: (a, 0) for a, direction in enumerate(directions) for end in direction.members}
+    aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
+    yielding = set(range(len(arms))) - {arm for (_, inward), (arm, _) in lane_of.items() if inward}
+    yielding |= set() if encounter is None else _yielding_arms(encounter, lane_of, config)
+    return draw_plan(Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim), name, config)
 
 
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float]:
@@ -204,16 +218,12 @@ def _ring(tracks: tuple[Track, ...], centre: Floats, least: float) -> tuple[floa
     speed = np.concatenate([track.speed[own] for track, own in zip(tracks, there, strict=True)])
     place = np.concatenate([track.poses[own, :2] for track, own in zip(tracks, there, strict=True)])
     away = np.hypot(*(place - centre).T)
+    lateral = _RING_FASTEST if least > _RING[0] else _RING_LATERAL  # a ring that was recorded is drawn as it was
     for radius in np.append(np.arange(max(least, _RING[0]), _RING[1], 0.25), _RING[1]):
         fastest = float(speed[away < radius + _NEAR_RING].max(initial=0.0))
-        if np.square(fastest) <= _RING_LATERAL * radius:
+        if np.square(fastest) <= lateral * radius:
             break
     return float(radius), fastest
-
-
-def _sweep(sketch: Sketch, way: Curve, length: float, width: float) -> None:
-    """Add a footprint's way through the junction, with room beside it."""
-    sketch.sweep(way.cut(length / 2.0, way.length - length / 2.0), length, width + 2.0 * _SWEPT)
 
 
 def _ends(i: int, track: Track, centre: Floats, ring: float) -> list[_End]:
@@ -332,30 +342,3 @@ def _lanes(direction: _Direction, config: RoadConfig) -> tuple[float, dict[tuple
 def _most(lanes: dict[tuple[int, bool], int], *, inward: bool) -> int:
     """The outermost lane in one direction."""
     return max([lane for (_, own), lane in lanes.items() if own == inward], default=0)
-
-
-def _draw_arms(sketch: Sketch, arms: list[PlannedArm], config: RoadConfig) -> None:
-    """Strips from the middle outwards, the corners between neighbours, and the middle itself."""
-    width, keep_right = config.lane_width, config.traffic_side == "right"
-    inner = []
-    for arm in sorted(arms, key=lambda arm: arm.pose[2] % (2.0 * np.pi)):
-        out = np.array([*unit(arm.pose[2]), 0.0])
-        start = arm.pose - float((arm.pose * out).sum()) * out
-        lefts, rights = (arm.inward, arm.outward) if keep_right else (arm.outward, arm.inward)
-        sketch.strip(Curve(np.stack((start, arm.pose))), -rights * width, lefts * width)
-        inner.append((start, float(-rights * width), float(lefts * width)))
-    middle = []
-    for (pose, right, high), (other, low, _) in zip(inner, inner[1:] + inner[:1], strict=True):
-        yaw, other_yaw = pose[2], other[2]
-        a, b = pose[:2] + high * unit_left(yaw), other[:2] + low * unit_left(other_yaw)
-        middle += [a, pose[:2] + right * unit_left(yaw)]
-        turn = float((other_yaw - yaw) % (2.0 * np.pi))
-        if 0.05 < turn < np.radians(165.0):
-            gap = b - a
-            along = float(gap[0] * np.sin(other_yaw) - gap[1] * np.cos(other_yaw)) / np.sin(turn)
-            corner = a + along * unit(yaw)
-            sketch.corner(corner, yaw, other_yaw, config.corner_radius)
-            if abs(along) < _WIDE_JUNCTION:
-                middle.append(corner)
-    hull = shapely.convex_hull(shapely.multipoints(middle))
-    sketch.drivable.append(np.asarray(shapely.get_coordinates(hull)[:-1]))

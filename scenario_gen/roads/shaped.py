@@ -14,11 +14,11 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import Plan, PlannedArm
-from scenario_gen.roads.sketch import ARM_COUNT, ROOM, SHORTEST, Sketch, SLACK
+from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
+from scenario_gen.roads.pavement import ARM_COUNT, ROOM, SHORTEST, SIDE_ARMS, SLACK
 from scenario_gen.roads.ways import draw_route, extended
-from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, sharpness_of, to_frenet, Track
-from scenario_gen.types import Encounter, Road
+from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, reactions_of, sharpness_of, to_frenet, Track
+from scenario_gen.types import Encounter, Road, YIELD
 
 _RAMP_ANGLE = np.radians(12.0)
 _BEND = np.radians(20.0)  # of a curve whose template does not bend
@@ -45,34 +45,21 @@ def draw_along(name: str, main: MainLine, lanes: int, config: RoadConfig) -> Roa
     Raises:
         RefusedError: it has more cells than are allowed.
     """
-    half = lanes * config.lane_width
     line = main_axis(name, main, config)
-    sketch = Sketch()
-    sketch.strip(line, -half, half)
-    arms = [PlannedArm(line.points[k] + np.array([0.0, 0.0, np.pi if k == 0 else 0.0]), lanes, lanes) for k in (0, -1)]
-    at = line.at(line.length / 2.0)
-    reach = config.arm_length or SHORTEST
-    side_lanes = config.lanes or 1
-    width = side_lanes * config.lane_width
-    for side in (-1.0, 1.0)[: ARM_COUNT[name] - 2]:
-        yaw = float(at[2] + side * np.pi / 2.0)
-        out = unit(yaw)
-        end = np.array([*(at[:2] + (half + reach) * out), yaw])
-        sketch.strip(Curve(np.array([[*at[:2], yaw], end])), -width, width)
-        arms.append(PlannedArm(end, side_lanes, side_lanes))
-        for way in (-1.0, 1.0):  # the corners with the main road, to both sides
-            corner = at[:2] + half * out + way * width * unit(at[2])
-            along = float(at[2] + (0.0 if way > 0.0 else np.pi))
-            sketch.corner(corner, *((along, yaw) if way * side > 0.0 else (yaw, along)), config.corner_radius)
-    return sketch.road(name, Plan(arms, line), config)
+    arms = [Arm(line.points[k] + np.array([0.0, 0.0, np.pi if k == 0 else 0.0]), lanes, lanes) for k in (0, -1)]
+    reach = lanes * config.lane_width + (config.arm_length or SHORTEST)
+    across = float(line.at(line.length / 2.0)[2])
+    arms += [Arm.towards(across + side, reach, config.lanes or 1) for side in SIDE_ARMS[: ARM_COUNT[name] - 2]]
+    return draw_plan(Plan(arms, line), name, config)
 
 
 def main_axis(name: str, main: MainLine, config: RoadConfig) -> Curve:
-    """The dividing line of the main road: straight on at both ends of the main line for its arms; a curve bends."""
+    """The dividing line of the main road, its middle at the origin: straight on at both ends for its arms; a curve bends."""
     run = max(config.arm_length - main.shape.length / 2.0, ROOM) if config.arm_length else ROOM
     own = float(main.shape.points[-1, 2] - main.shape.points[0, 2])
     extra = float(np.copysign(_BEND, own)) - own if name == "curve" and abs(own) < _BEND else 0.0
-    return extended(main.shape, extra, run)
+    line = extended(main.shape, extra, run)
+    return Curve(line.points - np.array([*line.at(line.length / 2.0)[:2], 0.0]))
 
 
 def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -82,35 +69,38 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it,
             or the template needs a junction.
     """
-    lanes, before, after, sharpness = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 0.02
+    lanes, before, after, sharpness, yields = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 0.02, True
+    tracks: tuple[Track, ...] = ()
+    who, joins = list[int](), np.zeros(3)  # where the template's vehicles join, heading as they do
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
         frenet = to_frenet(tracks)
         who = _merging(tracks, frenet)
         others = frenet.lane[[i for i in range(len(tracks)) if i not in who]]
-        lanes = max(int(others.max(initial=0)) + 1, int(frenet.lane[who[0]].max()), config.lanes)
+        lanes = max(int(others.max(initial=0)) + 1, int(frenet.lane[who, 1].max()) + 1, config.lanes)
         along = float(frenet.direction[who[0]])
         low, high = sorted(along * end for end in frenet.span(tracks))
         join = float(np.median([along * frenet.station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
         before, after = join - low, high - join
         sharpness = max(sharpness_of(tracks[i]) for i in who)
+        yields = any(edge.kind == YIELD and edge.who in who for edge in reactions_of(encounter).edges)
+        joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
+        joins[2] += 0.0 if along > 0.0 else np.pi
     reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after)]
     width = config.lane_width
     side = -1.0 if config.traffic_side == "right" else 1.0  # of the dividing line on which the traffic to the east drives
-    arms = [PlannedArm(np.array([x, 0.0, yaw]), lanes, lanes) for x, yaw in ((-reach[0], np.pi), (reach[1], 0.0))]
-    joined = np.array([0.0, side * (lanes - 0.5) * width])
+    arms = [Arm.towards(yaw, length, lanes) for yaw, length in ((np.pi, reach[0]), (0.0, reach[1]))]
     yaw = np.pi - side * _RAMP_ANGLE  # out along the ramp
+    joined = np.array([0.0, side * (lanes - 0.5) * width])
     ramp = np.array([*(joined + reach[0] * unit(yaw)), yaw + np.pi])
-    sketch = Sketch()
     axis = Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]]))
-    sketch.strip(axis, -lanes * width, lanes * width)
-    sketch.strip(Curve(np.array([ramp, [*joined, ramp[2]]])), -width / 2.0, width / 2.0)
     way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), lambda _: True, sharpness)
-    if way is not None:
-        sketch.sweep(way, 1.0, width)
-    ways = {} if way is None else {(2, 0, 1, lanes - 1): way}
-    return sketch.road(name, Plan([*arms, PlannedArm.ramp(ramp, config)], axis, ways), config)
+    driven = () if way is None else (Driven((2, 0, 1, lanes - 1), way, 1.0, width),)
+    lane_of = {(i, inward): (2, 0) if inward else (1, lanes - 1) for i in who for inward in (True, False)}
+    aim = aligned(tracks, lane_of, joins, np.array([*joined, 0.0]))
+    plan = Plan([*arms, Arm.ramp(ramp, config)], axis, driven, yielding=(2,) if yields else (), drawn_for=aim)
+    return draw_plan(plan, name, config)
 
 
 def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:

@@ -19,7 +19,7 @@ from scipy import ndimage
 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.numerics.plane import angle_between
+from scenario_gen.numerics.plane import ahead_and_left, angle_between
 from scenario_gen.template.answers import ALIKE, bumper_gaps, conflicts_in, is_behind, LANE, passing, SLOWEST
 from scenario_gen.template.interaction import Conflict, find_waits, WAIT_SPEED
 from scenario_gen.template.tracks import clean_tracks
@@ -38,6 +38,7 @@ _APART, _MARGIN = 0.5, 1.0  # m and s by which a footprint is kept away from ano
 _LOOKS = 0.5, 0.2  # s, between the instants at which a driver looks ahead, and between those that it sees
 _SMOOTH = 1.0  # s
 _SIGNIFICANT = 2.6  # standard errors of a correlation, the best of some lags
+_DRIVERS_LAG, _PERFECT = (1.2, 0.6), 0.999  # s, mean and standard deviation of followers' lags; greatest correlation
 _STEADY = 0.3  # m/s, spread of a leader's speed below which no gain can be seen
 _GAINS = 0.3, 1.0
 _OWN = 0.05, 0.15  # of the gap, least and greatest own residual of a follower
@@ -66,10 +67,15 @@ def reactions_of(encounter: Encounter) -> ReactionGraph:
     conflicts = conflicts_in(encounter)
     passes = [found for conflict in conflicts if (found := _passes(encounter, conflict)) is not None]
     led = {edge.who: edge for edge in leaders}
-    met = {pair for one in conflicts for pair in ((one.first, one.second), (one.second, one.first))}
-    met |= {(found.who, found.whom) for found in seen}
+    met = {
+        pair
+        for one in conflicts
+        for pair in ((one.first, one.second), (one.second, one.first))
+        if _turned(encounter, (one.first, one.exit_first), (one.second, one.entry_second)) < _HEAD_ON
+    }
+    met |= {(found.who, found.whom) for found in [*seen, *(one for one in passes if one.edge)]}
     pairs = [pair for pair in permutations(range(len(encounter.vehicles)), 2) if pair not in met]
-    short = [edge for pair in pairs if (edge := _stops_short(encounter, *pair)) is not None]
+    short = [edge for pair in pairs if (edge := _gives_way(encounter, *pair)) is not None]
     best: dict[tuple[int, float], Reaction] = {}
     for edge in [*short, *(found.edge for found in passes if found.edge is not None)]:
         if not _explained(edge, led.get(edge.who), encounter):  # of several that a wait is for, the last to clear lets it go
@@ -83,7 +89,9 @@ def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
     """Say why nobody is seen to react."""
     nearest = min(seen, key=lambda found: found.apart, default=None)
     if nearest is None or nearest.apart == math.inf:
-        return "none drives behind another one in its lane, or crosses its way"
+        stand = [vehicle.id for n, vehicle in enumerate(encounter.vehicles) if np.all(encounter.speed[n] < WAIT_SPEED)]
+        standing = f"; {' and '.join(f'vehicle {name}' for name in stand)} stands throughout" if stand else ""
+        return f"none drives behind another one in its lane, or crosses its way{standing}"
     who, whom = (encounter.vehicles[n].id for n in (nearest.who, nearest.whom))
     least = math.floor(10.0 * nearest.apart) / 10.0
     return f"the nearest are vehicle {who} and vehicle {whom}, and they are never within {least:.1f} s of each other"
@@ -210,29 +218,28 @@ def _smoothed(speed: Floats, dt: float) -> Floats:
 
 
 def _best_lag(own: Floats, other: Floats, behind: Bools, dt: float) -> tuple[float, float]:
-    """Lag [s] at which the other's acceleration (T,) explains the own best, and the share of variance that it explains.
+    """Lag [s] at which the other's acceleration (T,) explains the own most likely, and the share of variance that it explains.
 
-    0 where the correlation could be that of two that know nothing of each other: its standard error is Bartlett's, of two series
-    with the autocorrelations that these have.
+    How likely a lag is, is how likely the correlation is there, and how likely a driver has it. The share is 0 where the greatest
+    correlation could be that of two that know nothing of each other: its standard error is Bartlett's, of two series with the
+    autocorrelations that these have.
     """
-    best = 0.0, _STANDARD_LAG
-    error = 1.0
+    pairs = []
     for steps in range(max(round(LAGS[0] / dt), 1), round(LAGS[1] / dt) + 1):
         rows = np.flatnonzero(behind[steps:]) + steps
         if len(rows) * dt < LONG_ENOUGH:
             break
         a, b = own[rows] - own[rows].mean(), other[rows - steps] - other[rows - steps].mean()
         size = float(np.sqrt(np.square(a).mean() * np.square(b).mean()))
-        correlation = float((a * b).mean()) / size if size > 1e-4 else 0.0
-        if correlation > best[0]:
-            best, error = (correlation, steps * dt), _standard_error(a, b)
-    explained, lag = best
-    if explained <= _SIGNIFICANT * error:
-        return _STANDARD_LAG, 0.0
-    return lag, explained * explained
-
-
-_STANDARD_LAG = 1.2  # s, of a follower whose record does not show it
+        pairs.append((steps * dt, float((a * b).mean()) / size if size > 1e-4 else 0.0, a, b))
+    _, greatest, a, b = max(pairs, key=lambda pair: pair[1], default=(0.0, 0.0, own, other))
+    if greatest <= 0.0:
+        return _DRIVERS_LAG[0], 0.0
+    error = _standard_error(a, b)
+    lag, correlation = np.array([pair[:2] for pair in pairs]).T
+    explained = np.square(np.clip(correlation, 0.0, _PERFECT))
+    likely = -0.5 * np.log1p(-explained) / (error * error) - 0.5 * np.square((lag - _DRIVERS_LAG[0]) / _DRIVERS_LAG[1])
+    return float(lag[int(np.argmax(likely))]), greatest * greatest if greatest > _SIGNIFICANT * error else 0.0
 
 
 def _standard_error(a: Floats, b: Floats) -> float:
@@ -258,8 +265,7 @@ def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
         return None
     clears, enters = passing(encounter, conflict, merges=conflict.following)
     gap = enters - clears
-    yaw, other_yaw = (float(np.interp(at, encounter.time, encounter.heading[n])) for n, at in ((who, enters), (whom, clears)))
-    turned = abs(angle_between(yaw, other_yaw))
+    turned = _turned(encounter, (who, enters), (whom, clears))
     apart = max(gap, 0.0) if gap > -ANTICIPATES and (conflict.following or _ALONG < turned < _HEAD_ON) else math.inf
     near = _closeness(apart, PASSES)
     since, until, stands = _slow_before(encounter, who, clears, enters)
@@ -283,15 +289,28 @@ def _from_aside(encounter: Encounter, conflict: Conflict) -> bool:
     return bool(((station > 0.0) & ((np.abs(left) > LANE) | (np.abs(turned) > ALIKE))).any())
 
 
-def _stops_short(encounter: Encounter, who: int, whom: int) -> Reaction | None:
-    """The edge of one who slows down to the record's end for another that would else be in its way."""
+def _turned(encounter: Encounter, *passed: tuple[int, float]) -> float:
+    """The angle [rad] between the headings of two vehicles, each when [s] it passes."""
+    return abs(angle_between(*(float(np.interp(at, encounter.time, encounter.heading[n])) for n, at in passed)))
+
+
+def _gives_way(encounter: Encounter, who: int, whom: int) -> Reaction | None:
+    """The edge of one who slows down for another that it does not come behind: it stops before it, or lets it pass close by."""
+    between = encounter.position[whom] - encounter.position[who]
+    ahead, aside = ahead_and_left(between, encounter.heading[who])
+    both = np.flatnonzero(encounter.there[who] & encounter.there[whom])
     rows = np.flatnonzero(encounter.there[who])
-    speed, until = encounter.speed[who, rows], float(encounter.time[rows[-1]])
-    top = int(np.argmax(speed))
-    if speed[-1] > SLOWEST or speed[top] - speed[-1] < _SLOWS_BY or (need := _need(encounter, who, whom)) < SURE:
+    if len(both) == 0:
         return None
-    since = float(encounter.time[rows[top]])
-    return Reaction(YIELD, who, whom, 0.0, 1.0, _OWN_LAG, need, since, until, gap=math.inf, stands=True)
+    stops = bool(encounter.speed[who, rows[-1]] <= SLOWEST and ahead[both[-1]] > 0.0)
+    if not stops:  # until they pass each other
+        rows = rows[rows <= both[int(np.argmin(np.hypot(ahead, aside)[both]))]]
+    speed = encounter.speed[who, rows]
+    top = int(np.argmax(speed))
+    if speed[top] - speed[-1] < _SLOWS_BY or (need := _need(encounter, who, whom)) < SURE:
+        return None
+    since, until = (float(encounter.time[k]) for k in (rows[top], rows[-1]))
+    return Reaction(YIELD, who, whom, 0.0, 1.0, _OWN_LAG, need, since, until, gap=math.inf, stands=stops)
 
 
 def _slow_before(encounter: Encounter, who: int, clears: float, enters: float) -> tuple[float, float, bool]:

@@ -5,12 +5,17 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True)
@@ -102,6 +107,22 @@ class Tracks:
         """(N, T) whether each vehicle is there at each sample."""
         return mask(self.present, self.speed.shape[1])
 
+    def to_dataframe(self) -> "DataFrame":
+        """Return a table: vehicle (id), time [s], x, y [m], heading [rad], speed [m/s]. `read_log` takes such tables."""
+        import pandas as pd
+
+        return pd.DataFrame(columns_of(self))
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the vehicles' paths, as `scenario_gen.plot` does.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        import scenario_gen
+
+        return scenario_gen.plot(self, ax)
+
 
 @dataclass(frozen=True, eq=False)
 class Encounter(Tracks):
@@ -118,3 +139,12 @@ class Encounter(Tracks):
         if n < 2 or t < 2:
             raise InputError(f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed")
         super().__post_init__()
+
+
+def columns_of(motion: Any) -> dict[str, Any]:
+    """Return the columns of a table of tracks or of a scenario: a row for each vehicle and instant at which it is there."""
+    n, at = np.nonzero(motion.there)
+    ids = np.array([vehicle.id for vehicle in motion.vehicles], dtype=object)
+    x, y = motion.position[n, at].T
+    values = {"heading": motion.heading[n, at], "speed": motion.speed[n, at]}
+    return {"vehicle": ids[n], "time": motion.time[at], "x": x, "y": y, **values}

@@ -4,7 +4,7 @@
 """The lanes of a road: their borders, what follows what, where one may change, how fast."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 import math
@@ -109,6 +109,22 @@ class TrafficRule:
 
 
 @dataclass(frozen=True, eq=False)
+class DrawnFor:
+    """How a road was drawn for a template.
+
+    Attributes:
+        frame: (3,) x, y [m], yaw [rad] on the road of the template's own frame.
+        lanes: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be.
+    """
+
+    frame: Floats
+    lanes: tuple[tuple[str, str], ...]
+
+    def __post_init__(self) -> None:
+        freeze(self, frame=frozen(self.frame))
+
+
+@dataclass(frozen=True, eq=False)
 class LaneNetwork:
     """The lanes of a road that cars may use, those of a map or of a part of it; in metres in the road's own frame.
 
@@ -119,6 +135,7 @@ class LaneNetwork:
         rules: its signs, lights and rights of way.
         rules_kept: whether scenarios keep to the rules.
         drawn: whether it was drawn with its road: it is shown and exported, and nobody is held to it.
+        drawn_for: how it was drawn for a template; None: for none, or without a place for it.
         origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map says metres.
     """
 
@@ -128,6 +145,7 @@ class LaneNetwork:
     rules: tuple[TrafficRule, ...] = ()
     rules_kept: bool = True
     drawn: bool = False
+    drawn_for: DrawnFor | None = None
     origin: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -140,6 +158,13 @@ class LaneNetwork:
         for lane in self.lanes:
             if any(not 0 <= k < count for k in (*lane.successors, *lane.beside)):
                 raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")
+
+    def moved(self, by: Floats) -> "LaneNetwork":
+        """The same lanes (2,) [m] farther."""
+        lanes = (replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.lanes)
+        rules = (replace(rule, line=rule.line + by) for rule in self.rules)
+        aim = self.drawn_for and replace(self.drawn_for, frame=self.drawn_for.frame + np.array([*by, 0.0]))
+        return replace(self, lanes=tuple(lanes), rules=tuple(rules), drawn_for=aim)
 
     @cached_property
     def has_levels(self) -> bool:

@@ -5,8 +5,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import math
 
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types.scenario import NEARNESS, Scenario
 from scenario_gen.types.target import Pair
 
 Measure = Callable[[Scenario, str, Pair | None], float]  # a figure of a scenario; NaN if it has none
@@ -23,3 +24,8 @@ class Measures:
 
     figure: Measure
     features: Callable[[Scenario], tuple[float, ...]]
+
+    def nearness(self, scenario: Scenario) -> dict[str, str]:
+        """Return the facts that say how near vehicles come; none of a figure that the scenario does not have."""
+        figures = {key: self.figure(scenario, name, None) for key, name in NEARNESS.items()}
+        return {key: f"{value:.3f}" for key, value in figures.items() if not math.isnan(value)}

@@ -33,7 +33,8 @@ class Reaction:
         since, until: seconds of the template's clock: during which it follows; from its wait's begin to its departure.
         headway: least, median and greatest time gap [s], bumper to bumper, of a follower while it drives; zeros of a yielder.
         stands: whether a yielder stands before it goes; one that does not only slows down, or passes (`since` is `until`).
-        gap: seconds from the other's clearing of the shared area to a yielder's entry; infinite if it stops before it to the end.
+        gap: seconds from the other's clearing of the shared area to a yielder's entry; infinite if it does not come behind it: it
+            stops, or lets the other one pass close by.
         merges: whether a yielder enters the other's lane and goes on behind it.
     """
 
@@ -75,7 +76,7 @@ class Reaction:
             when = f"{self.gap:.1f} s behind" if self.gap >= 0.05 else "right behind"
             text = f"{who} {verb} passes {when} it" if verb else f"{who} passes {when} {whom}"
             if self.gap == math.inf:
-                text = f"{who} stops for {whom}"
+                text = f"{who} {'stops' if self.stands else 'slows'} for {whom}"
         return f"{text} (doubtful)" if self.doubtful else text
 
     @property

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.numerics import Bools, canonical_heading, canonical_poses, Floats, freeze, frozen, Ints
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.encounter import columns_of, Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
 
-FACTS = ("weight", "target.", "order", "passing_order", "reactions", "search.")
+NEARNESS = {"closest_approach": "gap", "pet": "pet"}
+"""Facts that say how near vehicles come [m, s], and the figures (`UNITS`) that they are, of the most critical pair."""
+FACTS = (*NEARNESS, "weight", "target.", "order", "passing_order", "reactions", "search.")
 """How the names of a scenario's facts begin."""
 
 
@@ -44,8 +46,8 @@ class Scenario:
         present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
         witness: of a scenario with an ego slot: a trajectory of the vehicle that was left out, as a scenario of that vehicle
             alone on the same clock. Both together were proven valid, so the slot can be driven.
-        facts: what else its entry in `scenarios/info` says: `weight`, `target.…`, `order`, `passing_order`, `reactions`,
-            `search.…` (FACTS).
+        facts: what else its entry in `scenarios/info` says: `closest_approach`, `pet`, `weight`, `target.…`, `order`,
+            `passing_order`, `reactions`, `search.…` (FACTS).
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -104,24 +106,10 @@ def dataframe(scenarios: Iterable[Scenario]) -> "DataFrame":
     """Return scenarios as one table, as `Scenario.to_dataframe` does."""
     import pandas as pd
 
-    tables = []
-    for scenario in scenarios:
-        n, at = np.nonzero(scenario.there)
-        ids = np.array([vehicle.id for vehicle in scenario.vehicles], dtype=object)
-        tables.append(
-            pd.DataFrame(
-                {
-                    "scenario": scenario.index,
-                    "vehicle": ids[n],
-                    "time": scenario.time[at],
-                    "x": scenario.position[n, at, 0],
-                    "y": scenario.position[n, at, 1],
-                    "heading": scenario.heading[n, at],
-                    "speed": scenario.speed[n, at],
-                    "acceleration": scenario.acceleration[n, at],
-                }
-            )
-        )
+    tables = [
+        pd.DataFrame({"scenario": one.index} | columns_of(one) | {"acceleration": one.acceleration[one.there]})
+        for one in scenarios
+    ]
     names = ("scenario", "vehicle", "time", "x", "y", "heading", "speed", "acceleration")
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(names))
 

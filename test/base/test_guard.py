@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from scenario_gen.base.errors import guarded, InputError, LONGEST, RefusedError
+from scenario_gen.base.errors import guarded, InputError, LONGEST, LONGEST_REFUSAL, print_error, RefusedError
 
 
 @given(st.text(), st.integers(0, 3000))
@@ -20,6 +20,17 @@ def test_a_message_is_short_and_prints(text, times):
 
 def test_a_message_that_is_fit_stays_as_it_is():
     assert str(InputError("σ of 3 m²: too much\nsecond line")) == "σ of 3 m²: too much\nsecond line"
+
+
+def test_of_joined_refusals_each_keeps_its_reason_and_remedy(capsys):
+    refusals = [f"road {name}: vehicle 1 {'drives on and on ' * 90}; choose road merge" for name in ("straight", "curve")]
+    print_error(RefusedError("; ".join(refusals)))
+    said = capsys.readouterr().err
+    assert said.count("choose road merge") == 2 and "road curve: vehicle 1 drives on" in said
+    assert len(said) <= len("error: \n") + LONGEST_REFUSAL
+    assert set(said.split()) <= {"error:", "…", *"; ".join(refusals).split()}, "no word is cut"
+    print_error(RefusedError("road merge: " + "its arms differ " * 60))
+    assert "…" not in capsys.readouterr().err
 
 
 def test_a_lone_surrogate_can_be_printed():

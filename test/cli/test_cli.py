@@ -29,17 +29,14 @@ def table(path, change=lambda rows: rows):
     return path
 
 
-def test_a_log_that_once_broke_a_reader_is_refused_in_a_line(run, crashes):
-    for name in ("spmd_grid_memoryerror_22GiB.csv", "table_ms_as_s_slow.csv", "table_grid_memoryerror_596GiB.parquet"):
-        code, said = run("generate", crashes / name, "--road", "straight")
-        assert code == 2 and "Traceback" not in said
-        assert name in "".join(said.split()), said
-
-
 def test_generate_leaves_bag_report_and_figures_and_is_reproducible(ran, made, tmp_path):
     code, said, err = ran("generate", LOG, *QUICK, "--seed", 7, "--out", "out", "--json")
     answer = json.loads(said, parse_constant=pytest.fail)
-    assert code == 0 and all((tmp_path / answer[name]).exists() for name in ("report", "bag", "figures")) and "2/2 valid" in err
+    assert (
+        code == 0
+        and all((tmp_path / answer[name]).exists() for name in ("report", "bag", "figures"))
+        and "2 of 2 scenarios" in err
+    )
     assert answer["cases"][0]["scenarios"] == 2 and answer["cases"][0]["vehicles"]
     one, two = ([(m.topic, m.data) for m in read_messages(folder / "bag")] for folder in (made, tmp_path / "out"))
     assert one == two and {topic for topic, _ in one} >= {"/map", "/tracks", "/changepoints", "/scenarios"}

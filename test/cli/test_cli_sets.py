@@ -3,10 +3,12 @@
 
 """Sets of results on the command line: two seeds side by side, and any bag as a page."""
 
+from dataclasses import replace
 import json
 
 import pytest
 
+from scenario_gen import bundled, generate, read_log
 from scenario_gen.base.folders import MARKER
 
 
@@ -41,3 +43,20 @@ def test_a_bag_is_evaluated_to_a_page_figures_and_a_table(results, run, tmp_path
     (found,) = [row["values"] for row in again["rows"] if row["name"] == "scenarios"]
     for key in ("e_position", "e_speed", "diversity", "min_distance"):
         assert found[key]["value"] == pytest.approx(expected[key]["value"], rel=1e-4), key
+
+
+def test_coverage_measures_recordings_and_their_sets_and_draws_a_page(run, tmp_path):
+    bags = []
+    for case, road in (("left_turn", "four_way"), ("follower", "curve")):
+        (encounter,) = read_log(bundled(case)).encounters
+        made = generate(encounter, road, count=2, seed=3)
+        bags.append(replace(made, provenance={**made.provenance, f"log {case}.csv": "0"}).save(tmp_path / case))
+    code, said = run("coverage", *bags, "--templates", 1)
+    assert code == 0 and "2 encounters whose vehicles share an area (1 following, 1 turn), 4 scenarios" in said
+    assert "with generated" in said and "never reached" in said
+    assert (tmp_path / "coverage.html").read_text().count("not reached: ") == 2
+    code, said = run("coverage", *bags)
+    assert code == 2 and "at most 1 templates can be drawn" in said
+    (tmp_path / "mine.html").write_text("my own notes")
+    assert run("coverage", *bags, "--templates", 1, "--out", "mine.html")[0] == 2
+    assert (tmp_path / "mine.html").read_text() == "my own notes"

@@ -35,30 +35,21 @@ def test_at_fault_is_the_one_who_hits_with_the_front_or_what_stands():
     assert hit.terms.no_at_fault_collision == 1.0 == hit.terms.ttc and hit.fault == "standing"
     hit, _ = verdict_of([straight(30.0, 0, 0, 4.0), comes], go_on)
     assert hit.terms.no_at_fault_collision == 1.0 and hit.fault == "other_ran_into_ego"
-    hit, _ = verdict_of([comes, straight(80.0, 0, np.pi, 9.0)], go_on)
-    assert hit.fault == "head_on" and hit.terms.no_at_fault_collision == 0.0
-
-
-def test_who_goes_first_where_its_witness_goes_second_crosses_out_of_order():
-    first, second = straight(0.0, -20.0, np.pi / 2, 5.0), straight(-60.0, 0, 0, 10.0)  # it is there 2 s after the first
-    verdict, _ = verdict_of([second, first], lambda seen: Command(4.0 * (seen.time < 3.0), 0.0))
-    assert verdict.fault == "crossing_out_of_order" and verdict.failure == "collision"
-    assert "(crossing out of order)" in verdict.sentence()
-
-
-def test_who_swerves_in_front_of_another_cuts_in():
-    def swerve(seen):
-        time = seen.time + 0.1
-        return Pose(20.0 + 6.0 * time, max(4.0 - max(time - 1.0, 0.0) * 4.0, 0.0), 0.0, 6.0)
-
-    verdict, _ = verdict_of([straight(20.0, 4.0, 0, 6.0), straight(0, 0, 0, 14.0)], swerve)
-    assert verdict.fault == "cut_in" and verdict.collision.ran == "other"
 
 
 def test_a_jump_fails_whatever_the_goal_says():
     verdict, _ = verdict_of([straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)], lambda _: Pose(149.0, 0.0, 0.0, 10.0))
-    assert verdict.goal == pytest.approx(0.1) and verdict.jumps == 1
+    assert np.isnan(verdict.goal) and verdict.jumps == 1 and verdict.collision is None
     assert not verdict.passed and verdict.fault == verdict.failure == "jump" and "1 jump(s)" in verdict.sentence()
+
+
+def test_a_jump_over_others_and_off_the_road_is_a_jump_and_nothing_else():
+    """From one lane across another car to a place beyond the road's edge."""
+    drivable = np.ones((100, 1000), dtype=np.bool_)
+    road = Road("field", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3)))
+    motions = [straight(0, 0, 0, 10.0), straight(0.0, 4.0, 0, 10.0)]
+    verdict, _ = verdict_of(motions, lambda seen: Pose(10.0 * (seen.time + 0.1), 80.0 * (seen.time > 0.45), 0.0, 10.0), road=road)
+    assert verdict.failure == "jump" and verdict.collision is None and np.isnan(verdict.off_road) and verdict.road_margin > 0.0
 
 
 @pytest.mark.parametrize(("aside", "counted"), [(0.02, False), (0.3, True)])

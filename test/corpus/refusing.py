@@ -4,6 +4,7 @@
 """A task for worker processes, in a module that loads next to nothing."""
 
 from dataclasses import dataclass
+import errno
 import os
 from pathlib import Path
 import signal
@@ -16,6 +17,8 @@ def refuse(name):
         raise InputError(f"{name} is none")
     if name == "c":
         raise KeyError(name)
+    if name == "d":
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "d.parquet")
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@
 """Batches: the same bytes by whomever, found again by what they are, made again alone; a killed run loses and doubles nothing."""
 
 from functools import partial
+import json
 import os
 import signal
 import subprocess
@@ -11,21 +12,23 @@ import sys
 import time
 
 import pytest
+from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.read import read_recording
-from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.folders import sha256_of
+from scenario_gen.cli.commands import app
 from scenario_gen.corpus import batch as batches
 from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
-from scenario_gen.method.fitting import LostConflictError
+from scenario_gen.method.fitting import LostEncounterError
 
 pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")
 REQUEST, TEMPLATES = BatchRequest(count=3, seed=5), 3
-PATIENCE = 120.0  # seconds in which a process is at work
+PATIENCE = 300.0  # seconds in which a process is at work
 interruptible = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell may have it ignored
 
 
@@ -50,12 +53,18 @@ def test_every_case_is_accounted_for(batch):
 
 def test_scenarios_are_found_by_what_they_are_and_made_again_alone(batch, tmp_path):
     out, made = batch
-    found = find(out, "road = 'corridor' and speed > 1", 2)
-    assert len(found.rows) == 2 and found.rows[0]["road"] == "corridor"
-    for row in found.rows:
+    condition = "road = 'corridor' and speed > 1"
+    found = find(out, condition)
+    assert found.rows[0]["road"] == "corridor"
+    for row in found.rows[:2]:
         assert make_again(out, row).sha256 == row["sha256"]
-    namespaces = read_recording(export_hits(out, found.rows, tmp_path / "hits")).namespaces
-    assert [one.hashes for one in namespaces.values()] == [(row["sha256"],) for row in found.rows]
+    words = ["--json", "find", str(out), condition, "--limit", "1", "--bag", str(tmp_path / "hits")]
+    told = CliRunner().invoke(app, words)
+    total = len(found.rows)
+    assert total > 1 and f"{total} scenarios found, the first 1 are listed; --limit 0 lists all" in told.stderr, told.output
+    assert len(json.loads(told.stdout)["scenarios"]) == total, "a limit of what is listed leaves nothing out of the results"
+    namespaces = read_recording(tmp_path / "hits").namespaces
+    assert {one.hashes for one in namespaces.values()} == {(row["sha256"],) for row in found.rows}
     assert sum(count for *_, count in found.coverage) == made.scenarios and "coverage" in coverage_lines(found, out)[0]
     with pytest.raises(ScenarioGenError, match="is not that of the table"):
         make_again(out, found.rows[0] | {"sha256": "0"})
@@ -160,12 +169,23 @@ def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypatch):
-    def lost(attempt):
-        raise LostConflictError(f"road {attempt.road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
+@pytest.mark.parametrize(
+    ("kind", "why", "failures"),
+    [
+        (LostEncounterError, "has no place that keeps the encounter: vehicles 1 and 2 do not meet", {LOST_CONFLICT: 4}),
+        (
+            RefusedError,
+            "has 4 arms, and the template goes by 3 (one each: vehicles 1, 2)",
+            {f"road {name} has … arms, and the template goes by …": 2 for name in ROADS},
+        ),
+    ],
+)
+def test_like_refusals_are_counted_under_one_cause(corpus, tmp_path, monkeypatch, kind, why, failures):
+    def refuse(attempt):
+        raise kind(f"road {attempt.road.name} {why}")
 
-    monkeypatch.setattr(batches.Chain, "run", lost)
+    monkeypatch.setattr(batches.Chain, "run", refuse)
     made = run_batch(corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1))
-    assert made.failures == {LOST_CONFLICT: 4} and not made.failed
+    assert made.failures == failures and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
     assert {case["why"].split()[1] for case in cases} == set(ROADS)

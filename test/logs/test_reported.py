@@ -106,13 +106,17 @@ SAID = {  # what is read, but looks otherwise
     "swapped": (swapped, "if lat and lon were swapped"),
     "frames": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 24, speed_mps=rows.speed_mps), "24fps"),
     "knots": (lambda rows: rows.assign(speed_mps=rows.speed_mps * 3600 / 1852), "knots (speed_kn)"),
+    "overlaps": (
+        lambda rows: rows.assign(x_m=rows.x_m.where(rows.vehicle_id == "a", rows.x_m.shift(1) + 2.0), y_m=0.0),
+        "overlap",
+    ),
     "y down": (lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)), "y=-…"),
 }
 
 
 @pytest.mark.parametrize(("change", "said"), SAID.values(), ids=SAID)
 def test_what_looks_otherwise_is_said_once(tmp_path, change, said):
-    notes = read_log(save(change(crossing()), tmp_path), LogConfig(travel=0.0)).quality.notes
+    notes = read_log(save(change(crossing()), tmp_path), LogConfig(travel=0.0)).quality.remarks()
     assert sum(said in note for note in notes) == 1
 
 
@@ -199,6 +203,10 @@ REFUSED = {
     "1e-7 degrees": (lambda rows: geographic(rows).assign(lat_deg=4.8e8, lon_deg=1.1e8), "lat=…:e7"),
     "a pedestrian": (lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "pedestrian"})), "1 × pedestrian"),
     "another unknown point": (lambda rows: rows, "point is one of centre, front"),
+    "ids of one ROS name": (
+        lambda rows: rows.assign(vehicle_id=rows.vehicle_id.map({"a": "car-1", "b": "car_1"})),
+        "vehicle ids 'car-1' and 'car_1' are both 'car_1' as ROS names; rename one",
+    ),
 }
 
 

@@ -4,7 +4,10 @@
 """Messages of vehicles that arrive late or leave early: no phantoms, and the same scenario again."""
 
 from dataclasses import replace
+import hashlib
 import json
+from pathlib import Path
+import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +18,6 @@ from msg_conventions.scenario_info import decode_info, encode_info, scenario_ent
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario, messages_of
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from msg_conventions.trajectory import decode, encode
-from scenario_gen.bags.recordings.requests import RequestTracker
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Scenario
@@ -111,22 +113,6 @@ def test_the_entry_says_who_is_there_when_and_which_messages_are_the_scenario():
         decode_info(encode_info(damaged, 5))
 
 
-@given(st.permutations(range(4)))
-def test_a_scenario_is_whole_in_whatever_order_its_messages_and_its_entry_come(order):
-    made = scenario([(0, 40), (5, 30), (0, 12)])
-    data = encode_scenario(made, 5)
-    tracker, matches = RequestTracker(), []
-    for k in order:
-        if k < 3:
-            message = messages_of(data)[k]
-            matches.append(tracker.add_scenario(digest(message), message))
-        else:
-            matches.append(tracker.add_info(entry_of(made, data)))
-    (match,) = [match for match in matches if match]
-    assert match[2] == data
-    assert match[0].came == 1
-
-
 def test_tracks_come_back_and_show_nobody_on_the_ground_who_is_not_there():
     made = scenario([(0, 40), (5, 40), (0, 20)])
     arrays = (made.position, made.heading, made.speed)
@@ -146,3 +132,24 @@ def test_tracks_in_which_a_vehicle_comes_back_are_refused():
     there[1, 10:20] = False
     with pytest.raises(InputError, match="vehicle v1 is there 2 times"):
         decode_tracks(encode(replace(heard, there=there)))
+
+
+def test_scenarios_and_entries_are_joined_as_the_documentation_says():
+    """The lines of docs/interfaces.md, with an entry that comes before its scenario, which has several messages."""
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rclpy.serialization import deserialize_message
+
+    made = scenario([(0, 40), (5, 30), (0, 40)])
+    data, asked = encode_scenario(made, 5), BoundaryStates(np.zeros((3, 4)), np.zeros((3, 4)))
+    recorded = (replace(made.vehicles[0], length=12.0), *made.vehicles[1:])
+    entry = scenario_entry(made, data, "1", "/x", template=recorded, asked=asked)
+    text = (Path(__file__).resolve().parents[2] / "docs" / "interfaces.md").read_text()
+    consumer = {"hashlib": hashlib, "json": json}
+    exec(re.search(r"```python\n(scenarios, entries = .*?)```", text, re.DOTALL)[1], consumer)
+    consumer["take_info"](deserialize_message(encode_info(entry, 5), DiagnosticArray))
+    (own,) = consumer["entries"]
+    assert json.loads(own["sizes"]) == [[4.8, 1.9]] * 3, "they are not those of the tracks"
+    for message in messages_of(data):
+        assert consumer["scenario_of"](own) is None
+        consumer["take_scenario"](message)
+    assert consumer["scenario_of"](own) == list(messages_of(data))

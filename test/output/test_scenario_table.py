@@ -8,7 +8,7 @@ from dataclasses import replace
 from bag_examples import hand_made_run
 import pytest
 
-from scenario_gen import InputError, measures
+from scenario_gen import bundled, generate, InputError, load, measures, read_log, report
 
 
 def run_with_distances():
@@ -37,6 +37,26 @@ def test_a_condition_keeps_the_scenarios_it_holds_for_and_says_so():
     assert near.generated.adaptations[-1] == "filtered by 'distance < 1.0': 2 of 5 scenarios"
     assert not near.evaluation.rows and near.coverage is None and len(made) == 5
     assert len(made.filter("pet < 2")) == 0 and len(made.filter("distance < 1.0 or ttc > 1")) == 5
+
+
+def test_an_encounter_becomes_a_table_and_a_table_a_log_whose_errors_name_it():
+    (encounter,) = read_log(bundled("follower")).encounters
+    table = encounter.to_dataframe()
+    assert list(table.columns) == ["vehicle", "time", "x", "y", "heading", "speed"] and len(table) == encounter.speed.size
+    (again,) = read_log(table).encounters
+    assert again.position == pytest.approx(encounter.position, abs=0.1) and again.speed == pytest.approx(encounter.speed, abs=0.2)
+    with pytest.raises(InputError, match=r"^the DataFrame has no column for position"):
+        read_log(table.drop(columns="x"))
+
+
+def test_results_become_a_folder_with_page_bag_and_figures(tmp_path):
+    made = generate(read_log(bundled("follower")).encounters[0], "curve", count=2, seed=3)
+    assert report(tmp_path / "made", made).read_text().startswith("<!doctype html>")
+    assert len(load(tmp_path / "made" / "bag")) == len(made)
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="own"):
+        report(tmp_path / "own", made)
 
 
 @pytest.mark.parametrize("condition", ["", "nearness < 1", "ttc <", "1 + 1", "scenario.sum()", "__import__('os')", "ttc = 2"])

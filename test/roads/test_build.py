@@ -25,8 +25,7 @@ def test_one_entry_and_one_exit_per_lane_on_the_right_side(name, lanes, side):
     for poses, sign in ((road.entries, 1.0), (road.exits, -1.0)):
         for x, y, yaw in poses:
             inward = np.array([np.cos(yaw), np.sin(yaw)]) * sign
-            at_edge = min(x, y, abs(width - x), abs(height - y))
-            assert at_edge < 0.3
+            assert min(x, y, abs(width - x), abs(height - y)) < 0.3
             inside = np.array([x, y]) + inward * 3.0
             assert footprint_fits(road, np.array([[*inside, yaw]]), 4.8, 1.9)[0]
             assert not footprint_fits(road, np.array([[*(inside - inward * 6.0), yaw]]), 4.8, 1.9)[0]

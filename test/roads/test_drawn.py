@@ -1,28 +1,45 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The lanes of drawn roads: they begin and end at its entries and exits, travel in messages, and hold nobody."""
+"""Drawn roads: a grid of their lanes, ends of lanes as entries and exits, and lanes that travel in messages."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from msg_conventions.lanes import decode_lanes, encode_lanes
 from scenario_gen.roads import build_road, BUILT_IN, RoadConfig
-from scenario_gen.roads.vector.network import lane_ends
+
+FORMER = np.load(Path(__file__).with_name("cells_without_lanes.npz"))  # as roads were drawn before they were drawn from lanes
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("name", [*BUILT_IN, "paper"])
+def test_a_road_is_its_lanes_and_they_travel_in_messages(name, side):
+    config = RoadConfig(lanes=2, traffic_side=side, paper=name == "paper")
+    road = build_road("t_intersection" if name == "paper" else name, None, config)
+    network = road.lanes
+    for k in (*network.entries, *network.exits):
+        assert not network.lanes[k].junction  # traffic comes and goes by arms alone
+    for lane in network.lanes:
+        assert road.drivable_at(lane.centre[1:-1]).all()
+        assert all(np.allclose(network.lanes[k].left[0], lane.left[-1]) for k in lane.successors)
+    assert network.traffic_side == side and road.map_lanes is None
+    _, again = decode_lanes(encode_lanes(network, "map", 0))
+    assert again.drawn and again.arms == network.arms and again.turns_back == (name == "roundabout")
+
+
+@pytest.mark.parametrize("lanes, side", [(1, "right"), (2, "left")])
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_lanes_begin_at_entries_and_end_at_exits(name, side):
-    road = build_road(name, None, RoadConfig(lanes=2, traffic_side=side))
-    for ends, poses in zip(lane_ends(road.lanes), (road.entries, road.exits), strict=True):
-        away = np.hypot(*(ends[:, None, :2] - poses[None, :, :2]).transpose(2, 0, 1))
-        assert len(ends) == len(poses) and away.min(axis=0).max() < 1e-6
-        assert np.cos(ends[:, 2] - poses[away.argmin(axis=1), 2]).min() > 0.9999
-    assert road.lanes.traffic_side == side and road.map_lanes is None
-    _, again = decode_lanes(encode_lanes(road.lanes, "map", 0))
-    assert again.drawn and again.arms == road.lanes.arms and again.turns_back == (name == "roundabout")
-
-
-def test_the_papers_roads_have_no_lanes_for_their_lengths_are_cells():
-    assert build_road("straight", None, RoadConfig(paper=True)).lanes is None
+def test_cells_are_those_of_the_road_that_was_drawn_without_lanes_but_for_its_kerbs(name, lanes, side):
+    road, key = build_road(name, None, RoadConfig(lanes=lanes, traffic_side=side)), f"{name}_{lanes}_{side}"
+    former = np.unpackbits(FORMER[key], axis=1, count=int(FORMER[f"{key}_width"])).astype(bool)
+    row, column = np.indices(former.shape)
+    middle = (np.stack((column, row), axis=-1) + 0.5) * road.resolution
+    differ = road.drivable_at(middle + road.entries[0, :2] - FORMER[f"{key}_entry"]) != former
+    around = np.ones((3, 3), dtype=bool)
+    kerb = ndimage.binary_dilation(former, around) ^ ndimage.binary_erosion(former, around, border_value=1)
+    assert (differ & ~kerb).sum() < 0.01 * former.sum()  # 0.7 % of a roundabout, 0.3 % of the others at most
+    assert differ.sum() < 0.07 * former.sum()

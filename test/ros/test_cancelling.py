@@ -8,12 +8,17 @@ import threading
 import pytest
 
 from scenario_gen.base.cancelling import cancellable, CancelledError, stop_if_cancelled
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.worker import Worker
 from scenario_gen.logs import read_log
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
+from scenario_gen.types import Request
 
 CASE = "scenario_gen/resources/synthetic_c"
 
@@ -30,6 +35,9 @@ def test_every_stage_of_a_node_can_be_cancelled(request):
         lambda fresh=read(): build_road("straight", fresh),
         lambda fresh=read(): fit_template(fresh, segmentation, road),
         lambda: plan_routes(road, fit),
+        lambda: suggest_nearest(
+            RefusedError("no"), Chain(encounter, segmentation, road, PipelineConfig(), Request(starts="1: 0 0 0"))
+        ),
     ):
         with cancellable(lambda: True), pytest.raises(CancelledError):
             work()
@@ -60,10 +68,10 @@ def test_two_threads_run_jobs_of_two_names_at_a_time_and_never_two_of_one():
             both.wait(0.01)
 
     worker.submit("a", job("a", patient))
-    worker.submit("b", job("b", lambda _: both.wait(60.0)))
-    assert both.wait(60.0) and most[1] == ["a", "b"]
+    worker.submit("b", job("b", lambda _: both.wait(180.0)))
+    assert both.wait(180.0) and most[1] == ["a", "b"]
     ended = threading.Event()
     worker.submit("a", job("a", lambda _: ended.set()))  # cancels the first, and waits for its end
-    assert ended.wait(60.0)
-    worker.close(60.0)
+    assert ended.wait(180.0)
+    worker.close(180.0)
     assert all(names.count("a") <= 1 for names in most) and running == []

@@ -30,7 +30,8 @@ from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.tracking import of_twist
 from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.ros.plumbing.driving import FIRST_STAMP
+from scenario_gen.ros.nodes import traffic_of_trials
+from scenario_gen.ros.plumbing.driving import decode_command, FIRST_STAMP
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.names import token
 from scenario_gen.types.scenario import EgoSlot
@@ -110,7 +111,10 @@ def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic
 
 
 def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, client):
-    process = traffic(patience=0.2)
+    from rcl_interfaces.srv import SetParameters
+    from rclpy.parameter import Parameter
+
+    process = traffic(patience=60.0)
     far = np.array([1e5, 0.0, 0.0, 0.0])
     frame = hand_made_run().road.frame_id
     wrong = {
@@ -123,7 +127,12 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     for topic, data in wrong.values():
         client.say(topic, data)
         step(client)
-    for _ in range(8):
+    for data in (encode_twist(1.0, 0.0), encode_twist(2.0, 0.0)):
+        client.say("ego/cmd_vel", data)
+    client.until(lambda: any("2 replies to one state" in status.message for status in client.statuses()), "a second reply")
+    short = SetParameters.Request(parameters=[Parameter("patience", value=0.1).to_parameter_msg()])
+    assert client.call(SetParameters, "/traffic/set_parameters", short).results[0].successful
+    for _ in range(9):
         step(client)  # silent
     found = set()
 
@@ -146,13 +155,21 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     assert "not finite" in faults and "jumped" in faults and "is not that of the scenario" in faults
 
 
+@pytest.mark.parametrize(("stamp", "step"), [(0, 7), (FIRST_STAMP, 0), (FIRST_STAMP + 300_000_000, 3), (10**18, 7)])
+def test_a_stamp_of_the_drive_names_the_state_that_a_command_answers(stamp, step):
+    run = hand_made_run()
+    loop = ClosedLoop(run.generated.scenarios[0], 0, run.road, ClosedLoopConfig())
+    data = encode(VELOCITY_STAMPED, stamp=stamp, frame_id="base_link", twist=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert decode_command("ego/cmd_vel_stamped", data, loop, "vehicle_1", 7).step == step
+
+
 def test_two_egos_and_a_late_one_are_said(traffic, client):
     """A second node that commands, and commands whose stamp is old: the drive goes on, and the verdict says both."""
     import rclpy
 
     from scenario_gen.ros.plumbing.topics import create_publisher
 
-    process = traffic()
+    process = traffic(patience=0.2)
     client.announce("ego/cmd_vel_stamped")
     client.until(lambda: client.node.count_subscribers("ego/cmd_vel_stamped") >= 1, "ego/cmd_vel_stamped")
     other = rclpy.create_node("second_planner", context=client.node.context)
@@ -166,9 +183,11 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
         other.destroy_node()
     ahead = (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     stale = encode(VELOCITY_STAMPED, stamp=FIRST_STAMP, frame_id="base_link", twist=ahead)  # of the drive's begin
-    said = {"over": False}
-    while not said["over"]:
+    for _ in range(12):
         client.say("ego/cmd_vel_stamped", stale)
+        said = step(client)
+    while not said["over"]:
+        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
         said = step(client)
     values = decode_diagnostics(client.wait("verdicts")[-1])[1][0].values
     faults = str(values["first_faults"])
@@ -235,7 +254,10 @@ node = rclpy.create_node("by_place")
 command = node.create_publisher(Twist, "ego/cmd_vel", 10)
 
 
-def act(heard):
+def act(heard, left=[int(sys.argv[2])]):
+    left[0] -= 1
+    if left[0] < 0:
+        return
     twist = Twist()
     twist.linear.x = 3.0 + math.sin(heard.pose.pose.position.x)
     command.publish(twist)
@@ -246,7 +268,7 @@ rclpy.spin(node)
 """
 
 
-def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag, tmp_path):
+def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag, tmp_path, monkeypatch):
     """`scenario-gen drive --ros`: any node that answers its odometry with a command; what it is not is said."""
     from typer.testing import CliRunner
 
@@ -257,19 +279,23 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag,
     words = ["drive", str(bag), "--count", "2", "--set", "bars.goals=0.0"]
     words += [word for bar in ("collisions", "at_fault", "off_road") for word in ("--set", f"bars.{bar}=1.0")]
     words += ["--set", "bars.progress=0.0"]
+    command = f"{sys.executable} {program} vehicle_1/odom"
     for out, more in (
-        ("over_dds", ["--ros", "--planner", f"{sys.executable} {program} vehicle_1/odom"]),
+        ("over_dds", ["--ros", "--planner", f"{command} 1000000"]),
         ("in_process", ["--planner", "test_traffic:ByPlace", "--workers", "1"]),
     ):
         told = CliRunner().invoke(app, [*words, "--out", str(tmp_path / out), *more])
         assert told.exit_code == 0, told.output
     over_dds, in_process = (json.loads((tmp_path / out / "drives.json").read_text()) for out in ("over_dds", "in_process"))
     assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
-    for command, said in (
-        (f"{sys.executable} -c 'print(7)'", "ended with code 0; its last output: 7"),
-        ("no_such_program", "No such"),
+    monkeypatch.setattr(traffic_of_trials, "SILENT", 1.0)
+    for planner, more, said in (
+        (f"{sys.executable} -c 'print(7)'", (), "ended with code 0; its last output: 7"),
+        ("no_such_program", (), "No such"),
+        (f"{command} 9", (), "has sent no command for 1 s: it hangs"),
+        (f"{command} 1000000", ("--set", "drive_time=0.1"), "did not come to an end in 0.1 s (drive_time)"),
     ):
-        refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", command])
+        refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", planner, *more])
         assert said in str(refused.exception), refused.output
 
 

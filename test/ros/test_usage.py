@@ -8,6 +8,7 @@ import importlib
 import subprocess
 import sys
 
+from node_server import start_nodes
 import pytest
 
 from scenario_gen.ros.plumbing.ros_parameters import help_of
@@ -17,12 +18,31 @@ from scenario_gen.ros.plumbing.start import node_class, NODES
 @pytest.mark.dds
 def test_the_player_lists_its_parameters():
     command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "player", "--help"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120.0, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180.0, check=False)
     assert done.returncode == 0 and done.stderr == ""
     assert "[--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]" in done.stdout
     assert "  rate := 1.0\n      how many times as fast as it was recorded" in done.stdout
     for name in ("bag", "topics", "rate", "start_offset", "loop", "paused", "clock"):
         assert f"  {name} := " in done.stdout
+
+
+@pytest.mark.dds
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("-p", "frames:="), "'-p frames:='; write -r FROM:=TO and -p NAME:=VALUE, an empty text as -p \"NAME:=''\""),
+        (("-p", "starts:=1: 31 68 0 10"), "Unknown YAML event; write"),
+        (("-r", "foo"), "'-r foo'"),
+        (("--params-file", "no_such.yaml"), "no_such.yaml"),
+        (("--no-such",), "--no-such"),
+    ],
+    ids=str,
+)
+def test_what_ros_cannot_read_is_one_line(words, said):
+    process = start_nodes("suite" if "-r" in words else "player", "--ros-args", *words)
+    output, _ = process.communicate(180.0)
+    (line,) = output.splitlines()
+    assert process.returncode == 2 and line.startswith("error: ") and said in line and "/src/" not in line
 
 
 @pytest.mark.parametrize("name", NODES)

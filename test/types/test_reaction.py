@@ -28,7 +28,8 @@ def test_who_slows_passes_or_stops_is_said_to():
     early = Reaction(YIELD, 1, 0, -0.3, 1.0, 0.6, 0.9, 3.0, 9.0, gap=-0.2)
     assert early.words(IDS) == "vehicle b slows for vehicle a and passes right behind it"
     assert replace(early, since=9.0, gap=1.2).words(IDS) == "vehicle b passes 1.2 s behind vehicle a"
-    assert replace(early, gap=math.inf).words(IDS) == "vehicle b stops for vehicle a"
+    assert replace(early, gap=math.inf).words(IDS) == "vehicle b slows for vehicle a"
+    assert replace(early, gap=math.inf, stands=True).words(IDS) == "vehicle b stops for vehicle a"
 
 
 def test_edges_that_scenarios_do_not_keep_are_said():

@@ -215,6 +215,14 @@ def _oncoming(rng: np.random.Generator) -> Drive:
     return driven(EAST, own, stop, 140.0), driven(WEST, own if rng.random() < 0.5 else wander(rng, 140, v), stop, 140.0)
 
 
+def _meets_closely(rng: np.random.Generator) -> Drive:
+    """Where two that come towards each other hardly pass, the one slows until the other has passed."""
+    v, at = rng.uniform(7.0, 11.0), rng.uniform(6.0, 8.0)
+    low = v * rng.uniform(0.1, 0.35)
+    own = ramps(140, (0.0, v), (at - 1.5 - (v - low) / 2.0, v), (at - 1.5, low), (at + 0.5, low), (at + 4.0, v))
+    return driven(line((150.0, 2.3), (-150.0, 2.3)), wander(rng, 140, v, 0.3), at, 140.0), driven(EAST, own, at, 155.0)
+
+
 REACTIONS: dict[str, Callable[[np.random.Generator], Drive]] = {
     "follows": _steady,
     "stops behind a stopping leader": _stops,
@@ -231,6 +239,7 @@ REACTIONS: dict[str, Callable[[np.random.Generator], Drive]] = {
     "merges": lambda rng: yields(rng, EAST, RAMP, rng.uniform(5.0, 7.0), merges=True),
     "right turn into a stream": lambda rng: yields(rng, EAST, RIGHT, rng.choice([0.0, 3.0]), merges=True),
     "roundabout entry": lambda rng: yields(rng, RING, ENTRY, rng.choice([0.0, 3.0]), merges=True),
+    "meets another one closely": _meets_closely,
     "narrow place": lambda rng: yields(rng, EAST, NARROW, rng.choice([0.0, 1.0])),
 }
 """The second drive reacts to the first."""

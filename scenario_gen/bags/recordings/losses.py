@@ -4,7 +4,7 @@
 """What a recorder did not record, by topic, and how it knows.
 
 - Where a topic has one publisher, by the numbers that it gives its messages: what is left out was lost, what came before the
-  first one was published before the recording began.
+  first one was published before the recording began. Of a stream (/tf, /clock) only what comes while it is recorded counts.
 - Where it has several, by what DDS tells.
 - Scenarios, by their entries on `scenarios/info`.
 - Of a topic that keeps its newest message only (a map, a route) older ones that were overwritten are not missed.
@@ -17,6 +17,7 @@ from time import monotonic
 from msg_conventions.scenario_info import INFO
 from msg_conventions.scenarios import digest
 from scenario_gen.bags.recordings.requests import RequestTracker
+from scenario_gen.types import Quality
 
 SETTLED = 5.0  # seconds without news after which what a closed request lacks is missing
 LATE = "began late"
@@ -62,11 +63,14 @@ class Losses:
         self._numbers: dict[str, Numbers] = {}
         self._requests: dict[str, RequestTracker] = {}  # by namespace
         self._of_newest: set[str] = set()
+        self._streams: set[str] = set()
         self._news = monotonic()
 
-    def begin(self, topic: str, *, only_newest: bool) -> None:
-        """Begin with a topic; where only the newest message counts, none that was overwritten is missed."""
-        if only_newest:
+    def begin(self, topic: str, quality: Quality) -> None:
+        """Begin with a topic, whose publishers offer `quality`: it says whether older messages are to be had from them."""
+        if not quality.transient_local:
+            self._streams.add(topic)
+        elif quality.depth == 1:
             self._of_newest.add(topic)
 
     def take(self, topic: str, data: bytes, number: int | None) -> None:
@@ -76,6 +80,8 @@ class Losses:
         numbers = self._numbers.setdefault(topic, Numbers())
         if number and numbers.take(number) and self._publishers(topic) > 1:
             numbers.several = True
+        if topic in self._streams:
+            numbers.late = 0
         if topic.endswith(("/scenarios", f"/{INFO}")):
             self._news = monotonic()
             requests = self._requests.setdefault(topic.removesuffix("/info").removesuffix("scenarios"), RequestTracker())

@@ -13,7 +13,6 @@ from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.closed_loop.trials import Outcome
-from scenario_gen.closed_loop.verdict import Runner
 
 AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = "at_fault", "collision", "off_road", "goal", "ttc", "pet"
 NAMES = (AT_FAULT, COLLISION, OFF_ROAD, GOAL)
@@ -55,7 +54,7 @@ class Objective:
         contact = -math.inf if hit is None else -(CONTACT + hit.speed)
         nearest = min(apart, default=FAR)
         if self.name in (AT_FAULT, COLLISION):
-            counts = hit is not None and (self.name == COLLISION or hit.ran is not Runner.OTHER)
+            counts = hit is not None and (self.name == COLLISION or verdict.at_fault)
             margin = contact if counts else max(nearest, LEAST)
         elif self.name == OFF_ROAD:
             margin = verdict.road_margin + verdict.off_road_depth
@@ -69,7 +68,8 @@ class Objective:
             margin = FAR + nearest if math.isnan(verdict.min_pet) else verdict.min_pet - self.limit
         margin = FAR if math.isnan(margin) else float(margin)
         parts = apart if self.name in (AT_FAULT, COLLISION) else ()
-        return Response(margin, parts, _kind(outcome, self.name) if margin <= 0.0 else "")
+        events = ((COLLISION,) if hit is not None else ()) + ((AT_FAULT,) if verdict.at_fault else ())
+        return Response(margin, parts, _kind(outcome, self.name) if margin <= 0.0 else "", events)
 
 
 def _apart(outcome: Outcome) -> tuple[float, ...]:
@@ -83,8 +83,7 @@ def _kind(outcome: Outcome, name: str) -> str:
     """Return which failure it was: who and how."""
     hit = outcome.verdict.collision
     if name in (AT_FAULT, COLLISION, TTC) and hit is not None:
-        words = {Runner.EGO: "the ego runs into {}", Runner.OTHER: "{} runs into the ego", Runner.BOTH: "the ego and {} meet"}
-        return f"{words[hit.ran].format(hit.vehicle)}: {hit.reason.value.replace('_', ' ')}"
+        return f"the ego and {hit.vehicle} meet: {hit.reason.value.replace('_', ' ')}"
     if name == OFF_ROAD:
         return "the ego leaves the road"
     if name == GOAL:

@@ -88,10 +88,11 @@ def label_of(
     encounter: Encounter,
     request: Request,
     aim: Aim | None,
+    measures: Measures | None,
     reactions: Sequence[Reaction] = (),
     lost: Iterable[tuple[int, ...]] = (),
 ) -> Label:
-    """Return what says a scenario's facts: figures of targets, reactions that it keeps, orders if they are not kept.
+    """Return what says a scenario's facts: nearness, figures of targets, reactions that it keeps, orders if they are not kept.
 
     `lost` are the pairs (who, whom) whose reaction, or whose least gap, scenarios are not held to on this road.
     """
@@ -100,7 +101,7 @@ def label_of(
     conflicts = () if request.order == "keep" else conflicts_in(encounter)
 
     def label(whole: Scenario) -> dict[str, str]:
-        facts = dict(held)
+        facts = held | (measures.nearness(whole) if measures is not None else {})
         if aim is not None:
             facts |= {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
         if request.order == "keep":

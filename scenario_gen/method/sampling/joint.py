@@ -16,7 +16,7 @@ lag and gain g of the edge:
   1.2 s, and is as much smaller as the gap at a lower speed; ε₁ is ε₂ divided by the follower's speed.
 - yielder y, first o, with the late arrival at a place a_n(τ) = ℓ_n(τ) − d_n(τ) / v_n(τ):
   a_y(enters)ᵀz_y − a_o(clears)ᵀz_o = ε, 0.3 s and a fifth of the template's gap; and where it stands, and drives off:
-  ℓ_y(leaves)ᵀz_y − a_o(clears)ᵀz_o = ε, 0.6 s. One that stops for the other to the record's end: ℓ_y(slows) − ℓ_o(slows) = ε.
+  ℓ_y(leaves)ᵀz_y − a_o(clears)ᵀz_o = ε, 0.6 s. One that gives way without coming behind: ℓ_y(slows) − ℓ_o(slows) = ε.
 
 Given the numbers of the vehicles it reacts to, those of a vehicle are again Gaussian. With the whitened equations
 A z + B z_others = η and A = U S Vᵀ they are z = ε + V ((I + S²)^−½ − I) Vᵀ ε − V S (I + S²)⁻¹ Uᵀ B z_others. So all numbers
@@ -154,7 +154,7 @@ def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, s
             (ahead, residual[:, None] * residual * (slow + rough) + np.square(_QUICK) * quick),
         ]
     if edge.gap == math.inf:
-        slows = np.array([edge.since])
+        slows = np.array([edge.since if edge.stands else edge.until])
         rows = {edge.who: lateness(who, slows, nominal, scale), edge.whom: -lateness(whom, slows, nominal, scale)}
         return [(rows, np.array([[np.square(edge.residual)]]))]
     first = -_arrival(whom, edge.clears, nominal, scale)

@@ -80,10 +80,10 @@ def draw_scenarios(
         drawn = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
     else:
         aim = aim_of(encounter, request, measures)
-        sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(encounter, request, aim))
+        sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(encounter, request, aim, measures))
         judge = Judge.of(sampler, check, _enough(config, request))
         kept = tuple(edge for edge in prepared.model.reactions.edges if (edge.who, edge.whom) not in judge.lost)
-        sampler = replace(sampler, label=label_of(encounter, request, aim, kept, judge.lost))
+        sampler = replace(sampler, label=label_of(encounter, request, aim, measures, kept, judge.lost))
         loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.requested, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
@@ -121,7 +121,7 @@ def regenerate(
     if prepared.model is None:
         return None
     ego, aim = request.ego_of(plan.encounter), aim_of(plan.encounter, request, measures)
-    sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(plan.encounter, request, aim))
+    sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(plan.encounter, request, aim, measures))
     if place_of(index)[0] == DIRECTED:
         if aim is None or check is None:
             raise InputError(f"index {index} is of a proposal, but no target was asked for")

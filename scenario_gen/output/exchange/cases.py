@@ -14,7 +14,7 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.provenance import read_parameters
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.derived_lanes import derived_lanes, lane_map_of
+from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.roads import RoadConfig
 from scenario_gen.types import Road, Scenario, split_off, tokens
@@ -72,7 +72,6 @@ class Case:
         start_ns: the template's stamp.
         scenarios: those asked for.
         lane_map: of the road; the same whichever scenarios are asked for.
-        other_lanes: derived ones, where those are of a vector map.
         origin: of the frame, as of `LaneNetwork`.
     """
 
@@ -82,13 +81,7 @@ class Case:
     start_ns: int
     scenarios: tuple[Exported, ...]
     lane_map: LaneMap
-    other_lanes: LaneMap | None = None
     origin: tuple[float, ...] = ()
-
-    @property
-    def strips(self) -> LaneMap:
-        """The lanes for a format of strips, which cannot hold those of every vector map: of that, derived ones."""
-        return self.lane_map if self.other_lanes is None else self.other_lanes
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +198,5 @@ def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, in
         start_ns=group.stamp,
         scenarios=tuple(exported for exported in group.scenarios if not indices or exported.index in indices),
         lane_map=lane_map_of(road, everybody, width, export.run_out),
-        other_lanes=derived_lanes(everybody, road, width, export.run_out) if road and road.map_lanes else None,
         origin=road.lanes.origin if road and road.lanes else (),
     )

@@ -20,13 +20,12 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.lanes import LaneMap
+from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
 from scenario_gen.output.exchange.xml import add, comment, Element, number, serialized
-from scenario_gen.types import is_truck, Lane, LaneNetwork, RuleKind, Scenario
+from scenario_gen.types import is_truck, Lane, LaneNetwork, Scenario
 
 OBSTACLES, PROBLEM, INTERSECTION, SIGNS = 100_000, 200_000, 300_000, 400_000  # ids from here on; lanelets count from 1
-SIGN_IDS = {RuleKind.STOP: "206", RuleKind.GIVE_WAY: "205", RuleKind.PRIORITY: "301"}
 MAX_SPEED = "274"
 GOAL_TURN = 0.3  # rad by which an ego may be turned at its goal
 AUTHOR = "scenario_gen"

@@ -13,7 +13,7 @@ from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.lanes import LaneMap, with_run_out
-from scenario_gen.roads import drivable_beside
+from scenario_gen.roads import drivable_beside, lane_along, sharing_lanes
 from scenario_gen.types import Lane, LaneNetwork, Road, Scenario, together
 
 STEP = 1.0  # metres between points of a lane
@@ -22,7 +22,6 @@ MARGIN = 0.1  # metres between a footprint and its lane's edge
 AROUND = 0.5  # metres by which a lane goes on beyond its footprints at least
 ACROSS = 0.6  # rad by which a vehicle in a lane may be turned in it
 CUT = 5.0  # metres of a path that may lie across all lanes, as where a corner is cut
-SAME_LANE, SAME_WAY = 1.0, 0.35  # metres and rad within which a path lies in another one's lane
 NEAR = 3  # points of a lane on both sides over which it keeps its widest
 
 
@@ -63,18 +62,10 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
     for scenario in scenarios:
         for n, vehicle in enumerate(scenario.vehicles):
             paths.setdefault(vehicle.id, driven_path(scenario, n))
-    lanes: list[tuple[str, Curve]] = []
-    homes: dict[str, int] = {}
-    for name in sorted(paths, key=lambda name_of_path: (-paths[name_of_path].length, name_of_path)):
-        home = next((k for k, (_, lane) in enumerate(lanes) if _runs_in(paths[name], lane)), None)
-        if home is None:
-            home = len(lanes)
-            lanes.append((name, paths[name]))
-        homes[name] = home
-    derived = []
-    for k, (name, path) in enumerate(lanes):
-        members = {member for member, home in homes.items() if home == k}
-        derived.append(_lane(f"along vehicle {name}", path, members, scenarios, road, lane_width, run_out))
+    derived = [
+        _lane(f"along vehicle {name}", paths[name], set(members), scenarios, road, lane_width, run_out)
+        for name, members in sharing_lanes(paths).items()
+    ]
     origin = "derived: one lane along each path that the scenarios drive; the road itself is a grid without lanes"
     return LaneMap(LaneNetwork("derived", tuple(derived)), len(derived), origin)
 
@@ -127,13 +118,6 @@ def driven_path(scenario: Scenario, n: int) -> Curve:
     return Curve.through(np.array(kept))
 
 
-def _runs_in(path: Curve, lane: Curve) -> bool:
-    """Say whether a path lies in the lane along another one, in the same direction."""
-    station, offset = lane.project(path.points[:, :2])
-    turn = path.points[:, 2] - lane.at(station)[:, 2]
-    return bool((np.abs(offset) < SAME_LANE).all() and (np.cos(turn) > np.cos(SAME_WAY)).all())
-
-
 def _lane(
     name: str, path: Curve, members: set[str], scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float
 ) -> Lane:
@@ -147,8 +131,7 @@ def _lane(
     reference = path.cut(float(station.min()) - more, float(station.max()) + more, STEP)
     room = np.minimum(*(_room(reference, sign, road, lane_width / 2.0, more) for sign in (1.0, -1.0)))
     half = np.maximum(room, _widest_near(reference, station - station.min() + more, np.abs(offset) + MARGIN))
-    left, right = (reference.beside(reference.station, sign * half)[:, :2] for sign in (1.0, -1.0))
-    return Lane(name, left, right)
+    return lane_along(name, reference, half)
 
 
 def _widest_near(line: Curve, station: Floats, wide: Floats) -> Floats:
@@ -176,4 +159,4 @@ def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out
     if road is None:
         return np.full(len(reference.points), most)
     on_run_out = (reference.station < run_out) | (reference.station > reference.length - run_out)
-    return np.where(on_run_out, most, drivable_beside(road, reference, sign, most))
+    return np.where(on_run_out, most, drivable_beside(road.drivable_at, reference, sign, most, road.resolution / 2.0))

@@ -22,7 +22,6 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.output.exchange.osi import write_osi
@@ -72,13 +71,11 @@ class ExportFormat:
         takes_map: whether `ExportConfig.map` is written in place of lanes.
         maps: endings of the names of such maps.
         projected_from: latitude and longitude about which positions are, if they are to be projected as a map is; else ().
-        own_lanes: whether the lanes of a vector map are written; if not, ones derived from the scenarios are in their place.
     """
 
     write: Callable[[Path, Case, Exported, ExportConfig], Written]
     shared: Callable[[Case, ExportConfig], Mapping[str, bytes]] = _nothing_shared
     projected_from: Callable[[Case, ExportConfig], tuple[float, ...]] = lambda *_: ()
-    own_lanes: bool = False
     takes_map: bool = False
     maps: tuple[str, ...] = MAPS
     closing: Callable[[Sequence[tuple[str, Any]]], Mapping[str, bytes]] = _nothing_at_the_end
@@ -121,7 +118,7 @@ def export_bag(
         for case in cases:
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
             frame, moved = projection_of(to.projected_from(case, export), export)
-            said = "; ".join(filter(None, (_origin(case, to, export), frame)))
+            said = "; ".join(filter(None, (_origin(case, export), frame)))
             notes.append(f"{about}: {len(case.scenarios)} scenarios; {said}")
             for name, data in to.shared(case, export).items():
                 (folder / name).write_bytes(data)
@@ -135,7 +132,7 @@ def export_bag(
                     notes.append(f"{about}: left out: {error}")
                     continue
                 notes += [f"{about}, scenario {exported.index}: {sentence}" for sentence in written.notes]
-                entries.append(_entry(case, exported, written.names, to, export))
+                entries.append(_entry(case, exported, written.names, export))
                 contents.append((written.names[0], written.content))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
@@ -162,24 +159,19 @@ def _format(target: str, road: str) -> ExportFormat:
     return to
 
 
-def _lanes(case: Case, to: ExportFormat) -> LaneMap:
-    """Return the lanes that a format is given."""
-    return case.lane_map if to.own_lanes else case.strips
-
-
-def _origin(case: Case, to: ExportFormat, export: ExportConfig) -> str:
+def _origin(case: Case, export: ExportConfig) -> str:
     if export.map:
         return "; ".join((f"the lanes of {Path(export.map).name}", *read_network(Path(export.map)).notes))
-    return _lanes(case, to).origin
+    return case.lane_map.origin
 
 
-def _entry(case: Case, exported: Exported, names: tuple[str, ...], to: ExportFormat, export: ExportConfig) -> dict[str, object]:
+def _entry(case: Case, exported: Exported, names: tuple[str, ...], export: ExportConfig) -> dict[str, object]:
     """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
     return {
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
-        "lanes": "derived" if _lanes(case, to).derived and not export.map else "true",
+        "lanes": "derived" if case.lane_map.derived and not export.map else "true",
         "index": exported.index,
         "seed": exported.seed,
         "sha256": exported.sha256,
@@ -229,7 +221,7 @@ def _roads(case: Case, export: ExportConfig) -> Mapping[str, bytes]:
     if export.map:
         refuse_other_map(case, Path(export.map))
         return {_road_file(case, export): Path(export.map).read_bytes()}
-    return {_road_file(case, export): write_opendrive(case.strips, case.road_name, case.start_ns)}
+    return {_road_file(case, export): write_opendrive(case.lane_map, case.road_name, case.start_ns)}
 
 
 def _origin_of_map(_: Case, export: ExportConfig) -> tuple[float, ...]:
@@ -256,11 +248,11 @@ def refuse_other_map(case: Case, path: Path) -> None:
 EXPORTS = Registry[ExportFormat](
     "scenario_gen.exports",
     {
-        "commonroad": ExportFormat(_to_commonroad, own_lanes=True),
+        "commonroad": ExportFormat(_to_commonroad),
         "openscenario": ExportFormat(_to_openscenario, _roads, _origin_of_map, takes_map=True),
         "osi": ExportFormat(_to_osi, _roads, takes_map=True, maps=(".xodr",)),
         "autoware": ExportFormat(_to_autoware, projected_from=lambda case, _: case.origin),
-        "scenarionet": ExportFormat(_to_scenarionet, own_lanes=True, closing=dataset_files),
+        "scenarionet": ExportFormat(_to_scenarionet, closing=dataset_files),
     },
     ExportFormat,
 )

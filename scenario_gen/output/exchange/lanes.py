@@ -11,8 +11,9 @@ import numpy as np
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.types import LaneNetwork
+from scenario_gen.types import LaneNetwork, RuleKind
 
+SIGN_IDS = {RuleKind.STOP: "206", RuleKind.GIVE_WAY: "205", RuleKind.PRIORITY: "301"}  # German numbers
 STRAIGHT_ON = 0.52  # rad, 30°: a way through a junction that turns by less goes straight on
 
 

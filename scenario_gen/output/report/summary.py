@@ -3,16 +3,15 @@
 
 """The end of a run on one screen of the terminal."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 import math
 
 from rich.console import Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from scenario_gen.base.errors import printable
 from scenario_gen.types import (
-    Cause,
     causes_in_words,
     ERRORS,
     formatted,
@@ -21,6 +20,7 @@ from scenario_gen.types import (
     NARROW,
     ORACLE,
     routes_in_words,
+    Row,
     UNIFORM,
     WITH,
     WITHOUT,
@@ -32,63 +32,86 @@ COMPARED = (
     "narrow, the template replayed"
 )
 UNCOMPARED = "; in brackets, not compared: the template replayed. --compare draws sets to compare with"
+VARIED = ("pet", "gap", "speed")  # figures whose range is said: PET, or where nobody crosses the least gap, and the speed
+FAILED = "yellow"
 
 
-def summary(cases: Sequence[GenerationResult]) -> RenderableType:
-    """Return two lines per case and what was refused, for rich to print; names are long, so no table."""
-    lines = [line for case in cases for line in _case(case)]
-    refused: Counter[Cause] = sum((case.generated.refused for case in cases), Counter())
-    causes = ", ".join(f"{count} {words}" for words, count in causes_in_words(refused))
-    beside = COMPARED if any(case.references for case in cases) else UNCOMPARED
-    return Group(
-        *lines,
-        Text(f"refused candidates: {causes}" if causes else "no candidate was refused"),
-        Text(f"K: changepoints. E: distance of the delivered set to the template, lower is nearer{beside}.", style="dim"),
+def summary(cases: Sequence[GenerationResult], *, verbose: bool = False) -> RenderableType:
+    """Return for rich to print what a user asks first of each case: what was read, who reacts, what is valid, how varied it is.
+
+    Args:
+        cases: what was generated.
+        verbose: routes and the comparison with the recording (E), too.
+    """
+    lines = [line for case in cases for line in _case(case, verbose)]
+    if verbose:
+        beside = COMPARED if any(case.references for case in cases) else UNCOMPARED
+        explained = f"K: changepoints. E: distance of the delivered set to the template, lower is nearer{beside}."
+        lines.append(Text(explained, style="dim"))
+    return Group(*lines)
+
+
+def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
+    """The name of a case, and below it a row for each question; what is not as recorded is yellow."""
+    result, recorded = case.generated, case.encounter
+    refused = ", ".join(f"{count} {words}" for words, count in causes_in_words(result.refused))
+    tried = (
+        f"{result.refused.total()} of {result.candidates} candidates were refused: {refused}"
+        if refused
+        else "no candidate was refused"
     )
+    complete = len(result) >= result.requested
+    table = Table.grid(padding=(0, 1))
+    table.add_row("", "recording", f"{len(recorded.vehicles)} vehicles for {recorded.duration:.1f} s")
+    for sentence in case.reacting["sentences"]:
+        table.add_row("", "reaction", printable(sentence))
+    valid = Text.assemble((f"{len(result)} of {result.requested} scenarios", "green" if complete else "red"), f"; {tried}")
+    table.add_row("", "valid", valid)
+    if varied := _variety(case):
+        table.add_row("", "variety", varied)
+    row = case.evaluation.row(WITH)
+    vanished = [] if row is None else _vanished(row.values)
+    losses = case.fit.lost if case.fit else ()
+    lost = [loss.message for loss in losses if loss.kind != "arm"]
+    remark = case.segmentation.remark(recorded.duration)
+    unused = [loss.message for loss in losses if loss.kind == "arm"]
+    for message in (*lost, *vanished, *case.lost_reactions):
+        table.add_row("", Text("not kept", style=FAILED), Text(printable(message), style=FAILED))
+    for message in (*unused, *case.route_remarks, *([remark] if remark else [])):
+        table.add_row("", "note", printable(message))
+    title: list[RenderableType] = [Text(printable(case.title), style="bold"), table]
+    return [*title, *_details(case, row)] if verbose else title
 
 
-def _case(case: GenerationResult) -> list[Text]:
-    """The name of a case, its figures, and the notes on its segmentation."""
-    result, row = case.generated, case.evaluation.row(WITH)
+def _variety(case: GenerationResult) -> str:
+    """The range of the figures of a set, each with the recording's in brackets."""
+    spreads = {} if case.coverage is None else case.coverage.spreads
+    ranges = []
+    for spread in (spreads[name] for name in VARIED if name in spreads):
+        values = [value for value in spread.values if math.isfinite(value)]
+        own = f" (recorded {spread.template:.1f})" if math.isfinite(spread.template) else ""
+        if values and (own or spread is spreads["speed"]):
+            ranges.append(f"{spread.label} {min(values):.1f} to {max(values):.1f} {spread.unit}{own}")
+    return ", ".join(ranges)
+
+
+def _vanished(values: Mapping[str, Interval]) -> list[str]:
+    """Say how many of the recording's conflicts the scenarios have not."""
+    vanished, conflicts = (values.get(key, Interval(math.nan)).value for key in ("vanished_conflicts", "conflicts"))
+    words = f"{vanished:.3g} of the recording's {vanished + conflicts:.0f} conflict(s) vanish, mean over scenarios"
+    return [words] if vanished > 0.0 else []
+
+
+def _details(case: GenerationResult, row: Row | None) -> list[Text]:
+    """Changepoints, order, routes and E of a case."""
     order = formatted(row.values.get("order_kept"), "%", bounds=False) if row else "–"
-    title = Text(printable(case.title), style="bold")
-    title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
-    complete = len(result.scenarios) >= result.requested
-    measured = f" (of {row.samples:,}, evenly spaced)" if row and row.samples < len(result.scenarios) else ""
-    figures = Text.assemble(
-        "  ",
-        (f"{len(result.scenarios)}/{result.requested} valid", "green" if complete else "red"),
-        f" of {result.candidates}  K {len(case.segmentation.changepoints)}"
-        f"  order {order if order == '–' else order + ' %'}{measured}",
-    )
-    kept = [] if row is None else _not_kept(row.values)
-    remark = case.segmentation.remark(case.encounter.duration)
-    lost = [f"lost on this road: {message}" for message in case.lost]
-    planned = routes_in_words(case.routes)
-    if planned:
-        figures.append(f"  routes: {planned}")
+    figures = f"  K {len(case.segmentation.changepoints)}  order {order if order == '–' else order + ' %'}"
+    if row and row.samples < len(case.generated):
+        figures += f" (of {row.samples:,}, evenly spaced)"
+    if planned := routes_in_words(case.routes):
+        figures += f"  routes: {planned}"
     similar = [_errors(case, metric) for metric in ERRORS if row and metric in row.values]
-    kept += [*case.similarity()["said"], *case.lost_reactions]
-    reactions = case.reacting["sentences"]
-    warnings = [*lost, *kept, *case.route_remarks, *([remark] if remark else [])]
-    return [
-        title,
-        figures,
-        *(Text(f"  {printable(line)}") for line in reactions),
-        *similar,
-        *(Text(f"  {printable(line)}", style="yellow") for line in warnings),
-    ]
-
-
-def _not_kept(values: Mapping[str, Interval]) -> list[str]:
-    """Say what of the template the samples have not: turns, conflicts."""
-    turns, vanished, conflicts = (
-        values.get(key, Interval(math.nan)).value for key in ("turn_kept", "vanished_conflicts", "conflicts")
-    )
-    message = [f"{100.0 * (1.0 - turns):.3g} % of the vehicles turn otherwise than in the template"] if turns < 1.0 else []
-    if vanished > 0.0:
-        message.append(f"{vanished:.3g} of the template's {vanished + conflicts:.0f} conflict(s) vanish, mean over samples")
-    return message
+    return [Text(figures), *similar, *(Text(f"  {printable(line)}", style=FAILED) for line in case.similarity()["said"])]
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:

@@ -12,12 +12,13 @@ import re
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import distance
 import shapely
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
-from scenario_gen.numerics import Bools, Floats, Ints, runs
-from scenario_gen.numerics.plane import edge_lengths, meeting_shares
+from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads.vector.signs import DraftRule, rules_of_pieces, with_rules
 from scenario_gen.types import Lane, LaneNetwork, LEVEL
 
@@ -28,10 +29,8 @@ MOST_LANES = 30_000  # a city of some 1000 km of streets
 MOST_LINKS = 100  # of a lane to lanes that follow it, or lie beside it
 FAULTY = "faulty"  # in notes on elements that were left out
 _NAMED = 5  # faulty elements that a note names
-_CHUNK = 16  # edges of a middle that are looked at together
-_QUERIED = 64  # chunks whose neighbours are looked up at once
-_COMPARED = 2_000  # pairs of chunks that are compared at once
-_MOST_COMPARED = 400_000  # pairs of chunks
+_QUERIED = 64  # lanes whose neighbours are looked up at once
+_MOST_COMPARED = 400_000  # pairs of lanes whose boxes meet
 
 
 class TooLargeError(InputError):
@@ -274,61 +273,33 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
 
 
 def crossing_lanes(network: LaneNetwork) -> Iterator[tuple[int, int]]:
-    """Yield the pairs of lanes whose middles cross between their ends, some of them more than once; not above each other.
-
-    Middles are cut into chunks of a few edges, whose boxes are looked up in a tree.
+    """Yield the pairs of lanes whose middles cross between their ends, neither above the other.
 
     Raises:
         InputError: too many of them lie upon each other.
     """
-    starts, steps, owners, edges, heights = [], [], [], [], []
-    for k, lane in enumerate(network.lanes):
-        count = len(lane.centre) - 1
-        index = np.arange(math.ceil(count / _CHUNK) * _CHUNK).reshape(-1, _CHUNK)
-        there = index < count
-        starts.append(np.where(there[..., None], lane.centre[np.minimum(index, count)], np.nan))
-        steps.append(np.where(there[..., None], np.diff(lane.centre, axis=0)[np.minimum(index, count - 1)], np.nan))
-        owners.append(np.full(len(index), k))
-        edges.append(np.where(index == 0, 1, 0) + np.where(index == count - 1, 2, 0))  # its first, its last, both
-        heights.append(lane.height[np.minimum(index, count)].mean(axis=1))
-    start, step, owner, edge, height = (np.concatenate(part) for part in (starts, steps, owners, edges, heights))
-    ends = np.concatenate((start, start + step), axis=1)
-    boxes = shapely.box(*np.nanmin(ends, axis=1).T, *np.nanmax(ends, axis=1).T)
-    tree, compared = shapely.STRtree(boxes), 0
-    for k in range(0, len(boxes), _QUERIED):
-        first, second = tree.query(boxes[k : k + _QUERIED])
-        first = first + k
-        ordered = owner[first] < owner[second]
-        ordered &= ~(np.abs(height[first] - height[second]) > LEVEL)
-        first, second = first[ordered], second[ordered]
+    lines = np.array([shapely.LineString(lane.centre) for lane in network.lanes])
+    tree, compared = shapely.STRtree(lines), 0
+    for k in range(0, len(lines), _QUERIED):
+        first, second = tree.query(lines[k : k + _QUERIED])
+        ordered = first + k < second
+        first, second = first[ordered] + k, second[ordered]
         compared += len(first)
         if compared > _MOST_COMPARED:
             raise InputError(
                 f"map {network.name}: its lanes lie upon each other in more than {_MOST_COMPARED} places, as at lane "
-                f"{network.lanes[owner[first[0]]].id}; check the coordinates"
+                f"{network.lanes[first[0]].id}; check the coordinates"
             )
-        for n in range(0, len(first), _COMPARED):
-            a, b = first[n : n + _COMPARED], second[n : n + _COMPARED]
-            hit = _cross(start[a], step[a], start[b], step[b], edge[a], edge[b])
-            yield from zip(owner[a[hit]].tolist(), owner[b[hit]].tolist(), strict=True)
+        shapely.prepare(lines[first])
+        crossing = shapely.crosses(lines[first], lines[second])
+        pairs = zip(first[crossing].tolist(), second[crossing].tolist(), strict=True)
+        yield from (pair for pair in pairs if not network.has_levels or _on_one_level(*(network.lanes[k] for k in pair)))
 
 
-def _cross(p: Floats, u: Floats, q: Floats, v: Floats, first: Ints, second: Ints) -> Bools:
-    """Say of pairs (K,) of chunks whether edges of one cross edges of the other.
-
-    Args:
-        p: (K, C, 2) begins of the edges of one, NaN where it has fewer.
-        u: (K, C, 2) their steps.
-        q: begins of the other's.
-        v: their steps.
-        first: (K, C) of each edge of one: 1 if it is the first of its lane, 2 if it is the last, 3 if it is both.
-        second: the same of the other.
-    """
-    t, s, _ = meeting_shares(p[:, :, None], u[:, :, None], q[:, None], v[:, None])
-    with np.errstate(invalid="ignore"):
-        hit = (t >= 0.0) & (t < 1.0) & (s >= 0.0) & (s < 1.0)
-    hit &= (first[:, :, None] & second[:, None]) == 0  # two first edges part, and two last ones meet, there
-    return np.asarray(hit.any(axis=(1, 2)))
+def _on_one_level(one: Lane, other: Lane) -> bool:
+    """Whether two lanes are at one height where their middles are nearest, or a height is not known."""
+    a, b = np.unravel_index(distance.cdist(one.centre, other.centre).argmin(), (len(one.centre), len(other.centre)))
+    return not abs(one.height[a] - other.height[b]) > LEVEL
 
 
 def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:

@@ -3,7 +3,6 @@
 
 """Where on a map a template goes: all ways of laying it on lanes, the best first, and the part of the map around one."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -19,14 +18,14 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import at_home, crossing_spots, find_spots, Spot
+from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
 from scenario_gen.types import LaneNetwork, LEVEL, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
-_STREETS = 8  # stretches of road that are looked at closely at a time
+_STREETS = 8  # stretches of road that are looked at closely
 _SCALES = (1.0, 0.9, 1.1)
 _WORST = 40.0  # m²: what resembles the template less is no place for it
 _PRESSED = 4.2  # m/s² across, a little less than scenarios may have: where more is forced, another scale is tried first
@@ -62,79 +61,83 @@ def placements(
         scales: s of eq 9, tried in this order where none before could be had.
 
     Raises:
-        NoPlaceError: there is none; says what is lost most often.
+        NoPlaceError: there is none; says what stands against the template where it was recorded, else where it came farthest.
     """
-    chains, judged, lost = chains_of(network), _Judged(network, tracks), _Lost()
-    home, found = at_home(network, tracks), False
+    chains = chains_of(network)
+    home = spot_at(network, tracks, np.zeros(3))
+    judged = _Judged(network, tracks)
+    drawn_for = network.drawn_for
+    sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
+    search = _Search(chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ())
+    found = False
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
         broken = own.reason or judged.broken(own)
         if not broken:
             found = True
             yield own, 1.0
-        elif not own.reason:
-            lost.rules[broken] += 1
+        search.failures.extend([(False, False, own.cost, f"where it was recorded, {broken}")] if broken else [])
     spots = find_spots(network, tracks, lanes)
     crossed = crossing_spots(network, tracks) if lanes is None else []
     streets = along_streets(chains, tracks, lanes)
     for k in range(0, max(len(spots), len(crossed), 1), _SPOTS):  # where nobody takes the first ones, the next are looked at
         if k and not found:
             break
-        some = spots[k : k + _SPOTS] + crossed[k : k + _SPOTS]
-        for placement in _near(some, list(islice(streets, _STREETS)), chains, tracks, scales, judged, lost):
+        first = [sized] if sized is not None and k == 0 else []
+        some = [*first, *spots[k : k + _SPOTS], *crossed[k : k + _SPOTS]]
+        for placed in search.near(some, list(islice(streets, _STREETS))):
             found = True
-            yield placement
+            yield placed
     if not found:
-        what, why = "road" if network.drawn else "map", lost.named or "it has no lanes of its directions"
-        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {why}")
+        what = "road" if network.drawn else "map"
+        *_, reason = min(search.failures, default=("it has no lanes of its directions",))
+        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {reason}")
 
 
-@dataclass(frozen=True)
-class _Lost:
-    """Why placements were left out: how many broke a rule, and how many are none for another reason."""
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What is laid where.
 
-    rules: Counter[str] = field(default_factory=Counter)
-    reasons: Counter[str] = field(default_factory=Counter)
+    Attributes:
+        chains, tracks, scales: as of `placements`.
+        judged: whether a placement keeps the rules.
+        sized: where the road was drawn for the template, None if it was not.
+        ends: the lanes that it was drawn with, for each vehicle.
+        failures: whether it is not at home, and no match at all; its cost; the reason.
+    """
 
-    @property
-    def named(self) -> str:
-        """The most frequent reasons."""
-        named = [*self.rules.most_common(1), *self.reasons.most_common(2)]
-        return "; ".join(
-            f"{reason} ({count} of {self.rules.total() + self.reasons.total()} placements)" for reason, count in named
-        )
+    chains: Chains
+    tracks: tuple[Track, ...]
+    scales: Sequence[float]
+    judged: "_Judged"
+    sized: Spot | None
+    ends: tuple[tuple[str, str], ...]
+    failures: list[tuple[bool, bool, float, str]] = field(default_factory=list)
 
-
-def _near(
-    spots: Sequence[Spot],
-    streets: Sequence[Match],
-    chains: Chains,
-    tracks: tuple[Track, ...],
-    scales: Sequence[float],
-    judged: "_Judged",
-    lost: _Lost,
-) -> Iterator[tuple[Match, float]]:
-    """Yield the ways of laying a template on lanes near some spots or along streets, the best first."""
-    pressed: list[tuple[Match, float]] = []
-    for scale in scales:
-        matches = list(streets) if scale == 1.0 else []
-        for spot in spots:
-            stop_if_cancelled()
-            placement = match(chains, tracks, spot, scale)
-            if placement.reason or placement.cost > _WORST:
-                lost.reasons[placement.reason or "vehicles would be too far from where they are in the template"] += 1
-            else:
-                matches.append(placement)
-        broken_by = [judged.broken(placement) for placement in matches]
-        lost.rules.update(filter(None, broken_by))
-        matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
-        matches.sort(key=lambda placement: (*judged.rank(placement), round(placement.cost, 3)))
-        pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
-        placed = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
-        yield from placed
-        if placed:
-            break
-    yield from pressed
+    def near(self, spots: Sequence[Spot], along: Sequence[Match]) -> Iterator[tuple[Match, float]]:
+        """Yield the placements near some spots and along some stretches of road, the best first, with their scales."""
+        others: list[tuple[Match, float]] = []
+        for scale in self.scales:
+            matches = list(along) if scale == 1.0 else []
+            for spot in spots:
+                stop_if_cancelled()
+                placement = match(self.chains, self.tracks, spot, scale, self.ends if spot is self.sized else ())
+                far = placement.cost > _WORST and spot is not self.sized
+                if placement.reason or far:
+                    reason = placement.reason or "vehicles would be too far from where they are"
+                    self.failures.append((True, True, placement.cost, reason))
+                else:
+                    matches.append(placement)
+            broken_by = [self.judged.broken(placement) for placement in matches]
+            self.failures.extend((True, False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken)
+            matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
+            matches.sort(key=lambda placement: (*self.judged.rank(placement), round(placement.cost, 3)))
+            placed = [p for p in matches if p.aside <= _PRESSED and self.judged.rank(p)[0] == 0]
+            others += [(p, scale) for p in matches if p not in placed]
+            yield from ((placement, scale) for placement in placed)
+            if placed:
+                break
+        yield from sorted(others, key=lambda other: (other[0].aside > _PRESSED, self.judged.rank(other[0])[0]))
 
 
 class _Judged:

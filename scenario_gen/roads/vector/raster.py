@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The grid of a lane network: a cell is drivable if its centre lies in a lane."""
+"""The grid of a road: a cell is drivable if its centre lies in a lane, or on what else is paved."""
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
@@ -13,13 +15,14 @@ from scenario_gen.types import LaneNetwork, Road
 _VERGE = 2.0  # metres of kerb drawn around a whole map
 
 
-def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig) -> Road:
+def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig, paved: BaseGeometry | None = None) -> Road:
     """Draw the part of a network that lies in a box.
 
     Args:
         network: its lanes end at the box.
         box: (2, 2) metres, lowest and highest x, y; None: all lanes and a verge.
         config: cell size, and the most cells.
+        paved: what else is drivable, in metres.
 
     Raises:
         RefusedError: it has more than `max_cells` cells.
@@ -30,9 +33,14 @@ def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig) -> Roa
     width, height = (last - first).tolist()
     refuse_too_many_cells(network.name, width, height, config)
     drivable = np.zeros((height, width), dtype=np.bool_)
-    for lane in network.lanes:
-        corner, inside = covered(lane.outline, cell, first, (height, width))
-        drivable[corner[1] : corner[1] + inside.shape[0], corner[0] : corner[0] + inside.shape[1]] |= inside
+    parts = shapely.get_parts(paved).tolist() if paved is not None else []
+    outlines = [(part.exterior.coords, True) for part in parts] + [
+        (hole.coords, False) for part in parts for hole in part.interiors
+    ]
+    for outline, is_road in (*outlines, *((lane.outline, True) for lane in network.lanes)):
+        corner, inside = covered(np.asarray(outline), cell, first, (height, width))
+        window = drivable[corner[1] : corner[1] + inside.shape[0], corner[0] : corner[0] + inside.shape[1]]
+        window[inside] = is_road
     entries, exits = lane_ends(network)
     return Road(
         name=network.name,
@@ -41,7 +49,7 @@ def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig) -> Roa
         origin=first * cell,
         entries=entries,
         exits=exits,
-        lanes=network,
+        lanes=network if network.lanes else None,
     )
 
 

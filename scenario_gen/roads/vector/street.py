@@ -8,7 +8,7 @@ driver's left become lanes beside it.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 
@@ -86,7 +86,10 @@ def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int
         return
     low, high = (end + room for end, room in zip(compact.span(tracks), (-_ROOM, _ROOM), strict=True))
     stretches = sorted(_stretches(chains, high - low, lanes), key=lambda candidate: (round(candidate.bend, 4), candidate.chain))
-    for frenet in (compact.spread(), compact):
+    ways = [compact.spread(), compact]
+    if compact.swerve.any():  # where there is no room for that, others say what is lost
+        ways.append(replace(compact, swerve=np.zeros_like(compact.swerve)))
+    for frenet in ways:
         for stretch in stretches[:_TRIED]:
             stop_if_cancelled()
             match = _laid(chains, stretch, tracks, frenet, low)
@@ -157,9 +160,12 @@ def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: 
             if changed is None:
                 return None
             curve, used = changed, tuple(dict.fromkeys((*used, *sides[last].chain)))
-        begin, _ = curve.project(axis.at(station[:1])[:, :2])
-        progress = np.zeros(len(station)) if track.still else (station - station[0]) * sign
-        courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
+        if frenet.swerve[i].any():
+            courses.append(_swerving(used, curve, axis.at(station)[:, :2], frenet.swerve[i]))
+        else:
+            begin, _ = curve.project(axis.at(station[:1])[:, :2])
+            progress = np.zeros(len(station)) if track.still else (station - station[0]) * sign
+            courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
         half = track.vehicle.length / 2.0 + _ROOM / 2.0
         if courses[-1].start < half or courses[-1].end + half > curve.length or _bends_more(courses[-1], track):
             return None
@@ -172,6 +178,16 @@ def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: 
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
     cost = stretch.bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
     return Match(tuple(courses), cost, "", max(forced for _, forced in aside))
+
+
+def _swerving(used: tuple[int, ...], lane: Curve, places: Floats, swerve: Floats) -> Course:
+    """The course of a vehicle that swerves by so much (T,) [m] to the left of a lane's middle at places (T, 2) [m] of a road."""
+    at = np.maximum.accumulate(lane.project(places)[0])
+    s = np.linspace(0.0, lane.length, max(math.ceil(2.0 * lane.length), 1) + 1)
+    moves = np.concatenate(([True], np.diff(at) > 0.0))
+    curve = Curve.through(lane.beside(s, np.interp(s, at[moves], swerve[moves]))[:, :2])
+    driven = np.interp(at, s, curve.station)
+    return Course(used, curve, float(driven[0]), driven - driven[0])
 
 
 def _bends_more(course: Course, track: Track) -> bool:

@@ -63,7 +63,7 @@ class LogPlayer(StageNode):
             self.outputs.send("tracks", encode_tracks(encounter))
         n, samples = encounter.speed.shape
         message = f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
-        notes = {f"note.{k}": note for k, note in enumerate(result.quality.notes)}
+        notes = {f"note.{k}": note for k, note in enumerate(result.quality.remarks())}
         if encounter.origin is not None:
             notes["origin"] = "{!r},{!r}".format(*encounter.origin)
         self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)

@@ -39,7 +39,8 @@ AT_ONCE = 50  # messages of a topic, before others have their turn
 HELD = 4.0  # seconds after which what came is written, whole chunk or not
 OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
 OF_A_SUITE = (
-    r"map|road/(entries|exits|info|lanes)|tracks|changepoints(/live)?|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
+    r"map|road/(entries|exits|info|lanes|markings)|"
+    r"tracks|changepoints(/live)?|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
     r"|ego/(start|goal|witness)|scenarios(/info)?|markers|report"
 )
 
@@ -62,12 +63,12 @@ class Config(RecorderParameters):
 
 
 @contextmanager
-def _disk_errors() -> Iterator[None]:
+def _disk_errors(advice: str = "; `scenario-gen reindex` saves what is whole in the bag") -> Iterator[None]:
     """Turn the system's errors into ours."""
     try:
         yield
     except OSError as error:
-        raise of_system(error, advice="; `scenario-gen reindex` saves what is whole in the bag") from error
+        raise of_system(error, advice=advice) from error
 
 
 class Recorder(Node):  # type: ignore[misc]
@@ -97,7 +98,7 @@ class Recorder(Node):  # type: ignore[misc]
 
     def _start(self, folder: Path) -> None:
         config = self.parameters.config
-        with _disk_errors():
+        with _disk_errors("; name another folder for the bag"):
             self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
         self._losses, self._warned = Losses(self.count_publishers), {}
         self._report(Level.OK, f"recording to {folder}")
@@ -211,7 +212,7 @@ class Recorder(Node):  # type: ignore[misc]
             self._report(Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError")
             return
         take, losses = partial(self._write, topic), self._losses
-        losses.begin(topic, only_newest=recorded.transient_local and recorded.depth == 1)
+        losses.begin(topic, recorded)
         lost = SubscriptionEventCallbacks(message_lost=lambda event: losses.count_by_dds(topic, event.total_count))
 
         def received(data: bytes, about: dict[str, Any]) -> None:  # rclpy counts the arguments

@@ -29,7 +29,7 @@ from msg_conventions.autoware import EGO, OBJECTS
 from msg_conventions.diagnostics import Level
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.arriving import TOPICS
-from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.errors import InputError, of_system, ScenarioGenError
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.results import Drives
@@ -71,6 +71,8 @@ class Traffic(Node):  # type: ignore[misc]
         self._loop: ClosedLoop | None = None
         self._states: list[State] = []
         self._received: EgoCommand | None = None
+        self._replies = 0  # to the last state
+        self._heard_at = 0.0  # when the last reply came, on the steady clock [s]
         self._waiting: Future | None = None
         self._until = 0.0  # when that ends, on the steady clock [s]
         self._load_at = math.inf  # when the next scenario begins, on the steady clock [s]
@@ -107,6 +109,11 @@ class Traffic(Node):  # type: ignore[misc]
             InputError: the bag cannot be read, or has no such vehicle or scenario; autoware_perception_msgs is not there.
         """
         config = self.config
+        if config.results:  # else the first drive's verdict would be lost
+            try:
+                Path(config.results).mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise of_system(error, f"parameter results is {config.results}", "; name another folder") from error
         if config.autoware:
             self._autoware = (OBJECTS, EGO)
             self._out |= {topic: create_publisher(self, topic) for topic in self._autoware}
@@ -142,6 +149,7 @@ class Traffic(Node):  # type: ignore[misc]
         trial = self._trials[number]
         self._loop = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config.drive)
         self._at, self._states, self._received, self._verdict = number, [self._loop.start()], None, ""
+        self._replies = 0
         self._load_at = math.inf
         self._names = tokens(vehicle.id for vehicle in self._loop.scenario.vehicles)
         self._children = tuple(f"vehicle_{name}" for name in self._names)
@@ -160,11 +168,16 @@ class Traffic(Node):  # type: ignore[misc]
         """Keep a command; a damaged one is reported and counts as none. After the end of a drive none counts."""
         if self._loop is None or self._load_at < math.inf:
             return
-        command = decode_command(topic, data, self._loop, self._children[self._loop.ego], self._states[-1].step)
-        if command.fault:
-            self._report_status(Level.WARN, command.fault, "ego")
+        state = self._states[-1]
+        command = decode_command(topic, data, self._loop, self._children[self._loop.ego], state.step)
+        self._heard_at = monotonic()
+        self._replies += command.step == state.step
+        if fault := command.fault or self._doubled(state):
+            self._report_status(Level.WARN, fault, "ego")
+        if self._received is not None and command.step < self._received.step:
+            return  # it answers an earlier state
         self._received = command
-        if self._waiting is not None and not self._waiting.done():
+        if command.step == state.step and self._waiting is not None and not self._waiting.done():
             self._waiting.set_result(None)
 
     def _command(self, state: State) -> tuple[Command | Pose | None, str]:
@@ -176,8 +189,14 @@ class Traffic(Node):  # type: ignore[misc]
             return None, fault
         if state.step % LOOK_AROUND == 0:
             self._sources = self.commanding()
-        note = f"several egos: {', '.join(self._sources)}; what came last counts" if len(self._sources) > 1 else ""
-        return command.at(state), note
+        several = f"several egos: {', '.join(self._sources)}; what came last counts" if len(self._sources) > 1 else ""
+        return command.at(state), several or self._doubled(state)
+
+    def _doubled(self, state: State) -> str:
+        """Say that a state has several replies in lock-step, but of the first one, which is sent until somebody replies."""
+        if not self.config.lock_step or self._replies < 2 or state.step == 0:
+            return ""
+        return f"{self._replies} replies to one state; the last one before the step counts"
 
     def commanding(self) -> list[str]:
         """Return the nodes that publish commands."""
@@ -197,6 +216,7 @@ class Traffic(Node):  # type: ignore[misc]
 
     def _advance(self, loop: ClosedLoop) -> None:
         requested, note = self._command(self._states[-1])
+        self._replies = 0
         self._states.append(loop.step(self._states[-1], requested, note))
         if fault := self._states[-1].fault:
             self._report_status(Level.WARN, fault, "ego")

@@ -14,7 +14,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import State
-from scenario_gen.closed_loop.trials import Outcome
+from scenario_gen.closed_loop.trials import Outcome, saying_what_was_before, too_long
 from scenario_gen.ros.nodes.traffic import Traffic
 from scenario_gen.ros.plumbing.driving import INPUTS
 from scenario_gen.ros.plumbing.node_parameters import TrafficParameters
@@ -22,6 +22,7 @@ from scenario_gen.ros.plumbing.node_parameters import TrafficParameters
 START = 60.0  # seconds that a planner's node may take until it publishes commands
 SETTLE = 1.0  # seconds from its first publisher until it has found the topics that it listens to
 LAST = 1.0  # seconds to wait for a reply to a drive's last state, which would else count as a reply to the next drive's first
+SILENT = 30.0  # seconds without a command after which a planner's node hangs
 AGAIN = 2.0  # seconds without a reply after which a drive's first state is sent again, for a planner that started late
 Progress = Callable[[int, int], None]
 
@@ -49,7 +50,7 @@ class TrafficOfTrials(Traffic):
         """Drive all trials."""
         for number in range(len(self._trials)):
             self._load(number)
-            loop = self._loop
+            loop, began = self._loop, monotonic()
             await self._wait_for_command(self._states[-1], self.config.patience)
             if self._times_sent > 1:
                 until = monotonic() + LAST  # each copy may get a reply, of which the last one counts
@@ -57,8 +58,20 @@ class TrafficOfTrials(Traffic):
                     await self._next_command(until)
             while loop is not None and not self._verdict:
                 await self._step_once(loop)
+                self._refuse_hanging(self._trials[number], began)
             self._progress(number + 1, len(self._trials))
             await self._wait_for_command(self._states[-1], LAST)
+
+    def _refuse_hanging(self, trial: Trial, began: float) -> None:
+        """Raise InputError if a drive that `began` then takes too long, or nothing has come of the planner for too long."""
+        now = monotonic()
+        if now - began > self.config.drive.drive_time:
+            raise too_long(trial, self.config.drive)
+        if now - max(began, self._heard_at) > SILENT:
+            raise InputError(
+                f"scenario {trial.name}: the planner's node has sent no command for {SILENT:.0f} s: it hangs, or does not answer "
+                "each odometry of the ego with one command"
+            )
 
 
 def drive_trials(
@@ -74,7 +87,7 @@ def drive_trials(
         check: called while waiting for the planner; it raises when the planner's process has ended.
 
     Raises:
-        InputError: the planner publishes no command.
+        InputError: the planner publishes no command, or none any more, or takes longer than `drive_time` for a drive.
     """
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
@@ -93,11 +106,12 @@ def drive_trials(
             until = monotonic() + SETTLE
             while monotonic() < until:
                 executor.spin_once(timeout_sec=0.05)
-            task = executor.create_task(node.drive_all)
-            while not task.done():
-                check()
-                executor.spin_once(timeout_sec=1.0)  # spin_until_future_complete of rclpy 7.1 leaves a task for each look
-            task.result()
+            with saying_what_was_before(node.outcomes):
+                task = executor.create_task(node.drive_all)
+                while not task.done():
+                    check()
+                    executor.spin_once(timeout_sec=1.0)  # spin_until_future_complete of rclpy 7.1 leaves a task for each look
+                task.result()
             return node.outcomes
         finally:
             node.destroy_node()

@@ -19,7 +19,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
-from scenario_gen.base.errors import printable, ScenarioGenError
+from scenario_gen.base.errors import LONGEST_REFUSAL, presentable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.ros.plumbing.topics import create_publisher, others_on, own_topics, publish
 
@@ -27,7 +27,6 @@ TICK_S = 0.25  # seconds of real time after which what has changed is published
 TICKS = 4  # after so many all is published, changed or not
 HOLD_S = 3.0  # seconds for which a finding is shown at least
 MOST = 100  # statuses of a node
-LONGEST = 2_000  # characters of a message
 LARGEST = 65_536  # characters of the values of one status
 
 
@@ -203,5 +202,4 @@ def bounded(status: Status) -> Status:
         values[key] = value
     if missing := len(status.values) - len(values):
         values["left_out"] = f"{missing} values, which would make the message too long"
-    message = status.message if len(status.message) <= LONGEST else f"{status.message[:LONGEST]} …"
-    return Status(status.name[:LONGEST], status.level, printable(message), values)
+    return Status(status.name[:LONGEST_REFUSAL], status.level, presentable(status.message, LONGEST_REFUSAL), values)

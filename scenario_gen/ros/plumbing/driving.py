@@ -42,7 +42,7 @@ class EgoCommand:
 
     Attributes:
         topic: where it came from.
-        step: the drive's last step when it came.
+        step: of the state that it answers: by its stamp, on the drive's clock, else the last one when it came.
         stamp_ns: its stamp [ns]; 0 if it has none.
         at: returns the command for a state.
         fault: why it does not count; "" if it does.
@@ -93,11 +93,15 @@ def decode_command(topic: str, data: bytes, loop: ClosedLoop, child: str, step: 
 
 def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> EgoCommand:
     period, frame, own = loop.config.step, loop.scenario.frame_id, (child, "base_link", "")
+
+    def answered(stamp_ns: int) -> int:
+        return min(step, round((stamp_ns - FIRST_STAMP) * 1e-9 / period)) if stamp_ns >= FIRST_STAMP else step
+
     if topic.startswith("ego/cmd_vel"):
         stamp, given_frame, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
         if given_frame not in own and given_frame != frame:
             raise InputError(f"{topic}: frame {given_frame!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
-        return EgoCommand(topic, step, stamp, lambda state: of_twist(state.ego, speed, rate, period))
+        return EgoCommand(topic, answered(stamp), stamp, lambda state: of_twist(state.ego, speed, rate, period))
     if topic in WAYS:
         decode = driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
         way = decode(data, topic)
@@ -110,7 +114,7 @@ def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -
         command = lambda _: pose  # noqa: E731
     if given_frame != frame:
         raise InputError(f"{topic}: frame {given_frame!r} is not that of the scenario, {frame!r}")
-    return EgoCommand(topic, step, stamp, command)
+    return EgoCommand(topic, answered(stamp), stamp, command)
 
 
 class ArrivingTrials:

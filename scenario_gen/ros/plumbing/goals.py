@@ -7,7 +7,7 @@ No action of Jazzy's own packages has a goal of named values and a result of cou
 sampler has the service `~/generate` only.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 import importlib
 from typing import Any
@@ -71,10 +71,11 @@ class Goals:
             outcome = await self._requests.answer(asked.parameters, asked.wait, partial(setattr, goal, "request"))
         finally:
             del self._goals[key]
-        if handle.is_cancel_requested and outcome.code is Code.CANCELLED:
-            handle.canceled()
-        elif outcome.code is Code.OK:
+        if outcome.code is Code.OK:
             handle.succeed()
+        elif handle.is_cancel_requested:  # also where it was refused, or failed, by then
+            outcome = replace(outcome, code=Code.CANCELLED)
+            handle.canceled()
         else:
             handle.abort()
         return self._result(outcome, goal.request)

@@ -19,6 +19,7 @@ import importlib
 import os
 from pathlib import Path
 import pkgutil
+import re
 import sys
 import threading
 import traceback
@@ -29,7 +30,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from scenario_gen.base.errors import print_error, ScenarioGenError
+from scenario_gen.base.errors import describe, InputError, print_error, ScenarioGenError
 from scenario_gen.base.interrupts import end_orderly, hear
 from scenario_gen.numerics.compiling import end_workers, make_ready, Progress, words
 from scenario_gen.numerics.kernels import registered
@@ -37,6 +38,10 @@ from scenario_gen.ros.plumbing.ros_parameters import help_of, USAGE
 
 REPORT_S = 5.0  # seconds between two reports of how many kernels are there
 ENDING = 5.0  # seconds that a node may take to react to a signal, and again to leave its ROS domain
+REMEDY = (
+    "write -r FROM:=TO and -p NAME:=VALUE, an empty text as -p \"NAME:=''\", "
+    "a text with colons or brackets as -p \"NAME:='1: 10 2'\""
+)
 Maker = Callable[[str | None], Any]
 
 
@@ -102,9 +107,22 @@ def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str
     return code
 
 
+def own_words(arguments: Sequence[str]) -> list[str]:
+    """Return the words behind the program's name that are not ROS's.
+
+    Raises:
+        InputError: those behind --ros-args are not as ROS reads them.
+    """
+    try:
+        return list(remove_ros_args(list(arguments))[1:])
+    except RuntimeError as error:  # RCLInvalidROSArgsError and UnknownROSArgsError of rclpy
+        reason = re.sub(r"(\. Error: error not set)?\s*, at [^\s,]+", "", describe(error))
+        raise InputError(f"{reason}; {REMEDY}" if "rule" in reason else reason) from error
+
+
 def asks_for_help(arguments: Sequence[str]) -> bool:
     """Return whether `--help` stands among the words that are not ROS's."""
-    return bool({"-h", "--help"} & set(remove_ros_args(list(arguments))[1:]))
+    return bool({"-h", "--help"} & set(own_words(arguments)))
 
 
 def show(text: str) -> None:
@@ -117,7 +135,7 @@ def show(text: str) -> None:
 
 def namespaces(arguments: Sequence[str]) -> list[str | None]:
     """Return the values of `--namespace` (one node for each, all in this process); [None] if there is none."""
-    rest = remove_ros_args(list(arguments))[1:]
+    rest = own_words(arguments)
     if any(word != "--namespace" for word in rest[::2]) or len(rest) % 2:
         raise SystemExit(f"{USAGE.format(name=arguments[0])}\n--help lists the parameters")
     return [name or None for name in rest[1::2]] or [None]

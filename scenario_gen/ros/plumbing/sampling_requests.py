@@ -28,6 +28,7 @@ from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary, RequestSummary
 from scenario_gen.bags.recordings.sending import RequestSender, Send
 from scenario_gen.bags.recordings.template import decode_template
+from scenario_gen.base.cancelling import CancelledError
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.method.chain import Chain
@@ -242,7 +243,9 @@ class OpenRequests:
                 return Code.CANCELLED, node.given_up(messages, lambda: True), None
             return Code.OK if result[0].generated.scenarios else Code.IMPOSSIBLE, result[1].status.message, result
 
-        def failed(error: Exception) -> tuple[Code, str, Answer | None]:
+        def failed(error: BaseException) -> tuple[Code, str, Answer | None]:
+            if isinstance(error, CancelledError):
+                return Code.CANCELLED, node.given_up(messages, lambda: True), None
             return Code.FAILED, f"{type(error).__name__}: {error}", None
 
         code, reason, result = await node.result_of(request.job, job, failed)

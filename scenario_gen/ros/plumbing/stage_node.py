@@ -257,7 +257,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self._worker.submit(name, lambda cancelled: None if cancelled() else job(cancelled))
 
     async def result_of(
-        self, name: str, job: Callable[[Callable[[], bool]], Result], failed: Callable[[Exception], Result]
+        self, name: str, job: Callable[[Callable[[], bool]], Result], failed: Callable[[BaseException], Result]
     ) -> Result:
         """Run a job off the executor's thread for a service, also if it is cancelled before its turn; return its result.
 
@@ -271,7 +271,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         def run(cancelled: Callable[[], bool]) -> None:
             try:
                 answer.set_result(job(cancelled))
-            except Exception as error:
+            except BaseException as error:  # CancelledError, too: somebody waits
                 answer.set_result(failed(error))
                 raise
             finally:

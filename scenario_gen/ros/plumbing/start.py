@@ -14,6 +14,7 @@ import os
 import sys
 from typing import Any
 
+from scenario_gen.base.errors import InputError, print_error
 from scenario_gen.base.interrupts import hear
 
 NODES = ("recorder", "evaluator", "preview", "gp_sampler", "planner", "segmenter", "road_server", "log_player", "player")
@@ -55,9 +56,12 @@ def start(name: str) -> None:
     nodes = [node_class(node) for node in names]
     gc.freeze()
     gc.enable()
-    if name == "suite" and asks_for_help(arguments):
-        show(SUITE)
-    sys.exit(run_nodes(nodes, arguments))
+    try:
+        if name == "suite" and asks_for_help(arguments):
+            show(SUITE)
+        sys.exit(run_nodes(nodes, arguments))
+    except InputError as error:
+        sys.exit(print_error(error))
 
 
 segmenter = partial(start, "segmenter")

@@ -71,14 +71,11 @@ def adapted_quality(topic: str, offers: Sequence[QoSProfile]) -> tuple[Quality, 
     reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
     transient_local = all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
     offered = max(offer.depth for offer in offers)
-    depth = offered or (DEPTH if topic.endswith(("/scenarios", "/scenarios/info")) else 1)
-    of_suite = True
-    try:
-        topic_entry(topic)
-    except KeyError:
-        of_suite = False
-    subscribed = Quality(max(DEPTH, offered), reliable, transient_local, keep_all=reliable and of_suite)
-    return subscribed, Quality(depth, reliable, transient_local)
+    own = None
+    with suppress(KeyError):
+        own = topic_entry(topic)[1]
+    subscribed = Quality(max(DEPTH, offered), reliable, transient_local, keep_all=reliable and own is not None)
+    return subscribed, Quality(offered or (own.depth if own else 1), reliable, transient_local)
 
 
 def create_publisher(node: Node, topic: str, name: str = "") -> Any:

@@ -9,9 +9,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from reaction_scenes import answering, crossing, lane_encounter, wander
+from textbook_motions import labelled
 
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.method.chain import Chain
+from scenario_gen.method.evaluation.measures import figures_of
 from scenario_gen.method.sampling import kept_reactions, Plan, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.joint import advance, lateness, Mixing
@@ -20,6 +22,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
 
@@ -94,8 +97,12 @@ def test_what_is_published_answers_as_the_template_does(case):
     (edge,) = made.generated.reactions
     named = "2 follows 1" if edge.kind == FOLLOW else "2 yields to 1"
     assert {scenario.facts["reactions"] for scenario in made.generated.scenarios} == {named}
-    assert free.generated.reactions == () and free.generated.scenarios[0].facts == {}
+    assert free.generated.reactions == () and "reactions" not in free.generated.scenarios[0].facts
     assert len(made.generated.scenarios) == 40
+    for scenario in made.generated.scenarios[:3]:
+        (figures,) = figures_of(scenario)
+        assert float(scenario.facts["closest_approach"]) == pytest.approx(figures.gap, abs=5e-4)
+        assert float(scenario.facts.get("pet", "nan")) == pytest.approx(figures.pet, abs=5e-4, nan_ok=True)
     if edge.kind == FOLLOW:
         seen, before = (following(edge, encounter, one.generated.scenarios) for one in (made, free))
         assert seen.slope > 0.75 > before.slope
@@ -106,6 +113,19 @@ def test_what_is_published_answers_as_the_template_does(case):
         seen, before = (yielding(edge, one.generated.scenarios) for one in (made, free))
         assert seen.early == 0.0
         assert 0.3 < seen.spread < 0.9 < before.spread
+
+
+def test_who_gives_way_is_slow_when_the_other_one_passes():
+    encounter = labelled("meets another one closely", 3).encounter
+    (edge,) = reactions_of(encounter).edges
+    road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
+    lost = []
+    for config in (CONFIG, FREE):
+        scenarios = Chain(encounter, segmentation, road, config, count=30, seed=1).run().generated.scenarios
+        passed = [int(np.argmin(np.hypot(*(one.position[0] - one.position[1]).T))) for one in scenarios]
+        lost.append([one.speed[edge.who].max() - one.speed[edge.who, k] for one, k in zip(scenarios, passed, strict=True)])
+    assert np.std(lost[0]) < 0.6 * np.std(lost[1])
+    assert min(lost[0]) > 4.0 > min(lost[1])
 
 
 def test_a_scenario_comes_again_by_its_index(case):

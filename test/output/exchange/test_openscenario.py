@@ -14,10 +14,12 @@ from test_commonroad import case_of
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.output.exchange.importing import read_scenario_file
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
-from scenario_gen.roads import RoadConfig
+from scenario_gen.roads import read_network, RoadConfig
 from scenario_gen.roads.build import build_road
+from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
 
 
 def written(scenario, ego=None, export=ExportConfig()):
@@ -211,3 +213,34 @@ def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
         assert len(links) == 1 and all(one.attrib["to"] in lanes and one.attrib["from"] in arms for one in links)
     driving = [lane for lane in root.iter("lane") if lane.attrib["type"] == "driving"]
     assert len(driving) == len(lane_map.network.lanes)
+
+
+def test_how_a_maps_lanes_are_joined_and_signed_comes_back(tmp_path):
+    def lane(name, begin, end, after=(), junction=""):
+        borders = [np.linspace(begin, end, 12) + np.array([0.0, aside]) for aside in (1.75, -1.75)]
+        return Lane(name, *borders, after, speed_limit=10.0, junction=junction)
+
+    lanes = (
+        lane("before", (0, 0), (50, 0), (1, 2)),
+        lane("on", (50, 0), (80, 0), (3,), "J"),
+        lane("off", (50, 0), (80, -20), (4,), "J"),
+        lane("after", (80, 0), (120, 0), (5, 6)),
+        lane("aside", (80, -20), (120, -20), (7,)),
+        lane("fork left", (120, 0), (160, 4)),
+        lane("fork right", (120, 0), (160, -4), (8,)),
+        lane("longer", (120, -20), (160, -20)),
+        lane("at the end", (160, -4), (200, -4)),
+    )
+    line = np.array([[48.0, 1.75], [48.0, -1.75]])
+    network = LaneNetwork("town", lanes, rules=(TrafficRule("s", RuleKind.STOP, (0,), (), line),))
+    path = tmp_path / "town.xodr"
+    path.write_bytes(write_opendrive(LaneMap(network, 0, "town"), "town", 0))
+    again = read_network(path)
+    assert [one.successors for one in again.lanes] == [one.successors for one in lanes]
+    assert [bool(one.junction) for one in again.lanes] == [bool(one.junction) for one in lanes]
+    assert all(
+        np.allclose(a.centre[[0, -1]], b.centre[[0, -1]]) and a.speed_limit == 10.0
+        for a, b in zip(again.lanes, lanes, strict=True)
+    )
+    (stop,) = again.rules
+    assert (stop.kind, stop.lanes) == (RuleKind.STOP, (0,)) and np.abs(stop.line[:, 0] - 48.0).max() < 3.0

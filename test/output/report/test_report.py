@@ -106,7 +106,7 @@ def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path)
     )
     case = replace(case, fit=replace(case.fit, lost=(lost,), fitted=fitted), routes=routes)
     console = Console(width=200, record=True, file=io.StringIO())
-    console.print(summary([case]))
+    console.print(summary([case], verbose=True))
     write_results(tmp_path, [case], title="", quality=(), provenance={})
     figures = json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]
     for text in (console.export_text(), (tmp_path / "report.html").read_text(encoding="utf-8")):
@@ -125,7 +125,7 @@ def test_the_summary_fits_on_a_screen():
     console = Console(width=110, record=True, file=io.StringIO())
     console.print(summary([report_case(5), report_case(4, "with [brackets]", without=False)]))
     text = console.export_text()
-    assert "5/5" in text and "with [brackets]" in text and "6 overlap" in text
+    assert "5 of 5 scenarios" in text and "E position" not in text and "with [brackets]" in text and "3 overlap" in text
     assert len(text.splitlines()) < 15 and max(map(len, text.splitlines())) <= 110
 
 

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How much unseen traffic a few recordings stand for: coverage and precision of what is generated, beside two nulls.
+
+Recorded encounters (SCENARIO_GEN_DATA), each on its own road with default settings; without data the drawn motions of
+test/worlds. Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no generator: *shifted*
+moves each vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another scenario of the same set.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from importlib import import_module
+import os
+from pathlib import Path
+import sys
+from typing import Any
+
+import numpy as np
+
+from benchmarks._naturalness_cuts import cuts, recorded
+from benchmarks._size import sized
+from benchmarks.row import Row
+from scenario_gen.base.errors import ScenarioGenError
+from scenario_gen.logs import read_log
+from scenario_gen.method.evaluation.population import Population, population_of
+from scenario_gen.pipeline import generate
+from scenario_gen.types import Encounter, Scenario
+
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+COUNT, MOST = sized((50, None), (3, 12))
+TEMPLATES = sized((5, 10, 20), (1,))
+SHIFT_S, PACE = 1.0, 0.06
+TARGETS = {5: 0.48, 10: 0.65, 20: 0.78}
+
+
+@dataclass(frozen=True)
+class Set:
+    """An encounter and members that stand for it, as a result has them."""
+
+    encounter: Encounter
+    members: tuple[Scenario, ...]
+
+    def __iter__(self) -> Iterator[Scenario]:
+        return iter(self.members)
+
+
+def run() -> list[Row]:
+    """Measure."""
+    made = [(name, Set(encounter, members)) for name, encounter, members in _generated()]
+    rng = np.random.default_rng(1)
+    nulls = {
+        "shifted": [(name, Set(own.encounter, tuple(_shifted(own.encounter, rng) for _ in own.members))) for name, own in made],
+        "mixed": [(name, Set(own.encounter, _mixed(own.members, rng))) for name, own in made],
+    }
+    found = _population(made)
+    beside = {name: _population(sets) for name, sets in nulls.items()}
+    rows = [Row("encounters", sum(found.encounters.values()), "", "higher")]
+    for k, point in enumerate(found.curve):
+        n = point.templates
+        others = "; ".join(
+            f"{name} {sets.curve[k].generated.value:.2f} at precision {sets.curve[k].precision.value:.2f}"
+            for name, sets in beside.items()
+        )
+        peer = f"templates alone {point.alone}; {others}"
+        rows.append(Row(f"coverage with {n} templates", point.generated.value, "", "higher", TARGETS.get(n), peer))
+        rows.append(Row(f"precision with {n}", point.precision.value, "", "higher", None, f"of the recorded {point.recorded}"))
+        rows.append(Row(f"multiplier with {n} (inf: more than there are)", point.multiplier, "", "higher", 10.0))
+    return rows
+
+
+def _population(sets: Sequence[tuple[str, Set]]) -> Population:
+    return population_of(sets, TEMPLATES)  # type: ignore[arg-type]
+
+
+def _generated() -> Iterator[tuple[str, Encounter, tuple[Scenario, ...]]]:
+    """Yield recording, encounter and scenarios."""
+    for name, encounter in list(_encounters())[:MOST]:
+        try:
+            yield name, encounter, tuple(generate(encounter, "corridor", count=COUNT, seed=3))
+        except ScenarioGenError as error:
+            print(f"{encounter.name}: {error}", file=sys.stderr)
+
+
+def _encounters() -> Iterator[tuple[str, Encounter]]:
+    if not (DATA / "trajectories").is_dir():
+        sys.path.append(str(Path(__file__).resolve().parents[1] / "test" / "worlds"))
+        drawn = import_module("textbook_motions")
+        yield from ((f"drawn {seed}", drawn.labelled(kind, seed).encounter) for seed in range(3) for kind in drawn.REACTIONS)
+        return
+    for cut in [*cuts()[0], *recorded(DATA)]:
+        for encounter in read_log([DATA / "trajectories" / file for file in cut.files], cut.config()).encounters[:1]:
+            yield cut.files[0], encounter
+
+
+def _shifted(encounter: Encounter, rng: np.random.Generator) -> Scenario:
+    """Each vehicle's record, moved in time and paced."""
+    time, rows = encounter.time, []
+    for n in range(len(encounter.vehicles)):
+        pace = 1.0 + PACE * rng.standard_normal()
+        at = np.clip(time * pace + SHIFT_S * rng.standard_normal(), 0.0, time[-1])
+        track = np.column_stack([encounter.position[n], encounter.heading[n], encounter.speed[n] * pace])
+        rows.append(np.array([np.interp(at, time, column) for column in track.T]))
+    x, y, heading, speed = np.stack(rows, axis=1)
+    position = np.stack((x, y), axis=-1)
+    return Scenario(encounter.vehicles, time, position, heading, speed, np.gradient(speed, time, axis=1))
+
+
+def _mixed(members: Sequence[Scenario], rng: np.random.Generator) -> tuple[Scenario, ...]:
+    """Each vehicle from another scenario, as long as the shorter one lasts."""
+    mixed = []
+    for _ in members:
+        chosen = rng.permutation(len(members))
+        own = [members[chosen[n % len(members)]] for n in range(len(members[0].vehicles))]
+        count = min(len(one.time) for one in own)
+        rows: dict[str, Any] = {
+            name: np.stack([getattr(one, name)[n, :count] for n, one in enumerate(own)])
+            for name in ("position", "heading", "speed", "acceleration", "present")
+        }
+        rows["present"] = np.minimum(np.stack([one.present[n] for n, one in enumerate(own)]), count - 1)
+        mixed.append(replace(members[0], time=own[0].time[:count], witness=None, **rows))
+    return tuple(mixed)

@@ -1,0 +1,353 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How much unseen traffic a few recordings stand for: coverage and precision of what is generated from them.
+
+Both as of Kynkäänniemi et al. (2019), with balls about recorded encounters. An encounter is that of its most critical pair. Its
+features (FEATURES) are independent of the place, and the same for recorded and generated motions; distances are in standard
+deviations of the recorded encounters of the same kind, root mean square over features. Of one kind r is the median distance of
+an encounter to its nearest in other recordings.
+
+- coverage: share of unseen encounters, which are of other recordings, within r of the nearest member;
+- precision: share of members within r of a recorded encounter of another recording than their template's.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from scipy.spatial import distance
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.evaluation.geometry import footprint_distance
+from scenario_gen.method.evaluation.measures import figures_of, PERIOD
+from scenario_gen.method.evaluation.motion import at_period, Motion
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.template import Conflict, conflict_of
+from scenario_gen.types import Encounter, GenerationResult, join_ego, Pair, Scenario
+
+APART = "apart"  # a scenario whose pair shares no area any more: it is near nothing
+KINDS = ("crossing", "turn", "merge", "following", APART)
+EACH = ("first speed", "least speed before", "speed at conflict", "braking", "acceleration", "standing time")
+COMMON = ("gap", "arrival gap", "distance", "time to collision", "closing speed", "approach")
+FEATURES = (*COMMON, *(f"{name} of the {who}" for who in ("first", "second") for name in EACH))
+TURNS, BESIDE_M = math.radians(45.0), 2.0
+LONGEST_S, FARTHEST_M = 10.0, 30.0  # gaps and times above, distances above, are as good as this
+SECOND = round(1.0 / PERIOD)  # samples
+STANDS_MPS = 0.5
+SMALLEST_R = 0.05  # standard deviations: the same encounter in two files makes no smaller ball
+SMALLEST_SHARE = 0.05  # of the largest standard deviation: a feature in which nobody differs does not count for all
+CHOSEN = 0.5  # share of the encounters that are drawn at most; those of other recordings are unseen
+WANTED = 0.9  # coverage
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """An encounter, recorded or generated: kind, features (F,), recording, place of its template in a list, and its pair."""
+
+    kind: str
+    features: Floats
+    recording: str
+    template: int
+    pair: Pair | None
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share, its median over draws of templates and the 5 and 95 % quantiles."""
+
+    value: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> "Share":
+        """Take one value per draw."""
+        known = np.array(values)[np.isfinite(values)]
+        low, middle, high = np.quantile(known, [0.05, 0.5, 0.95]).tolist() if len(known) else [math.nan] * 3
+        return cls(middle, low, high)
+
+
+@dataclass(frozen=True)
+class Point:
+    """What so many templates cover, alone and with what is generated from them, and how precise the generated are.
+
+    Attributes:
+        templates: drawn.
+        alone: coverage by the templates.
+        generated: coverage by templates and generated.
+        precision: of the generated; `recorded`: of the templates themselves.
+        multiplier: recordings that cover alone as much, over `templates`; inf: more than there are.
+    """
+
+    templates: int
+    alone: Share
+    generated: Share
+    precision: Share
+    recorded: Share
+    multiplier: float
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """A recorded encounter that nothing of other recordings comes near: how far in units of r, and in which feature most."""
+
+    encounter: str
+    kind: str
+    distance: float
+    feature: str
+
+
+@dataclass(frozen=True)
+class Population:
+    """What recordings and the sets generated from them cover.
+
+    Attributes:
+        encounters: recorded, by kind.
+        scenarios: generated from them, by kind.
+        curve: coverage by number of templates.
+        unreached: encounters that no other recording's set reaches, the farthest first.
+        needed: recordings that would cover 0.9 by the curve's extrapolation, inf where it does not rise.
+    """
+
+    encounters: dict[str, int]
+    scenarios: dict[str, int]
+    curve: tuple[Point, ...]
+    unreached: tuple[Unreached, ...]
+    needed: float
+
+    @property
+    def lead(self) -> str:
+        """What was measured, in a sentence."""
+        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self.encounters.items()))
+        recorded, made = (sum(counts.values()) for counts in (self.encounters, self.scenarios))
+        return f"{recorded} encounters whose vehicles share an area ({kinds}), {made} scenarios"
+
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Return the columns and the rows of the curve as texts; in brackets the 5 and 95 % quantiles over draws."""
+        columns = ("templates", "coverage alone", "with generated", "precision", "of the recorded", "stand for")
+        rows = []
+        for point in self.curve:
+            stands = f"{point.multiplier * point.templates:.0f}" if math.isfinite(point.multiplier) else "more than there are"
+            shares = (point.alone, point.generated, point.precision, point.recorded)
+            rows.append((str(point.templates), *map(str, shares), stands))
+        return columns, rows
+
+    def remarks(self) -> list[str]:
+        """Return what the curve says, in sentences."""
+        needed = f"{self.needed:.0f} recorded encounters" if math.isfinite(self.needed) else "more encounters than can be told"
+        lines = [f"coverage of {WANTED} takes {needed}, if the curve goes on as it does"]
+        if self.unreached:
+            worst = self.unreached[0]
+            farthest = f"the farthest is {worst.encounter} ({worst.kind}): {worst.feature}"
+            lines.append(f"{len(self.unreached)} encounters are never reached; {farthest}")
+        return lines
+
+
+def member_of(motion: Encounter | Scenario, recording: str, template: int, pair: Pair | None = None) -> Member:
+    """Return kind and features of a motion's pair, the one that has most to do with each other by default.
+
+    That is, of the pairs that cross or merge the one with the least PET, and where there are none the followers nearest to each
+    other. The kind is APART where the pair, or every pair, shares no area.
+    """
+    whole = at_period(motion, PERIOD)
+    figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
+    conflicts = {own: found for own in figures if (found := conflict_of(whole, *own)) is not None}
+    if not conflicts:
+        return Member(APART, np.zeros(len(FEATURES)), recording, template, pair)
+
+    def closeness(own: Pair) -> tuple[bool, float]:
+        conflict = conflicts[own]
+        return conflict.following, figures[own].gap if conflict.following else conflict.encroachment
+
+    chosen = min(conflicts, key=closeness)
+    conflict, most = conflicts[chosen], figures[chosen]
+    first, second = conflict.first, conflict.second
+    both = whole.together(first, second)
+    gap = _headway(whole, conflict) if conflict.following else conflict.encroachment
+    common = [
+        np.clip(gap, -LONGEST_S, LONGEST_S),
+        min(conflict.arrival_gap, LONGEST_S),
+        min(most.gap, FARTHEST_M),
+        min(most.ttc, LONGEST_S),
+        most.closing_speed,
+        min(conflict.entry_second - both.start * whole.dt, 2.0 * LONGEST_S),
+    ]
+    entries = (conflict.entry_first, conflict.entry_second)
+    each = [_driving(whole, n, entry) for n, entry in zip((first, second), entries, strict=True)]
+    return Member(_kind(whole, conflict), np.array([*common, *each[0], *each[1]]), recording, template, chosen)
+
+
+def _generated(scenario: Scenario, template: Member, encounter: Encounter) -> Member:
+    """The member that a scenario is, by the pair of its template, whose vehicles may stand in another order."""
+    ids = [vehicle.id for vehicle in scenario.vehicles]
+    a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
+    return member_of(scenario, template.recording, template.template, (a, b))
+
+
+def _kind(motion: Motion, conflict: Conflict) -> str:
+    """What the two do; whoever begins beside the way of the one whose way it then shares merges."""
+    both = motion.together(conflict.first, conflict.second)
+    if conflict.following:
+        away = motion.position[conflict.second, both.start] - motion.position[conflict.first, both]
+        nearest = int(np.hypot(*away.T).argmin())
+        _, left = ahead_and_left(away[nearest], motion.heading[conflict.first, both][nearest])
+        return "merge" if abs(left) > BESIDE_M else "following"
+    headings = motion.heading[[conflict.first, conflict.second], both]
+    turned = np.abs(headings[:, -1] - headings[:, 0]).max()
+    return "turn" if turned >= TURNS else "crossing"
+
+
+def _headway(motion: Motion, conflict: Conflict) -> float:
+    """The median time [s] that the follower needs for the gap to its leader, while it moves."""
+    both = motion.together(conflict.first, conflict.second)
+    speed = motion.speed[conflict.second, both]
+    moves = speed > STANDS_MPS
+    gap = footprint_distance(motion, conflict.first, conflict.second)[both]
+    return float(np.median(gap[moves] / speed[moves])) if moves.any() else LONGEST_S
+
+
+def _driving(motion: Motion, n: int, entry: float) -> list[float]:
+    """How one vehicle drives: EACH."""
+    own = motion.own(n)
+    speed = motion.speed[n, own]
+    at = int(np.clip(round(entry / motion.dt) - own.start, 0, len(speed) - 1))
+    change = (speed[SECOND:] - speed[:-SECOND]) if len(speed) > SECOND else np.zeros(1)
+    standing = float((speed < STANDS_MPS).sum() * motion.dt)
+    return [speed[0], speed[: at + 1].min(), speed[at], max(-change.min(), 0.0), max(change.max(), 0.0), standing]
+
+
+def population_of(
+    results: Iterable[tuple[str, GenerationResult]], counts: Sequence[int] = (5, 10, 20), *, draws: int = 200, seed: int = 0
+) -> Population:
+    """Measure what recordings and the sets generated from them cover.
+
+    Args:
+        results: the name of the recording and what was generated from one of its encounters.
+        counts: templates to draw; those that the recordings do not hold are left out.
+        draws: of templates, recording by recording in a random order.
+        seed: of the draws.
+
+    Raises:
+        InputError: fewer than two recordings, or none whose vehicles share an area.
+    """
+    recorded: list[Member] = []
+    made: list[Member] = []
+    names: list[str] = []
+    for recording, result in results:
+        own = member_of(result.encounter, recording, len(recorded))
+        if own.kind != APART:
+            recorded.append(own)
+            names.append(result.encounter.name)
+            made += [_generated(join_ego(scenario), own, result.encounter) for scenario in result]
+    if len({member.recording for member in recorded}) < 2:
+        raise InputError("encounters of at least two recordings are needed; give results of more logs")
+    drawn = [n for n in sorted(set(counts)) if n <= CHOSEN * len(recorded)]
+    if not drawn:
+        most = int(CHOSEN * len(recorded))
+        raise InputError(
+            f"{len(recorded)} encounters share an area: at most {most} templates can be drawn; ask for fewer, or give more logs"
+        )
+    near, rng = _Near.of(recorded, made), np.random.default_rng(seed)
+    alone = {n: Share.of([near.draw(rng, n)[0] for _ in range(draws)]) for n in range(1, len(recorded))}
+    points = []
+    for n in drawn:
+        by_templates, covered, precision, own_precision = (
+            Share.of(list(values)) for values in zip(*(near.draw(rng, n) for _ in range(draws)), strict=True)
+        )
+        equal = next((m for m, share in alone.items() if share.value >= covered.value), math.inf)
+        points.append(Point(n, by_templates, covered, precision, own_precision, equal / n))
+    counted, generated = (dict(Counter(member.kind for member in members)) for members in (recorded, made))
+    return Population(counted, generated, tuple(points), tuple(near.unreached(names)), _needed(points))
+
+
+def _needed(points: Sequence[Point]) -> float:
+    """Templates at which what is not covered, as a power of their number, falls to 0.1; inf where it does not fall."""
+    missed = np.array([1.0 - point.generated.value for point in points])
+    if len(points) < 2 or missed.min() <= 0.0:
+        return math.inf
+    slope, level = np.polyfit(np.log([point.templates for point in points]), np.log(missed), 1)
+    return math.ceil(math.exp((math.log(1.0 - WANTED) - level) / slope)) if slope < 0.0 else math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """How near members are to each other.
+
+    Attributes:
+        members: recorded ones.
+        recording: (R,) number of each one's recording.
+        template: (M,) index of each generated member's template.
+        scaled: (R + M, F) features in standard deviations of the kind, recorded ones first.
+        apart: (R + M, R) distances to recorded members in units of r, inf between kinds.
+    """
+
+    members: Sequence[Member]
+    recording: Ints
+    template: Ints
+    scaled: Floats
+    apart: Floats
+
+    @classmethod
+    def of(cls, recorded: Sequence[Member], made: Sequence[Member]) -> "_Near":
+        """Scale features by kind, and measure all distances."""
+        every = [*recorded, *made]
+        recording = np.unique([member.recording for member in recorded], return_inverse=True)[1]
+        kinds = np.array([KINDS.index(member.kind) for member in every])
+        scaled = np.array([member.features for member in every])
+        apart = np.full((len(every), len(recorded)), math.inf)
+        for kind in np.unique(kinds[: len(recorded)]):
+            rows, columns = np.flatnonzero(kinds == kind), np.flatnonzero(kinds[: len(recorded)] == kind)
+            spread = scaled[columns].std(axis=0)
+            scaled[rows] /= np.maximum(spread, max(SMALLEST_SHARE * float(spread.max()), 1e-9))
+            between = distance.cdist(scaled[rows], scaled[columns]) / math.sqrt(scaled.shape[1])
+            others = np.where(recording[columns, None] == recording[columns], math.inf, between[: len(columns)])
+            nearest = others.min(axis=1)
+            known = nearest[np.isfinite(nearest)]
+            if len(known):
+                apart[np.ix_(rows, columns)] = between / max(float(np.median(known)), SMALLEST_R)
+        return cls(recorded, recording, np.array([member.template for member in made], dtype=np.int64), scaled, apart)
+
+    def draw(self, rng: np.random.Generator, count: int) -> tuple[float, float, float, float]:
+        """Return coverage by `count` templates alone, with the generated, and precision of generated and of templates."""
+        names = rng.permutation(self.recording.max() + 1)
+        shuffled = rng.permutation(len(self.recording))
+        rank = np.argsort(names)[self.recording[shuffled]]
+        chosen = shuffled[np.argsort(rank, kind="stable")][:count]  # recording by recording, in a random order
+        unseen = ~np.isin(self.recording, self.recording[chosen])
+        members = len(self.recording) + np.flatnonzero(np.isin(self.template, chosen))
+        if not unseen.any():
+            return (math.nan,) * 4
+        alone = self.apart[chosen][:, unseen].min(axis=0)
+        generated = np.minimum(alone, self.apart[members][:, unseen].min(axis=0, initial=math.inf))
+        own = self.recording[self.template[members - len(self.recording)]]
+        return (
+            float((alone <= 1.0).mean()),
+            float((generated <= 1.0).mean()),
+            self._precision(members, own),
+            self._precision(chosen, self.recording[chosen]),
+        )
+
+    def _precision(self, members: Ints, own: Ints) -> float:
+        """The share of members within r of an encounter of another recording than their own."""
+        there = np.where(own[:, None] == self.recording, math.inf, self.apart[members])
+        return float((there.min(axis=1) <= 1.0).mean()) if len(members) else math.nan
+
+    def unreached(self, names: Sequence[str]) -> list[Unreached]:
+        """Return the recorded encounters that nothing from other recordings is near, the farthest first."""
+        source = np.concatenate([self.recording, self.recording[self.template]])
+        found = []
+        for n, member in enumerate(self.members):
+            far = np.where(source == self.recording[n], math.inf, self.apart[:, n])
+            nearest = int(far.argmin())
+            if far[nearest] > 1.0:
+                differs = int(np.abs(self.scaled[nearest] - self.scaled[n]).argmax())
+                feature = FEATURES[differs] if math.isfinite(far[nearest]) else "no other of its kind"
+                found.append(Unreached(names[n], member.kind, float(far[nearest]), feature))
+        return sorted(found, key=lambda one: -one.distance)

@@ -1,0 +1,255 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whose fault a contact is, in situations that are drawn: the ego drives otherwise than its witness, the other as certified."""
+
+from lengths import LONG
+import numpy as np
+import pytest
+
+from benchmarks._driving_worlds import as_scenario, PERIOD
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.ego import Pose
+from scenario_gen.closed_loop.reasons import safe_gap
+from scenario_gen.closed_loop.simulation import ClosedLoop
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.template import conflicts_in
+
+STEPS = 160
+TIME = np.arange(STEPS) * PERIOD
+VARIATIONS = 30 if LONG else 3
+LENGTH, WIDTH = 4.25, 1.8  # mean of both vehicles
+
+
+def drive_along(points, speed, start=0.0):
+    """A motion along points (M, 2) [m] at a speed [m/s], or at speeds (T,), from a station [m] on."""
+    curve = Curve.through(np.asarray(points, dtype=np.float64))
+    speed = np.broadcast_to(np.asarray(speed, dtype=np.float64), TIME.shape)
+    poses = curve.at(start + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * PERIOD)]))
+    return poses[:, :2], poses[:, 2], speed.copy()
+
+
+def lane(y, reverse=False):
+    points = np.column_stack([np.arange(-150.0, 151.0), np.full(301, y)])
+    return points[::-1] if reverse else points
+
+
+def over(y, to, at, length=25.0):
+    """From one lane to another, half-way at x = at."""
+    x = np.arange(-150.0, 151.0)
+    share = np.clip((x - at) / length + 0.5, 0.0, 1.0)
+    return np.column_stack([x, y + (to - y) * share * share * (3.0 - 2.0 * share)])
+
+
+def turn(radius=8.0):
+    """From the south to the north-west quadrant: along +y, then left along -x, the turn's end at (0, 0)."""
+    angle = np.linspace(0.0, np.pi / 2, 20)
+    arc = np.column_stack([radius * np.cos(angle), radius * np.sin(angle) - radius])
+    south = np.column_stack([np.full(80, radius), np.linspace(-100.0, -radius - 1.0, 80)])
+    return np.concatenate([south, arc, np.column_stack([np.linspace(-1.0, -100.0, 80), np.zeros(80)])])
+
+
+def up():
+    return np.column_stack([np.zeros(301), np.arange(-150.0, 151.0)])
+
+
+def to_pass(points, at, when, speed):
+    """A motion at one speed that is at a station of points when it should be."""
+    return drive_along(points, speed, at - speed * when)
+
+
+def both_to_pass(points, at, when, speed):
+    """Motions from one start, at one speed each: the witness is at a station at when[0], the ego, at this speed, at when[1]."""
+    way = speed * when[1]
+    return drive_along(points, way / when[0], at - way), drive_along(points, speed, at - way)
+
+
+def crosses(rng, offset):
+    """(witness, other, ego): the other crosses at x = 0; the ego is there so much later than that, its witness long after."""
+    fast, slow = rng.uniform(8.0, 14.0), rng.uniform(4.0, 7.0)
+    when = rng.uniform(4.0, 6.0)
+    other = to_pass(lane(0.0), 150.0, when, fast)
+    late = when + 4.0 + LENGTH / slow + rng.uniform(0.0, 1.0)
+    witness, ego = both_to_pass(up(), 150.0, (late, when + offset(fast, slow)), slow)
+    return witness, other, ego
+
+
+def pulls_out_and_is_hit(rng):
+    return crosses(rng, lambda fast, slow: -rng.uniform(0.3, 0.9) * 0.5 * LENGTH / slow)
+
+
+def pulls_out_and_hits(rng):
+    return crosses(rng, lambda fast, slow: (0.5 * LENGTH + 0.5 * WIDTH) / slow + rng.uniform(-0.1, 0.1))
+
+
+def pulls_out_and_stops(rng):
+    other = to_pass(lane(0.0), 150.0, rng.uniform(5.0, 6.5), rng.uniform(8.0, 14.0))
+    speed, start = np.where(TIME < 2.0, 6.0, np.maximum(6.0 - 6.0 * (TIME - 2.0), 0.0)), 135.0 + rng.uniform(-1.0, 1.0)
+    return drive_along(up(), 1.6, start), other, drive_along(up(), speed, start)
+
+
+def turns_left_across_oncoming(rng):
+    fast, slow, when = rng.uniform(8.0, 13.0), rng.uniform(3.0, 6.0), rng.uniform(4.0, 6.0)
+    path = turn()
+    station = 92.0 + np.pi / 4 * 8.0  # half-way round it crosses the lane of x = 5.7
+    oncoming = np.column_stack([np.full(301, 5.7), np.arange(150.0, -151.0, -1.0)])
+    other = to_pass(oncoming, 152.3, when, fast)
+    witness, ego = both_to_pass(path, station, (when + 6.0, when + rng.uniform(-0.3, 0.3)), slow)
+    return witness, other, ego
+
+
+def cuts_in(rng, share):
+    """The ego comes into the lane of a faster one, leaving it a share of the safe gap; its witness stays."""
+    fast, slow, when = rng.uniform(12.0, 18.0), rng.uniform(5.0, 9.0), rng.uniform(2.0, 4.0)
+    gap = max(share * float(safe_gap(fast, slow)), 2.0)
+    at = -20.0
+    enters = at - 25.0 * 0.12  # where its corner comes into the other's way, about
+    ego = to_pass(over(3.5, 0.0, at), 150.0 + enters, when, slow)
+    other = to_pass(lane(0.0), 150.0 + enters - gap - LENGTH, when, fast)
+    return to_pass(lane(3.5), 150.0 + enters, when, slow), other, ego
+
+
+def cuts_in_unsafely(rng):
+    return cuts_in(rng, rng.uniform(0.3, 0.7))
+
+
+def cuts_in_safely(rng):
+    return cuts_in(rng, rng.uniform(1.3, 1.6))
+
+
+def merges_before_its_turn(rng):
+    fast, slow, when = rng.uniform(10.0, 14.0), rng.uniform(6.0, 9.0), rng.uniform(4.0, 5.0)
+    ramp = over(-20.0, 0.0, 0.0, 60.0)
+    other = to_pass(lane(0.0), 165.0, when, fast)
+    station = float(Curve.through(ramp).project(np.array([[15.0, 0.0]]))[0][0])
+    witness, ego = both_to_pass(ramp, station, (when + 4.0, when - rng.uniform(0.3, 0.8)), slow)
+    return witness, other, ego
+
+
+def drifts_sideways(rng):
+    speed, beside = rng.uniform(7.0, 14.0), rng.uniform(-2.0, 2.0)
+    other = to_pass(lane(0.0), 60.0 + beside, 0.0, speed)
+    return to_pass(lane(3.5), 60.0, 0.0, speed), other, to_pass(over(3.5, 0.0, -40.0, 60.0), 60.0, 0.0, speed)
+
+
+def head_on_in_the_wrong_lane(rng):
+    mine, its = rng.uniform(6.0, 12.0, 2)
+    other = to_pass(lane(1.75, reverse=True), 150.0, 6.0, its)
+    return to_pass(lane(-1.75), 150.0, 6.0, mine), other, to_pass(over(-1.75, 1.75, -30.0), 150.0, 6.0, mine)
+
+
+def stops_in_the_oncoming_lane(rng):
+    mine, its = rng.uniform(6.0, 9.0), rng.uniform(6.0, 12.0)
+    speed = np.where(TIME < 3.0, mine, np.maximum(mine - 5.0 * (TIME - 3.0), 0.0))
+    start = 150.0 - 30.0 - 3.0 * mine
+    other = to_pass(lane(1.75, reverse=True), 150.0, rng.uniform(7.0, 9.0), its)
+    return drive_along(lane(-1.75), mine, start), other, drive_along(over(-1.75, 1.75, -35.0), speed, start)
+
+
+def brakes_for_nothing(rng):
+    speed, braking, begin = rng.uniform(8.0, 15.0), rng.uniform(4.0, 8.0), rng.uniform(2.0, 4.0)
+    other = drive_along(lane(0.0), speed, 20.0)
+    slower = np.where(begin > TIME, speed, np.maximum(speed - braking * (TIME - begin), rng.choice([0.0, 2.0])))
+    start = 20.0 + LENGTH + 0.5 * speed
+    return drive_along(lane(0.0), speed, start), other, drive_along(lane(0.0), slower, start)
+
+
+def has_priority_and_is_hit(rng):
+    fast, slow, when = rng.uniform(8.0, 12.0), rng.uniform(3.0, 5.0), rng.uniform(4.0, 6.0)
+    other = to_pass(lane(0.0), 150.0, when, fast)
+    witness, ego = both_to_pass(up(), 150.0, (when - 2.4, when + rng.uniform(-0.8, 0.8) * 0.5 * LENGTH / slow), slow)
+    return witness, other, ego
+
+
+def teleports(rng):
+    speed, when = rng.uniform(8.0, 14.0), 20
+    other = drive_along(lane(0.0), speed, 20.0)
+    position, yaw, mine = (each.copy() for each in drive_along(lane(30.0), speed, 20.0))
+    position[when:] = other[0][when] + (rng.uniform(6.0, 12.0), 0.0)
+    mine[when:] = 0.0
+    return drive_along(lane(30.0), speed, 20.0), other, (position, yaw, mine)
+
+
+def reverses(rng):
+    back, gap = rng.uniform(1.0, 3.0), rng.uniform(1.0, 4.0)
+    other = drive_along(lane(0.0), 0.0, 100.0)
+    position, yaw, speed = drive_along(lane(0.0), 0.0, 100.0 + LENGTH + gap)
+    position = position - np.column_stack([back * np.maximum(TIME - 1.0, 0.0), np.zeros(STEPS)])
+    return drive_along(lane(0.0), np.minimum(2.0 * TIME, 8.0), 100.0 + LENGTH + gap), other, (position, yaw, speed)
+
+
+SITUATIONS = {
+    pulls_out_and_is_hit: {"out_of_order"},
+    pulls_out_and_hits: {"out_of_order"},
+    pulls_out_and_stops: {"out_of_order"},
+    turns_left_across_oncoming: {"out_of_order"},
+    cuts_in_unsafely: {"cut_in"},
+    cuts_in_safely: {"other_ran_into_ego"},
+    merges_before_its_turn: {"out_of_order"},
+    drifts_sideways: {"out_of_path"},
+    head_on_in_the_wrong_lane: {"head_on"},
+    stops_in_the_oncoming_lane: {"head_on"},
+    brakes_for_nothing: {"other_ran_into_ego", "standing"},
+    has_priority_and_is_hit: {"priority"},
+    teleports: {"jump"},
+    reverses: {"reversing"},
+}
+NOT_AT_FAULT = {cuts_in_safely, brakes_for_nothing, has_priority_and_is_hit}
+
+
+def placed(motion, angle, mirrored):
+    """A motion turned about the origin, and mirrored before if asked."""
+    xy, yaw, speed = motion
+    side = -1.0 if mirrored else 1.0
+    c, s = np.cos(angle), np.sin(angle)
+    xy = np.column_stack([xy[:, 0], side * xy[:, 1]]) @ np.array([[c, s], [-s, c]])
+    return xy, side * yaw + angle, speed
+
+
+class Plays:
+    """Is where a motion has it."""
+
+    def __init__(self, motion):
+        self.motion = motion
+
+    def reset(self, task):
+        pass
+
+    def act(self, seen):
+        k = min(round(seen.time / PERIOD) + 1, STEPS - 1)
+        (x, y), yaw, speed = (each[k] for each in self.motion)
+        return Pose(float(x), float(y), float(yaw), float(speed))
+
+
+def judged(situation, seed):
+    rng = np.random.default_rng([seed, *situation.__name__.encode()])
+    angle, mirrored = rng.uniform(-np.pi, np.pi), rng.random() < 0.5
+    witness, other, ego = (placed(motion, angle, mirrored) for motion in situation(rng))
+    loop = ClosedLoop(as_scenario([witness, other], STEPS), 0, config=ClosedLoopConfig(policy="replay"))
+    proven = judge(loop, loop.drive(Plays(witness)))
+    assert proven.passed, f"{situation.__name__} {seed}: {proven.sentence()}; {conflicts_in(loop.scenario)}"
+    return judge(loop, loop.drive(Plays(ego)))
+
+
+@pytest.mark.parametrize("situation", SITUATIONS, ids=lambda one: one.__name__)
+def test_fault_is_that_of_who_was_out_of_place(situation):
+    for seed in range(VARIATIONS):
+        verdict = judged(situation, seed)
+        assert verdict.collision is not None, f"{seed}: nobody was met; {verdict.sentence()}"
+        assert verdict.collision.reason.value in SITUATIONS[situation], f"{seed}: {verdict.sentence()}"
+        assert verdict.at_fault == verdict.document()["at_fault"] == (situation not in NOT_AT_FAULT)
+
+
+def test_a_cut_in_says_its_gap_beside_what_is_asked_for():
+    cut_in = judged(cuts_in_unsafely, 0).collision.cut_in
+    assert 0.0 < cut_in.gap < cut_in.safe_gap and not cut_in.safe and cut_in.ttc > 0.0 and cut_in.least_ttc > 0.35
+    assert "came in" in (verdict := judged(cuts_in_safely, 0)).sentence() and verdict.collision.cut_in.safe
+    assert verdict.sentence().count("not at fault") == 1
+    assert float(safe_gap(14.0, 14.0)) == pytest.approx(14.0 + 196.0 / 12.0 - 196.0 / 18.0)
+
+
+def test_who_has_priority_is_at_fault_by_nuplan_alone():
+    shown = [judged(has_priority_and_is_hit, seed) for seed in range(12)]
+    assert not any(one.at_fault for one in shown)
+    assert any(one.terms.no_at_fault_collision == 0.0 for one in shown)  # its front touched the other

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Coverage and precision of sets about drawn encounters, where the right answer is known."""
+
+from dataclasses import dataclass, replace
+import math
+
+import numpy as np
+import pytest
+from textbook_motions import labelled
+
+from scenario_gen import InputError
+from scenario_gen.method.evaluation.population import member_of, population_of
+from scenario_gen.types import Encounter, Scenario
+
+KINDS = ("crossing, stops", "crossing, rolls", "follows", "stops behind a stopping leader", "merges")
+
+
+@dataclass
+class Made:
+    """What a result is here: an encounter, and others that were made from it."""
+
+    encounter: Encounter
+    made: tuple[Encounter, ...] = ()
+
+    def __iter__(self):
+        for own in self.made:
+            yield Scenario(own.vehicles, own.time, own.position, own.heading, own.speed, np.zeros_like(own.speed))
+
+
+@pytest.fixture(scope="module")
+def encounters():
+    return [labelled(kind, seed).encounter for seed in range(6) for kind in KINDS]
+
+
+def results(encounters, made):
+    return [(f"recording {k // len(KINDS)}", Made(encounter, made(k, encounter))) for k, encounter in enumerate(encounters)]
+
+
+def apart(encounter):
+    """The same drives, a kilometre apart."""
+    position = encounter.position.copy()
+    position[0] += 1000.0
+    return replace(encounter, position=position)
+
+
+def test_kinds_are_those_of_the_drawn_motions():
+    wanted = {
+        "crossing, stops": "crossing",
+        "left turn before oncoming, stops": "turn",
+        "merges": "merge",
+        "follows": "following",
+    }
+    for kind, name in wanted.items():
+        found = [member_of(labelled(kind, seed).encounter, "", 0).kind for seed in range(5)]
+        assert found.count(name) >= 4, (kind, found)
+
+
+def test_copies_of_the_templates_cover_no_more_than_these_and_are_as_precise(encounters):
+    (point,) = population_of(results(encounters, lambda _, own: (own, own)), (8,), draws=60).curve
+    assert point.generated == point.alone and point.precision == point.recorded and point.multiplier <= 1.0
+
+
+def test_what_reaches_other_recordings_covers_more_and_what_is_like_nothing_is_imprecise(encounters):
+    def others(k, _):
+        return tuple(encounters[(k + len(KINDS) * n) % len(encounters)] for n in (1, 2, 3))
+
+    def slower(_, own):
+        return (replace(own, speed=own.speed * 6.0),) * 3
+
+    wide, wild = (population_of(results(encounters, made), (5,), draws=60).curve[0] for made in (others, slower))
+    assert wide.generated.value > wide.alone.value + 0.2 and wide.precision.value > 0.9 and wide.multiplier > 1.5
+    assert wild.precision.value < 0.1 and wild.generated.value <= wild.alone.value + 0.1
+
+
+def test_a_scenario_that_lost_the_shared_area_counts_against_precision(encounters):
+    kept, lost = (
+        population_of(results(encounters, made), (8,), draws=60).curve[0]
+        for made in (lambda _, own: (own,), lambda _, own: (own, apart(own)))
+    )
+    assert lost.precision.value == pytest.approx(kept.precision.value / 2.0, abs=0.05)
+
+
+def test_an_encounter_like_no_other_is_named_with_what_sets_it_apart(encounters):
+    odd = replace(encounters[0], name="odd", speed=encounters[0].speed * np.array([[3.0], [1.0]]))
+    found = population_of([*results(encounters, lambda _, own: ()), ("odd", Made(odd))], (5,), draws=20)
+    assert found.unreached[0].encounter == "odd" and found.unreached[0].distance > 2.0
+    assert set(found.unreached[0].feature.split()) & {"speed", "acceleration", "braking"}
+    assert found.needed == math.inf, "one point tells no curve"
+
+
+def test_what_cannot_be_measured_is_refused_with_a_remedy(encounters):
+    with pytest.raises(InputError, match="two recordings"):
+        population_of([("one", Made(own)) for own in encounters])
+    with pytest.raises(InputError, match=r"at most 15 templates"):
+        population_of(results(encounters, lambda _, own: ()), (16,))
