@@ -13,13 +13,15 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import Arm, draw_lanes, draw_plan, Plan
+from scenario_gen.roads.drawn import aligned, Arm, draw_lanes, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
+from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
 from scenario_gen.types import Encounter, LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells
+_BESIDE = 0.6  # metres of room beside a footprint in a U-turn
 _U_TURN = 12.0  # metres between the lanes of a U-turn
 _SAME_WAY = np.radians(25.0)
 _WIDEST = 12.0
@@ -54,6 +56,40 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
     south, north = (layout.side if side in sides else verge for side in SIDE_ARMS)
     low = -half - cell * np.ceil((np.array([layout.main, south]) - half) / cell - 1e-6)  # kerbs on cell edges
     return draw_plan(Plan(arms, axis), name, config, np.array([low, [layout.main, north]]))
+
+
+def draw_u_turn_road(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Road:
+    """Draw a main road, and side arms, with a U-turn for who makes one: from the outermost lane of an arm to that beside it."""
+    layout = layout_for(name, tracks, config)
+    outermost, sign = layout.lanes - 1, 1.0 if config.traffic_side == "right" else -1.0
+    arms = [Arm.towards(yaw, layout.main, layout.lanes) for yaw in (np.pi, 0.0)]
+    arms += [Arm.towards(yaw, layout.side, layout.lanes) for yaw in SIDE_ARMS[: ARM_COUNT[name] - 2]]
+    ends = [arms[0].lane(outermost, config, inward=inward) for inward in (True, False)]
+    way = draw_u_turn(ends[0], ends[1], layout.main, lambda _: True)
+    turner = next(track for track in tracks if track.makes_u_turn)
+    yaw = turner.curve.points[:, 2]
+    middle = int(np.argmin(np.abs(yaw - (yaw[0] + yaw[-1]) / 2.0)))
+    lane_of = dict[tuple[int, bool], tuple[int, int]]()
+    for i, track in enumerate(tracks):
+        if track is turner:
+            lane_of |= {(i, True): (0, outermost), (i, False): (0, outermost)}
+            continue
+        if _shares(turner, track.poses[0], middle, last=False):
+            lane_of |= {(i, True): (0, outermost), (i, False): (1, outermost)}
+        elif _shares(turner, track.poses[-1], middle, last=True):
+            lane_of |= {(i, True): (1, outermost), (i, False): (0, outermost)}
+    radius = abs(float(ends[0][1]))
+    aim = aligned(tracks, lane_of, turner.curve.points[middle], np.array([radius, 0.0, sign * np.pi / 2.0]))
+    width = max(track.vehicle.width for track in tracks) + 2.0 * _BESIDE
+    driven = () if way is None else (Driven((0, outermost, 0, outermost), way, turner.vehicle.length, width),)
+    return draw_plan(Plan(arms, driven=driven, drawn_for=aim), name, config)
+
+
+def _shares(turner: Track, pose: Floats, middle: int, *, last: bool) -> bool:
+    """Whether a pose (3,) lies in the lane by which a vehicle comes that makes a U-turn, or by which it goes (`last`)."""
+    station, offset = turner.curve.project(pose[None, :2])
+    turned = abs(float(wrap_angle(turner.curve.at(station)[0, 2] - pose[2])))
+    return bool(abs(offset[0]) < LANE_GAP and turned < _SAME_WAY and (station[0] > turner.curve.station[middle]) == last)
 
 
 def draw_paper(name: str, config: RoadConfig) -> Road:
