@@ -12,7 +12,7 @@ from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import did_you_mean, InputError, reading, RefusedError
 from scenario_gen.base.registry import Registry
 from scenario_gen.base.stores import local
-from scenario_gen.roads.builtin import draw, draw_corridor, draw_paper, draw_u_turn_road, layout_for
+from scenario_gen.roads.builtin import draw, draw_corridor, draw_paper, layout_for
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
 from scenario_gen.roads.nav2 import read_map
@@ -147,15 +147,13 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     try:
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings: a junction's template
-        if name != "curve" and any(track.makes_u_turn for track in tracks):
-            return draw_u_turn_road(name, tracks, config)
-        if name in ("t_intersection", "four_way"):
+        if name in ("t_intersection", "four_way") and not any(track.makes_u_turn for track in tracks):
             return draw_junction(name, encounter, config)
     else:
         main = main_line(frenet, tracks)
         if bends(name, main):
             return draw_along(name, main, config.lanes or frenet.spread().lanes, config)
-    return draw(name, layout_for(name, tracks, config), config)
+    return draw(name, layout_for(name, tracks, config), config, tracks)
 
 
 BUILT_IN: dict[str, DrawRoad] = {

@@ -17,12 +17,12 @@ from scenario_gen.roads.drawn import aligned, Arm, draw_lanes, draw_plan, Driven
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
 from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
-from scenario_gen.types import Encounter, LaneNetwork, Road
+from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells
-_BESIDE = 0.6  # metres of room beside a footprint in a U-turn
 _U_TURN = 12.0  # metres between the lanes of a U-turn
+_TURNING = (5.0, 3.5)  # metres, length of who turns round, and the width that it needs
 _SAME_WAY = np.radians(25.0)
 _WIDEST = 12.0
 _ONCOMING = 20.0  # metres sideways within which oncoming vehicles are on the same road
@@ -38,51 +38,51 @@ class Layout:
     main: float
     side: float
     lanes: int
+    u_turns: bool = False
 
 
-def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
+def draw(name: str, layout: Layout, config: RoadConfig, tracks: tuple[Track, ...] = ()) -> Road:
     """Draw a straight main road from west to east, and the side arms that the road `name` has.
 
     Args:
         name: of a built-in road.
         layout: its sizes.
         config: lane width, corner radius, resolution, traffic side.
+        tracks: of the template, if there is one.
     """
     sides, half, cell = SIDE_ARMS[: ARM_COUNT[name] - 2], layout.lanes * config.lane_width, config.resolution
     arms = [Arm.towards(yaw, layout.main, layout.lanes) for yaw in (np.pi, 0.0)]
     arms += [Arm.towards(yaw, layout.side, layout.lanes) for yaw in sides]
     axis = Curve(np.array([[-layout.main, 0.0, 0.0], [layout.main, 0.0, 0.0]]))
+    outermost = layout.lanes - 1
+    ends = [[arm.lane(outermost, config, inward=inward) for inward in (True, False)] for arm in arms[:2] if layout.u_turns]
+    turns = ((k, draw_u_turn(entry, leave, layout.main)) for k, (entry, leave) in enumerate(ends))
+    driven = [Driven((k, outermost, k, outermost), way, _TURNING[0], _TURNING[1]) for k, way in turns if way is not None]
     verge = layout.side if config.paper else half + _VERGE
     south, north = (layout.side if side in sides else verge for side in SIDE_ARMS)
     low = -half - cell * np.ceil((np.array([layout.main, south]) - half) / cell - 1e-6)  # kerbs on cell edges
-    return draw_plan(Plan(arms, axis), name, config, np.array([low, [layout.main, north]]))
+    aim = _turned_round(tracks, outermost, config)
+    return draw_plan(Plan(arms, axis, driven, drawn_for=aim), name, config, np.array([low, [layout.main, north]]))
 
 
-def draw_u_turn_road(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Road:
-    """Draw a main road, and side arms, with a U-turn for who makes one: from the outermost lane of an arm to that beside it."""
-    layout = layout_for(name, tracks, config)
-    outermost, sign = layout.lanes - 1, 1.0 if config.traffic_side == "right" else -1.0
-    arms = [Arm.towards(yaw, layout.main, layout.lanes) for yaw in (np.pi, 0.0)]
-    arms += [Arm.towards(yaw, layout.side, layout.lanes) for yaw in SIDE_ARMS[: ARM_COUNT[name] - 2]]
-    ends = [arms[0].lane(outermost, config, inward=inward) for inward in (True, False)]
-    way = draw_u_turn(ends[0], ends[1], layout.main, lambda _: True)
-    turner = next(track for track in tracks if track.makes_u_turn)
+def _turned_round(tracks: tuple[Track, ...], outermost: int, config: RoadConfig) -> DrawnFor | None:
+    """Where a template lies of which a vehicle makes a U-turn: in the road's middle, from the first arm's outermost lane."""
+    turner = next((track for track in tracks if track.makes_u_turn), None)
+    if turner is None:
+        return None
     yaw = turner.curve.points[:, 2]
     middle = int(np.argmin(np.abs(yaw - (yaw[0] + yaw[-1]) / 2.0)))
     lane_of = dict[tuple[int, bool], tuple[int, int]]()
     for i, track in enumerate(tracks):
         if track is turner:
             lane_of |= {(i, True): (0, outermost), (i, False): (0, outermost)}
-            continue
-        if _shares(turner, track.poses[0], middle, last=False):
+        elif _shares(turner, track.poses[0], middle, last=False):
             lane_of |= {(i, True): (0, outermost), (i, False): (1, outermost)}
         elif _shares(turner, track.poses[-1], middle, last=True):
             lane_of |= {(i, True): (1, outermost), (i, False): (0, outermost)}
-    radius = abs(float(ends[0][1]))
-    aim = aligned(tracks, lane_of, turner.curve.points[middle], np.array([radius, 0.0, sign * np.pi / 2.0]))
-    width = max(track.vehicle.width for track in tracks) + 2.0 * _BESIDE
-    driven = () if way is None else (Driven((0, outermost, 0, outermost), way, turner.vehicle.length, width),)
-    return draw_plan(Plan(arms, driven=driven, drawn_for=aim), name, config)
+    sign = 1.0 if config.traffic_side == "right" else -1.0
+    apex = np.array([(outermost + 0.5) * config.lane_width, 0.0, sign * np.pi / 2.0])
+    return aligned(tracks, lane_of, turner.curve.points[middle], apex)
 
 
 def _shares(turner: Track, pose: Floats, middle: int, *, last: bool) -> bool:
@@ -119,7 +119,7 @@ def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) 
     main, side = (config.arm_length, config.arm_length) if config.arm_length else (layout.main, layout.side)
     lanes = config.lanes or layout.lanes
     mouth = lanes * config.lane_width + config.corner_radius + 5.0 if name != "straight" else 5.0
-    return Layout(max(main, mouth), max(side, mouth), lanes)
+    return Layout(max(main, mouth), max(side, mouth), lanes, layout.u_turns)
 
 
 def junction_centre(tracks: tuple[Track, ...]) -> Floats:
@@ -146,9 +146,10 @@ def _at_a_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
     across = np.abs(np.sin(wrap_angle(poses[:, 2] - poses[np.argmax(required), 2])))
     side = float(required[across > np.sin(np.radians(30.0))].max(initial=SHORTEST))
     lanes = _parallel_lanes(tracks, config.lane_width)
-    if any(track.makes_u_turn for track in tracks):  # from one outermost lane to the other in a half circle
+    turns_round = any(track.makes_u_turn for track in tracks)
+    if turns_round:  # from one outermost lane to the other in a half circle
         lanes = max(lanes, int(np.ceil((_U_TURN / config.lane_width + 1.0) / 2.0)))
-    return Layout(max(float(required.max()), SHORTEST), side, lanes)
+    return Layout(max(float(required.max()), SHORTEST), side, lanes, turns_round)
 
 
 def _parallel_lanes(tracks: tuple[Track, ...], lane_width: float) -> int:
