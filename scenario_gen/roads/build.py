@@ -153,7 +153,7 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
         main = main_line(frenet, tracks)
         if bends(name, main):
             return draw_along(name, main, config.lanes or frenet.spread().lanes, config)
-    return draw(name, layout_for(name, tracks, config), config)
+    return draw(name, layout_for(name, tracks, config), config, tracks)
 
 
 BUILT_IN: dict[str, DrawRoad] = {

@@ -13,11 +13,11 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import Arm, draw_lanes, draw_plan, Driven, Plan
+from scenario_gen.roads.drawn import aligned, Arm, draw_lanes, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
 from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
-from scenario_gen.types import Encounter, LaneNetwork, Road
+from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells
@@ -41,13 +41,14 @@ class Layout:
     u_turns: bool = False
 
 
-def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
+def draw(name: str, layout: Layout, config: RoadConfig, tracks: tuple[Track, ...] = ()) -> Road:
     """Draw a straight main road from west to east, and the side arms that the road `name` has.
 
     Args:
         name: of a built-in road.
         layout: its sizes.
         config: lane width, corner radius, resolution, traffic side.
+        tracks: of the template, if there is one.
     """
     sides, half, cell = SIDE_ARMS[: ARM_COUNT[name] - 2], layout.lanes * config.lane_width, config.resolution
     arms = [Arm.towards(yaw, layout.main, layout.lanes) for yaw in (np.pi, 0.0)]
@@ -60,7 +61,35 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
     verge = layout.side if config.paper else half + _VERGE
     south, north = (layout.side if side in sides else verge for side in SIDE_ARMS)
     low = -half - cell * np.ceil((np.array([layout.main, south]) - half) / cell - 1e-6)  # kerbs on cell edges
-    return draw_plan(Plan(arms, axis, driven), name, config, np.array([low, [layout.main, north]]))
+    aim = _turned_round(tracks, outermost, config)
+    return draw_plan(Plan(arms, axis, driven, drawn_for=aim), name, config, np.array([low, [layout.main, north]]))
+
+
+def _turned_round(tracks: tuple[Track, ...], outermost: int, config: RoadConfig) -> DrawnFor | None:
+    """Where a template lies of which a vehicle makes a U-turn: in the road's middle, from the first arm's outermost lane."""
+    turner = next((track for track in tracks if track.makes_u_turn), None)
+    if turner is None:
+        return None
+    yaw = turner.curve.points[:, 2]
+    middle = int(np.argmin(np.abs(yaw - (yaw[0] + yaw[-1]) / 2.0)))
+    lane_of = dict[tuple[int, bool], tuple[int, int]]()
+    for i, track in enumerate(tracks):
+        if track is turner:
+            lane_of |= {(i, True): (0, outermost), (i, False): (0, outermost)}
+        elif _shares(turner, track.poses[0], middle, last=False):
+            lane_of |= {(i, True): (0, outermost), (i, False): (1, outermost)}
+        elif _shares(turner, track.poses[-1], middle, last=True):
+            lane_of |= {(i, True): (1, outermost), (i, False): (0, outermost)}
+    sign = 1.0 if config.traffic_side == "right" else -1.0
+    apex = np.array([(outermost + 0.5) * config.lane_width, 0.0, sign * np.pi / 2.0])
+    return aligned(tracks, lane_of, turner.curve.points[middle], apex)
+
+
+def _shares(turner: Track, pose: Floats, middle: int, *, last: bool) -> bool:
+    """Whether a pose (3,) lies in the lane by which a vehicle comes that makes a U-turn, or by which it goes (`last`)."""
+    station, offset = turner.curve.project(pose[None, :2])
+    turned = abs(float(wrap_angle(turner.curve.at(station)[0, 2] - pose[2])))
+    return bool(abs(offset[0]) < LANE_GAP and turned < _SAME_WAY and (station[0] > turner.curve.station[middle]) == last)
 
 
 def draw_paper(name: str, config: RoadConfig) -> Road:

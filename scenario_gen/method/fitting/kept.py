@@ -34,7 +34,7 @@ _SAME_WAY = np.radians(30.0)
 _ENOUGH = 0.5  # share of that time in which they are beside each other on the road, on the same side
 _IN_LANE, _OFF_LANE = 1.4, 2.3  # metres sideways up to which a vehicle is in another one's lane, and from which on beside it
 _STILL_IN_LANE = 2.0  # metres, likewise on the road
-_BEYOND, _STRAIGHT_ON = 30.0, np.radians(8.0)  # metres beyond a path's ends, straight on, for which it says where its lane lies
+_BEYOND, _DRIFT = 30.0, 1.0  # metres beyond a path's ends, straight on, for which it says where its lane lies, to so many
 _PASSED = 2.0  # metres by which one that passes another is behind it first, and then before it
 
 
@@ -163,7 +163,7 @@ def _aside(track: Track, other: Track, end: int) -> float:
     station, offset = track.curve.project(pose[None, :2])
     beyond = max(-float(station[0]), float(station[0]) - track.travelled)
     turned = abs(float(wrap_angle(track.curve.at(station)[0, 2] - pose[2])))
-    leads = turned < _SAME_WAY if beyond <= 0.0 else turned < _STRAIGHT_ON and beyond < _BEYOND
+    leads = turned < _SAME_WAY if beyond <= 0.0 else beyond < _BEYOND and turned * beyond < _DRIFT
     return float(offset[0]) if leads and not (track.still or other.still) else np.nan
 
 

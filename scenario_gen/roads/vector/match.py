@@ -20,7 +20,17 @@ from scenario_gen.numerics import Floats, runs, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template import Equation, find_conflicts, in_words, pair_crossings, solve_starts, Track, turn_of, WAIT_SPEED
+from scenario_gen.template import (
+    Equation,
+    find_conflicts,
+    in_words,
+    pair_crossings,
+    solve_starts,
+    Track,
+    turn_of,
+    turns_to_keep,
+    WAIT_SPEED,
+)
 from scenario_gen.types import LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -41,8 +51,8 @@ _PRIOR, _CROSSED, _MET, _BEYOND, _FOLLOWED = (
     0.25,
     2.0,
 )  # weights: the place; crossings driven, or beyond the ends; gaps
-_STOPPED, _TURNED = 4.0, 4.0  # weights of a stop before a line, and of a begin from which a vehicle turns as it does
-_OTHERWISE = math.radians(20.0)  # that a vehicle turns more or less on a course, for which another begin is looked for
+_STOPPED, _TURNED = 4.0, 20.0  # weights of a stop before a line, and of a begin from which a vehicle turns as it does
+_OTHERWISE = math.radians(12.0)  # that a vehicle turns more or less on a course, for which another begin is looked for
 _BEFORE, _PASSED = 0.7, 6.0  # metres before a stop line where one stops; beyond it, where a stop is taken for one at it
 _WORTH = 1.5  # m² that a change of lanes must gain
 _TURN = math.radians(40.0)  # a chain may turn by this much more or less than the vehicle in the template
@@ -326,11 +336,11 @@ def _starts_to_stop(network: LaneNetwork, course: Course, track: Track, scale: f
 
 def _start_to_turn(course: Course, track: Track) -> float | None:
     """The begin [m] nearest to a course's own from which it turns as the vehicle does; None if it does anyway, or from none."""
-    if abs(turned_more(course, track)) < _OTHERWISE:
+    turn, driven = float(np.mean(turns_to_keep(track))), float(course.progress[-1])
+    if track.still or abs(turned_more(course, track) + turn_of(track) - turn) < _OTHERWISE:
         return None
-    driven = float(course.progress[-1])
     starts = np.arange(0.0, max(course.curve.length - driven, 0.0), _STEP)
-    more = course.curve.at(starts + driven)[:, 2] - course.curve.at(starts)[:, 2] - turn_of(track)
+    more = course.curve.at(starts + driven)[:, 2] - course.curve.at(starts)[:, 2] - turn
     alike = starts[np.abs(more) < _OTHERWISE / 2.0]
     return float(alike[np.argmin(np.abs(alike - course.start))]) if len(alike) else None
 
