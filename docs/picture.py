@@ -9,12 +9,21 @@ import matplotlib
 import numpy as np
 
 from scenario_gen import build_road, bundled, Encounter, generate, read_log, Road, Scenario, segment
+from scenario_gen.types import Marking, markings
 
 matplotlib.use("agg")
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 
 COLOURS = ("#0b6e99", "#d9622b", "#4b8b3b")
+PAINT = {
+    Marking.EDGE: {"linewidth": 0.8},
+    Marking.LANE: {"linewidth": 0.6, "dashes": (5, 7)},
+    Marking.CENTRE: {"linewidth": 0.8, "dashes": (5, 3)},
+    Marking.STOP: {"linewidth": 2.0},
+    Marking.GIVE_WAY: {"linewidth": 1.6, "dashes": (1, 1)},
+    Marking.ARROW: {"linewidth": 0.6},
+}
 PICTURE = Path(__file__).with_name("picture.png")
 CASE, COUNT, SEED = "b", 30, 7
 
@@ -60,11 +69,14 @@ def draw(axes: Axes, motion: Encounter | Scenario, alpha: float) -> None:
 
 
 def draw_road(axes: Axes, road: Road) -> None:
-    """Draw what is drivable underneath, as far as the axes reach."""
+    """Draw what is drivable and what is painted on it underneath, as far as the axes reach."""
     bounds = axes.axis()
     height, width = road.drivable.shape
     x, y = (low + road.resolution * (np.arange(cells) + 0.5) for low, cells in zip(road.origin, (width, height), strict=True))
-    axes.contourf(x, y, road.drivable, levels=(0.5, 1.5), colors=("#e9e9e4",), zorder=0)
+    axes.contourf(x, y, road.drivable, levels=(0.5, 1.5), colors=("#d9dade",), zorder=0)
+    for kind, lines in (markings(road.lanes) if road.lanes is not None else {}).items():
+        for line in lines:
+            axes.plot(*line.T, color="white", zorder=0.5, **PAINT[kind])
     axes.axis(bounds)
 
 

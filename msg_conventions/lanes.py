@@ -7,8 +7,11 @@ One LINE_LIST draws all borders, the left one of a lane before its right one, la
 points. `text` is a JSON object: `name`, `notes`, and of every lane its `id`, the number of `points` of a border, `successors` and
 `beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Where the map has traffic rules there are also
 `rules`, of each its `id`, `kind`, `lanes`, `over` (places in the list of lanes) and `line` (points of the stop line), and
-`rules_kept`. Lanes that were drawn with a built-in road have `drawn` true. Action 2 (delete) means that the road has no
-lanes. Stamp and frame: the map's. QoS: reliable, transient_local, depth 1.
+`rules_kept`. Where lanes lie above others each has `height` [m] of its points. `origin` is the latitude and longitude of the
+frame's origin, where the map has it. Lanes that were drawn with a built-in road have `drawn` true, and those that were drawn
+for a template `drawn_for`: the `frame` of the template (x, y [m], yaw [rad] on the road) and of every vehicle the ids of the
+`lanes` by which it comes and goes. Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. QoS: reliable,
+transient_local, depth 1.
 """
 
 from collections.abc import Iterator
@@ -24,7 +27,7 @@ from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
+from scenario_gen.types import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
 
 TOPIC = "road/lanes"
 TAIL = 1  # bytes by which the message ends behind a multiple of 4
@@ -46,13 +49,17 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
         | {"speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit, "junction": lane.junction}
         for lane in network.lanes
     ]
+    for lane, entry in zip(network.lanes, lanes if network.has_levels else (), strict=False):
+        entry["height"] = [None if math.isnan(height) else round(height, 2) for height in lane.height.tolist()]
     rules = [
         {"id": rule.id, "kind": rule.kind, "lanes": rule.lanes, "over": rule.over, "line": rule.line.tolist()}
         for rule in network.rules
     ]
     document: dict[str, Any] = {"name": network.name, "notes": network.notes, "lanes": lanes}
     document |= {"rules": rules, "rules_kept": network.rules_kept} if rules else {}
-    return document | ({"drawn": True} if network.drawn else {})
+    document |= ({"drawn": True} if network.drawn else {}) | ({"origin": network.origin} if network.origin else {})
+    aim = network.drawn_for
+    return document | ({} if aim is None else {"drawn_for": {"frame": aim.frame.tolist(), "lanes": aim.lanes}})
 
 
 def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | None]:
@@ -77,9 +84,16 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
         notes = tuple(str(note) for note in document["notes"])
         rules = tuple(map(_rule, document.get("rules", ())))
         kept, drawn = document.get("rules_kept", True) is not False, document.get("drawn", False) is True
-        return frame_id, LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn)
+        aim = _drawn_for(document["drawn_for"]) if "drawn_for" in document else None
+        origin = tuple(map(float, document.get("origin", ())))
+        return frame_id, LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn, aim, origin)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}") from None
+
+
+def _drawn_for(document: dict[str, Any]) -> DrawnFor:
+    x, y, yaw = (float(value) for value in document["frame"])
+    return DrawnFor(np.array([x, y, yaw]), tuple((str(first), str(last)) for first, last in document["lanes"]))
 
 
 def _rule(document: dict[str, Any]) -> TrafficRule:
@@ -101,7 +115,8 @@ def _lanes(documents: list[dict[str, Any]], points: Floats, what: str) -> Iterat
         left, right = (np.concatenate((border[:1], border[1::2])) for border in borders)
         limit = math.nan if document["speed_limit"] is None else float(document["speed_limit"])
         after, beside = (tuple(int(k) for k in document[key]) for key in ("successors", "beside"))
-        yield Lane(str(document["id"]), left, right, after, beside, limit, str(document["junction"]))
+        height = np.array(document.get("height", ()), dtype=np.float64)
+        yield Lane(str(document["id"]), left, right, after, beside, limit, str(document["junction"]), height)
         at += 2 * pairs
     if at != len(points):
         raise InputError(f"{what}: {len(points) - at} points belong to no lane")

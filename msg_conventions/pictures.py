@@ -12,13 +12,23 @@ import numpy as np
 
 from msg_conventions.cdr import decode, encode
 from msg_conventions.layouts import MARKERS, POLYGON
-from msg_conventions.markers import CUBE, DELETE_ALL, LINE_STRIP, Marker
+from msg_conventions.markers import CUBE, DELETE_ALL, LINE_LIST, LINE_STRIP, Marker
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.types import Scenario, tokens, Vehicle
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.types import LaneNetwork, Marking, markings, Scenario, tokens, Vehicle
 
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
 COLOURS = ((0.12, 0.47, 0.71), (0.84, 0.15, 0.16), (0.17, 0.63, 0.17), (1.0, 0.5, 0.05), (0.58, 0.4, 0.74), (0.55, 0.34, 0.29))
 EGO_COLOUR = (0.06, 0.09, 0.16)
+PAINT = {
+    Marking.EDGE: (0.15,),
+    Marking.LANE: (0.12, 3.0, 4.5),
+    Marking.CENTRE: (0.15, 3.0, 1.5),
+    Marking.STOP: (0.5,),
+    Marking.GIVE_WAY: (0.4, 0.6, 0.4),
+    Marking.ARROW: (0.12,),
+}
+"""How wide a marking is, and of how many metres its dashes and gaps are."""
 
 
 def encode_footprint(vehicle: Vehicle, stamp_ns: int, frame_id: str) -> bytes:
@@ -59,6 +69,27 @@ def vehicle_markers(vehicles: Sequence[Vehicle], states: Floats, here: Bools, eg
         x, y, yaw = states[k, :3].tolist()
         markers.append(Marker(f"box_{names[k]}", CUBE, pose=(x, y, yaw), scale=size, colour=(*colour, 0.9)))
     return encode_markers(markers, frame_id, stamp_ns)
+
+
+def road_markers(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> bytes:
+    """Return what is painted on a road's lanes as a MarkerArray that replaces the one before; without lanes nothing."""
+    markers = [Marker("", 0, DELETE_ALL)]
+    for kind, lines in (markings(network) if network is not None else {}).items():
+        width, *dashes = PAINT[kind]
+        points = [_pairs(line, *dashes) for line in lines]
+        if points:
+            paint = Marker(kind, LINE_LIST, scale=(width, 0.0, 0.0), colour=(1.0, 1.0, 1.0, 0.9), points=np.concatenate(points))
+            markers.append(paint)
+    return encode_markers(markers, frame_id, stamp_ns)
+
+
+def _pairs(line: Floats, dash: float = 0.0, gap: float = 0.0) -> Floats:
+    """(2K, 2) [m] the begin and the end of each piece of a line (M, 2), or of each dash."""
+    if not dash:
+        return line[np.repeat(np.arange(len(line)), 2)[1:-1]]
+    curve = Curve.through(line)
+    begin = np.arange(0.0, curve.length, dash + gap)
+    return curve.at(np.column_stack((begin, np.minimum(begin + dash, curve.length))).ravel())[:, :2]
 
 
 def encode_markers(markers: Sequence[Marker], frame_id: str, stamp_ns: int) -> bytes:

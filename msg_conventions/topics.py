@@ -43,7 +43,7 @@ _TABLE: tuple[tuple[str, Quality, str], ...] = (
     (roads.MAP_TYPE, NEWEST, "traffic/local_map"),
     (roads.POSES_TYPE, LATCHED, "road/entries road/exits"),
     (markers.TYPE, LATCHED, lanes.TOPIC),
-    (markers.ARRAY_TYPE, LATCHED, "markers"),
+    (markers.ARRAY_TYPE, LATCHED, "markers road/markings"),
     (markers.ARRAY_TYPE, LIVE, "traffic/markers preview"),
     (changepoints.POSTERIOR_TYPE, LATCHED, "posterior"),
     (pictures.FOOTPRINT_TYPE, LATCHED, "vehicle_*/footprint"),

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.provenance import what_makes_it_again
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
@@ -16,7 +17,7 @@ from scenario_gen.method.sampling import Callbacks, Progress
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
 from scenario_gen.roads import road_and_template
-from scenario_gen.types import Encounter, GenerationResult, Request, Road
+from scenario_gen.types import causes_in_words, Encounter, GenerationResult, Request, Road
 
 __all__ = ["PipelineConfig", "generate"]
 
@@ -47,8 +48,8 @@ def generate(
 
     Raises:
         InputError: a vehicle of the request does not exist.
-        RefusedError: the encounter is too large, the template does not fit the road, there is no way, or what the request
-            asks cannot be had; the message says why.
+        RefusedError: the encounter is too large, the template does not fit the road, there is no way, what the request asks
+            cannot be had, or no candidate is valid; the message says why.
     """
     if road == AUTO:
         again = partial(generate, config=config, count=count, seed=seed, request=request, progress=progress, select=select)
@@ -57,7 +58,11 @@ def generate(
     segmentation = segment(encounter, config.segmentation, seed)
     chain = Chain(encounter, segmentation, road, config, request, count, seed)
     planned = replace(chain.plan(), provenance=what_makes_it_again(config, request))
-    result = select(chain.sample(planned, Callbacks(progress)))
+    sampled = chain.sample(planned, Callbacks(progress))
+    if not sampled.generated.scenarios:
+        causes = ", ".join(f"{count} × {cause}" for cause, count in causes_in_words(sampled.generated.refused))
+        raise RefusedError(f"none of {sampled.generated.candidates} candidates is valid: {causes or 'none was drawn'}")
+    result = select(sampled)
     if config.evaluation.compare:
         result = with_references(result, config, request)
     result = replace(result, oracle=replay(encounter, result.placed()[1], road.frame_id))

@@ -10,7 +10,7 @@ import gc
 import os
 from pathlib import Path
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from lengths import DATA, LONG
 import pytest
 from skips import MAY_SKIP, NO_RECORDS
@@ -89,8 +89,9 @@ def file(request: pytest.FixtureRequest) -> Path:
     return path if path.is_absolute() else request.getfixturevalue("made_crashes") / path
 
 
-settings.register_profile("same", derandomize=True, database=None, deadline=None)
-settings.register_profile("new", database=None, deadline=None, print_blob=True)
+untimed = settings(database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow])  # a machine may be busy
+settings.register_profile("same", untimed, derandomize=True)
+settings.register_profile("new", untimed, print_blob=True)
 settings.load_profile(
     os.environ.get("SCENARIO_GEN_EXAMPLES", "same")
 )  # the same examples every time, unless new ones are asked for

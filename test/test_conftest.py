@@ -21,7 +21,7 @@ def test_a_worker_that_crashes_ends_the_run_and_its_test_is_named(tmp_path):
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words.split(), "-n", "2", str(tmp_path)]
     variables = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}
     variables |= {"PYTHONPATH": str(tmp_path), "CI": "true"}
-    run = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False, timeout=60)
+    run = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False, timeout=300)
     assert run.returncode == 1, run.stdout + run.stderr
     assert {"FAILED test_crash.py::test_crash", "FAILED test_skip.py::test_skip"} <= set(
         re.findall(r"FAILED [\w.:]+", run.stdout)

@@ -159,7 +159,7 @@ def reading(path: object) -> Iterator[None]:
         ) from error
 
 
-def describe(error: Exception) -> str:
+def describe(error: BaseException) -> str:
     """Return the message of an error in one line, with its class where the message is a single word or empty."""
     if isinstance(error, MemoryError):
         return "asks for more memory than there is"

@@ -4,11 +4,12 @@
 """What is chosen by name (roads, planners, log and export formats, metrics): built-in, or of an installed package."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import entry_points, EntryPoint
 from typing import cast, Generic, TypeVar
 
-from scenario_gen.base.errors import describe, did_you_mean, InputError
+from scenario_gen.base.errors import describe, did_you_mean, InputError, ScenarioGenError
 
 T = TypeVar("T")
 
@@ -81,12 +82,29 @@ class Registry(Generic[T]):
         entry = installed(self.group)[name]
         try:
             loaded = entry.load()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise InputError(f"plugin {name!r} of {_source(entry)} cannot be loaded: {describe(error)}") from error
         if not (callable(loaded) if self.kind is None else isinstance(loaded, self.kind)):
             kind = "function" if self.kind is None else self.kind.__name__
             raise InputError(f"plugin {name!r} of {_source(entry)} is no {kind}: {entry.value}")
         return cast(T, loaded)
+
+    @contextmanager
+    def running(self, name: str) -> Iterator[None]:
+        """Name the plugin in an error of its code; what is built in answers for itself.
+
+        Raises:
+            InputError: the code of the plugin raised an error that is not ours, or wanted to leave the process.
+        """
+        try:
+            yield
+        except ScenarioGenError:
+            raise
+        except (Exception, SystemExit) as error:
+            if name in self.built_in:
+                raise
+            source = _source(installed(self.group)[name])
+            raise InputError(f"plugin {name!r} of {source} failed: {describe(error)}") from error
 
     def values(self) -> Iterator[T]:
         """Yield everything in the order of `names`; a plugin is loaded when its turn comes.

@@ -83,6 +83,9 @@ def drive(options: Drive) -> None:
     _report(result, options.out)
     if result.broken:
         say("bars not met: " + "; ".join(result.broken))
+    if result.easy:
+        say(result.easy)
+    if result.broken:
         raise typer.Exit(1)
 
 
@@ -146,7 +149,7 @@ class Search:
     ] = ""
     worst: Annotated[bool, typer.Option("--worst", help="Look for the worst failure instead of the failure rate.")] = False
     max_rate: Annotated[
-        float | None, typer.Option(min=0.0, max=1.0, help="Exit code 1 if the interval of the failure rate ends above this.")
+        float | None, typer.Option(min=0.0, max=1.0, help="Exit code 1 if the failure rate's upper bound (95 %) is above this.")
     ] = None
     namespace: Annotated[str | None, typer.Option(help="Namespace of the scenarios, if the bag has several.")] = None
     seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same search.")] = 0
@@ -190,6 +193,8 @@ def search(options: Search) -> None:
     from scenario_gen.closed_loop.search.command import JOURNAL, search_failures, SearchRequest
     from scenario_gen.closed_loop.search.objective import Objective
 
+    if options.worst and options.max_rate is not None:
+        raise InputError("--max-rate: a search for the worst gives no rate; leave out --worst, or --max-rate")
     remind(options.source)
     source = drawn_from(options)
     request = SearchRequest(
@@ -222,6 +227,6 @@ def search(options: Search) -> None:
     if result.findings:
         again = f"scenario-gen drive {options.out / 'bag'} --planner {options.planner} --ego {request.ego_id()}"
         say(f"as a regression test: {again}")
-    if options.max_rate is not None and not result.estimate.rate.high <= options.max_rate:
-        say(f"the failure rate may be above {options.max_rate:g}: its interval ends at {result.estimate.rate.high:.3g}")
+    if options.max_rate is not None and not result.estimate.bound <= options.max_rate:
+        say(f"the failure rate may be above {options.max_rate:g}: its bound is {result.estimate.bound:.3g} (95 %)")
         raise typer.Exit(1)

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.off_road import is_off_road
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.picture import picture
 from scenario_gen.closed_loop.planners import RouteFollower
@@ -35,6 +36,7 @@ from scenario_gen.numerics.plane import ahead_and_left, angle_between, unit
 
 OTHERS = 8  # nearest others that are seen
 AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route at which it is seen
+LOOKED_AT = np.array((0.0, *AHEAD))
 OWN, EACH = 5, 7  # numbers about the ego, and about each other
 REACH = 100.0  # metres beyond which nobody is seen
 FARTHEST, LONGEST, FASTEST = 1000.0, 50.0, 100.0  # bounds of what is seen: metres to the goal, metres of a length, m/s
@@ -128,7 +130,8 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         seen, reward = self._observed(), self._station - before
         info: dict[str, Any] = {"time": state.time}
         at_goal = loop.at_goal(state)
-        off_road = loop.off_road(state)
+        pose, half = state.vehicles[loop.ego, :3], loop.scenario.vehicles[loop.ego].half
+        off_road = loop.road is not None and is_off_road(loop.road, pose, half, config.off_road_depth)
         hit = loop.hit(state)
         terminated = at_goal or off_road or hit
         truncated = not terminated and state.step >= loop.last_step
@@ -155,10 +158,10 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         ahead, offset, angle, left = np.zeros((len(AHEAD), 2)), 0.0, 0.0, 0.0
         _, self._station = self._follower.steer(ego)
         if (route := self._follower.route) is not None:
-            pose = route.at(self._station)
+            pose, *coming = route.at(self._station + LOOKED_AT)
             offset = float(ahead_and_left(ego[:2] - pose[:2], pose[2])[1])
             angle, left = angle_between(ego.yaw, pose[2]), route.length - self._station
-            ahead = local(route.at(self._station + AHEAD)[:, :2])
+            ahead = local(np.array(coming)[:, :2])
         found = self._loop.observe(state)
         place = local(found.others[:, :2])
         away = np.hypot(place[:, 0], place[:, 1])

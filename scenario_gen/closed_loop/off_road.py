@@ -19,7 +19,7 @@ from scenario_gen.method.validity import control_points
 from scenario_gen.numerics import Bools, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
 from scenario_gen.numerics.plane import edge_lengths, unit
-from scenario_gen.roads import clearance_in_cells, distance_transform, to_cells
+from scenario_gen.roads import clearance_in_cells, distance_transform, footprint_fits, to_cells
 from scenario_gen.types import once_per_object, Road, Scenario
 
 FARTHEST = 10.0  # metres; margins and depths beyond are told as this
@@ -71,6 +71,13 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
             break  # nothing more is told
         deepest, most = max(deepest, float(found[:, 0].max())), max(most, float(found[:, 1].max()))
     return RoadUse(-deepest, most, begin)
+
+
+def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: float) -> bool:
+    """Whether a footprint at a pose (3,) is at least `limit` [m] deep off the road, as `road_use` has it."""
+    if footprint_fits(road, pose, 2.0 * half[0], 2.0 * half[1])[0]:
+        return False
+    return bool(_measured(road, pose[None], half, outside=True)[0, 0] >= limit)
 
 
 def poses_in(motion: Scenario, rows: list[int], k: int, u: Floats) -> Floats:

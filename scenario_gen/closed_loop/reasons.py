@@ -137,10 +137,10 @@ def _goes_first(loop: ClosedLoop, drive: Drive, conflict: Conflict, time: float)
     ego, other = state_at(drive, drive.ego, time), state_at(drive, conflict.first, time)
     ahead, _ = ahead_and_left(np.subtract(other[:2], ego[:2]), ego.yaw)
     same_way = math.cos(other.yaw - ego.yaw) > SAME_WAY
-    if same_way and ahead >= 0.5 * drive.motion.vehicles[drive.ego].length:
+    if same_way and float(ahead) >= 0.5 * drive.motion.vehicles[drive.ego].length:
         return False
     if conflict.following:
-        return conflict.entry_second > loop.begin + float(loop.scenario.time[1])
+        return bool(conflict.entry_second > loop.begin + loop.scenario.time[1])
     return float(np.interp(time, drive.motion.time, drive.clock[conflict.first])) < conflict.exit_first
 
 

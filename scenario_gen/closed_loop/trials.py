@@ -8,10 +8,12 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 import math
 import multiprocessing
 import os
 from pathlib import Path
+import pickle
 import pkgutil
 import sys
 from typing import Any
@@ -30,7 +32,7 @@ from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge
 from scenario_gen.method.evaluation import clustered_wilson
-from scenario_gen.types import GenerationResult, Interval, join_ego, Road, Scenario, token
+from scenario_gen.types import GenerationResult, Interval, join_ego, once_per_object, Road, Scenario, token
 
 MakePlanner = Callable[[], Planner]
 
@@ -60,7 +62,7 @@ class Bars(Parameters):
 
     collisions: float = parameter(0.0, "largest share of drives with a collision", low=0.0, high=1.0)
     off_road: float = parameter(0.0, "largest share of drives that leave the road", low=0.0, high=1.0)
-    goals: float = parameter(0.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
+    goals: float = parameter(1.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
     at_fault: float = parameter(0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0)
     jumps: float = parameter(0.0, "largest share of drives in which the ego jumps", low=0.0, high=1.0)
     progress: float = parameter(
@@ -250,18 +252,16 @@ def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: 
     if isinstance(planner, str):
         find_planner(planner)  # what is wrong with it is reported before there are processes
 
-    def tasks(trials: Sequence[Trial]) -> list[tuple[Trial, MakePlanner | str, ClosedLoopConfig]]:
-        return [(trial, planner, config) for trial in trials]
-
     if workers <= 1:
-        yield lambda trials: map(_run, tasks(trials))
+        yield lambda trials: map(_run, ((trial, planner, config) for trial in trials))
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
 
         def run(trials: Sequence[Trial]) -> Iterator[Outcome]:
+            tasks = ((replace(trial, road=None), _packed(trial.road) if trial.road else b"", planner, config) for trial in trials)
             with starting():
-                results = pool.map(_run, tasks(trials), chunksize=min(max(len(trials) // workers, 1), 4))
+                results = pool.map(_run_packed, tasks, chunksize=min(max(len(trials) // workers, 1), 4))
             done = 0
             try:
                 for outcome in results:
@@ -275,6 +275,23 @@ def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: 
                 ) from error
 
         yield run
+
+
+@once_per_object
+def _packed(road: Road) -> bytes:
+    return pickle.dumps(road)
+
+
+@lru_cache(maxsize=4)
+def _unpacked(road: bytes) -> Road:
+    """Return the road of a task: one object for all tasks, so that what is derived from it is derived once."""
+    known: Road = pickle.loads(road)
+    return known
+
+
+def _run_packed(task: tuple[Trial, bytes, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
+    trial, road, planner, config = task
+    return _run((replace(trial, road=_unpacked(road)) if road else trial, planner, config))
 
 
 def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:

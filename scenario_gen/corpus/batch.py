@@ -34,7 +34,7 @@ from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, 
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import at_period, criticality
-from scenario_gen.method.fitting import LostConflictError
+from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.types import GenerationResult
@@ -228,7 +228,7 @@ def _generate_case(
         segmentation = segment(encounter, request.config.segmentation, seed)
         result = Chain(encounter, segmentation, road, request.config, count=request.count, seed=seed).run()
     except (RefusedError, InputError) as error:
-        message = LOST_CONFLICT if isinstance(error, LostConflictError) else str(error)
+        message = LOST_CONFLICT if isinstance(error, LostEncounterError) else str(error)
         cause = message if isinstance(error, RefusedError) else "input"
         return case | {"cause": _cause(cause), "why": str(error)}, None
     generated = result.generated

@@ -5,9 +5,10 @@
 
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
+from scenario_gen.logs.cleaning import parse_origin
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_time_gap
-from scenario_gen.logs.geodesy import latitude_longitude, local_frame, metres_per_degree, middle_of
+from scenario_gen.logs.geodesy import azimuthal, latitude_longitude, local_frame, metres_per_degree, middle_of, reprojected, utm
 from scenario_gen.logs.groups import APART, shortest, ticks, windows
 from scenario_gen.logs.growing import Growth, Meeting
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
@@ -31,8 +32,8 @@ from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
     "APART", "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "Growth", "LogConfig", "LogFormat", "LogResult", "Meeting",
-    "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "UnknownFormatError", "bundled",
+    "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "UnknownFormatError", "azimuthal", "bundled",
     "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_known", "is_nocturne", "is_osi", "is_spmd",
-    "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "read_log", "read_raw", "shortest",
-    "space_time_gap", "ticks", "windows",
+    "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log", "read_raw",
+    "reprojected", "shortest", "space_time_gap", "ticks", "utm", "windows",
 ]  # fmt: skip

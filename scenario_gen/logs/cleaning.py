@@ -196,8 +196,8 @@ def in_metres(vehicles: list[Observations], config: LogConfig) -> list[Observati
     return found
 
 
-def parse_origin(text: str) -> tuple[float, float]:
-    """Return latitude and longitude of a text `latitude,longitude`, in degrees.
+def parse_origin(text: str, parameter: str = "origin") -> tuple[float, float]:
+    """Return latitude and longitude of a text `latitude,longitude`, in degrees, that a parameter has.
 
     Raises:
         InputError: it is not of that form, or no place on the globe.
@@ -205,9 +205,9 @@ def parse_origin(text: str) -> tuple[float, float]:
     try:
         latitude, longitude = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise InputError(f"parameter origin is {text!r}; write latitude,longitude in degrees") from error
+        raise InputError(f"parameter {parameter} is {text!r}; write latitude,longitude in degrees") from error
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
-        raise InputError(f"parameter origin is {text!r}; that is not a place on Earth")
+        raise InputError(f"parameter {parameter} is {text!r}; that is not a place on Earth")
     return latitude, longitude
 
 

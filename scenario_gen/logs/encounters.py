@@ -3,6 +3,7 @@
 
 """From clean tracks to smooth pieces: tracks are cut at long gaps, relocations and reversals."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -18,6 +19,7 @@ from scenario_gen.numerics import Bools, Floats, runs
 TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
 SHARPEST = 0.4  # 1/m: no car turns sharper, noise included
+BACKWARDS = np.radians(150.0)  # headings further off the path are those of a vehicle that drives backwards
 LEVER = 3.0  # m over which the course before and after a stop is measured
 
 
@@ -101,6 +103,23 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
         lost=lost,
     )
     return pieces, quality
+
+
+def driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], tuple[str, ...]]:
+    """Return the pieces without those whose recorded headings are opposite to the path, and a note on each of these.
+
+    Where most are, these are no headings of cars, and all pieces stay.
+    """
+    known = [piece for piece in pieces if len(piece.smooth.turned)]
+    opposite = [piece for piece in known if np.median(np.abs(piece.smooth.turned)) > BACKWARDS]
+    if 2 * len(opposite) > len(known):
+        return list(pieces), ()
+    notes = tuple(
+        f"vehicle {piece.track.id} drives backwards for {(piece.last - piece.first) * config.period:.1f} s, by its recorded "
+        "headings; that is left out, for only driving forwards is generated"
+        for piece in opposite
+    )
+    return [piece for piece in pieces if piece not in opposite], notes
 
 
 def moved_ahead(smooth: Smooth, metres: float) -> Smooth:

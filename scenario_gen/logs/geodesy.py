@@ -25,10 +25,22 @@ OWN_FRAME_M = 1000.0  # from the middle of its site at which an encounter has a 
 LEVER_M = 100.0  # ahead of a vehicle, a point that tells how its heading turns from frame to frame
 
 
-def _projection(origin: tuple[float, float]) -> Any:
+def azimuthal(origin: tuple[float, float]) -> Any:
+    """Return the `pyproj.Proj` of the local frame about latitude and longitude in degrees."""
     import pyproj
 
     return pyproj.Proj(proj="aeqd", lat_0=origin[0], lon_0=origin[1], ellps="WGS84")
+
+
+def utm(origin: tuple[float, float]) -> tuple[Any, str]:
+    """Return the `pyproj.Proj` of UTM in the zone of latitude and longitude in degrees, and the zone's name."""
+    import pyproj
+
+    latitude, longitude = origin
+    norway = 56.0 <= latitude < 64.0 and 3.0 <= longitude < 12.0  # its zone is wider
+    zone = 32 if norway else int((longitude + 180.0) // 6.0) % 60 + 1
+    half = "south" if latitude < 0.0 else "north"
+    return pyproj.Proj(proj="utm", zone=zone, south=latitude < 0.0, ellps="WGS84"), f"UTM zone {zone} {half}"
 
 
 def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]) -> Floats:
@@ -39,12 +51,12 @@ def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]
         longitude: degrees, of the same shape.
         origin: latitude and longitude in degrees.
     """
-    return np.stack(_projection(origin)(longitude, latitude), axis=-1)
+    return np.stack(azimuthal(origin)(longitude, latitude), axis=-1)
 
 
 def geodetic(position: Floats, origin: tuple[float, float]) -> tuple[Floats, Floats]:
     """Return latitude and longitude in degrees of positions (..., 2) [m], the inverse of `local_frame`."""
-    longitude, latitude = _projection(origin)(position[..., 0], position[..., 1], inverse=True)
+    longitude, latitude = azimuthal(origin)(position[..., 0], position[..., 1], inverse=True)
     return latitude, longitude
 
 
@@ -99,13 +111,23 @@ def about_its_middle(encounter: Encounter) -> Encounter:
     if encounter.origin is None or not np.hypot(*encounter.position.reshape(-1, 2).T).max() > OWN_FRAME_M:
         return encounter
     origin = middle_of(latitude_longitude(encounter).reshape(-1, 2), digits=5)
-    ahead = LEVER_M * np.stack([np.cos(encounter.heading), np.sin(encounter.heading)], axis=-1)
-    position, ahead = (
-        local_frame(*geodetic(places, encounter.origin), origin) for places in (encounter.position, encounter.position + ahead)
-    )
-    course = np.arctan2(*np.moveaxis(ahead - position, -1, 0)[::-1])
-    heading = encounter.heading + wrap_angle(course - encounter.heading)
+    position, heading = reprojected(encounter.position, encounter.heading, encounter.origin, azimuthal(origin))
     return replace(encounter, position=position, heading=heading, origin=origin)
+
+
+def reprojected(position: Floats, heading: Floats, origin: tuple[float, float], into: Any) -> tuple[Floats, Floats]:
+    """Return positions (..., 2) [m] and headings (...) [rad] of the local frame about an origin in another projection.
+
+    Args:
+        position: metres east and north of the origin.
+        heading: counter-clockwise from east.
+        origin: latitude and longitude in degrees.
+        into: a `pyproj.Proj`.
+    """
+    ahead = position + LEVER_M * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    there, ahead = (np.stack(into(*geodetic(places, origin)[::-1]), axis=-1) for places in (position, ahead))
+    course = np.arctan2(*np.moveaxis(ahead - there, -1, 0)[::-1])
+    return there, heading + wrap_angle(course - heading)
 
 
 def latitude_longitude(encounter: Encounter) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError, ScenarioGenError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.fitting import LostConflictError
+from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.sampling import Cancelled, TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, suitable_roads, with_suitable_roads
@@ -89,7 +89,7 @@ def suggest_nearest(error: RefusedError, requested: Chain, cancelled: Cancelled 
         cancelled: whether to stop looking; then nothing is suggested.
 
     Returns:
-        A LostConflictError that names roads that keep the conflict; an ImpossibleError with possible requests where states were
+        A LostEncounterError that names roads that keep the conflict; an ImpossibleError with possible requests where states were
         requested; else the error itself, as where a target or an order is what cannot be had.
     """
     if isinstance(error, TargetError):  # the states are not what is impossible
@@ -98,9 +98,9 @@ def suggest_nearest(error: RefusedError, requested: Chain, cancelled: Cancelled 
         search = _Search(replace(requested, count=min(requested.count, ENOUGH)), cancelled)
         suggestions = tuple(search.run())
         return ImpossibleError(str(error), () if cancelled() else suggestions)
-    if isinstance(error, LostConflictError):
+    if isinstance(error, LostEncounterError):
         kept = " or ".join(f"road {name}" for name in roads_that_keep(requested))
-        return LostConflictError(f"{error}. Nearest possible: {kept}")
+        return LostEncounterError(f"{error}. Nearest possible: {kept}")
     return error
 
 
@@ -116,7 +116,7 @@ def answer_refusal(
     """Return what a command answers when `pipeline.generate` refused these arguments: with the nearest requests or roads."""
     if road == AUTO:
         return error
-    if not request.moves and not isinstance(error, LostConflictError | TargetError):
+    if not request.moves and not isinstance(error, LostEncounterError | TargetError):
         return with_suitable_roads(error, encounter, road, config, seed)
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)

@@ -12,14 +12,14 @@ from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import NoPlaceError, road_and_template, ROADS
-from scenario_gen.template import refuse_too_large
+from scenario_gen.template import refuse_reversing, refuse_too_large
 from scenario_gen.types import Encounter, GenerationResult, Road, Segmentation
 
 AUTO = "auto"
 
 
 def takes(road: Road | str, encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> bool:
-    """Whether the template fits a road with all of its conflicts."""
+    """Whether the template fits a road, and nothing of its encounter is lost there."""
     try:
         there, template = road_and_template(road, encounter, config.road)
         fit_template(template, segmentation, there, replace(config.fitting, allow=""))
@@ -42,10 +42,14 @@ def on_first_suitable_road(
         RefusedError: the encounter is too large, or nothing can be generated on any of them.
     """
     refuse_too_large(encounter)
+    refuse_reversing(encounter)
+    reason = ""
     for name in suitable_roads(encounter, segment(encounter, config.segmentation, seed), config):
-        with suppress(RefusedError):
+        try:
             return _noted(generate(name), name)
-    raise RefusedError(f"{encounter.name}: no built-in road takes this encounter; give the path of a map")
+        except RefusedError as error:
+            reason = f": on road {name}, {error}"
+    raise RefusedError(f"{encounter.name}: no built-in road takes this encounter{reason}; give the path of a map")
 
 
 def with_suitable_roads(
@@ -63,5 +67,5 @@ def with_suitable_roads(
 
 def _noted(result: GenerationResult, name: str) -> GenerationResult:
     """Return a result that says which road was chosen."""
-    note = f"road auto: {name}, the first built-in road that keeps all conflicts of the template"
+    note = f"road auto: {name}, the first built-in road that keeps the encounter"
     return replace(result, generated=replace(result.generated, adaptations=(note, *result.generated.adaptations)))

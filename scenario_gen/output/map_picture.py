@@ -4,7 +4,7 @@
 """A map as a picture (SVG): its lanes and their directions, junctions, arms, and the places where a template fits."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from xml.sax.saxutils import escape
 
@@ -15,17 +15,18 @@ from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
 from scenario_gen.template import clean_tracks
-from scenario_gen.types import Encounter, LaneNetwork, Road, RuleKind
+from scenario_gen.types import Encounter, LaneNetwork, markings, Road
 
 PLACES = 8  # that are shown
-WIDE = 1200.0  # pixels
+WIDE, HEAD, FOOT = 1200.0, 70.0, 45.0  # pixels, of the sheet, and of the title above and the scale below
+SCALES = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)  # metres
+LEGEND = "green: traffic enters, red: it leaves; arrows: direction of lanes; darker: junctions; red line: stop, orange: give way"
 COLOURS = ("#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b", "#0e7490", "#7c4a21")
 STYLE = (
-    "rect.ground{fill:#fff} .lane{fill:#d4d9e2;stroke:#94a3b8} .turn{fill:#c3cad6;stroke:#94a3b8} .arrow{fill:#64748b} "
-    ".in{fill:#15803d} .out{fill:#b91c1c} .box{fill:none;stroke:#0f172a;stroke-dasharray:6 4} "
-    ".rule{fill:none;stroke-width:3;stroke:#15803d} .rule.stop{stroke:#b91c1c} .rule.priority{stroke:#ca8a04} "
-    ".rule.give_way{stroke:#d97706;stroke-dasharray:4 3} "
-    "text{font-family:sans-serif;fill:#0f172a}"
+    "rect.ground{fill:#fff} .lane{fill:#d4d9e2} .turn{fill:#c3cad6} .in{fill:#15803d} .out{fill:#b91c1c} "
+    ".box{fill:none;stroke:#0f172a;stroke-dasharray:6 4} .paint{fill:none;stroke:#64748b} .paint.arrow{fill:#64748b} "
+    ".paint.lane{stroke-dasharray:9 13} .paint.centre{stroke-dasharray:9 5} .paint.stop{stroke:#b91c1c;stroke-width:3} "
+    ".paint.give_way{stroke:#d97706;stroke-width:3;stroke-dasharray:4 3} text{font-family:sans-serif;fill:#0f172a}"
 )
 
 
@@ -53,14 +54,28 @@ def map_picture(name: str, encounter: Encounter | None = None) -> tuple[str, lis
     found: list[Place] = []
     if encounter is not None:
         try:
-            found = list(islice(places(network, clean_tracks(encounter)), PLACES))
+            found = list(islice(_apart(places(network, clean_tracks(encounter))), PLACES))
         except RefusedError as error:
             said.append(f"no place for {encounter.name}: {error}")
         said += [
-            f"place {k}: {place.where}, cost {place.cost:.1f} m²: --road '{split(name)[0]}{place.part}'"
+            f"place {k}: {place.where}, {_cost_in_words(place)}: --road '{split(name)[0]}{place.part}'"
             for k, place in enumerate(found, 1)
         ]
     return _picture(network, found), said
+
+
+def _apart(found: Iterator[Place]) -> Iterator[Place]:
+    """Yield the places that lie elsewhere than those before, which are better."""
+    boxes: list[Floats] = []
+    for place in found:
+        if not any((place.box[0] < other[1]).all() and (other[0] < place.box[1]).all() for other in boxes):
+            boxes.append(place.box)
+            yield place
+
+
+def _cost_in_words(place: Place) -> str:
+    """Say how little a place resembles the template."""
+    return f"cost {place.cost:.1f} m² (about {np.sqrt(place.cost):.1f} m off the template's paths)"
 
 
 class _Sheet:
@@ -68,7 +83,9 @@ class _Sheet:
 
     def __init__(self, low: Floats, high: Floats) -> None:
         margin = 0.02 * float((high - low).max()) + 5.0
-        self.low, self.high = low - margin, high + margin
+        wide = float(high[0] - low[0]) + 2.0 * margin
+        above, below = HEAD / WIDE * wide, FOOT / WIDE * wide
+        self.low, self.high = low - np.array([margin, below]), high + np.array([margin, above])
         self.scale = WIDE / float(self.high[0] - self.low[0])
         self.parts: list[str] = []
 
@@ -93,7 +110,12 @@ class _Sheet:
         tall = (self.high[1] - self.low[1]) * self.scale
         head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDE:g} {tall:.0f}" role="img">'
         ground = f'<rect class="ground" width="{WIDE:g}" height="{tall:.0f}"/>'
-        return "\n".join([head, f"<title>{escape(title)}</title>", f"<style>{STYLE}</style>", ground, *self.parts, "</svg>\n"])
+        metres = next((m for m in SCALES if m * self.scale > 0.08 * WIDE), SCALES[-1])
+        bar = f'<path class="paint scale" d="M20 {tall - 18:.0f}v6h{metres * self.scale:.1f}v-6"/>'
+        words = [(20, 28, 18, title), (20, 48, 12, LEGEND), (26, tall - 18, 12, f"{metres} m")]
+        texts = [f'<text x="{x}" y="{y:.0f}" font-size="{size}">{escape(text)}</text>' for x, y, size, text in words]
+        named = [f"<title>{escape(title)}</title>", f"<style>{STYLE}</style>"]
+        return "\n".join([head, *named, ground, *self.parts, bar, *texts, "</svg>\n"])
 
 
 def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
@@ -101,25 +123,22 @@ def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
     sheet = _Sheet(corners.min(axis=0), corners.max(axis=0))
     junctions: dict[str, list[Floats]] = defaultdict(list)
     for lane in sorted(network.lanes, key=lambda lane: not lane.junction):  # an arm's borders lie over the ways' ends
-        kind = "turn" if lane.junction else "lane"
-        sheet.shape("polygon", lane.outline, **{"class": kind})
-        if lane.junction:
+        sheet.shape("polygon", lane.outline, **{"class": "turn" if lane.junction else "lane"})
+        if lane.junction and not network.drawn:
             junctions[lane.junction].append(lane.centre.mean(axis=0))
-        else:
-            _arrow(sheet, lane.centre, len(lane.centre) // 2, "arrow")
+    for marking, lines in markings(network).items():
+        for line in lines:
+            sheet.shape("polyline", line, **{"class": f"paint {marking}"})
     for kind, lanes, at in (("in", network.entries, 0), ("out", network.exits, -1)):
         for k in lanes:
             _arrow(sheet, network.lanes[k].centre, at, kind)
-    for rule in sorted(network.rules, key=lambda rule: rule.kind != RuleKind.TRAFFIC_LIGHT):  # a sign lies over its light
-        if len(rule.line):
-            sheet.shape("polyline", rule.line, **{"class": f"rule {rule.kind}"})
     for k, place in enumerate(found, 1):
         (x0, y0), (x1, y1) = place.box.tolist()
         sheet.shape("polygon", np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), **{"class": "box"})
         for n, path in enumerate(place.paths):
             colour = COLOURS[n % len(COLOURS)]
             sheet.shape("polyline", path, fill="none", stroke=colour, stroke_width="2.5", stroke_opacity="0.8")
-        sheet.text(np.array([x0, y1 + 1.0]), f"place {k}: cost {place.cost:.1f} m²", 14.0)
+        sheet.text(np.array([x0, y1 + 1.0]), f"place {k}: {_cost_in_words(place)}", 14.0)
     for name, middles in junctions.items():
         sheet.text(np.mean(middles, axis=0), name)
     return sheet.svg(network.name)

@@ -128,7 +128,12 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
         kinds = f"a map_server YAML file or a vector map ({', '.join(FORMATS)})"
         part = "; one part behind one # can be named of a vector map alone" if "#" in name_or_path else ""
         raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}{near}")
-    return ROADS[name_or_path](name_or_path, encounter, config)
+    draw_road = ROADS[name_or_path]
+    with ROADS.running(name_or_path):
+        road = draw_road(name_or_path, encounter, config)
+        if not isinstance(road, Road):
+            raise TypeError(f"it returned {type(road).__name__}; it must return a Road")
+        return road
 
 
 def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -143,7 +148,7 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings: a junction's template
         if name in ("t_intersection", "four_way") and not any(track.makes_u_turn for track in tracks):
-            return draw_junction(name, tracks, config)
+            return draw_junction(name, encounter, config)
     else:
         main = main_line(frenet, tracks)
         if bends(name, main):

@@ -22,8 +22,13 @@ class RoadConfig(Parameters):
     traffic_side: str = parameter("right", "side of the road that traffic keeps", choices=("right", "left"))
     traffic_rules: str = parameter(
         "kept",
-        "whether scenarios keep the stop lines and rights of way of a vector map",
+        "whether scenarios keep the stop lines and rights of way of a vector map, or of `priority`",
         choices=("kept", "ignored"),
+    )
+    priority: str = parameter(
+        "auto",
+        "signs of a drawn junction: auto: arms of those who yielded give way, and into a roundabout; all_way_stop: all stop",
+        choices=("none", "auto", "all_way_stop"),
     )
     corridor_margin: float = parameter(
         1.0, "room on each side of the template's footprints in a corridor", unit="m", low=0.1, high=10.0

@@ -8,9 +8,9 @@ the template drives is the one that the road was drawn for, another one the clot
 wider than a lane, as far as the road is.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import pairwise, permutations
 
 import numpy as np
 import shapely
@@ -18,12 +18,13 @@ from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import angle_between, unit, unit_left
+from scenario_gen.numerics.plane import angle_between, place, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.pavement import drivable_beside, Inside, inside, paved, ring, strip, swept
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.roads.ways import draw_route, reverse
-from scenario_gen.types import Lane, LaneNetwork, Road
+from scenario_gen.template import Track
+from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road, RuleKind, TrafficRule
 
 Way = tuple[int, int, int, int]
 """Arm and lane that a way comes from, arm and lane that it leads to; lanes count from the dividing line."""
@@ -96,12 +97,39 @@ class Plan:
         axis: the dividing line from the end of the first arm to that of the second; None: these are arms as the others.
         driven: ways through the junction.
         ring: radius [m] of the lane of a roundabout about the origin; 0: it is none.
+        yielding: the arms that give way, if priorities are shown.
+        drawn_for: where the template that it is drawn for lies, about the same origin.
     """
 
     arms: Sequence[Arm]
     axis: Curve | None = None
     driven: Sequence[Driven] = ()
     ring: float = 0.0
+    yielding: Collection[int] = ()
+    drawn_for: DrawnFor | None = None
+
+
+def lane_id(arm: int, lane: int, *, inward: bool) -> str:
+    """The id of lane `lane`, counted from the dividing line, of an arm."""
+    return f"{arm + 1}.{-lane - 1 if inward else lane + 1}"
+
+
+def aligned(
+    tracks: Sequence[Track], lane_of: Mapping[tuple[int, bool], tuple[int, int]], pose: Floats, at: Floats
+) -> DrawnFor | None:
+    """Where the template of a road lies of which a pose (3,) in its own frame is one on the road; None without a template.
+
+    Args:
+        tracks: the template's.
+        lane_of: arm and lane of the ends of its tracks, as far as they are known, by vehicle and whether it comes in.
+        pose: x, y [m], yaw [rad] in the template's frame.
+        at: the same on the road, about the plan's origin.
+    """
+    turn = at[2] - pose[2]
+    ids = {key: lane_id(*place, inward=key[1]) for key, place in lane_of.items()}
+    lanes = tuple((ids.get((i, True), ""), ids.get((i, False), "")) for i in range(len(tracks)))
+    moved = place(np.array([*at[:2], turn]), -pose[0], -pose[1])
+    return DrawnFor(np.array([*moved, turn]), lanes) if tracks else None
 
 
 def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = None) -> Road:
@@ -116,17 +144,24 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
     Raises:
         RefusedError: it has more cells than are allowed.
     """
-    lanes, surface = _Drawing(plan, config).drawn()
+    drawing = _Drawing(plan, config)
+    lanes, surface = drawing.drawn()
+    network = LaneNetwork(
+        name,
+        lanes,
+        rules=tuple(drawing.rules(lanes)),
+        rules_kept=config.traffic_rules == "kept",
+        drawn=True,
+        drawn_for=plan.drawn_for,
+    )
     if box is None:
         box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
         box[0] = np.floor(box[0])
     low = box[0]
-    return draw_lanes(
-        [lane.moved(-low) for lane in lanes], shapely.transform(surface, lambda xy: xy - low), name, config, box - low
-    )
+    return draw_lanes(network.moved(-low), shapely.transform(surface, lambda points: points - low), config, box - low)
 
 
-def draw_lanes(lanes: Sequence[Lane], surface: BaseGeometry, name: str, config: RoadConfig, box: Floats | None = None) -> Road:
+def draw_lanes(network: LaneNetwork, surface: BaseGeometry, config: RoadConfig, box: Floats | None = None) -> Road:
     """Return the road of lanes and of what is paved about them, in metres; `box` of its grid, or all and a verge.
 
     Raises:
@@ -135,7 +170,7 @@ def draw_lanes(lanes: Sequence[Lane], surface: BaseGeometry, name: str, config: 
     if box is None:
         box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
     whole = surface.buffer(_KERB_M, join_style="mitre")
-    return road_of(LaneNetwork(name, tuple(lanes), drawn=True), box, config, whole)
+    return road_of(network, box, config, whole)
 
 
 class _Drawing:
@@ -144,12 +179,17 @@ class _Drawing:
     def __init__(self, plan: Plan, config: RoadConfig) -> None:
         self._plan, self._config, self._width = plan, config, config.lane_width
         self._sign = 1.0 if config.traffic_side == "right" else -1.0  # lanes in lie so many times their offset to the right
-        self._joined = len(plan.arms) > 2 or plan.axis is None
+        self._joined = len(plan.arms) > 2 or plan.axis is None or len(plan.driven) > 0
         self._lines = [self._line(k) for k in range(len(plan.arms))]
         rounded = self._joined and not plan.ring and all(arm.outward for arm in plan.arms)
         self._corner_radius = config.corner_radius if rounded else 0.0
         self._surface = paved(self._pieces(), self._corner_radius)
         self._drivable: Inside = inside(self._surface)
+        self._driven = {way.places: way.curve for way in reversed(plan.driven)}
+        self._mouths = [self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)]
+        for places in self._usual() if self._joined else ():
+            if self._way(places) is None and (way := self._from_end_to_end(places)) is not None:  # its mouths lie too near
+                self._driven[places] = way
         self._mouths = [self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)]
 
     def drawn(self) -> tuple[tuple[Lane, ...], BaseGeometry]:
@@ -165,7 +205,7 @@ class _Drawing:
                     left, right = (inner, outer) if self._sign > 0.0 else (outer, inner)
                     beside = tuple(first + other for other in (n - 1, n + 1) if 0 <= other < count)
                     index[k, inward, n] = len(lanes)
-                    lanes.append(Lane(f"{k + 1}.{-n - 1 if inward else n + 1}", left, right, (), beside))
+                    lanes.append(Lane(lane_id(k, n, inward=inward), left, right, (), beside))
         if not self._joined:
             return tuple(lanes), self._surface
         ways = [(index[a, True, i], index[b, False, j], way) for (a, i, b, j), way in self._ways().items()]
@@ -181,6 +221,23 @@ class _Drawing:
         return tuple(
             replace(lane, successors=tuple(after.get(k, lane.successors))) for k, lane in enumerate(lanes)
         ), self._surface
+
+    def rules(self, lanes: Sequence[Lane]) -> Iterator[TrafficRule]:
+        """What signs say at the mouths of arms: to stop, or to give way to the other arms, and to who is on the ring."""
+        arms = range(len(self._plan.arms)) if self._joined and self._config.priority != "none" else ()
+        mouths = [k for k, lane in enumerate(lanes) if not lane.junction]
+        into = [[k for k in mouths if lanes[k].id.startswith(f"{arm + 1}.-")] for arm in arms]
+        stop = self._config.priority == "all_way_stop" and not self._plan.ring and all(arm.outward for arm in self._plan.arms)
+        for arm in arms:
+            if not into[arm] or not (stop or arm in self._plan.yielding):
+                continue
+            over = [k for other in arms if other != arm and other not in self._plan.yielding for k in into[other]]
+            if self._plan.ring:
+                over = [k for k, lane in enumerate(lanes) if lane.junction and not lane.id.startswith(f"{arm + 1}.")]
+            ends = [edge for k in into[arm] for edge in (lanes[k].left[-1], lanes[k].right[-1])]
+            line = np.stack((ends[0], ends[-1]) if self._sign > 0.0 else (ends[1], ends[-2]))
+            kind = RuleKind.STOP if stop else RuleKind.GIVE_WAY
+            yield TrafficRule(f"arm {arm + 1}", kind, tuple(into[arm]), () if stop else tuple(over), line)
 
     def _pieces(self) -> Iterator[BaseGeometry]:
         """What is paved for certain: the arms, the ring, and where a vehicle drives through the junction."""
@@ -214,9 +271,8 @@ class _Drawing:
             edge = side * (count * self._width + _WIDER_THAN_LANES_M)
             wider |= self._drivable(line.beside(along, edge)[:, :2])
         mouth = float(along[int(np.argmax(wider))]) if wider.any() else line.length
-        for way in self._plan.driven:
-            a, _, b, _ = way.places
-            for own, curve in ((a, way.curve), (b, way.curve.reversed())):
+        for (a, _, b, _), way in self._driven.items():
+            for own, curve in ((a, way), (b, way.reversed())):
                 bent = np.abs(curve.points[:, 2] - curve.points[0, 2]) > _BENT
                 if own == k and bent.any():
                     mouth = min(mouth, float(curve.station[max(int(np.argmax(bent)) - 1, 0)]))
@@ -229,32 +285,41 @@ class _Drawing:
         borders = [line.beside(line.station, side * self._width * n)[:, :2] for n in range(count + 1)]
         return borders if inward else [border[::-1] for border in borders]
 
-    def _ways(self) -> dict[Way, Curve]:
-        """The ways of the template, those from each lane straight on to the same lane of each other arm, and those that lack."""
+    def _usual(self) -> list[Way]:
+        """From each lane to the same lane of each other arm."""
         arms = self._plan.arms
-        pairs = [(a, b) for a, b in product(range(len(arms)), repeat=2) if a != b]
-        usual = [
+        return [
             (a, i, b, j)
-            for a, b in pairs
+            for a, b in permutations(range(len(arms)), 2)
             for i in range(arms[a].inward)
             if 0 <= (j := i if arms[a].outward else i + arms[b].outward - arms[a].inward) < arms[b].outward
         ]
-        driven = {way.places: way.curve for way in reversed(self._plan.driven)}
-        ways = {places: way for places in dict.fromkeys((*driven, *usual)) if (way := self._way(places, driven)) is not None}
-        for a, b in pairs:
+
+    def _ways(self) -> dict[Way, Curve]:
+        """The ways of the template, the usual ones, and those that lack."""
+        arms = self._plan.arms
+        everywhere = dict.fromkeys((*self._driven, *self._usual()))
+        ways = {places: way for places in everywhere if (way := self._way(places)) is not None}
+        for a, b in permutations(range(len(arms)), 2):
             lacking = [(a, i, b, arms[b].outward - 1) for i in range(arms[a].inward) if all(w[:2] != (a, i) for w in ways)]
             lacking += [(a, arms[a].inward - 1, b, j) for j in range(arms[b].outward) if all(w[2:] != (b, j) for w in ways)]
             for places in lacking:
-                if min(places) >= 0 and (way := self._way(places, driven)) is not None:
+                if min(places) >= 0 and (way := self._way(places)) is not None:
                     ways[places] = way
         return ways
 
-    def _way(self, places: Way, driven: Mapping[Way, Curve]) -> Curve | None:
+    def _from_end_to_end(self, places: Way) -> Curve | None:
+        """The way from the end of one lane to that of another; None if no car could drive it."""
+        (a, i, b, j), arms = places, self._plan.arms
+        start, goal = arms[a].lane(i, self._config, inward=True), arms[b].lane(j, self._config, inward=False)
+        return None if abs(angle_between(goal[2], start[2])) > _TURN_BACK else draw_route(start, goal)
+
+    def _way(self, places: Way) -> Curve | None:
         """The way from the middle of one lane at its mouth to another's; None if no car could drive it."""
         a, i, b, j = places
         begin, end = self._mouths[a], self._mouths[b]
-        if places in driven:
-            return driven[places].cut(begin, driven[places].length - end, _WAY_STEP_M)
+        if (driven := self._driven.get(places)) is not None:
+            return driven.cut(begin, driven.length - end, _WAY_STEP_M)
         start = self._lines[a].beside(np.array([begin]), -self._sign * (i + 0.5) * self._width)[0]
         goal = reverse(self._lines[b].beside(np.array([end]), self._sign * (j + 0.5) * self._width)[0])
         if self._plan.axis is not None and max(a, b) < 2 and i == j:
@@ -263,7 +328,7 @@ class _Drawing:
             return Curve(line.beside(line.station, -self._sign * (i + 0.5) * self._width))
         if abs(angle_between(goal[2], start[2])) > _TURN_BACK:
             return None
-        way = draw_route(start, goal, lambda _: True)
+        way = draw_route(start, goal)
         return None if way is None else way.cut(0.0, way.length, _WAY_STEP_M)
 
     def _wider(self, way: Curve) -> Floats | float:
@@ -284,7 +349,7 @@ class _Drawing:
             own = way.beside(way.station, sign * (self._width / 2.0 + wider))[:, :2]
             edges.append(own + (1.0 - share) * (ends[0] - own[0]) + share * (ends[1] - own[-1]))
             edges[-1][[0, -1]] = ends
-        return Lane(f"{start.id}>{goal.id}", *edges, junction="1")
+        return Lane(f"{start.id}>{goal.id}", edges[0], edges[1], junction="1")
 
 
 def ways_through(road: Road) -> dict[tuple[int, int], Curve]:

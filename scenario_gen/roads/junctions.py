@@ -7,6 +7,7 @@ Each arm has its dividing line and lanes where the recorded vehicles were, to th
 with the template's own curvature, is swept into the road, so there is room for it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -17,12 +18,12 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.builtin import junction_centre
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import Arm, draw_plan, Driven, Plan
+from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLACK
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route
-from scenario_gen.template import clean_tracks, sharpness_of, Track, turn_of
-from scenario_gen.types import Encounter, Road
+from scenario_gen.template import clean_tracks, reactions_of, sharpness_of, Track, turn_of
+from scenario_gen.types import Encounter, Road, YIELD
 
 _RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
 _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
@@ -83,18 +84,20 @@ class _Direction:
         return max([end.away + tracks[end.vehicle].vehicle.length / 2.0 for end in self.members], default=0.0)
 
 
-def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Road:
+def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
     """Draw a junction whose arms are where the template comes and goes.
 
     Args:
         name: `t_intersection` or `four_way`.
-        tracks: the template's.
+        encounter: the template.
         config: how it is drawn.
 
     Raises:
         RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
     """
-    directions = _directions(name, tracks, junction_centre(tracks))
+    tracks = clean_tracks(encounter)
+    centre = junction_centre(tracks)
+    directions = _directions(name, tracks, centre)
     longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
     turn = np.pi - longest.yaw  # the longest arm leads west
     lane_of: dict[tuple[int, bool], tuple[int, int]] = {}  # arm and lane of each end
@@ -114,10 +117,27 @@ def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> R
         if (i, True) in lane_of and (i, False) in lane_of and not track.still:
             (a, first), (b, last) = lane_of[i, True], lane_of[i, False]
             ends = arms[a].lane(first, config, inward=True), arms[b].lane(last, config, inward=False)
-            way = draw_route(*ends, lambda _: True, sharpness_of(track))
+            way = draw_route(*ends, sharpness=sharpness_of(track))
             if way is not None:
                 driven.append(Driven((a, first, b, last), way, track.vehicle.length, track.vehicle.width + 2.0 * _SWEPT))
-    return draw_plan(Plan(arms, driven=driven), name, config)
+    aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
+    yielding = _yielding_arms(encounter, lane_of, config)
+    return draw_plan(Plan(arms, driven=driven, yielding=yielding, drawn_for=aim), name, config)
+
+
+def _yielding_arms(encounter: Encounter, lane_of: Mapping[tuple[int, bool], tuple[int, int]], config: RoadConfig) -> set[int]:
+    """Return the arms of those who yield to others of other arms, but for those to whom somebody yields.
+
+    Args:
+        encounter: the template.
+        lane_of: arm and lane of the ends of its tracks, by vehicle and whether it comes in.
+        config: whether priorities are shown.
+    """
+    came_by = {vehicle: arm for (vehicle, inward), (arm, _) in lane_of.items() if inward}
+    edges = reactions_of(encounter).edges if config.priority == "auto" else ()
+    ways = [(came_by[e.who], came_by[e.whom]) for e in edges if e.kind == YIELD and {e.who, e.whom} <= came_by.keys()]
+    pairs = [(arm, other) for arm, other in ways if arm != other]
+    return {arm for arm, _ in pairs} - {other for _, other in pairs}
 
 
 def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -129,11 +149,12 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     radius, fastest, length, wide = _RING[0], 0.0, 5.0, 2.0
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
+    centre = np.zeros(2)
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
-        centre, driven = _ring_driven(tracks, config)
-        radius, fastest = _ring(tracks, centre, driven)
+        centre, recorded = _ring_driven(tracks, config)
+        radius, fastest = _ring(tracks, centre, recorded)
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
     if fastest > np.sqrt(_RING_FASTEST * radius):
@@ -155,10 +176,14 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     driven = []
     for a, b in product(range(len(arms)), repeat=2):
         ends = arms[a].lane(0, config, inward=True), arms[b].lane(0, config, inward=False)
-        way = draw_ring_route(*ends, np.zeros(2), radius, lambda _: True)
+        way = draw_ring_route(*ends, np.zeros(2), radius)
         if way is not None:
             driven.append(Driven((a, 0, b, 0), way, length, wide + 2.0 * _SWEPT))
-    return draw_plan(Plan(arms, driven=driven, ring=radius), name, config)
+    lane_of = {end.key: (a, 0) for a, direction in enumerate(directions) for end in direction.members}
+    aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
+    yielding = set(range(len(arms))) - {arm for (_, inward), (arm, _) in lane_of.items() if inward}
+    yielding |= set() if encounter is None else _yielding_arms(encounter, lane_of, config)
+    return draw_plan(Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim), name, config)
 
 
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float]:
@@ -193,9 +218,10 @@ def _ring(tracks: tuple[Track, ...], centre: Floats, least: float) -> tuple[floa
     speed = np.concatenate([track.speed[own] for track, own in zip(tracks, there, strict=True)])
     place = np.concatenate([track.poses[own, :2] for track, own in zip(tracks, there, strict=True)])
     away = np.hypot(*(place - centre).T)
+    lateral = _RING_FASTEST if least > _RING[0] else _RING_LATERAL  # a ring that was recorded is drawn as it was
     for radius in np.append(np.arange(max(least, _RING[0]), _RING[1], 0.25), _RING[1]):
         fastest = float(speed[away < radius + _NEAR_RING].max(initial=0.0))
-        if np.square(fastest) <= _RING_LATERAL * radius:
+        if np.square(fastest) <= lateral * radius:
             break
     return float(radius), fastest
 

@@ -14,11 +14,11 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import Arm, draw_plan, Driven, Plan
+from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, ROOM, SHORTEST, SIDE_ARMS, SLACK
 from scenario_gen.roads.ways import draw_route, extended
-from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, sharpness_of, to_frenet, Track
-from scenario_gen.types import Encounter, Road
+from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, reactions_of, sharpness_of, to_frenet, Track
+from scenario_gen.types import Encounter, Road, YIELD
 
 _RAMP_ANGLE = np.radians(12.0)
 _BEND = np.radians(20.0)  # of a curve whose template does not bend
@@ -69,30 +69,40 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it,
             or the template needs a junction.
     """
-    lanes, before, after, sharpness = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 0.02
+    lanes, before, after, approach, yields = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 2.0 * SHORTEST, True
+    sharpness = 0.02
+    tracks: tuple[Track, ...] = ()
+    who, joins = list[int](), np.zeros(3)  # where the template's vehicles join, heading as they do
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
         frenet = to_frenet(tracks)
         who = _merging(tracks, frenet)
         others = frenet.lane[[i for i in range(len(tracks)) if i not in who]]
-        lanes = max(int(others.max(initial=0)) + 1, int(frenet.lane[who[0]].max()), config.lanes)
+        lanes = max(int(others.max(initial=0)) + 1, int(frenet.lane[who, 1].max()) + 1, config.lanes)
         along = float(frenet.direction[who[0]])
         low, high = sorted(along * end for end in frenet.span(tracks))
         join = float(np.median([along * frenet.station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
         before, after = join - low, high - join
+        approach = join - min(along * float(frenet.station[i][0]) - tracks[i].vehicle.length / 2.0 for i in who)
         sharpness = max(sharpness_of(tracks[i]) for i in who)
-    reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after)]
+        yields = any(edge.kind == YIELD and edge.who in who for edge in reactions_of(encounter).edges)
+        joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
+        joins[2] += 0.0 if along > 0.0 else np.pi
+    reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after, approach)]
     width = config.lane_width
     side = -1.0 if config.traffic_side == "right" else 1.0  # of the dividing line on which the traffic to the east drives
     arms = [Arm.towards(yaw, length, lanes) for yaw, length in ((np.pi, reach[0]), (0.0, reach[1]))]
     yaw = np.pi - side * _RAMP_ANGLE  # out along the ramp
     joined = np.array([0.0, side * (lanes - 0.5) * width])
-    ramp = np.array([*(joined + reach[0] * unit(yaw)), yaw + np.pi])
+    ramp = np.array([*(joined + reach[2] * unit(yaw)), yaw + np.pi])
     axis = Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]]))
-    way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), lambda _: True, sharpness)
+    way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), sharpness=sharpness)
     driven = () if way is None else (Driven((2, 0, 1, lanes - 1), way, 1.0, width),)
-    return draw_plan(Plan([*arms, Arm.ramp(ramp, config)], axis, driven), name, config)
+    lane_of = {(i, inward): (2, 0) if inward else (1, lanes - 1) for i in who for inward in (True, False)}
+    aim = aligned(tracks, lane_of, joins, np.array([*joined, 0.0]))
+    plan = Plan([*arms, Arm.ramp(ramp, config)], axis, driven, yielding=(2,) if yields else (), drawn_for=aim)
+    return draw_plan(plan, name, config)
 
 
 def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:

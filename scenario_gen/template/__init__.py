@@ -21,7 +21,7 @@ from scenario_gen.template.path_crossing import pair_crossings, path_crossing
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.template.separation import least_gap, least_gaps, own_paths, separate, smallest_gaps
 from scenario_gen.template.side import mirrored, traffic_side
-from scenario_gen.template.size import MOST_SAMPLES, MOST_VEHICLES, refuse_too_large
+from scenario_gen.template.size import MOST_SAMPLES, MOST_VEHICLES, refuse_reversing, refuse_too_large
 from scenario_gen.template.starts import Equation, solve_starts
 from scenario_gen.template.tracks import clean_tracks, Track
 
@@ -59,6 +59,7 @@ __all__ = [
     "passing",
     "path_crossing",
     "reactions_of",
+    "refuse_reversing",
     "refuse_too_large",
     "required_orders",
     "separate",

@@ -25,7 +25,8 @@ _ROAD_WAVELENGTH = 60.0  # metres: and as the line of a road over this one
 _STRAIGHT = np.radians(10.0)  # a template in which nobody turns by more is one of a straight road
 _STATION_WAVELENGTH = 150.0  # metres: what projection adds is smoothed over this wavelength
 _MAX_SHIFT = 30.0  # metres between oncoming vehicles on the widest road
-_BUMPER = 1.0  # metres kept between two footprints that share a lane
+_OVERLAP = 0.5  # metres by which two footprints in one lane may overlap lengthwise in a record, which is no exacter
+_SWERVE = 1.5  # metres by which a vehicle that comes back leaves its lane, at least
 _MOST_BETWEEN = 4  # lanes left free between oncoming vehicles, at most
 
 
@@ -40,6 +41,8 @@ class FrenetTracks:
         offset: (N, T) metres to the left of the line.
         lane: (N, 2) lane at the start and at the end, counted per direction from the driver's left, 0 is the leftmost.
         change: (N, T) how much of the lane change is done, 0 to 1; 0 for a vehicle that keeps its lane.
+        swerve: (N, T) metres to the driver's left of its lane for a vehicle that leaves it and comes back, round another one say;
+            0 for one that does not.
         lanes: lanes per direction that the template needs.
         between: (2,) lanes along and against the line that are left free between oncoming vehicles, to be as far apart as
             they are; a road that has not got them can do without.
@@ -51,6 +54,7 @@ class FrenetTracks:
     offset: Floats
     lane: Ints
     change: Floats
+    swerve: Floats
     lanes: int
     between: tuple[int, int] = (0, 0)
 
@@ -130,11 +134,12 @@ def to_frenet(tracks: tuple[Track, ...]) -> FrenetTracks:
                 f"vehicle {track.vehicle.id} lies across the others' road (turned from it by {np.degrees(turned.max()):.0f}°): "
                 f"this template needs a junction"
             )
-    lane, change, lanes = _lanes(tracks, direction, station, offset)
+    lane, change, swerve, lanes = _lanes(tracks, direction, station, offset)
     between = _between(direction, offset)
     return FrenetTracks(
-        line, frozen_ints(direction), frozen(station), frozen(offset), frozen_ints(lane), frozen(change), lanes, between
-    )
+        line, frozen_ints(direction), frozen(station), frozen(offset), frozen_ints(lane), frozen(change), frozen(swerve), lanes,
+        between,
+    )  # fmt: skip
 
 
 def _smoothed_station(track: Track, along: Floats) -> Floats:
@@ -205,19 +210,26 @@ def _shifted(curve: Curve, rows: Ints, offset: float) -> Floats:
     return np.asarray(curve.points[rows, :2] + shift * normal)
 
 
-def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: Floats) -> tuple[Ints, Floats, int]:
-    """Lanes of each direction by clustering offsets, from the driver's left to the right."""
+def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: Floats) -> tuple[Ints, Floats, Floats, int]:
+    """Lanes of each direction by clustering offsets, from the driver's left; lane changes, swerves, how many lanes."""
     right = -direction[:, None] * offset
     span = max(offset.shape[1] // 10, 1)
     ends = np.column_stack((right[:, :span].mean(axis=1), right[:, -span:].mean(axis=1)))
     changes = np.abs(ends[:, 1] - ends[:, 0]) > _LANE_CHANGE
-    ends[~changes] = right[~changes].mean(axis=1)[:, None]
+    into = _into_oncoming(direction, -direction[:, None] * ends) & changes[:, None]
+    ends = np.where(into, ends[:, ::-1], ends)  # who ends in the oncoming lane has not changed to a lane of its own direction
+    changes &= ~into.any(axis=1)
+    swerve = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * np.linspace(0.0, 1.0, offset.shape[1]) - right
+    swerve[changes | (np.abs(swerve).max(axis=1) < _SWERVE)] = 0.0
+    swerves = swerve.any(axis=1)
+    ends[~changes & swerves] = ends[~changes & swerves].mean(axis=1)[:, None]
+    ends[~changes & ~swerves] = right[~changes & ~swerves].mean(axis=1)[:, None]
     change = np.zeros_like(offset)
     for i in np.flatnonzero(changes):
         done = np.clip((right[i] - ends[i, 0]) / (ends[i, 1] - ends[i, 0]), 0.0, 1.0)
         change[i] = np.maximum.accumulate(done)
     there = np.stack((change < 0.5, (change >= 0.5) | ~changes[:, None]), axis=1)  # when each is in its first, in its last lane
-    there &= np.stack([track.there for track in tracks])[:, None]
+    there &= np.stack([track.there for track in tracks])[:, None] & (np.abs(swerve) < _SWERVE / 2.0)[:, None]
     lane = np.zeros((len(tracks), 2), dtype=np.int64)
     for sign in (1, -1):
         members = np.flatnonzero(direction == sign)
@@ -227,7 +239,11 @@ def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: 
         held: list[tuple[int, int]] = []
         for value, j, k in slots:
             apart = bool(values) and value - float(np.mean(values)) > _SAME_LANE
-            if apart or any(_beside(tracks, station, j, other, there[j, k] & there[other, m]) for other, m in held if other != j):
+            if apart or any(
+                _beside(tracks, station, j, other, there[j, k] & there[other, m], passing=bool(swerves[j] or swerves[other]))
+                for other, m in held
+                if other != j
+            ):
                 current += max(1, round((value - float(np.mean(values))) / (2.0 * _SAME_LANE)))
                 values, held = [], []
             values.append(value)
@@ -235,7 +251,15 @@ def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: 
             lane[j, k] = current
             if not changes[j]:
                 lane[j, 1] = current
-    return lane, change, int(lane.max()) + 1
+    return lane, change, swerve, int(lane.max()) + 1
+
+
+def _into_oncoming(direction: Ints, ends: Floats) -> Bools:
+    """(N, 2) whether a vehicle starts or ends at an offset (N, 2) [m] at which one of the other direction drives."""
+    oncoming = direction[:, None] != direction
+    kept = np.abs(ends[:, 1] - ends[:, 0]) < _SAME_LANE
+    near = np.abs(ends[:, :, None] - ends.mean(axis=1)) < _SAME_LANE
+    return np.asarray((near & (oncoming & kept)[:, None, :]).any(axis=2))
 
 
 def _between(direction: Ints, offset: Floats) -> tuple[int, int]:
@@ -248,10 +272,13 @@ def _between(direction: Ints, offset: Floats) -> tuple[int, int]:
     return (free + 1) // 2, free // 2
 
 
-def _beside(tracks: tuple[Track, ...], station: Floats, i: int, j: int, when: Bools) -> bool:
-    """True if the two are ever side by side at these samples (T,), so that they cannot share a lane."""
+def _beside(tracks: tuple[Track, ...], station: Floats, i: int, j: int, when: Bools, *, passing: bool) -> bool:
+    """True if the two are ever side by side at these samples (T,), so that they cannot share a lane; nor if one gets past.
+
+    With `passing` one leaves the lane to get past.
+    """
     if not when.any():
         return False
-    reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0 + _BUMPER
+    reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0 - _OVERLAP
     ahead = (station[i] - station[j])[when]
-    return bool((np.abs(ahead) < reach).any() or np.sign(ahead[0]) != np.sign(ahead[-1]))
+    return bool((np.abs(ahead) < reach).any() or (not passing and np.sign(ahead[0]) != np.sign(ahead[-1])))

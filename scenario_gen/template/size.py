@@ -1,19 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How large an encounter can be, in time and in space, so that its scenarios take minutes and some gigabytes at most."""
+"""What can be a template: no larger than takes minutes and some gigabytes, and driven forwards."""
 
 from itertools import combinations
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Encounter
 
 MOST_VEHICLES = 64  # as many as a log is cut into at most
 MOST_VEHICLE_SECONDS = 4000.0  # two vehicles for 1,000 s take some two minutes and 1 GB; effort grows faster than the duration
 MOST_SAMPLES = 45_000  # of all vehicles: those seconds at 10 Hz; the segmenter keeps some 16 kB for each
 FARTHEST_APART = 2000.0  # m: as `log.proximity` at most
+REVERSED = 2.0  # m of path against its heading from which on a vehicle drives backwards
 STRAY, OUT_OF_PROPORTION = 2000.0, 4.0  # a vehicle's places span at most so many metres, and so many times what it drives
 
 
@@ -43,6 +45,26 @@ def refuse_too_large(encounter: Encounter) -> None:
             f"{MOST_SAMPLES} are possible; resample the tracks (10 Hz is usual): --set log.period=0.1"
         )
     _refuse_scattered(encounter)
+
+
+def refuse_reversing(encounter: Encounter) -> None:
+    """Refuse an encounter in which somebody drives backwards, which no scenario would.
+
+    Raises:
+        RefusedError: a vehicle moves against its heading for more than `REVERSED` in all.
+    """
+    for vehicle, position, heading, there in zip(
+        encounter.vehicles, encounter.position, encounter.heading, encounter.there, strict=True
+    ):
+        step, yaw = np.diff(position[there], axis=0), heading[there]
+        ahead, aside = ahead_and_left(step, (yaw[1:] + yaw[:-1]) / 2.0)
+        back = np.where(ahead < -np.abs(aside), -ahead, 0.0)
+        if back.sum() > REVERSED:
+            at = float(encounter.time[int(np.flatnonzero(there)[0]) + int(np.argmax(back > 0.0))])
+            raise RefusedError(
+                f"{encounter.name}: vehicle {vehicle.id[:50]} drives backwards for {back.sum():.1f} m, from {at:.1f} s on; only "
+                "driving forwards is generated: leave it out (log.vehicles names who is kept), or cut the log there"
+            )
 
 
 def _refuse_scattered(encounter: Encounter) -> None:

@@ -15,6 +15,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
 
+LEVEL = 2.5  # metres between the heights of two lanes of which one lies above the other
 MIRRORED = "the template is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
 _ONCOMING = -0.9  # cosine between directions of traffic
 
@@ -31,6 +32,7 @@ class Lane:
         beside: indices of the lanes of the same direction to which its traffic may change.
         speed_limit: m/s; NaN where the map does not say.
         junction: the junction that it is part of, "" if none.
+        height: (M,) metres, of each cross-section; NaN where it is not known, as where none is given.
     """
 
     id: str
@@ -40,19 +42,17 @@ class Lane:
     beside: tuple[int, ...] = ()
     speed_limit: float = math.nan
     junction: str = ""
+    height: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        freeze(self, left=frozen(self.left), right=frozen(self.right))
+        height = self.height if len(self.height) == len(self.left) else np.full(len(self.left), np.nan)
+        freeze(self, left=frozen(self.left), right=frozen(self.right), height=frozen(height))
         if self.left.shape != self.right.shape or self.left.ndim != 2 or self.left.shape[1] != 2 or len(self.left) < 2:
             raise InputError(
                 f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed"
             )
         if not (np.isfinite(self.left).all() and np.isfinite(self.right).all()):
             raise InputError(f"lane {self.id}: a border is not finite")
-
-    def moved(self, by: Floats) -> "Lane":
-        """The same lane (2,) [m] farther."""
-        return replace(self, left=self.left + by, right=self.right + by)
 
     @cached_property
     def centre(self) -> Floats:
@@ -109,6 +109,22 @@ class TrafficRule:
 
 
 @dataclass(frozen=True, eq=False)
+class DrawnFor:
+    """How a road was drawn for a template.
+
+    Attributes:
+        frame: (3,) x, y [m], yaw [rad] on the road of the template's own frame.
+        lanes: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be.
+    """
+
+    frame: Floats
+    lanes: tuple[tuple[str, str], ...]
+
+    def __post_init__(self) -> None:
+        freeze(self, frame=frozen(self.frame))
+
+
+@dataclass(frozen=True, eq=False)
 class LaneNetwork:
     """The lanes of a road that cars may use, those of a map or of a part of it; in metres in the road's own frame.
 
@@ -119,6 +135,8 @@ class LaneNetwork:
         rules: its signs, lights and rights of way.
         rules_kept: whether scenarios keep to the rules.
         drawn: whether it was drawn with its road: it is shown and exported, and nobody is held to it.
+        drawn_for: how it was drawn for a template; None: for none, or without a place for it.
+        origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map says metres.
     """
 
     name: str
@@ -127,8 +145,12 @@ class LaneNetwork:
     rules: tuple[TrafficRule, ...] = ()
     rules_kept: bool = True
     drawn: bool = False
+    drawn_for: DrawnFor | None = None
+    origin: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        if len(self.origin) not in (0, 2):
+            raise InputError(f"lanes of {self.name!r}: origin {self.origin}; latitude and longitude are needed")
         count = len(self.lanes)
         for rule in self.rules:
             if any(not 0 <= k < count for k in (*rule.lanes, *rule.over)):
@@ -136,6 +158,19 @@ class LaneNetwork:
         for lane in self.lanes:
             if any(not 0 <= k < count for k in (*lane.successors, *lane.beside)):
                 raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")
+
+    def moved(self, by: Floats) -> "LaneNetwork":
+        """The same lanes (2,) [m] farther."""
+        lanes = (replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.lanes)
+        rules = (replace(rule, line=rule.line + by) for rule in self.rules)
+        aim = self.drawn_for and replace(self.drawn_for, frame=self.drawn_for.frame + np.array([*by, 0.0]))
+        return replace(self, lanes=tuple(lanes), rules=tuple(rules), drawn_for=aim)
+
+    @cached_property
+    def has_levels(self) -> bool:
+        """Whether some lanes may lie above others."""
+        height = np.concatenate([lane.height[np.isfinite(lane.height)] for lane in self.lanes]) if self.lanes else np.zeros(0)
+        return bool(len(height) and np.ptp(height) > LEVEL)
 
     @cached_property
     def predecessors(self) -> tuple[tuple[int, ...], ...]:
@@ -165,13 +200,6 @@ class LaneNetwork:
                 name = lane.id.partition(".")[0]
                 arms[name] = (*arms.get(name, ()), k)
         return arms
-
-    @cached_property
-    def turns_back(self) -> bool:
-        """Whether one can turn back to the arm from which one comes, as in a roundabout."""
-        arm = {k: name for name, lanes in self.arms.items() for k in lanes}
-        ways = [(k, goal) for k in self.entries for way in self.lanes[k].successors for goal in self.lanes[way].successors]
-        return any(k in arm and arm[k] == arm.get(goal) for k, goal in ways)
 
     @cached_property
     def traffic_side(self) -> str:

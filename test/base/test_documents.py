@@ -13,7 +13,6 @@ import pytest
 from scenario_gen.base.documents import parse_json, parse_yaml, read_text, shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import assigned, flatten, loaded, read_parameter_file
-from scenario_gen.cli.commands import main
 from scenario_gen.pipeline import PipelineConfig
 
 NAMES = sorted(flatten(PipelineConfig()))
@@ -63,20 +62,6 @@ def test_any_text_is_a_valid_value_or_a_clear_error(name, text):
     else:
         entry, value = flatten(config)[name]
         assert type(value) is type(entry.default)
-
-
-def test_a_bad_value_ends_with_exit_code_2(capsys, monkeypatch, tmp_path):
-    for arguments in (
-        ["--set", "road.lane_width='"],
-        ["--params", str(tmp_path / "none.yaml")],
-        ["--set", "x"],
-        ["--set", "road=1"],
-    ):
-        monkeypatch.setattr("sys.argv", ["scenario-gen", "validate", str(tmp_path), *arguments])
-        with pytest.raises(SystemExit) as end:
-            main()
-        assert end.value.code == 2
-        assert "error:" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

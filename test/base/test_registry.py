@@ -73,6 +73,20 @@ def test_what_is_wrong_with_a_plugin_names_its_distribution(install, entries, ki
         Registry(GROUP, NUMBERS, kind)["broken"]
 
 
+@pytest.mark.parametrize(("body", "said"), [("raise SystemExit(0)", "SystemExit 0"), ("return 1 / 0", "division by zero")])
+def test_a_plugin_that_raises_or_exits_is_named(install, body, said):
+    (install("bad", own="bad_plugin:make") / "bad_plugin.py").write_text(f"def make():\n    {body}\n")
+    registry = Registry(GROUP, NUMBERS)
+    make = registry["own"]
+    del sys.modules["bad_plugin"]
+    with pytest.raises(InputError, match=rf"plugin 'own' of bad 1\.2 failed: {said}"), registry.running("own"):
+        make()
+    with pytest.raises(InputError, match="ours"), registry.running("own"):
+        raise InputError("ours")
+    with pytest.raises(ZeroDivisionError), registry.running("one"):  # a fault of our own is not hidden
+        1 / 0  # noqa: B018
+
+
 def test_two_distributions_with_one_name_are_both_named(install):
     install("left", same="builtins:len")
     install("right", same="builtins:abs")

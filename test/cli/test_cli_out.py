@@ -118,7 +118,7 @@ def test_a_signal_ends_it_with_its_code_and_leaves_nothing(made, tmp_path, numbe
     shutil.copytree(made, tmp_path / "out")
     before = files(tmp_path)
     process = started(tmp_path, *GENERATE[:5], 10_000, "--out", "out")
-    end = time.monotonic() + 120.0
+    end = time.monotonic() + 300.0
     while process.poll() is None and not any(tmp_path.glob(f"{PREFIX}*")) and time.monotonic() < end:
         time.sleep(0.01)
     process.send_signal(number)

@@ -52,15 +52,3 @@ def test_what_cannot_be_had_is_an_error_with_what_can(run):
     nearest = re.search(r"--goal '([^']*)'", said)[1]
     assert "off the road" in said
     assert run("generate", LOG, *QUICK, "--count", 2, "--goal", nearest, "--out", "taken")[0] == 0
-
-
-def test_bad_requests_say_what_is_wrong(run):
-    for arguments, reason in (
-        (("--ego", "nobody"), "there are: 1, 2"),
-        (("--start", "1 2 3"), "is not of the form"),
-        (("--goal", "5: 0 0 0"), "goals: no vehicle '5'"),
-    ):
-        code, said = run("generate", LOG, *QUICK, "--count", 2, *arguments)
-        assert code == 2 and reason in said
-    code, said = run("regenerate", "none", 0)
-    assert code == 2 and "does not exist" in said

@@ -29,6 +29,7 @@ def folder(code_of, tmp_path_factory):
     (place / "columns.csv").write_text(LOG.replace("t,id,x", "tyme,id,x", 1))
     (place / "bad.yaml").write_text("a: [")
     (place / "bad.json").write_text("{")
+    (place / "cut.mcap").write_bytes(b"\x89MCAP0\r\n" + b"\xff" * 100)
     (place / "nothing").mkdir()
     assert code_of("generate", place / "my log ü.csv", *ROAD, "--out", place / "made") == 0
     assert (place / "made" / "report.html").is_file() and (place / "made" / "bag").is_dir()
@@ -61,6 +62,10 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ((*GENERATE, "--count", "0"), "'--count': it must be at least 1"),
     ((*GENERATE, "--set", "sampling.lateral_sigma=nan"), "sampling.lateral_sigma is nan; give a finite number"),
     ((*GENERATE, "--set", "sampling.lateral_sigma=much"), "must be a number, not 'much'"),
+    ((*GENERATE, "--set", "road=1"), "road"),
+    ((*GENERATE, "--params", "none.yaml"), "none.yaml"),
+    ((*GENERATE, "--goal", "5: 0 0 0"), "goals: no vehicle '5'"),
+    (("regenerate", "none", "0"), "none does not exist"),
     ((*GENERATE, "--start", "a 0 0 0"), "is not of the form `id: x y yaw [speed]`"),
     ((*GENERATE, "--target", "pet=2..1"), "the lower bound must be below the upper one"),
     ((*GENERATE, "--obstacle", "1 2"), "is not of the form `x y yaw length width`"),
@@ -79,6 +84,10 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("validate", "none"), "none does not exist; name a folder"),
     (("validate", "my log ü.csv"), "is not a bag; name a folder"),
     (("compare", "made", "nothing"), "nothing/evaluation.json is no evaluation"),
+    *(
+        ((name, "cut.mcap", *more), "cut.mcap")
+        for name, *more in (("validate",), ("evaluate",), ("regenerate", "0"), ("reindex",))
+    ),
     (("reindex", "nothing"), "no .mcap file here; name the folder of a recorded bag"),
     # folders that are written
     ((*GENERATE, "--out", "note.txt"), "note.txt is a file; name another folder"),

@@ -22,6 +22,7 @@ from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
 from scenario_gen.closed_loop.ego import Pose
 from scenario_gen.closed_loop.results import as_junit
+from scenario_gen.closed_loop.trials import read_trials
 
 PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
 
@@ -42,6 +43,11 @@ def test_a_bag_is_driven_and_the_bars_decide_the_exit_code(bag, tmp_path):
         assert told.exit_code == (0 if reached else 1) and ("bars not kept: goals" in told.output) != reached, told.output
         assert len(said["drives"]) == 2 and said["parameters"]["overtime"] == 1.0
         assert (tmp_path / "out" / "junit.xml").is_file() and (tmp_path / "out" / "drives.html").is_file()
+
+
+def test_scenarios_on_one_road_share_it(bag):
+    roads = {id(trial.road) for trial in read_trials(bag)}
+    assert len(read_trials(bag)) > len(roads) == 1
 
 
 class Still:
@@ -127,8 +133,8 @@ def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, w
 
 def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
     Hangs.drives = 0
-    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 1 s") as caught:
-        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=1", "overtime=1"])
+    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 5 s") as caught:
+        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=5", "overtime=1"])
         drive_bag(request, tmp_path / "out", run=in_processes(1))
     assert "of the 1 drives before: failures 1, collisions" in str(caught.value) and not (tmp_path / "out").exists()
 

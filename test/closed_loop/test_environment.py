@@ -5,6 +5,7 @@
 
 from dataclasses import replace
 
+from driving_scenes import following
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 import numpy as np
@@ -76,3 +77,16 @@ def test_the_same_seed_gives_the_same_drive():
     assert env.reset(options={"index": 2})[1]["name"] == "5"
     with pytest.raises(InputError, match="no scenario 3; there are 3"):
         env.reset(options={"index": 3})
+
+
+@pytest.mark.parametrize("edge", [0.05, 0.5])
+def test_off_the_road_is_what_the_verdict_says(edge):
+    """A footprint that is outside by less than counts goes on."""
+    scenario = following(8.0, 20.0)  # along y = 0
+    corner = np.array((-200.0, edge - 0.5 * scenario.vehicles[0].width))
+    road = Road("r", np.ones((400, 400), dtype=bool), 1.0, corner, np.zeros((0, 3)), np.zeros((0, 3)))
+    env = DriveEnv([Trial("edge", scenario, 0, road)])
+    env.reset(seed=1)
+    _, reward, terminated, _, info = env.step(np.array((-1.0, 0.0), dtype=np.float32))
+    assert terminated == (edge > 0.1) == (reward < -90.0)
+    assert not terminated or info["verdict"]["off_road"] is not None

@@ -23,12 +23,12 @@ from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
-from scenario_gen.method.fitting import LostConflictError
+from scenario_gen.method.fitting import LostEncounterError
 
 pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")
 REQUEST, TEMPLATES = BatchRequest(count=3, seed=5), 3
-PATIENCE = 120.0  # seconds in which a process is at work
+PATIENCE = 300.0  # seconds in which a process is at work
 interruptible = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell may have it ignored
 
 
@@ -172,7 +172,7 @@ def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
 @pytest.mark.parametrize(
     ("kind", "why", "failures"),
     [
-        (LostConflictError, "has no place that keeps the encounter: vehicles 1 and 2 do not meet", {LOST_CONFLICT: 4}),
+        (LostEncounterError, "has no place that keeps the encounter: vehicles 1 and 2 do not meet", {LOST_CONFLICT: 4}),
         (
             RefusedError,
             "has 4 arms, and the template goes by 3 (one each: vehicles 1, 2)",

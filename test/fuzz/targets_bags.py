@@ -35,6 +35,8 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.base.parameters import assigned, flatten, loaded
 from scenario_gen.closed_loop.comparison import read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.search.estimate import Response
+from scenario_gen.closed_loop.search.journal import open_journal, read_journal
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.evaluation import compare, comparison_table, EvaluationConfig, read_evaluations
@@ -260,6 +262,17 @@ def refuse_other_drives(path: Path) -> None:
     refuse_others({name: digest for name, (digest, _) in earlier.drives.items()}, ClosedLoopConfig(), earlier)
 
 
+def journals(folder: Path) -> list[bytes]:
+    """The journal of a search of three drives."""
+    with open_journal(folder / "a.journal.jsonl", {"planner": "p:C", "seed": 7}) as journal:
+        for response in (
+            Response(1.5, (1.5, 2.0)),
+            Response(-3.1, (0.2, 1.0), "the ego and 2 meet: rear end", ("collision", "at_fault")),
+        ):
+            journal.add(response)
+    return [(folder / "a.journal.jsonl").read_bytes()]
+
+
 def compare_with_itself(path: Path) -> None:
     """Read figures, show them and compare them."""
     found = read_evaluations(path)
@@ -321,4 +334,5 @@ TARGETS = (
     Target("library", libraries, in_file("library.json", use_library), JSON, ("library/*",)),
     Target("evaluation_json", evaluations, in_file("evaluation.json", compare_with_itself), JSON, ("result/*",)),
     Target("drives_json", drives, in_file("drives.json", refuse_other_drives), JSON),
+    Target("journal", journals, in_file("a.journal.jsonl", read_journal), (*BYTES, *TEXT)),
 )

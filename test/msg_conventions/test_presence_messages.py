@@ -18,7 +18,6 @@ from msg_conventions.scenario_info import decode_info, encode_info, scenario_ent
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario, messages_of
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from msg_conventions.trajectory import decode, encode
-from scenario_gen.bags.recordings.requests import RequestTracker
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Scenario
@@ -112,22 +111,6 @@ def test_the_entry_says_who_is_there_when_and_which_messages_are_the_scenario():
     damaged = replace(entry, status=replace(entry.status, values={**entry.status.values, "messages": "[1]"}))
     with pytest.raises(InputError, match="no list of SHA-256"):
         decode_info(encode_info(damaged, 5))
-
-
-@given(st.permutations(range(4)))
-def test_a_scenario_is_whole_in_whatever_order_its_messages_and_its_entry_come(order):
-    made = scenario([(0, 40), (5, 30), (0, 12)])
-    data = encode_scenario(made, 5)
-    tracker, matches = RequestTracker(), []
-    for k in order:
-        if k < 3:
-            message = messages_of(data)[k]
-            matches.append(tracker.add_scenario(digest(message), message))
-        else:
-            matches.append(tracker.add_info(entry_of(made, data)))
-    (match,) = [match for match in matches if match]
-    assert match[2] == data
-    assert match[0].came == 1
 
 
 def test_tracks_come_back_and_show_nobody_on_the_ground_who_is_not_there():

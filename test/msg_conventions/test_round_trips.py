@@ -33,7 +33,7 @@ from scenario_gen.numerics.arrays import canonical_angle
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.lanes import Lane, LaneNetwork, RuleKind, TrafficRule
+from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
 from scenario_gen.types.names import token, tokens
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
@@ -103,21 +103,25 @@ def test_lanes(seed, count):
     for k in range(count):
         left, right = rng.normal(0, 50, (2, 2 + int(rng.integers(5)), 2))
         limit = math.nan if k % 2 else float(rng.random())
-        own.append(Lane(f"é.{k}", left, right, (int(rng.integers(count)),), tuple(range(k)), limit, "j" * k))
+        height = np.where(np.arange(len(left)) == k, np.nan, 4.0 * k)  # from two lanes on they lie above each other
+        own.append(Lane(f"é.{k}", left, right, (int(rng.integers(count)),), tuple(range(k)), limit, "j" * k, height))
     rules = tuple(
         TrafficRule(f"é{k}", kind, (int(rng.integers(count)),), tuple(range(k % count)), rng.normal(0, 50, (2 * (k % 2), 2)))
         for k, kind in enumerate(RuleKind)
     )
-    sent = LaneNetwork("map", tuple(own), ("read so",), rules[: int(rng.integers(5))], bool(rng.integers(2)))
+    aim, origin = DrawnFor(rng.normal(0, 50, 3), (("é.0", ""), ("", "2.1"))), (49.0, 8.4) if count % 2 else ()
+    sent = LaneNetwork("map", tuple(own), ("read so",), rules[: int(rng.integers(5))], bool(rng.integers(2)), True, aim, origin)
     road = Road("map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
     got = roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "map", 9))[1].lanes
-    assert (got.name, got.notes) == (sent.name, sent.notes)
+    assert (got.name, got.notes, got.drawn, got.origin) == (sent.name, sent.notes, True, origin)
+    assert_same(got.drawn_for, aim, "frame", "lanes")
     assert got.rules_kept == (sent.rules_kept or not sent.rules)
     for one, other in zip(sent.rules, got.rules, strict=True):
         assert_same(one, other, "id", "kind", "lanes", "over", "line")
     for one, other in zip(sent.lanes, got.lanes, strict=True):
         assert_same(one, other, "id", "left", "right", "successors", "beside", "junction")
         assert np.array_equal(one.speed_limit, other.speed_limit, equal_nan=True)
+        assert np.array_equal(other.height, one.height if sent.has_levels else np.nan * one.height, equal_nan=True)
     with pytest.raises(InputError, match="frame 'odom' is not the map's"):
         roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "odom", 9))
 

@@ -5,12 +5,17 @@
 
 import numpy as np
 import pytest
+from textbook_motions import labelled
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads import build_road
+from scenario_gen.pipeline import generate
+from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.ways import draw_ring_route
+from scenario_gen.template import reactions_of
+from scenario_gen.types import RuleKind
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.segmentation import Segmentation
 
@@ -123,7 +128,7 @@ def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_dri
         out = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in (come, leave)]
         beside = [1.75 * np.array([-y, x]) for x, y in out]
         start, goal = np.array([*(90.0 * out[0] + beside[0]), come + np.pi]), np.array([*(90.0 * out[1] - beside[1]), leave])
-        way = draw_ring_route(start, goal, np.zeros(2), 16.0, lambda _: True)
+        way = draw_ring_route(start, goal, np.zeros(2), 16.0)
         away = np.maximum(np.hypot(*way.points[:, :2].T) - 19.0, 0.0)
         speed = np.minimum(np.sqrt(36.0 + 4.0 * away), 14.0)
         time = np.concatenate(([0.0], np.cumsum(2.0 * np.diff(way.station) / (speed[1:] + speed[:-1]))))
@@ -141,3 +146,31 @@ def test_roads_without_a_template_are_of_their_kind():
     assert abs(np.degrees(curve.exits[0, 2] - curve.entries[0, 2])) == pytest.approx(20.0, abs=1.0)
     merge = build_road("merge")
     assert len(merge.entries) == 3 and len(merge.exits) == 2
+
+
+@pytest.mark.parametrize("priority, kind", [("auto", RuleKind.GIVE_WAY), ("all_way_stop", RuleKind.STOP), ("none", None)])
+def test_arms_of_those_who_yield_give_way_and_the_line_lies_across_their_lanes(priority, kind):
+    encounter = labelled("crossing, stops", 1).encounter
+    (edge,) = reactions_of(encounter).edges
+    road = build_road("four_way", encounter, RoadConfig(priority=priority, lanes=2))
+    assert {rule.kind for rule in road.lanes.rules} == ({kind} if kind else set())
+    for rule in road.lanes.rules:
+        lanes = [road.lanes.lanes[k] for k in rule.lanes]
+        assert all(np.hypot(*(lane.centre[-1] - rule.line.mean(axis=0))) < 2.0 for lane in lanes)
+        assert np.hypot(*np.diff(rule.line, axis=0)[0]) == pytest.approx(7.0, abs=0.1)
+    if priority == "auto":
+        (rule,) = road.lanes.rules
+        scenarios = generate(encounter, road, count=3, seed=1).generated.scenarios
+        arm = road.lanes.lanes[rule.lanes[0]]
+        for scenario in scenarios:
+            poses = np.column_stack((scenario.position[edge.who], scenario.heading[edge.who]))
+            assert on_lane(arm, poses) or on_lane(road.lanes.lanes[rule.lanes[1]], poses)
+        assert len(scenarios) == 3
+
+
+def test_arms_into_a_roundabout_and_ramps_give_way():
+    ring, merge = (build_road(name).lanes for name in ("roundabout", "merge"))
+    assert [rule.kind for rule in ring.rules] == [RuleKind.GIVE_WAY] * 4
+    assert {ring.lanes[k].id for k in ring.rules[0].over} == {f"{a}.-1>{b}.1" for a in (2, 3, 4) for b in (1, 2, 3, 4)}
+    ((ramp,),) = ([merge.lanes[k].id for k in rule.lanes] for rule in merge.rules)
+    assert ramp == "3.-1"

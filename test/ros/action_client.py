@@ -3,8 +3,8 @@
 
 """A client of the action: python action_client.py GOALS, a JSON list; it prints a JSON list of how each went.
 
-A goal is {"parameters": {…}, "wait": s, "cancel": …, "then": a node to activate when it waits for tracks}; each is sent
-once the one before is accepted.
+A goal is {"parameters": {…}, "wait": s, "cancel": …, "then": a node to activate when it has ended and the first one waits for
+tracks}; each is sent once the one before is accepted.
 "cancel" is how many scenarios it has found, which position in the queue it has, and which others have ended when it is cancelled.
 It is a program of its own, for the libraries of an interface package are looked for where LD_LIBRARY_PATH said at the start.
 """
@@ -14,6 +14,7 @@ import json
 import sys
 import time
 
+from known_readers import until_known_at
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 import rclpy
@@ -38,15 +39,20 @@ def main(goals: list[dict]) -> list[dict]:
 
     node.create_subscription(MultiDOFJointTrajectory, "scenarios", hear, quality, raw=True)
     client = ActionClient(node, Generate, "gp_sampler/generate_scenarios")
-    assert client.wait_for_server(60.0)
-    ended, begun = [], time.monotonic()
+    assert client.wait_for_server(180.0)
+    until_known_at(node, "gp_sampler", lambda answer: rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0))
+    ended, begun, waits, then = [], time.monotonic(), [], []
+
+    def look() -> None:
+        if waits and then:
+            activate(then.pop())
 
     def ended_ones() -> set[int]:
         return {one["goal"] for one in ended}
 
     def activate(name: str) -> None:
         change = node.create_client(ChangeState, f"{name}/change_state")
-        assert change.wait_for_service(60.0)
+        assert change.wait_for_service(180.0)
         for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             change.call_async(ChangeState.Request(transition=Transition(id=transition)))
 
@@ -61,8 +67,9 @@ def main(goals: list[dict]) -> list[dict]:
             if "handle" in told and one.found >= found and one.position >= position and ended_ones().issuperset(after):
                 goal["cancel"] = [0, 0, [k]]
                 told["handle"].cancel_goal_async()
-            if "tracks" in row[1] and "then" in goal:
-                activate(goal.pop("then"))
+            if "tracks" in row[1] and k == 0:
+                waits.append(row)
+                look()
 
         def accepted(future) -> None:
             told["handle"] = future.result()
@@ -82,16 +89,22 @@ def main(goals: list[dict]) -> list[dict]:
                 "seconds": time.monotonic() - begun,
             }
             ended.append({"goal": k, **words, **more, "feedback": told["feedback"]})
+            then.extend([goal["then"]] if "then" in goal else [])
+            look()
 
         given = [Parameter(name, value=value).to_parameter_msg() for name, value in goal.get("parameters", {}).items()]
-        message = Generate.Goal(parameters=given, wait=float(goal.get("wait", 60.0)))
+        message = Generate.Goal(parameters=given, wait=float(goal.get("wait", 300.0)))
         client.send_goal_async(message, feedback_callback=heard).add_done_callback(accepted)
 
     send(0, goals[0])
     while len(ended) < len(goals):
         rclpy.spin_once(node, timeout_sec=1.0)
-    spare = time.monotonic()
-    while time.monotonic() - max([spare, *scenarios[-1:]]) < 1.0:  # what is still on its way
+    published, all_ended = sum(one["published"] for one in ended), time.monotonic()
+
+    def silence() -> float:
+        return time.monotonic() - max([all_ended, *scenarios[-1:]])
+
+    while silence() < (1.0 if len(scenarios) >= published else 60.0):  # what is still on its way
         rclpy.spin_once(node, timeout_sec=0.05)
     first = scenarios[0] - begun if scenarios else None
     return [*ended, {"heard": len(scenarios), "first": first, "digests": digests}]

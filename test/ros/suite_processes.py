@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 
+from known_readers import until_known_at
 from node_server import Forked, start_nodes
 
 from scenario_gen.base.ros_domain import this_host_only
@@ -130,8 +131,16 @@ class Client:
     def call_later(self, kind, name: str, request):
         if name not in self._callers:  # one for all calls of a service, so that they arrive in order
             self._callers[name] = self.node.create_client(kind, name)
-        assert self._callers[name].wait_for_service(120.0), name
+            assert self._callers[name].wait_for_service(180.0), name
+            until_known_at(self.node, name.rpartition("/")[0], self._wait)
         return self._callers[name].call_async(request)
+
+    @staticmethod
+    def _wait(answer) -> None:
+        """Wait for what the executor's thread does, a second at most."""
+        done = threading.Event()
+        answer.add_done_callback(lambda _: done.set())
+        done.wait(1.0)
 
     def call(self, kind, name: str, request, timeout: float = 180.0):
         future = self.call_later(kind, name, request)

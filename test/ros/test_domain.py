@@ -14,7 +14,8 @@ import pytest
 from scenario_gen.base.ros_domain import DOMAINS, free_domain, this_host_only
 
 
-def test_two_runs_get_two_domains():
+def test_two_runs_get_two_domains(monkeypatch, tmp_path):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))  # where no other run of the tests holds one
     with free_domain() as one, free_domain() as two:
         assert one != two
     with free_domain() as again:

@@ -138,7 +138,7 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
     finally:
         for process in processes:
             process.terminate()
-        assert [process.wait(60.0) for process in processes] == [0 for _ in processes]
+        assert [process.wait(180.0) for process in processes] == [0 for _ in processes]
 
 
 IN_ROS_PYTHON = """

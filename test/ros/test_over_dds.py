@@ -29,7 +29,7 @@ def suite(tmp_path_factory, domain):
 
 def test_a_late_joiner_gets_everything(suite, client):
     client.hear("/scenarios", "/scenarios/info")
-    client.wait("/scenarios/info", 5, timeout=120.0)
+    client.wait("/scenarios/info", 5)
     late = Client(client.context.get_domain_id())
     try:
         late.hear("/map", "/tracks", "/changepoints", "/posterior", "/fit", "/vehicle_1/route", "/scenarios", "/report")

@@ -60,7 +60,7 @@ def published(client, result):
 
 def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
     client.hear("/scenarios", "/scenarios/info", "/ego/start", "/ego/goal", "/ego/witness")
-    client.wait("/scenarios/info", 3, timeout=120.0)
+    client.wait("/scenarios/info", 3)
     result = client.generate(ego="1", count=3)
     assert result.successful, result.reason
     encounter, made = in_process(3, ego="1")
@@ -78,7 +78,7 @@ def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
 
 def test_the_same_bytes_as_in_process_with_states(suite, client):
     client.hear("/scenarios", "/scenarios/info")
-    client.wait("/scenarios/info", 3, timeout=120.0)
+    client.wait("/scenarios/info", 3)
     result = client.generate(count=3, **MOVED)
     assert result.successful, result.reason
     encounter, made = in_process(3, **MOVED)
@@ -91,7 +91,7 @@ def test_the_same_bytes_as_in_process_with_states(suite, client):
 
 def test_what_is_impossible_is_refused_and_the_nearest_is_possible(suite, client):
     client.hear("/scenarios", "/scenarios/info")
-    client.wait("/scenarios/info", 3, timeout=120.0)
+    client.wait("/scenarios/info", 3)
     result = client.generate(count=2, goals="1: 19 18.07 3.1413 11")
     assert not result.successful
     assert "off the road" in result.reason
@@ -105,9 +105,11 @@ def test_what_is_impossible_is_refused_and_the_nearest_is_possible(suite, client
 
 def test_all_of_it_is_in_the_bag(suite, client):
     client.hear("/scenarios", "/scenarios/info")
-    client.wait("/scenarios/info", 3, timeout=120.0)
+    client.wait("/scenarios/info", 3)
     results = [client.generate(ego="2", count=2), client.generate(count=2, **MOVED)]
     digests = [published(client, result)[0] for result in results]
+    for topic in ("/scenarios", "/scenarios/info"):
+        client.until(lambda topic=topic: client.counted(topic) >= len(client.heard[topic]), f"{topic} in the bag")
     suite.end()
     bag = suite.folder / "bag"
     (found,) = validate_bag(bag)

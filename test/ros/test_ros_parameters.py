@@ -100,4 +100,4 @@ def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
     finally:
         for one in (process, player):
             one.terminate()
-        assert [one.wait(60.0) for one in (process, player)] == [0, 0]
+        assert [one.wait(180.0) for one in (process, player)] == [0, 0]

@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 import re
 import shlex
+import time
 from typing import Any
 
 import pytest
@@ -136,7 +137,7 @@ def test_the_calls_are_answered_as_the_page_says(suite, client):
         pairs = [{pair.key: pair.value for pair in s.values} for m in shown for s in m.status if s.name.endswith("progress")]
         return any(values.get("request") == "large" and int(values["accepted"]) > 0 for values in pairs)
 
-    later, wrong = [], []
+    later, wrong, begun = [], [], time.monotonic()
     for call in calls():
         if "large: cancelled" in str(call.answer):
             later.append((call, client.call_later(call.kind, call.name, call.made())))
@@ -151,4 +152,4 @@ def test_the_calls_are_answered_as_the_page_says(suite, client):
     assert len(later) == 1
     assert [path.is_dir() for path in suite.folder.glob("bag_*")] == [True]
     lines = [line for line in suite.log("gp_sampler").splitlines() if "request large:" in line]
-    assert len(lines) < 40, "about a line for a second, not one for each scenario"
+    assert len(lines) < 10 + time.monotonic() - begun, "about a line for a second, not one for each scenario"

@@ -53,12 +53,12 @@ def test_a_recorder_closes_its_bag(domain, tmp_path):
                 recorders[name].send_signal(number)
                 time.sleep(0.05)
         for process in recorders.values():
-            output, _ = process.communicate(timeout=120.0)
+            output, _ = process.communicate(timeout=180.0)
             assert "Traceback" not in output, output
             assert process.returncode == 0
     finally:
         player.send_signal(signal.SIGTERM)
-        output, _ = player.communicate(timeout=120.0)
+        output, _ = player.communicate(timeout=180.0)
         for process in recorders.values():
             process.kill()
     assert "Traceback" not in output, output
@@ -70,7 +70,7 @@ def test_ctrl_c_while_the_libraries_load(domain):
     process = _started("gp_sampler", domain)
     time.sleep(0.7)
     process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=120.0)
+    output, _ = process.communicate(timeout=180.0)
     assert "Traceback" not in output
     assert process.returncode in (0, 130, -2)
 
@@ -110,7 +110,7 @@ def test_a_node_ends_when_something_waits_for_ever_holding_the_lock_of_python(do
     try:
         assert process.stdout is not None and process.stdout.readline() == "ready\n"
         process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=120.0)
+        output, _ = process.communicate(timeout=180.0)
     finally:
         process.kill()
     assert process.returncode == 1
@@ -125,7 +125,7 @@ def test_a_bad_start_is_one_message_and_exit_code_2(domain, tmp_path):
         ("recorder", ("-p", f"bag:={tmp_path}"), "exists"),
     ):
         process = _forked(node, domain, *arguments)
-        output, _ = process.communicate(timeout=120.0)
+        output, _ = process.communicate(timeout=180.0)
         assert process.returncode == 2
         assert words in output
         assert "Traceback" not in output, output

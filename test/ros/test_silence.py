@@ -39,7 +39,7 @@ class Gate:
 
     def __call__(self, *arguments):
         self.reached.set()
-        assert self.opened.wait(120.0)
+        assert self.opened.wait(180.0)
         return self._work(*arguments)
 
 
@@ -47,7 +47,7 @@ def spun(node, condition) -> None:
     """Spin a node until something is so."""
     import rclpy
 
-    deadline = time.monotonic() + 120.0
+    deadline = time.monotonic() + 180.0
     while not condition():
         assert time.monotonic() < deadline
         rclpy.spin_once(node, timeout_sec=0.02)
@@ -71,14 +71,14 @@ def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch
         node.trigger_activate()
         (encounter,) = read_log(RESOURCES / "synthetic_c").encounters
         node.received("tracks", encode_tracks(encounter))
-        assert gate.reached.wait(60.0)
+        assert gate.reached.wait(180.0)
         (worker,) = (t for t in threading.enumerate() if t.name.startswith("worker of segmenter"))
         node.trigger_deactivate()
         if cleaned:
             node.trigger_cleanup()
         client.until(lambda: client.node.count_publishers("/changepoints") == (0 if cleaned else 1), "what is offered")
         gate.opened.set()
-        worker.join(120.0)
+        worker.join(180.0)
         assert not worker.is_alive()
         spun(node, lambda: _said(client).endswith("unconfigured" if cleaned else "inactive"))
         names = {s.name for s in client.statuses()}
@@ -122,13 +122,13 @@ def test_of_too_many_jobs_the_newest_is_answered_at_once():
     failures: list[BaseException] = []
     worker = Worker(lambda _, error: failures.append(error))
     started, gate, answers = threading.Event(), threading.Event(), []
-    worker.submit("long", lambda _: (started.set(), gate.wait(60.0)))
-    assert started.wait(60.0)
+    worker.submit("long", lambda _: (started.set(), gate.wait(180.0)))
+    assert started.wait(180.0)
     for k in range(MOST_WAITING + 1):
         worker.submit(f"request {k}", lambda cancelled, k=k: answers.append((k, cancelled())))
     assert answers == [(MOST_WAITING, True)]
     (error,) = failures
     assert isinstance(error, RefusedError) and "1000 jobs wait already" in str(error)
     gate.set()
-    worker.close(60.0)
+    worker.close(180.0)
     assert len(answers) == MOST_WAITING + 1

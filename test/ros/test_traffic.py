@@ -111,7 +111,10 @@ def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic
 
 
 def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, client):
-    process = traffic(patience=0.2)
+    from rcl_interfaces.srv import SetParameters
+    from rclpy.parameter import Parameter
+
+    process = traffic(patience=60.0)
     far = np.array([1e5, 0.0, 0.0, 0.0])
     frame = hand_made_run().road.frame_id
     wrong = {
@@ -127,6 +130,8 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     for data in (encode_twist(1.0, 0.0), encode_twist(2.0, 0.0)):
         client.say("ego/cmd_vel", data)
     client.until(lambda: any("2 replies to one state" in status.message for status in client.statuses()), "a second reply")
+    short = SetParameters.Request(parameters=[Parameter("patience", value=0.1).to_parameter_msg()])
+    assert client.call(SetParameters, "/traffic/set_parameters", short).results[0].successful
     for _ in range(9):
         step(client)  # silent
     found = set()
@@ -178,9 +183,11 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
         other.destroy_node()
     ahead = (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     stale = encode(VELOCITY_STAMPED, stamp=FIRST_STAMP, frame_id="base_link", twist=ahead)  # of the drive's begin
-    said = {"over": False}
-    while not said["over"]:
+    for _ in range(12):
         client.say("ego/cmd_vel_stamped", stale)
+        said = step(client)
+    while not said["over"]:
+        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
         said = step(client)
     values = decode_diagnostics(client.wait("verdicts")[-1])[1][0].values
     faults = str(values["first_faults"])

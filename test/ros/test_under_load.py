@@ -21,17 +21,19 @@ pytestmark = pytest.mark.dds
 CALLER = """
 import json, sys
 import scenario_gen.ros.nodes
+from known_readers import until_known_at
 import rclpy
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 rclpy.init()
 node = rclpy.create_node(f"caller_{sys.argv[1]}")
 client = node.create_client(SetParametersAtomically, "gp_sampler/generate")
-assert client.wait_for_service(60.0)
+assert client.wait_for_service(180.0)
 values = {"seed": int(sys.argv[1]), "count": int(sys.argv[2])}
 request = SetParametersAtomically.Request(parameters=[Parameter(k, value=v).to_parameter_msg() for k, v in values.items()])
+until_known_at(node, "gp_sampler", lambda answer: rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0))
 future = client.call_async(request)
-rclpy.spin_until_future_complete(node, future, timeout_sec=90.0)
+rclpy.spin_until_future_complete(node, future, timeout_sec=300.0)
 result = future.result().result
 print(json.dumps([result.successful, result.reason]))
 """
@@ -58,14 +60,14 @@ def test_callers_from_many_processes_get_their_own_answers(suite, domain, client
     client.wait("/scenarios/info", 2)
     client.heard.clear()
     counts = {seed: 1 + seed % 3 for seed in range(500, 520 if LONG else 504)}
-    environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(sys.path)}
     callers = {
         seed: subprocess.Popen(
             [sys.executable, "-c", CALLER, str(seed), str(count)], stdout=subprocess.PIPE, text=True, env=environment
         )
         for seed, count in counts.items()
     }
-    said = {seed: caller.communicate(timeout=120.0)[0] for seed, caller in callers.items()}
+    said = {seed: caller.communicate(timeout=400.0)[0] for seed, caller in callers.items()}
     assert all(said.values()), (
         f"callers without an answer: {[seed for seed in said if not said[seed]]}\n{suite.log('gp_sampler')}"
     )

@@ -18,7 +18,7 @@ from scenario_gen.ros.plumbing.start import node_class, NODES
 @pytest.mark.dds
 def test_the_player_lists_its_parameters():
     command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "player", "--help"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120.0, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180.0, check=False)
     assert done.returncode == 0 and done.stderr == ""
     assert "[--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]" in done.stdout
     assert "  rate := 1.0\n      how many times as fast as it was recorded" in done.stdout
@@ -40,7 +40,7 @@ def test_the_player_lists_its_parameters():
 )
 def test_what_ros_cannot_read_is_one_line(words, said):
     process = start_nodes("suite" if "-r" in words else "player", "--ros-args", *words)
-    output, _ = process.communicate(60.0)
+    output, _ = process.communicate(180.0)
     (line,) = output.splitlines()
     assert process.returncode == 2 and line.startswith("error: ") and said in line and "/src/" not in line
 

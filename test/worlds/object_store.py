@@ -18,18 +18,21 @@ KEYS = {"AWS_ACCESS_KEY_ID": "any", "AWS_SECRET_ACCESS_KEY": "any", "AWS_DEFAULT
 @contextmanager
 def serving() -> Iterator[str]:
     """Give the address of a new server."""
-    with socket.socket() as own:
-        own.bind(("127.0.0.1", 0))
-        address = f"http://127.0.0.1:{own.getsockname()[1]}"
-    command = [sys.executable, "-m", "moto.server", "-p", address.rpartition(":")[2]]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        try:
-            while not _answers(address):
-                assert process.poll() is None
-                time.sleep(0.1)
-            yield address
-        finally:
-            process.kill()
+    for _ in range(5):  # another process may take the port first
+        with socket.socket() as own:
+            own.bind(("127.0.0.1", 0))
+            address = f"http://127.0.0.1:{own.getsockname()[1]}"
+        command = [sys.executable, "-m", "moto.server", "-p", address.rpartition(":")[2]]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            try:
+                while process.poll() is None and not _answers(address):
+                    time.sleep(0.1)
+                if process.poll() is None:
+                    yield address
+                    return
+            finally:
+                process.kill()
+    raise AssertionError("no server of moto could be started")
 
 
 def _answers(address: str) -> bool:

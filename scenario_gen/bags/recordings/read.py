@@ -94,7 +94,12 @@ def read_recording(path: Path, config: BagConfig = BagConfig(), topics: Collecti
         if match := known(message.topic):
             found.setdefault(match["namespace"] or "", {}).setdefault(match["topic"], []).append(message)
     shared = [message.data for message in found.get("", {}).get("diagnostics", ())]  # one topic for the nodes of all namespaces
-    return Recording(path, {name: Namespace(path, name, messages, shared) for name, messages in sorted(found.items())})
+    roads: Roads = {}
+    return Recording(path, {name: Namespace(path, name, messages, shared, roads) for name, messages in sorted(found.items())})
+
+
+Roads = dict[tuple[str, bytes | None, str], Road]
+"""Those of a bag, by their map's hash, lanes and name: what is derived from a road is large, and derived once."""
 
 
 class Namespace(RecordedScenarios):
@@ -104,10 +109,12 @@ class Namespace(RecordedScenarios):
     a scenario is checked against or generated from raises an error then.
     """
 
-    def __init__(self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]], shared: Sequence[bytes]) -> None:
-        """Take the bag's path, the namespace's name, its messages by topic, and /diagnostics of all namespaces."""
+    def __init__(
+        self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]], shared: Sequence[bytes], roads: "Roads"
+    ) -> None:
+        """Take the bag's path, the namespace's name, its messages by topic, and /diagnostics and roads of all namespaces."""
         super().__init__(path, name, messages)
-        self._shared = shared
+        self._shared, self._roads = shared, roads
 
     # The template and the road of one scenario.
 
@@ -139,7 +146,10 @@ class Namespace(RecordedScenarios):
 
     def _decode_road(self, data: bytes) -> Road:
         lanes = lanes_beside(data, self.data("map"), self.data("road/lanes"), self.data("fit/info"))
-        return replace(decode_map(data, lanes=lanes, name=self.where("map"))[1], name=self.road_name)
+        key = (hash_of("map", data), lanes, self.road_name)
+        if key not in self._roads:
+            self._roads[key] = replace(decode_map(data, lanes=lanes, name=self.where("map"))[1], name=self.road_name)
+        return self._roads[key]
 
     @cached_property
     def roads_differ(self) -> bool:

@@ -16,7 +16,7 @@ from msg_conventions.hashes import encode_hashes, template_hashes
 from msg_conventions.lanes import encode_lanes
 from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.paths import encode_route
-from msg_conventions.pictures import scenario_markers
+from msg_conventions.pictures import road_markers, scenario_markers
 from msg_conventions.request_messages import footprint_messages, RequestMessages
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.scenario_info import encode_info, INFO, request_summary
@@ -60,6 +60,7 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     infos["fit/info"] = encode_hashes("fit", template, stamp)
     for topic, data in (*template.items(), *infos.items()):
         yield topic, data, stamp
+    yield "road/markings", road_markers(road.lanes, road.frame_id, stamp), stamp
     yield "posterior", encode_posterior(encounter, result.segmentation), stamp
     for topic, data in footprint_messages(encounter):
         yield topic, data, stamp

@@ -25,8 +25,9 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import as_junit, drawings, JUNIT
 from scenario_gen.closed_loop.search.estimate import Estimate, LEVEL, Search
 from scenario_gen.closed_loop.search.findings import Finding, findings_of
-from scenario_gen.closed_loop.search.objective import Objective
-from scenario_gen.closed_loop.search.problem import DrivenScenarios, open_journal
+from scenario_gen.closed_loop.search.journal import open_journal
+from scenario_gen.closed_loop.search.objective import AT_FAULT, COLLISION, Objective
+from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.trials import find_planner, named_vehicle, Rate, trial_runner
 from scenario_gen.method.evaluation import wilson
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, SamplingConfig
@@ -150,11 +151,14 @@ class SearchResult:
         if e.first:
             interval = f"95 % interval {_share(rate.low)} to {_share(rate.high)}"
             messages = [f"failure rate {_share(rate.value)} ({interval})", f"first failure: drive {e.first} of {e.drives}"]
+        for name, share in e.events.items():
+            words = "collisions by the ego's fault" if name == AT_FAULT else "collisions"
+            messages.append(f"{words}: {_share(share.value)} ({_share(share.low)} to {_share(share.high)})")
         messages.append(f"natural drives alone: {self.plain}")
         if not math.isnan(self.equal_plain):
             messages.append(f"plain sampling would need {self.equal_plain:,.0f} drives for an interval as narrow")
-        if not math.isnan(e.unexpected):
-            messages.append(f"of it, where the regression expects no failure: at most {_share(e.unexpected)} (95 %)")
+        if e.first and not math.isnan(e.unexpected):
+            messages.append(f"failures that the regression does not expect: at most {_share(e.unexpected)} (95 %)")
         return messages
 
 
@@ -195,7 +199,7 @@ def search_failures(
             problem = DrivenScenarios(
                 natural, ego, plan.road, request.objective, run, journal, lambda done: progress(done, request.budget)
             )
-            search = Search(problem, request.seed, request.budget, request.worst)
+            search = Search(problem, request.seed, request.budget, request.worst, told=(COLLISION, AT_FAULT))
             estimate = search.run()
             findings = findings_of(search, problem, config)
         names = (JSON, PAGE, JUNIT, *((BAG,) if findings else ()))
@@ -207,7 +211,7 @@ def search_failures(
 def _write(folder: Path, result: SearchResult, request: SearchRequest, identity: dict[str, Any], asked: Any) -> None:
     document = _document(result, request, identity)
     write_text(folder / JSON, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    write_text(folder / JUNIT, as_junit([one.outcome for one in result.findings], request.planner))
+    write_text(folder / JUNIT, as_junit([one.outcome for one in result.findings], request.planner, _facts(request)))
     write_text(folder / PAGE, _page(result, request))
     if result.findings:
         encounter, fit = request.planned.encounter, request.planned.placed()[1]
@@ -226,6 +230,10 @@ def _write(folder: Path, result: SearchResult, request: SearchRequest, identity:
             add_results(bag, {"": delivered})
 
 
+def _facts(request: SearchRequest) -> dict[str, str]:
+    return {"policy": request.drive_config().policy}
+
+
 def _document(result: SearchResult, request: SearchRequest, identity: dict[str, Any]) -> dict[str, Any]:
     e = result.estimate
 
@@ -242,7 +250,9 @@ def _document(result: SearchResult, request: SearchRequest, identity: dict[str, 
         "drives": e.drives,
         "first_failure": e.first or None,
         "plain_drives_for_the_same_interval": None if request.worst else rounded(result.equal_plain),
+        "rates": None if request.worst else {name: interval(each) for name, each in e.events.items()},
         "unexpected_at_most": rounded(e.unexpected),
+        "bound": None if request.worst else rounded(e.bound),
         "natural_scenarios": e.seen,
         "valid_share_of_candidates": rounded(e.valid),
         "shares": {kind: rounded(value) for kind, value in sorted(e.shares.items())},
@@ -258,7 +268,7 @@ def _page(result: SearchResult, request: SearchRequest) -> str:
     outcomes, trials = [one.outcome for one in ordered], [one.trial for one in ordered]
     return render_page(
         "search.html.j2",
-        ("scene.js", "drives.js"),
+        ("scene.js", "drives.js", "tables.js"),
         drawings(outcomes, trials, range(len(ordered))),
         planner=request.planner,
         objective=str(request.objective),

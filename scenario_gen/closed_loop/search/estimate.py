@@ -19,7 +19,7 @@ import math
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from scipy import special
+from scipy import optimize, special
 
 from scenario_gen.closed_loop.search.surrogate import Surrogate
 from scenario_gen.method.evaluation import wilson
@@ -50,11 +50,13 @@ class Response:
         margin: 0 or less if it failed; the smaller, the nearer to failure.
         parts: figures whose least is the margin where it did not fail; as many for every drive, or none.
         kind: which failure it is, "" for none.
+        events: what happened whose rates are told, too.
     """
 
     margin: float
     parts: tuple[float, ...] = ()
     kind: str = ""
+    events: tuple[str, ...] = ()
 
     @property
     def failed(self) -> bool:
@@ -91,8 +93,9 @@ class Estimate:
         plain: the same by natural drives alone: failures, drives.
         drives: how many; first: number of the first that failed, counted from 1, 0 if none did.
         seen: certified natural scenarios that the rate is of, driven or not; valid: their share of the candidates.
-        unexpected: upper end (95 %) of the rate of failures among scenarios in which the regression expects none.
+        unexpected: upper end (95 %) of the rate of failures that the regression does not expect.
         shares: of the rate, by kind of failure.
+        events: rates of the events of the responses, by name, with their intervals.
     """
 
     rate: Interval
@@ -103,6 +106,12 @@ class Estimate:
     valid: float
     unexpected: float
     shares: dict[str, float]
+    events: dict[str, Interval]
+
+    @property
+    def bound(self) -> float:
+        """Upper end (95 %) of the rate, whatever the regression is worth."""
+        return max(self.rate.high, self.unexpected) if self.unexpected >= 0.0 else self.rate.high
 
 
 class _SpentError(Exception):
@@ -128,7 +137,8 @@ class Search:
         worst: explore on beyond the first failures, for the worst, and estimate no rate.
         z: (d,) numbers of each drive.
         responses: of each drive.
-        weights: of failures among natural scenarios, by drive: for how many of these each stands.
+        weights: of drives of natural scenarios that count for the rate: for how many of these each stands.
+        told: names of events whose rates are told.
     """
 
     problem: Problem  # type: ignore[type-arg]
@@ -141,11 +151,11 @@ class Search:
     _features: list[tuple[float, ...]] = field(default_factory=list)
     _natural: list[int] = field(default_factory=list)  # drives of natural scenarios that nobody chose
     _sampled: list[int] = field(default_factory=list)  # drives of natural scenarios that the regression chose
-    _seen: int = 0  # certified natural scenarios of the batches
+    told: Sequence[str] = ()
+    _even: list[tuple[int, float]] = field(default_factory=list)  # of each batch: scenarios, least probability to be driven
     _drawn: int = 0  # numbers drawn for natural scenarios
     _certified: int = 0  # of these
     _floor: list[int] = field(default_factory=list)  # drives of scenarios that were chosen evenly: no failure was expected
-    _calm: int = 0  # scenarios of the batches in which no failure was expected
     _explored: int = 0
     _runs: int = 0
     _batches: int = 0
@@ -292,14 +302,11 @@ class Search:
         driven = self._drive([drawn[place] for place in chosen])
         self._sampled += driven
         if len(driven) == len(chosen):
-            self._seen += len(drawn)
-            calm = probability <= evenly
-            self._calm += int(calm.sum())
+            self._even.append((len(drawn), evenly))
             for place, k in zip(chosen, driven, strict=True):
-                if calm[place]:
+                self.weights[k] = float(1.0 / probability[place])
+                if probability[place] <= evenly:
                     self._floor.append(k)
-                if self.responses[k].failed:
-                    self.weights[k] = float(1.0 / probability[place])
             likely = float(near.mean())
             self._evenly = min(max(EXPLORING / (1.0 - EXPLORING) * likely, LEAST), MOST)
         self._check_budget()
@@ -313,21 +320,29 @@ class Search:
         hits, natural = self._failed(self._natural), len(self._natural)
         plain = wilson(hits, natural, LEVEL) if natural else Interval(math.nan, 0.0, 1.0)
         shares: dict[str, float] = {}
-        for k, weight in self.weights.items():
-            shares[self.responses[k].kind] = shares.get(self.responses[k].kind, 0.0) + weight
-        unexpected = math.nan
-        if self._floor:
-            unexpected = wilson(self._failed(self._floor), len(self._floor), LEVEL).high * self._calm / self._seen
+        failed = [k for k in self.weights if self.responses[k].failed]
+        for k in failed:
+            shares[self.responses[k].kind] = shares.get(self.responses[k].kind, 0.0) + self.weights[k]
+        seen = sum(count for count, _ in self._even)
         return Estimate(
-            rate=self._rate() if self._seen else plain,
+            rate=self._rate(failed, also=not hits) if seen else plain,
             plain=(hits, natural),
             drives=len(self.z),
             first=next((k for k, one in enumerate(self.responses, start=1) if one.failed), 0),
-            seen=self._seen,
+            seen=seen,
             valid=self._certified / max(self._drawn, 1),
-            unexpected=unexpected,
+            unexpected=self._rate([k for k in self._floor if self.responses[k].failed], also=not hits).high if seen else math.nan,
             shares={kind: part / math.fsum(shares.values()) for kind, part in shares.items()},
+            events={name: self._event(name) for name in self.told},
         )
+
+    def _event(self, name: str) -> Interval:
+        """Return the rate of an event."""
+        if self._even:
+            never = not any(name in self.responses[k].events for k in self._natural)
+            return self._rate([k for k in self.weights if name in self.responses[k].events], also=never)
+        hits = sum(name in self.responses[k].events for k in self._natural)
+        return wilson(hits, len(self._natural), LEVEL) if self._natural else Interval(math.nan, 0.0, 1.0)
 
     def deviation(self, k: int) -> float:
         """Return how far a drive's scenario is from the mean, in standard deviations along what the regression goes by."""
@@ -335,19 +350,26 @@ class Search:
         slope = self._predictor().surrogates[int(np.argmin(parts)) if parts else 0].direction(self.problem.size)
         return abs(float(slope @ self.z[k]))
 
-    def _rate(self) -> Interval:
-        """Return the rate over the batches with its interval, the gamma interval of a sum of weights (Fay & Feuer 1997).
+    def _rate(self, hits: Sequence[int], *, also: bool) -> Interval:
+        """Return the rate over the batches of what happened in some drives, with its interval.
 
-        Without a failure its upper end is that of plain sampling with as many drives as were chosen evenly.
+        That is the gamma interval of a sum of weights (Fay & Feuer 1997). If it never happened, the upper end is the rate at
+        which that has a probability of 2.5 %: in batch b each of n scenarios is driven with a probability of e at least, which
+        is fixed before they are drawn, so it is Π (1 - rate · e)^n at most. `also`: nor in any natural drive of the exploration.
         """
-        w = np.array(list(self.weights.values()))
+        w = np.array([self.weights[k] for k in hits])
         if not len(w):
-            return Interval(0.0, 0.0, wilson(0, max(round(self._seen * self._evenly), 1), LEVEL).high)
-        total, square = float(w.sum()), float((w * (w - w.sum() / self._seen)).sum())
+            count, evenly = np.array([*self._even, (len(self._natural) * also, 1.0)]).T
+            tail, most = math.log(0.5 - 0.5 * LEVEL), 1.0 - 1e-12
+            if count @ np.log1p(-most * evenly) > tail:
+                return Interval(0.0, 0.0, 1.0)
+            return Interval(0.0, 0.0, float(optimize.brentq(lambda rate: count @ np.log1p(-rate * evenly) - tail, 0.0, most)))
+        seen = sum(count for count, _ in self._even)
+        total, square = float(w.sum()), float((w * (w - w.sum() / seen)).sum())
         low = _gamma_quantile(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
         most = float(w.max())
         high = _gamma_quantile(total + most, square + most * most, 0.5 + 0.5 * LEVEL)
-        return Interval(min(total / self._seen, 1.0), min(low / self._seen, 1.0), min(high / self._seen, 1.0))
+        return Interval(min(total / seen, 1.0), min(low / seen, 1.0), min(high / seen, 1.0))
 
 
 def _gamma_quantile(mean: float, variance: float, share: float) -> float:

@@ -68,7 +68,8 @@ class Objective:
             margin = FAR + nearest if math.isnan(verdict.min_pet) else verdict.min_pet - self.limit
         margin = FAR if math.isnan(margin) else float(margin)
         parts = apart if self.name in (AT_FAULT, COLLISION) else ()
-        return Response(margin, parts, _kind(outcome, self.name) if margin <= 0.0 else "")
+        events = ((COLLISION,) if hit is not None else ()) + ((AT_FAULT,) if verdict.at_fault else ())
+        return Response(margin, parts, _kind(outcome, self.name) if margin <= 0.0 else "", events)
 
 
 def _apart(outcome: Outcome) -> tuple[float, ...]:

@@ -3,75 +3,18 @@
 
 """A planner among the scenarios of one template, as a function of the sampler's numbers; each drive is written to a journal."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-import json
-from pathlib import Path
-from typing import Any, TextIO
 
-from scenario_gen.base.errors import InputError, of_system
-from scenario_gen.base.folders import write_text
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.search.estimate import Response
+from scenario_gen.closed_loop.search.journal import Journal
 from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.closed_loop.search.objective import Objective
 from scenario_gen.closed_loop.trials import RunTrials
 from scenario_gen.method.sampling import NaturalScenarios
 from scenario_gen.numerics import Floats
 from scenario_gen.types import mask, Road, Scenario
-
-
-@dataclass(frozen=True, eq=False)
-class Journal:
-    """The drives of a search in a file, one line each, written as they end; a search that goes on reads them again.
-
-    Attributes:
-        known: responses of the drives that the file had.
-        file: where further ones go.
-    """
-
-    known: list[Response]
-    file: TextIO
-
-    def add(self, response: Response) -> None:
-        """Write one drive."""
-        self.file.write(json.dumps([response.margin, response.parts, response.kind], ensure_ascii=False) + "\n")
-        self.file.flush()
-
-
-@contextmanager
-def open_journal(path: Path, identity: Mapping[str, Any]) -> Iterator[Journal]:
-    """Yield the journal at a path, made if it is not there; `identity` says what the drives hang on.
-
-    Raises:
-        InputError: the file is of another search, is no journal, or cannot be written.
-    """
-    head = json.dumps(identity, sort_keys=True, ensure_ascii=False)
-    try:
-        lines = path.read_text().splitlines(keepends=True) if path.exists() else []
-        whole = [line for line in lines if line.endswith("\n")]  # the last one may have been cut off
-        if whole:
-            before, now = json.loads(whole[0]), json.loads(head)
-            differ = [name for name in now if not isinstance(before, dict) or before.get(name) != now[name]]
-            if differ:
-                raise InputError(
-                    f"{path} has the drives of another search ({', '.join(differ)} differ); move it away, or give another --out"
-                )
-        known = [Response(float(margin), tuple(parts), kind) for margin, parts, kind in map(json.loads, whole[1:])]
-    except (ValueError, TypeError, RecursionError) as error:
-        raise InputError(f"{path} is no journal of a search ({error}); move it away, or give another --out") from error
-    except OSError as error:
-        raise of_system(error, path, "; give another --out") from error
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if len(whole) != len(lines) or not whole:
-            write_text(path, "".join(whole) or head + "\n")
-        file = path.open("a")
-    except OSError as error:
-        raise of_system(error, path, "; give another --out") from error
-    with file:
-        yield Journal(known, file)
 
 
 @dataclass(eq=False)

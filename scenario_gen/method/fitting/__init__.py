@@ -5,8 +5,8 @@
 
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.fit import fit_template
-from scenario_gen.method.fitting.kept import LostConflictError
+from scenario_gen.method.fitting.kept import LostEncounterError
 
 __all__ = [
-    "FittingConfig", "LostConflictError", "fit_template",
+    "FittingConfig", "LostEncounterError", "fit_template",
 ]  # fmt: skip

@@ -67,7 +67,7 @@ def finish(
         ends = np.where(track.still, 0.0, ends)
         states.append(np.column_stack((anchors[[0, -1]], ends)))
     requested = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))
-    lost = (*find_losses(encounter, tracks, placement), *placement.unused)
+    lost = (*find_losses(tracks, placement.tracks), *placement.unused)
     return Fit(encounter.vehicles, tuple(fitted), index, requested, tuple(notes), lost)
 
 

@@ -3,8 +3,6 @@
 
 """One door to the fitting: which way of placing a template is tried on which road."""
 
-from collections.abc import Callable
-from contextlib import suppress
 from functools import lru_cache
 import math
 
@@ -13,15 +11,14 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.finish import finish
-from scenario_gen.method.fitting.given import place_given, place_in_own_frame
-from scenario_gen.method.fitting.junction import has_lanes, place_at_junction
-from scenario_gen.method.fitting.kept import refuse_lost_conflicts
+from scenario_gen.method.fitting.given import place_given, place_in_own_frame, share_at_home
+from scenario_gen.method.fitting.kept import refuse_lost
+from scenario_gen.method.fitting.lanes import place_on_lanes
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.fitting.requested import refuse_impossible, refuse_misfits
 from scenario_gen.method.fitting.search import place_by_search
-from scenario_gen.method.fitting.vector import place_along_road, place_on_lanes
 from scenario_gen.numerics import Floats
-from scenario_gen.template import clean_tracks, Track
+from scenario_gen.template import clean_tracks, refuse_reversing
 from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation
 
 _AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
@@ -52,10 +49,11 @@ def fit_template(
         max_speed: [m/s] that no asked state may exceed.
 
     Raises:
-        LostConflictError: the best place on the road loses a conflict of the template, and `config.allow` does not name that.
+        LostEncounterError: the best place on the road loses something of the encounter that `config.allow` does not name.
         RefusedError: it does not fit, or a requested state cannot be had; the message says why, with figures.
         InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
     """
+    refuse_reversing(encounter)
     request.ego_of(encounter)  # no such vehicle: refused before anything is placed
     if request.moves:
         return _fit_request(encounter, segmentation, road, config, request, max_speed)
@@ -64,8 +62,8 @@ def fit_template(
         return finish(encounter, segmentation, road, placement, config, given)
     placement = _place(encounter, road.cleared, config)
     fit = finish(encounter, segmentation, road, placement, config)
-    if not config.allow and not placement.at_home:
-        refuse_lost_conflicts(fit.lost, road.name)
+    if not placement.at_home:
+        refuse_lost(fit.lost, config.allow, road.name)
     return fit
 
 
@@ -78,48 +76,30 @@ def _fit_request(
     placement, given = place_given(encounter, road, config, starts, goals, base)
     fit = finish(encounter, segmentation, road, placement, config, given)
     refuse_misfits(fit, starts, goals)
-    if not config.allow:
-        refuse_lost_conflicts(fit.lost, road.name)
+    refuse_lost((loss for loss in fit.lost if loss.kind == "conflict"), config.allow, road.name)  # lanes are as requested
     return fit
 
 
 @lru_cache(maxsize=1)  # changepoints have no part in it: the references have the same
 def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
-    if config.placement == "identity":
-        return place_in_own_frame(encounter, road, config)[0]
     tracks = clean_tracks(encounter)
-    ways: dict[str, Callable[[tuple[Track, ...], Road, FittingConfig], Placement]] = {
-        "lanes": place_along_road if road.map_lanes is None else place_on_lanes,
-        "junction": place_at_junction,
-        "search": place_by_search,
-    }
-    if road.map_lanes is not None and config.placement != "search":
+    if config.placement == "search":
+        return place_by_search(tracks, road, config)
+    if config.placement == "lanes" or (config.placement == "auto" and road.map_lanes is not None):
         return place_on_lanes(tracks, road, config)
-    if config.placement != "auto":
-        return ways[config.placement](tracks, road, config)
-    own, share = None, 0.0
-    reasons: list[str] = []
+    share = share_at_home(encounter, road)
+    reason, own = "", None
     try:
-        own, share = place_in_own_frame(encounter, road, config)
+        own = place_in_own_frame(encounter, road, config)
     except RefusedError as error:
-        reasons.append(f"in its own frame, {error}")
-    if own is not None and share >= _AT_HOME:
+        reason = f"where it was recorded, {error}"
+        if config.placement == "identity":
+            raise
+    if own is not None and (config.placement == "identity" or share >= (_NEAR_HOME if road.lanes is None else _AT_HOME)):
         return own
-    order: tuple[str, ...] = ("lanes", "junction") if road.lanes is not None else ("junction",)
-    if road.lanes is not None or has_lanes(road):
-        reasons = []
-    elif own is not None and share >= _NEAR_HOME:
-        return own
-    else:
-        order = ("search",)
-    if road.lanes is not None and road.lanes.turns_back:  # as one piece first: rings are drawn as large as those recorded
-        with suppress(RefusedError):
-            return place_on_lanes(tracks, road, config)
-    for name in order:
-        try:
-            return ways[name](tracks, road, config)
-        except RefusedError as error:
-            reasons.append(str(error))
-    if order == ("lanes", "junction"):  # what stands against it on one road, or at a junction where the road has one
-        reasons = reasons[-1:] if road.lanes is not None and len(road.lanes.arms) > 2 else reasons[:1]
-    raise RefusedError(f"the template does not fit road {road.name}: " + "; ".join(reasons))
+    try:
+        return place_by_search(tracks, road, config) if road.lanes is None else place_on_lanes(tracks, road, config)
+    except RefusedError as error:
+        if share < _NEAR_HOME or not reason:
+            raise
+        raise RefusedError(f"{reason}; elsewhere on road {road.name}, {error}") from error

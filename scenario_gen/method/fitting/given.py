@@ -19,21 +19,21 @@ from scenario_gen.template import clean_tracks, own_paths, Track
 from scenario_gen.types import Encounter, Road
 
 
-def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) -> tuple[Placement, float]:
+def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
     """Leave the template where it was recorded (only pulled apart where the record has vehicles overlap).
-
-    Returns:
-        The placement, and the share of sampled footprints that have room as they are.
 
     Raises:
         RefusedError: a sampled pose is farther than `max_move` from the nearest with room.
     """
     separation = own_paths(encounter)
-    shares = [float(share_with_room(road, track)) for track in separation.tracks]
-    max_repair([t for t, share in zip(separation.tracks, shares, strict=True) if share < 1.0], road, config.max_move)
+    max_repair([track for track in separation.tracks if share_with_room(road, track) < 1.0], road, config.max_move)
     notes = (f"placed on road {road.name} in the template's own frame", *separation.notes)
-    placement = replace(Placement.of(separation.tracks, 1.0, notes, "own path"), moved=separation.moved, at_home=True)
-    return placement, float(np.mean(shares))
+    return replace(Placement.of(separation.tracks, 1.0, notes, "own path"), moved=separation.moved, at_home=True)
+
+
+def share_at_home(encounter: Encounter, road: Road) -> float:
+    """The share of sampled footprints that have room on a road where they were recorded, 0 to 1."""
+    return float(np.mean([share_with_room(road, track) for track in clean_tracks(encounter)]))
 
 
 _CHORD = 2.0  # metres: a shorter one gives no direction (eq 8) and no scale (eq 9)

@@ -1,85 +1,80 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Is the manoeuvre kept? Turns, conflicts, who goes first and who is beside whom, of template and fit, over whole paths."""
+"""Is the encounter kept? Who turns, who meets whom and goes first, who drives in whose lane, who passes whom on which side."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
-from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.fitting.placement import Placement
+from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
-from scenario_gen.template import Conflict, conflicts_in, find_conflicts, in_words, keeps, Track, turn_of, turns_to_keep
-from scenario_gen.types import Encounter, Loss, Road
+from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.template import Conflict, find_conflicts, in_words, keeps, Track, turn_of, turns_to_keep
+from scenario_gen.types import Loss, Road
 
-CONFLICT, FOLLOWING = "conflict", "following"  # kinds of losses
+LOSABLE = {
+    "conflict": "vehicles whose paths cross or merge do not meet",
+    "order": "another vehicle goes first",
+    "following": "a vehicle does not follow its leader",
+    "merge": "a vehicle does not come into another one's lane",
+    "lane_change": "a vehicle does not leave another one's lane, or two lanes become one",
+    "overtaking": "a vehicle does not pass another one",
+    "stand": "a vehicle does not pass one that stands, on its side",
+    "turn": "a vehicle turns otherwise",
+}
+"""What a fit may lose only where `fitting.allow` names it, as lost_KIND; other losses are only reported."""
+
 _LONG = 1.0  # s side by side that count
 _NEAREST, _FARTHEST = 1.0, 6.0  # metres sideways between centres of two vehicles that are beside each other
 _LANES_DIFFER = 1.5  # metres by which they may be farther apart on a road, whose lanes are all of one width
 _SAME_WAY = np.radians(30.0)
 _ENOUGH = 0.5  # share of that time in which they are beside each other on the road, on the same side
+_IN_LANE, _OFF_LANE = 1.4, 2.3  # metres sideways up to which a vehicle is in another one's lane, and from which on beside it
+_STILL_IN_LANE = 2.0  # metres, likewise on the road
+_BEYOND, _STRAIGHT_ON = 30.0, np.radians(8.0)  # metres beyond a path's ends, straight on, for which it says where its lane lies
+_PASSED = 2.0  # metres by which one that passes another is behind it first, and then before it
 
 
-class LostConflictError(RefusedError):
-    """Vehicles that meet in the template would not on the road: its encounter is lost."""
+class LostEncounterError(RefusedError):
+    """The road has a place for the template, and there something of its encounter would be lost."""
 
 
-def refuse_lost_conflicts(lost: Iterable[Loss], road: str) -> None:
-    """Refuse a fit on which vehicles whose paths cross or merge in the template do not meet; who follows whom is only reported.
+def allowed_losses(allow: str) -> frozenset[str]:
+    """Return the kinds of losses that `fitting.allow` names.
 
     Raises:
-        LostConflictError: one is; it names the vehicles, and how it can be had all the same.
+        InputError: it names something else.
     """
-    lost_here = [loss.message for loss in lost if loss.kind == CONFLICT]
-    if lost_here:
-        message = "; ".join(lost_here)
-        raise LostConflictError(
-            f"road {road} has no place that keeps the encounter: {message}; fitting.allow=lost_conflict takes it as it is"
+    known = {f"lost_{kind}": kind for kind in LOSABLE}
+    names = [name.strip() for name in allow.split(",") if name.strip()]
+    for name in names:
+        if name not in known:
+            raise InputError(f"parameter allow names {name!r}; it may name, with commas between them, {', '.join(known)}")
+    return frozenset(known[name] for name in names)
+
+
+def refused_losses(lost: Iterable[Loss], allow: str) -> list[Loss]:
+    """Return the losses for which a fit is refused."""
+    allowed = allowed_losses(allow)
+    return [loss for loss in lost if loss.kind in LOSABLE and loss.kind not in allowed]
+
+
+def refuse_lost(lost: Iterable[Loss], allow: str, road: str) -> None:
+    """Refuse a fit that loses what `allow` does not name.
+
+    Raises:
+        LostEncounterError: it does; it names the vehicles, and how it can be had all the same.
+    """
+    refused = refused_losses(lost, allow)
+    if refused:
+        names = ",".join(f"lost_{kind}" for kind in sorted(allowed_losses(allow) | {loss.kind for loss in refused}))
+        raise LostEncounterError(
+            f"road {road} has no place that keeps the encounter: {'; '.join(loss.message for loss in refused)}; "
+            f"fitting.allow={names} takes it as it is"
         )
-
-
-def refuse_lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...], road: str) -> None:
-    """Refuse a placement on which a vehicle does another manoeuvre than in the template.
-
-    Raises:
-        RefusedError: one turns more than 25° differently, or otherwise; with both figures.
-    """
-    for track, other in zip(tracks, placed, strict=True):
-        there, name = turn_of(other), track.vehicle.id
-        for turn in turns_to_keep(track):
-            if not keeps(turn, there):
-                raise RefusedError(
-                    f"vehicle {name} {in_words(turn)} in the template, and would on road {road} {_otherwise(there)}"
-                )
-
-
-def _otherwise(turn: float) -> str:
-    """As `in_words`, after "would"."""
-    verb, rest = in_words(turn).split(" ", 1)
-    return f"{verb.removesuffix('es') if verb == 'goes' else verb.removesuffix('s')} {rest}"
-
-
-def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
-    """How many of the template's conflicts a placement has not, or in another order, each counted twice, and new ones."""
-    before, after = (_meetings(some) for some in (tracks, placed))
-    changed = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
-    return 2 * len(changed) + len(after.keys() - before.keys())
-
-
-@lru_cache(maxsize=2)  # of one template many places are looked at
-def _meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
-    """The conflicts of some motion, by the vehicles."""
-    time, poses = np.arange(len(tracks[0].progress), dtype=np.float64), np.stack([track.poses for track in tracks])
-    return _by_pair(find_conflicts(tuple(track.vehicle for track in tracks), time, poses[..., :2], poses[..., 2]))
-
-
-def keeps_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> bool:
-    """Whether all whose paths cross or merge in the template meet on the road."""
-    before, after = (_meetings(some) for some in (tracks, placed))
-    return {pair for pair, conflict in before.items() if not conflict.following} <= after.keys()
 
 
 def find_unused(road: Road, used: Iterable[int]) -> tuple[Loss, ...]:
@@ -93,82 +88,129 @@ def find_unused(road: Road, used: Iterable[int]) -> tuple[Loss, ...]:
     return (Loss("arm", (), f"{unused} of the {len(arms)} arms of road {road.name} {used_by_nobody}"),)
 
 
-def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:
-    """What of the template's interaction the placed motion has not, or has otherwise.
-
-    Args:
-        encounter: the template.
-        tracks: its N cleaned tracks.
-        placement: where they are on the road, sample by sample.
-    """
-    poses = np.stack([track.poses for track in placement.tracks])
-    turns = [
-        Loss("turn", (track.vehicle.id,), f"vehicle {track.vehicle.id} {in_words(a)} in the template, {in_words(b)} on this road")
-        for track, a, b in ((t, _recorded(t), turn_of(p)) for t, p in zip(tracks, placement.tracks, strict=True))
-        if not keeps(a, b)
-    ]
-    own = np.concatenate((encounter.position, encounter.heading[..., None]), axis=-1)
-    return (*turns, *_lost_conflicts(encounter, poses), *_lost_neighbours(encounter, own, poses))
+def find_losses(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> tuple[Loss, ...]:
+    """Return what of the template's interaction its placement on a road has not, or has otherwise; both are cleaned tracks."""
+    found = (_lost_turns, _lost_passings, _lost_lanes, _lost_conflicts, _lost_neighbours)
+    by_vehicles = {frozenset(loss.vehicles): loss for find in reversed(found) for loss in reversed([*find(tracks, placed)])}
+    return tuple(by_vehicles.values())[::-1]
 
 
-def _recorded(track: Track) -> float:
-    """How far [rad] a vehicle was recorded to turn, by its heading; by its path where that is not known."""
-    return turn_of(track) if np.isnan(track.recorded_turn) else track.recorded_turn
+def _lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
+    for track, other in zip(tracks, placed, strict=True):
+        there, name = turn_of(other), track.vehicle.id
+        lost = next((turn for turn in turns_to_keep(track) if not keeps(turn, there)), None)
+        if lost is not None:
+            yield Loss("turn", (name,), f"vehicle {name} {in_words(lost)} in the template, {in_words(there)} on this road")
 
 
-def _lost_conflicts(encounter: Encounter, poses: Floats) -> list[Loss]:
-    vehicles, time = encounter.vehicles, encounter.time
-    before = _by_pair(conflicts_in(encounter))
-    after = _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], encounter.present))
-    lost = []
+@lru_cache(maxsize=2)  # of one template many places are looked at
+def _meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
+    """The conflicts of some motion, by the vehicles."""
+    poses = np.stack([track.poses for track in tracks])
+    time = np.arange(poses.shape[1], dtype=np.float64) * tracks[0].dt
+    vehicles, present = tuple(track.vehicle for track in tracks), np.stack([track.present for track in tracks])
+    found = find_conflicts(vehicles, np.asarray(time), poses[..., :2], poses[..., 2], present)
+    return {(min(c.first, c.second), max(c.first, c.second)): c for c in found}
+
+
+def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
+    before, after = _meetings(tracks), _meetings(placed)
     for pair in sorted(before.keys() | after.keys()):
-        a, b = (vehicles[k].id for k in pair)
+        a, b = (tracks[k].vehicle.id for k in pair)
         if pair not in after:
-            kind = FOLLOWING if before[pair].following else CONFLICT
-            what = "follow each other" if before[pair].following else "have crossing or merging paths"
-            lost.append(Loss(kind, (a, b), f"vehicles {a} and {b} {what} in the template, and do not meet on this road"))
+            following = before[pair].following
+            what = "follow each other" if following else "have crossing or merging paths"
+            kind = "following" if following else "conflict"
+            yield Loss(kind, (a, b), f"vehicles {a} and {b} {what} in the template, and do not meet on this road")
         elif pair not in before:
-            lost.append(
-                Loss("new conflict", (a, b), f"vehicles {a} and {b} come into conflict on this road, not in the template")
-            )
+            yield Loss("new conflict", (a, b), f"vehicles {a} and {b} come into conflict on this road, not in the template")
         elif before[pair].first != after[pair].first and not before[pair].following:
-            first, second = vehicles[before[pair].first].id, vehicles[before[pair].second].id
-            late = abs(after[pair].arrival_gap)
-            lost.append(
-                Loss("order", (a, b), f"vehicle {first} goes before {second} in the template, {late:.1f} s after it on this road")
-            )
-    return lost
+            first, late = tracks[before[pair].first].vehicle.id, abs(after[pair].arrival_gap)
+            yield Loss("order", (a, b), f"vehicle {first} goes first in the template, {late:.1f} s after the other on this road")
 
 
-def _by_pair(conflicts: tuple[Conflict, ...]) -> dict[tuple[int, int], Conflict]:
-    return {(min(c.first, c.second), max(c.first, c.second)): c for c in conflicts}
+def _lost_lanes(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
+    """Who drives in whose lane at the start and at the end: what has become of it on the road."""
+    for i, j in permutations(range(len(tracks)), 2):
+        before = [_aside(tracks[i], tracks[j], end) for end in (0, 1)]
+        after = [_aside(placed[i], placed[j], end) for end in (0, 1)]
+        together = [abs(offset) < _IN_LANE for offset in before]
+        farthest = np.inf if any(together) else _FARTHEST
+        if not any(_differs(own, there, farthest) for own, there in zip(before, after, strict=True)):
+            continue
+        a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
+        known = [near for near, own in zip(together, before, strict=True) if not np.isnan(own)]
+        if all(known):
+            yield Loss("following", (a, b), f"vehicles {a} and {b} drive in one lane in the template, not on this road")
+        elif known[-1]:
+            yield Loss("merge", (a, b), f"vehicle {b} comes into the lane of {a} in the template, not on this road")
+        elif known[0]:
+            yield Loss("lane_change", (a, b), f"vehicle {b} leaves the lane of {a} in the template, not on this road")
+        else:
+            yield Loss("lane_change", (a, b), f"vehicles {a} and {b} drive in two lanes in the template, otherwise on this road")
 
 
-def _lost_neighbours(encounter: Encounter, own: Floats, poses: Floats) -> list[Loss]:
-    lost = []
-    for i, j in combinations(range(len(own)), 2):
-        reach = (encounter.vehicles[i].length + encounter.vehicles[j].length) / 2.0
-        both = encounter.there[i] & encounter.there[j]
-        before = np.where(both, _side(own[i], own[j], reach), 0)
+def _differs(own: float, there: float, farthest: float) -> bool:
+    """Whether a vehicle so far aside [m] in the template, at most `farthest`, is so far aside [m] on the road in another lane."""
+    if abs(own) < _IN_LANE:
+        return bool(np.isnan(there)) or abs(there) > _STILL_IN_LANE
+    return _OFF_LANE < abs(own) < farthest and (own * there < 0.0 or abs(there) < _IN_LANE)
+
+
+def _aside(track: Track, other: Track, end: int) -> float:
+    """How far [m, left positive] beside a path another vehicle starts (`end` 0) or ends (1); NaN if it does not lead there."""
+    pose = other.curve.at(other.progress[other.present[end]])
+    station, offset = track.curve.project(pose[None, :2])
+    beyond = max(-float(station[0]), float(station[0]) - track.travelled)
+    turned = abs(float(wrap_angle(track.curve.at(station)[0, 2] - pose[2])))
+    leads = turned < _SAME_WAY if beyond <= 0.0 else turned < _STRAIGHT_ON and beyond < _BEYOND
+    return float(offset[0]) if leads and not (track.still or other.still) else np.nan
+
+
+def _lost_passings(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
+    for i, j in permutations(range(len(tracks)), 2):
+        side = _passes(tracks[i], tracks[j], _FARTHEST)
+        if not side or _passes(placed[i], placed[j], _FARTHEST + _LANES_DIFFER) == side:
+            continue
+        a, b, word = tracks[i].vehicle.id, tracks[j].vehicle.id, "left" if side > 0 else "right"
+        kind, what = ("stand", f"{b}, which stands") if tracks[j].still else ("overtaking", b)
+        yield Loss(kind, (a, b), f"vehicle {a} passes {what}, to its {word}, in the template, not on this road")
+
+
+def _passes(track: Track, other: Track, farthest: float) -> int:
+    """On which side a vehicle passes another one that drives the same way, or stands: 1 left, -1 right, 0 it does not."""
+    both = track.there & other.there
+    if track.still or not both.any():
+        return 0
+    poses, others = track.poses[both], other.poses[both]
+    ahead, left = ahead_and_left((others - poses)[:, :2], poses[:, 2])
+    near = (np.abs(left) < farthest) & (other.still | (np.abs(wrap_angle(others[:, 2] - poses[:, 2])) < _SAME_WAY))
+    before, after = np.flatnonzero(near & (ahead > _PASSED)), np.flatnonzero(near & (ahead < -_PASSED))
+    if not len(before) or not len(after) or before[0] > after[-1]:
+        return 0
+    aside = float(left[np.argmin(np.where(near, np.abs(ahead), np.inf))])
+    return -int(np.sign(aside)) if abs(aside) > _NEAREST else 0
+
+
+def _lost_neighbours(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
+    for i, j in combinations(range(len(tracks)), 2):
+        reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0
+        before = np.where(tracks[i].there & tracks[j].there, _side(tracks[i].poses, tracks[j].poses, reach), 0)
         for side, word in ((1, "left"), (-1, "right")):
             there: Bools = before == side
-            seconds = float(there.sum()) * encounter.dt
+            seconds = float(there.sum()) * tracks[0].dt
             if seconds < _LONG:
                 continue
-            kept = float((_side(poses[i], poses[j], reach, _LANES_DIFFER)[there] == side).mean())
+            kept = float((_side(placed[i].poses, placed[j].poses, reach, _LANES_DIFFER)[there] == side).mean())
             if kept < _ENOUGH:
-                a, b = encounter.vehicles[i].id, encounter.vehicles[j].id
+                a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
                 here = f"for {kept * seconds:.1f} s of these on this road"
-                in_template = f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the template"
-                lost.append(Loss("beside", (a, b), f"{in_template}, {here}"))
-    return lost
+                yield Loss("beside", (a, b), f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the template, {here}")
 
 
 def _side(path: Floats, other: Floats, reach: float, wider: float = 0.0) -> Ints:
     """(T,) 1 where `other` (T, 3) is to the left of `path`, side by side and the same way, -1 to the right, 0 elsewhere."""
-    d = other[:, :2] - path[:, :2]
-    cos, sin = np.cos(path[:, 2]), np.sin(path[:, 2])
-    ahead, left = d[:, 0] * cos + d[:, 1] * sin, d[:, 1] * cos - d[:, 0] * sin
+    ahead, left = ahead_and_left((other - path)[:, :2], path[:, 2])
     same = np.abs(wrap_angle(other[:, 2] - path[:, 2])) < _SAME_WAY
     beside = same & (np.abs(ahead) < reach) & (np.abs(left) > _NEAREST) & (np.abs(left) < _FARTHEST + wider)
     return np.where(beside, np.sign(left), 0.0).astype(np.int64)

@@ -5,7 +5,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 import itertools
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +36,8 @@ from scenario_gen.types import Fit, FittedVehicle, Road, Route, Vehicle
 STANDS = 0.05  # [m] a vehicle whose start and end are nearer than this has no path
 CLOSE = 0.3  # [m] anchors nearer to each other than this are one waypoint
 SHORTEST = 0.1  # [m] what a moving primitive covers at least, else it is a dwell
+DENSE = 0.05  # metres between places of a curve at which an anchor may lie,
+MOST_DENSE = 20_000  # so many at most: each is compared with each anchor
 SHARP = np.deg2rad(100.0)  # a waypoint farther off the heading than this lies behind
 SOFT_WEIGHT = 0.1  # weight of an anchor that is no waypoint
 FIRMNESS = ((1.0, 12), (10.0, 12), (100.0, 12), (1000.0, 24))  # by which a guess is held, ever more firmly, and rounds for each
@@ -123,7 +127,21 @@ def deviations(route: Route, fitted: FittedVehicle) -> Floats:
 
 def make_planner(config: PlanningConfig) -> Planner:
     """The geometric planner that `config` names."""
-    return PLANNERS[config.planner](config)
+    make = PLANNERS[config.planner]
+    with PLANNERS.running(config.planner):
+        planner = make(config)
+        if not (hasattr(planner, "plan") or hasattr(planner, "plan_poses")):
+            raise TypeError(f"it returned {type(planner).__name__}, which has no method `plan`")
+        return planner
+
+
+def _found(task: _Task, find: Callable[[], Any], name: str, columns: int) -> Floats:
+    """Return the path (P, columns) of this name in the plan that a planner finds; one of a plugin may return anything."""
+    with PLANNERS.running(task.config.planner):
+        path = np.asarray(getattr(find(), name), dtype=np.float64)
+        if path.ndim != 2 or len(path) < 2 or path.shape[1] < columns or not np.isfinite(path).all():
+            raise ValueError(f"its path is no array of two or more finite rows of {columns} numbers")
+        return path
 
 
 def _route(task: _Task) -> Route:
@@ -331,23 +349,34 @@ def _searched_poses(
         query = PoseQuery(start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit)
         try:
             try:
-                return planner.plan_poses(task.road, query, Budget(iterations), task.seed + a, wishes).poses
+                search = partial(planner.plan_poses, task.road, query, Budget(iterations), task.seed + a, wishes)
+                return _found(task, search, "poses", 3)
             except BudgetSpentError:
                 if extra or patience == 1:
                     raise
                 budget = Budget(patience * config.iterations, first=True)
-                return planner.plan_poses(task.road, query, budget, task.seed + a, wishes).poses
+                return _found(task, partial(planner.plan_poses, task.road, query, budget, task.seed + a, wishes), "poses", 3)
         except NoWayError as reason:
             error = RefusedError(f"{where}: {reason}")
         except BudgetSpentError:
             error = RefusedError(
                 f"no drivable route for vehicle {vehicle.id} on road {task.road.name!r} {where}: none with a curvature of at "
-                f"most {limit:.3f} 1/m was found in {patience * config.iterations} iterations; planning.iterations allows more"
+                f"most {limit:.3f} 1/m was found in {patience * config.iterations} iterations{_off_road(task)}"
             )
         except BlockedError as reason:  # of the larger footprint: the anchors themselves have room
             error = RefusedError(f"{task.name(a if reason.end == 'start' else b)} is blocked: {reason}")
     assert error is not None
     raise error
+
+
+def _off_road(task: _Task) -> str:
+    """Where the fitted path of a vehicle leaves the road; what to do where it does not."""
+    path = task.fitted.path
+    off = path[~footprint_fits(task.road, path, task.vehicle.length, task.vehicle.width)]
+    if not len(off):
+        return "; planning.iterations allows more"
+    x, y = off[len(off) // 2, :2]
+    return f"; where the template was placed its footprint leaves the road, at {x:.2f}, {y:.2f} m: no search mends that"
 
 
 def _sides(config: PlanningConfig, against: float, away: float) -> tuple[float, float]:
@@ -374,7 +403,8 @@ def _searched(task: _Task, a: int, b: int) -> Floats:
     start, end = task.anchors[a], task.anchors[b]
     query = Query(start[:2], end[:2], _radius(task, start, end))
     try:
-        return plan_with_retry(task.planner, task.road, query, task.config.iterations, task.seed + a).path
+        search = partial(plan_with_retry, task.planner, task.road, query, task.config.iterations, task.seed + a)
+        return _found(task, search, "path", 2)
     except BlockedError as error:
         raise RefusedError(f"{task.name(a if error.end == 'start' else b)} is blocked: {error}") from error
     except RefusedError as error:
@@ -390,7 +420,7 @@ def _joined(legs: list[Guess]) -> Guess:
 
 def _sampled(task: _Task, poses_at: Callable[[Floats], Floats], total: float) -> Route:
     """A curve of length `total` at points at most `spacing` apart, one of them beside every anchor."""
-    dense = np.linspace(0.0, total, int(np.ceil(total / 0.05)) + 1)
+    dense = np.linspace(0.0, total, min(int(np.ceil(total / DENSE)), MOST_DENSE) + 1)
     stops = _stops(task, dense, poses_at(dense))
     for k in range(1, len(stops)):  # what hardly moves is a dwell
         if stops[k] - stops[k - 1] < SHORTEST:

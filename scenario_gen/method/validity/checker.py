@@ -74,8 +74,10 @@ class Checker:
         self._dynamics_limits = np.array([getattr(self._limits, name) for name in dynamics.LIMITS])
         if self.road is not None:
             self._ground = inside.Ground.of(self.road)
-        lanes = self.road.map_lanes if self.road is not None else None
-        self._rules = RuleCheck(lanes) if lanes is not None and lanes.rules else None
+        lanes = self.road.lanes if self.road is not None else None
+        swapped = self._first != tuple(conflict.first for conflict in self.conflicts or ())
+        against = lanes is not None and lanes.drawn and swapped  # the signs of a drawn road say who went first in the template
+        self._rules = RuleCheck(lanes) if lanes is not None and lanes.rules and not against else None
 
     @classmethod
     def of_template(
@@ -119,7 +121,7 @@ class Checker:
             "stop_not_kept: no template's waits are known": self.waits,
         }
         sentences = tuple(sentence for sentence, given in missing.items() if given is None)
-        lanes = self.road.map_lanes if self.road is not None else None
+        lanes = self.road.lanes if self.road is not None else None
         if lanes is not None and lanes.rules and not lanes.rules_kept:
             sentences += ("traffic_rule: the request ignores the map's rules",)
         return sentences

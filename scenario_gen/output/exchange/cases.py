@@ -72,6 +72,7 @@ class Case:
         start_ns: the template's stamp.
         scenarios: those asked for.
         lane_map: of the road; the same whichever scenarios are asked for.
+        origin: of the frame, as of `LaneNetwork`.
     """
 
     number: int
@@ -80,6 +81,7 @@ class Case:
     start_ns: int
     scenarios: tuple[Exported, ...]
     lane_map: LaneMap
+    origin: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,4 +198,5 @@ def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, in
         start_ns=group.stamp,
         scenarios=tuple(exported for exported in group.scenarios if not indices or exported.index in indices),
         lane_map=lane_map_of(road, everybody, width, export.run_out),
+        origin=road.lanes.origin if road and road.lanes else (),
     )

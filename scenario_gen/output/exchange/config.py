@@ -16,6 +16,13 @@ class ExportConfig(Parameters):
     map: str = parameter(
         "", "OpenSCENARIO: the map that the scenarios were made on (.xodr, .osm); it is copied and named as their road"
     )
+    projection: str = parameter(
+        "mgrs",
+        "Autoware, OpenSCENARIO with a Lanelet2 map: the frame in which others load a map in latitude and longitude: its MGRS "
+        "square, UTM, or metres about its middle",
+        choices=("mgrs", "utm", "local"),
+    )
+    projection_origin: str = parameter("", "latitude, longitude that are 0, 0 of projection utm or local")
     run_out: float = parameter(
         50.0,
         "how far lanes are continued straight on beyond the road, so that a planner sees road ahead",

@@ -4,7 +4,7 @@
 """`scenario-gen export`: a folder of files for other software, with notes on them."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 import json
 from pathlib import Path
@@ -25,6 +25,7 @@ from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.output.exchange.osi import write_osi
+from scenario_gen.output.exchange.projection import projection_of
 from scenario_gen.output.exchange.scenarionet import dataset_files, description, file_name, pickled
 from scenario_gen.roads import read_network
 
@@ -69,10 +70,12 @@ class ExportFormat:
         closing: files about all scenarios, by name: of the first file and the `content` of each.
         takes_map: whether `ExportConfig.map` is written in place of lanes.
         maps: endings of the names of such maps.
+        projected_from: latitude and longitude about which positions are, if they are to be projected as a map is; else ().
     """
 
     write: Callable[[Path, Case, Exported, ExportConfig], Written]
     shared: Callable[[Case, ExportConfig], Mapping[str, bytes]] = _nothing_shared
+    projected_from: Callable[[Case, ExportConfig], tuple[float, ...]] = lambda *_: ()
     takes_map: bool = False
     maps: tuple[str, ...] = MAPS
     closing: Callable[[Sequence[tuple[str, Any]]], Mapping[str, bytes]] = _nothing_at_the_end
@@ -114,13 +117,17 @@ def export_bag(
     with replaced_folder(out, EXPORTED, [bag]) as folder:
         for case in cases:
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
-            notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, export)}")
+            frame, moved = projection_of(to.projected_from(case, export), export)
+            said = "; ".join(filter(None, (_origin(case, export), frame)))
+            notes.append(f"{about}: {len(case.scenarios)} scenarios; {said}")
             for name, data in to.shared(case, export).items():
                 (folder / name).write_bytes(data)
             for exported in case.scenarios:
                 progress(next(done), total)
                 try:
-                    written = to.write(folder, case, exported, export)
+                    ego = None if exported.ego is None else moved(exported.ego)
+                    placed = replace(exported, others=moved(exported.others), ego=ego)
+                    written = to.write(folder, case, placed, export)
                 except RefusedError as error:
                     notes.append(f"{about}: left out: {error}")
                     continue
@@ -217,6 +224,10 @@ def _roads(case: Case, export: ExportConfig) -> Mapping[str, bytes]:
     return {_road_file(case, export): write_opendrive(case.lane_map, case.road_name, case.start_ns)}
 
 
+def _origin_of_map(_: Case, export: ExportConfig) -> tuple[float, ...]:
+    return read_network(Path(export.map)).origin if export.map else ()
+
+
 def refuse_other_map(case: Case, path: Path) -> None:
     """Refuse a map that is not the one on which the scenarios of a case drive.
 
@@ -238,9 +249,9 @@ EXPORTS = Registry[ExportFormat](
     "scenario_gen.exports",
     {
         "commonroad": ExportFormat(_to_commonroad),
-        "openscenario": ExportFormat(_to_openscenario, _roads, takes_map=True),
+        "openscenario": ExportFormat(_to_openscenario, _roads, _origin_of_map, takes_map=True),
         "osi": ExportFormat(_to_osi, _roads, takes_map=True, maps=(".xodr",)),
-        "autoware": ExportFormat(_to_autoware),
+        "autoware": ExportFormat(_to_autoware, projected_from=lambda case, _: case.origin),
         "scenarionet": ExportFormat(_to_scenarionet, closing=dataset_files),
     },
     ExportFormat,

@@ -12,11 +12,22 @@ import numpy as np
 
 from scenario_gen.method.evaluation import at_common, at_count, mean_feature
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, RuleKind, Scenario, Segmentation, UNIFORM, WITHOUT
+from scenario_gen.types import (
+    Encounter,
+    Fit,
+    GenerationResult,
+    markings,
+    Road,
+    Route,
+    Scenario,
+    Segmentation,
+    UNIFORM,
+    WITHOUT,
+)
 
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""
-MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS, MAX_BORDERS = 240, 900, 72, 10, 200, 400
+MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS, MAX_LINES = 240, 900, 72, 10, 200, 400
 MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
 """Speed and accelerations over time are stored more finely than the animation, of fewer samples."""
 
@@ -97,27 +108,18 @@ def road_data(road: Road) -> dict[str, Any]:
         "origin": [_short(v) for v in road.origin],
         "size": [width, height],
         "runs": runs(coarse),
-        "lanes": _lane_borders(road),
-        "stops": _stop_lines(road),
+        "markings": _markings(road),
     }
 
 
-def _lane_borders(road: Road) -> list[list[float]]:
-    """Return the borders of the road's lanes, each x, y, x, y … [m]; none where no lanes are known, or too many.
-
-    Nobody paints borders inside the junction of a built-in road.
-    """
-    lanes = [] if road.lanes is None else [lane for lane in road.lanes.lanes if not (road.lanes.drawn and lane.junction)]
-    borders = [border for lane in lanes for border in (lane.left, lane.right)]
-    step = max(1, -(-len(borders) * 2 // MAX_BORDERS))
-    kept = [np.linspace(0, len(border) - 1, min(len(border), 25)).round().astype(np.int64) for border in borders]
-    return [np.round(border[rows].ravel(), 1).tolist() for border, rows in zip(borders[::step], kept[::step], strict=True)]
-
-
-def _stop_lines(road: Road) -> list[list[float]]:
-    """Return the stop lines of the road's signs and lights, each x, y, x, y … [m]."""
-    rules = road.lanes.rules if road.lanes is not None else ()
-    return [np.round(rule.line.ravel(), 1).tolist() for rule in rules if len(rule.line) and rule.kind != RuleKind.PRIORITY]
+def _markings(road: Road) -> dict[str, list[list[float]]]:
+    """Return what is painted on the road, each line x, y, x, y … [m] by its kind; of a large map's lines only some."""
+    drawn = {}
+    for kind, lines in (markings(road.lanes) if road.lanes is not None else {}).items():
+        some = lines[:: max(1, -(-len(lines) // MAX_LINES))]
+        kept = [line[np.linspace(0, len(line) - 1, min(len(line), 25)).round().astype(np.int64)] for line in some]
+        drawn[kind.value] = [np.round(line.ravel(), 2).tolist() for line in kept]
+    return drawn
 
 
 def _turn(encounter: Encounter, fit: Fit | None) -> float:

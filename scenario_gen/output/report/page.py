@@ -63,7 +63,7 @@ def render(report: ReportInput) -> str:
     views = [_view(index, case) for index, case in enumerate(report.cases)]
     return render_page(
         "report.html.j2",
-        ("scene.js", "plots.js", "charts.js", "page.js"),
+        ("scene.js", "plots.js", "charts.js", "page.js", "tables.js"),
         [case_data(case, MAX_SAMPLES) for case in report.cases],
         report=report,
         views=views,

@@ -25,6 +25,7 @@ SKIPPED = frozenset(
 _NOT_FOR_CARS = frozenset(
     ("sidewalk", "crosswalk", "bicycleLane", "busLane", "shoulder", "parking", "border", "railway", "restricted")
 )
+_CARS = frozenset(("vehicle", "car"))  # users of lanelets
 _MAX_SPEED = ("274", "274.1", "R2-1", "maxSpeed")  # names and national numbers of the sign
 
 
@@ -42,8 +43,9 @@ def lanes_of(root: Element) -> MapLanes:
     for_cars = {
         name: lanelet
         for name, lanelet in lanelets.items()
-        if not {kind.text.strip() for kind in lanelet.all("laneletType")} & _NOT_FOR_CARS
+        if not _texts(lanelet, "laneletType") & _NOT_FOR_CARS and _open_to_cars(lanelet)
     }
+    both_ways = {name for name, lanelet in for_cars.items() if _texts(lanelet, "userBidirectional") & _CARS}
     drafts = []
     for name, lanelet in for_cars.items():
         with faults.leaving_out("lanelet", name):
@@ -60,11 +62,24 @@ def lanes_of(root: Element) -> MapLanes:
             )
             limit, junction = _speed_limit(lanelet, limits), junctions.get(name, "")
             drafts.append(Draft(name, left, right, successors, beside, limit, junction, lanelet.place))
+            if name in both_ways:
+                before = tuple(f"{other.get('ref')}r" for other in lanelet.all("predecessor") if other.get("ref") in both_ways)
+                drafts.append(Draft(f"{name}r", right[::-1], left[::-1], before, (), limit, junction, lanelet.place))
     version = root.attributes.get("commonRoadVersion", "?")
     notes = (f"CommonRoad {version}: coordinates as they stand, in metres", *_georeference(root))
     rules = list(_rules(root, for_cars, faults))
     others = [sign for sign in root.all("trafficSign") if not any(map(_means, _sign_names(sign)))]
     return MapLanes(drafts, notes, len(lanelets) - len(for_cars), faults, rules, len(others))
+
+
+def _texts(lanelet: Element, tag: str) -> set[str]:
+    return {child.text.strip() for child in lanelet.all(tag)}
+
+
+def _open_to_cars(lanelet: Element) -> bool:
+    """Whether cars are among those who may use a lanelet; all may where nobody is named, or only who has priority."""
+    users = (_texts(lanelet, "userOneWay") | _texts(lanelet, "userBidirectional")) - {"priorityVehicle"}
+    return not users or bool(users & _CARS)
 
 
 def _sign_names(sign: Element) -> list[str]:
@@ -90,7 +105,7 @@ def _rules(root: Element, lanelets: dict[str, Element], faults: Faults) -> Itera
         with faults.leaving_out("stop line", name):
             stop = lanelet.first("stopLine")
             holders = [lanelet] if stop is None else [lanelet, stop]
-            line = _points(stop) if stop is not None and len(stop.all("point")) > 1 else np.zeros((0, 2))
+            line = _points(stop)[:, :2] if stop is not None and len(stop.all("point")) > 1 else np.zeros((0, 2))
             refs = dict.fromkeys((tag, ref.get("ref")) for tag, _ in kinds for holder in holders for ref in holder.all(tag))
             for ref in refs:
                 if ref in kinds:
@@ -103,8 +118,10 @@ def _georeference(root: Element) -> list[str]:
 
 
 def _points(bound: Element) -> Floats:
-    points = [(point.one("x").value(), point.one("y").value()) for point in bound.all("point")]
-    return np.array(points, dtype=np.float64).reshape(-1, 2)
+    """Points (P, 3) [m] of a bound or a line, with their height, NaN where it is not given."""
+    heights = [(point, point.first("z")) for point in bound.all("point")]
+    points = [(p.one("x").value(), p.one("y").value(), math.nan if z is None else z.value()) for p, z in heights]
+    return np.array(points, dtype=np.float64).reshape(-1, 3)
 
 
 def _speed_signs(root: Element, faults: Faults) -> dict[str, float]:

@@ -103,7 +103,7 @@ def lanes_of(root: Element) -> MapLanes:
         with faults.leaving_out("stop line", ref):
             lines[ref] = _nodes(ways[ref], nodes)
     all_names = dict.fromkeys(chain(*names.values(), *lines.values()))
-    positions, note = _positions([nodes[name] for name in all_names], root.file, faults)
+    positions, note, origin = _positions([nodes[name] for name in all_names], root.file, faults)
     drawn = []
     for relation, tags in for_cars:
         if relation.get("id") not in sides:
@@ -112,17 +112,19 @@ def lanes_of(root: Element) -> MapLanes:
             borders = [_border(ways[ref], names[ref], positions) for ref in sides[relation.get("id")]]
             lanelet = _lanelet(relation, tags, borders)
             drawn.append(lanelet)
-            if tags.get("one_way") in ("no", "false"):
+            if _first(tags, ("one_way:vehicle:car", "one_way:vehicle", "one_way")) in ("no", "false"):
                 drawn.append(lanelet.turned())
     limits = {relation.get("id"): _sign_limit(relation, tags, ways) for relation, tags in tagged}
     at = {
-        ref: np.array([positions[name] for name in own]) for ref, own in lines.items() if all(name in positions for name in own)
+        ref: np.array([positions[name][:2] for name in own])
+        for ref, own in lines.items()
+        if all(name in positions for name in own)
     }
     rules = [replace(rule, line=line) for rule, refs in signed for line in [at[ref] for ref in refs if ref in at] or [rule.line]]
     elements = [(relation, tags) for relation, tags in tagged if tags.get("type") == "regulatory_element"]
     others = [relation for relation, tags in elements if tags.get("subtype") != "speed_limit" and not _kind(relation, tags, ways)]
     left_out = len(lanelets) - len(for_cars)
-    return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), left_out, faults, rules, len(others))
+    return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), left_out, faults, rules, len(others), origin)
 
 
 def _regulations(
@@ -140,7 +142,8 @@ def _regulations(
         if kind is None:
             continue
         lanes = tuple(_members(relation, "yield")) or tuple(under[name])
-        lines = [ref for ref in _members(relation, "ref_line") if ref in ways]
+        role = "refers" if tags.get("subtype") == "road_marking" else "ref_line"
+        lines = [ref for ref in _members(relation, role) if ref in ways]
         yield DraftRule(name, kind, lanes, tuple(_members(relation, "right_of_way"))), lines
 
 
@@ -153,7 +156,8 @@ def _kind(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> 
     """What a regulatory element means for traffic; None if it is none that is known."""
     if tags.get("type") != "regulatory_element":
         return None
-    signs = [_tags(ways[ref]).get("subtype", "") for ref in _members(relation, "refers") if ref in ways]
+    referred = [_tags(ways[ref]) for ref in _members(relation, "refers") if ref in ways]
+    signs = [own.get("subtype", "") for own in referred]
     kinds = [kind for kind in map(kind_of_sign, (tags.get("sign_type", ""), *signs)) if kind is not None]
     match tags.get("subtype"):
         case "traffic_light":
@@ -164,6 +168,8 @@ def _kind(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> 
             return RuleKind.STOP if RuleKind.STOP in kinds else RuleKind.GIVE_WAY
         case "traffic_sign":
             return kinds[0] if kinds else None
+        case "road_marking" if any(own.get("type") == "stop_line" for own in referred):  # Autoware's
+            return RuleKind.STOP
     return None
 
 
@@ -183,13 +189,17 @@ def _tags(element: Element) -> dict[str, str]:
     return {tag.get("k"): tag.get("v") for tag in element.all("tag")}
 
 
+def _first(tags: dict[str, str], keys: Sequence[str]) -> str | None:
+    """The value of the first of some tags that is there."""
+    return next((tags[key] for key in keys if key in tags), None)
+
+
 def _for_cars(tags: dict[str, str]) -> bool:
     """Whether cars may use a lanelet: by its participants, or else by its subtype."""
-    named = {key.removeprefix("participant:"): value for key, value in tags.items() if key.startswith("participant:")}
-    for key in ("vehicle:car", "vehicle"):
-        if key in named:
-            return named[key] in ("yes", "true")
-    return not named and tags.get("subtype", "road") in _FOR_CARS
+    named = _first(tags, ("participant:vehicle:car", "participant:vehicle"))
+    if named is not None:
+        return named in ("yes", "true")
+    return not any(key.startswith("participant:") for key in tags) and tags.get("subtype", "road") in _FOR_CARS
 
 
 def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
@@ -222,8 +232,8 @@ def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
     return refs
 
 
-def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[str, Floats], str]:
-    """Metres of each node by its id, and a sentence on how they were found.
+def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[str, Floats], str, tuple[float, ...]]:
+    """Metres (3,) of each node by its id, x, y and its height; a sentence on how they were found; the origin in degrees.
 
     Local coordinates are taken if most nodes have them; nodes of the other frame are faulty.
 
@@ -242,15 +252,16 @@ def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[st
                     "have; two frames cannot be mixed"
                 )
             if local:
-                found[name] = np.array([finite(own[key], f"{node.place}, tag {key}") for key in ("local_x", "local_y")])
+                place = [finite(own[key], f"{node.place}, tag {key}") for key in ("local_x", "local_y")]
             else:
-                found[name] = np.array([_degrees(node, key, most) for key, most in (("lat", 90.0), ("lon", 180.0))])
+                place = [_degrees(node, key, most) for key, most in (("lat", 90.0), ("lon", 180.0))]
+            found[name] = np.array([*place, _height(own)])
     if not found:
         raise InputError(faults.found[0][2] if faults.found else f"{file}: no lanelet for cars has borders")
     if local:
-        return found, "coordinates are the tags local_x and local_y, in metres"
+        return found, "coordinates are the tags local_x and local_y, in metres", ()
     degrees = np.array(list(found.values()))
-    latitude, longitude = middle_of(degrees)
+    latitude, longitude = middle_of(degrees[:, :2])
     metres = local_frame(degrees[:, 0], degrees[:, 1], (latitude, longitude))
     size = float(np.hypot(metres[:, 0], metres[:, 1]).max())
     if not size <= _FARTHEST:
@@ -260,7 +271,15 @@ def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[st
             f"{file}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read"
         )
     note = f"latitude and longitude in metres east and north of {latitude:.7f}, {longitude:.7f} (azimuthal equidistant, WGS84)"
-    return dict(zip(found, metres, strict=True)), note
+    return dict(zip(found, np.column_stack((metres, degrees[:, 2])), strict=True)), note, (latitude, longitude)
+
+
+def _height(tags: dict[str, str]) -> float:
+    """The height [m] that a node's tag `ele` says, NaN if it does not."""
+    try:
+        return float(tags.get("ele", "nan"))
+    except ValueError:
+        return math.nan
 
 
 def _degrees(node: Element, key: str, most: float) -> float:
@@ -282,7 +301,7 @@ def _lanelet(relation: Element, tags: dict[str, str], borders: Sequence[_Border]
     A file may have them either way round: they are turned so that begin lies at begin, and left is on the left.
     """
     left, right = borders
-    a, b, c, d = left.points[0], left.points[-1], right.points[0], right.points[-1]
+    a, b, c, d = left.points[0, :2], left.points[-1, :2], right.points[0, :2], right.points[-1, :2]
     straight = float(np.hypot(*(a - c)) + np.hypot(*(b - d)))
     if float(np.hypot(*(a - d)) + np.hypot(*(b - c))) < straight:
         right = right.turned()

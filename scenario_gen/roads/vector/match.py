@@ -20,7 +20,7 @@ from scenario_gen.numerics import Floats, runs, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template import Equation, find_conflicts, pair_crossings, solve_starts, Track, WAIT_SPEED
+from scenario_gen.template import Equation, find_conflicts, in_words, pair_crossings, solve_starts, Track, turn_of, WAIT_SPEED
 from scenario_gen.types import LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -41,7 +41,8 @@ _PRIOR, _CROSSED, _MET, _BEYOND, _FOLLOWED = (
     0.25,
     2.0,
 )  # weights: the place; crossings driven, or beyond the ends; gaps
-_STOPPED = 4.0  # weight of a stop before a line
+_STOPPED, _TURNED = 4.0, 4.0  # weights of a stop before a line, and of a begin from which a vehicle turns as it does
+_OTHERWISE = math.radians(20.0)  # that a vehicle turns more or less on a course, for which another begin is looked for
 _BEFORE, _PASSED = 0.7, 6.0  # metres before a stop line where one stops; beyond it, where a stop is taken for one at it
 _WORTH = 1.5  # m² that a change of lanes must gain
 _TURN = math.radians(40.0)  # a chain may turn by this much more or less than the vehicle in the template
@@ -51,7 +52,7 @@ _ROOM = 1.0  # metres between a footprint and the end of the lanes
 _BLEND = 5.7735  # largest second derivative of x³(10 − 15x + 6x²)
 _SHIFT = 0.02  # 1/m, curvature of a change of lanes
 _FORTH = 25.0  # metres of lanes before and after what is driven
-_LOST = 6.0  # m² of a crossing beyond the recorded ends that is none on the lanes
+_LOST, _LOST_DRIVEN = 6.0, 18.0  # m² of a crossing that is none on the lanes: beyond the recorded ends; one that is driven
 _SPEEDING = 0.1  # m² per (m/s)² beyond the speed limit
 _BRAKED, _PULLED = 4.0, 2.5  # m/s² with which a vehicle slows down for a bend, and speeds up after it
 _ASIDE = 3.0  # m/s² across, beyond which a bend counts against a place,
@@ -107,6 +108,7 @@ class Chains:
         self.length = [float(edge_lengths(lane.centre).sum()) for lane in network.lanes]
         self.points = np.concatenate([lane.centre[:-1] for lane in network.lanes])
         self.yaws = np.concatenate([lane.yaw for lane in network.lanes])
+        self.height = np.concatenate([lane.height[:-1] for lane in network.lanes])
         self.owner = np.repeat(np.arange(len(network.lanes)), [len(lane.yaw) for lane in network.lanes])
         self._curves: dict[tuple[int, ...], Curve] = {}
 
@@ -161,7 +163,7 @@ def middle(points: Floats) -> Curve:
     return Curve.through(even[index[:, None] + np.clip(offset, -room, room)].mean(axis=1))
 
 
-def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.0) -> Match:
+def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.0, ends: Sequence[tuple[str, str]] = ()) -> Match:
     """Give every vehicle its course near a placement of the template as one piece.
 
     Args:
@@ -169,10 +171,11 @@ def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.
         tracks: the template.
         spot: where it lies.
         scale: s of eq 9, of the distances driven.
+        ends: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be; (): any for all.
     """
     courses = []
-    for track in tracks:
-        course = _course(chains, track, spot, scale)
+    for track, (first, last) in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
+        course = _course(chains, track, _placed(track, spot), scale, first, last)
         if course is None:
             return Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
         courses.append(course)
@@ -186,12 +189,13 @@ def _placed(track: Track, spot: Spot) -> Floats:
     return np.column_stack((spot.moved(poses[:, :2]), poses[:, 2] + spot.yaw))
 
 
-def _course(chains: Chains, track: Track, spot: Spot, scale: float) -> Course | None:
-    """The chain of lanes that resembles a vehicle's path most."""
-    poses = _placed(track, spot)
+def _course(chains: Chains, track: Track, poses: Floats, scale: float, enters: str, leaves: str) -> Course | None:
+    """The chain of lanes that resembles a vehicle's path (K, 3) most, of those that come and go by lanes that are named."""
+    lanes, exits = chains.network.lanes, {k for k, lane in enumerate(chains.network.lanes) if not leaves or lane.id == leaves}
+    firsts = [k for k, lane in enumerate(lanes) if lane.id == enters] or chains.near(poses[0])
     driven = scale * track.travelled
     tried: dict[tuple[int, ...], tuple[float, Curve, Floats]] = {}
-    candidates = (chain for first in chains.near(poses[0]) for chain in chains.from_lane(first, driven))
+    candidates = (chain for first in firsts for chain in chains.from_lane(first, driven) if exits.intersection(chain))
     for chain in dict.fromkeys(islice(candidates, _MOST_TRIED)):
         curve = _around(chains.curve(chain), poses, driven)
         misses = _misses(curve, poses)
@@ -290,6 +294,8 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
                     shift = float(station[0]) - courses[first].start
                     known.append(Equation(((first, 1.0), (second, -1.0)), scale * gap - shift, _FOLLOWED))
     for i, (course, track) in enumerate(zip(courses, tracks, strict=True)):
+        turning = _start_to_turn(course, track)
+        known += [] if turning is None else [Equation(((i, 1.0),), turning, _TURNED)]
         known += [Equation(((i, 1.0),), start, _STOPPED) for start in _starts_to_stop(network, course, track, scale)]
     starts = solve_starts(range(len(courses)), known)
     return [replace(course, start=starts[i]) for i, course in enumerate(courses)]
@@ -316,6 +322,17 @@ def _starts_to_stop(network: LaneNetwork, course: Course, track: Track, scale: f
             beyond = course.start + ahead - float(station[0])
             if -_BEFORE < beyond < _PASSED:
                 yield float(station[0]) - ahead - _BEFORE
+
+
+def _start_to_turn(course: Course, track: Track) -> float | None:
+    """The begin [m] nearest to a course's own from which it turns as the vehicle does; None if it does anyway, or from none."""
+    if abs(turned_more(course, track)) < _OTHERWISE:
+        return None
+    driven = float(course.progress[-1])
+    starts = np.arange(0.0, max(course.curve.length - driven, 0.0), _STEP)
+    more = course.curve.at(starts + driven)[:, 2] - course.curve.at(starts)[:, 2] - turn_of(track)
+    alike = starts[np.abs(more) < _OTHERWISE / 2.0]
+    return float(alike[np.argmin(np.abs(alike - course.start))]) if len(alike) else None
 
 
 def _follows(track: Track, leader: Track) -> float | None:
@@ -345,19 +362,16 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
         if short > 0.0:
             reason = reason or f"the lanes of vehicle {track.vehicle.id} end {short:.1f} m too soon"
         if abs(turn) > _TURN:
-            reason = reason or f"the lanes turn vehicle {track.vehicle.id} by {math.degrees(turn):.0f}° more than in the template"
+            there = turn_of(track) + turn
+            reason = reason or f"vehicle {track.vehicle.id} {in_words(turn_of(track))} in the template, {in_words(there)} there"
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
         miss = np.minimum(np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED)
         turned = 1.0 - np.cos(fitted[:, 2] - poses[:, 2])
         cost += float(miss.mean() + _YAW * turned.mean()) / len(tracks)
     for a, b, crossing in pair_crossings(tracks):
-        if len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
-            continue
-        cost += _LOST
-        if crossing.driven:
-            ids = f"{tracks[b].vehicle.id} and {tracks[a].vehicle.id}"
-            reason = reason or f"vehicles {ids} cross in the template, and not on these lanes"
+        if not len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
+            cost += _LOST_DRIVEN if crossing.driven else _LOST
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
     for (_, forced), track in zip(aside, tracks, strict=True):
         if forced > _NO_GRIP:

@@ -12,14 +12,15 @@ import re
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import distance
 import shapely
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
-from scenario_gen.numerics import Bools, Floats, Ints, runs
-from scenario_gen.numerics.plane import edge_lengths, meeting_shares
+from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads.vector.signs import DraftRule, rules_of_pieces, with_rules
-from scenario_gen.types import Lane, LaneNetwork
+from scenario_gen.types import Lane, LaneNetwork, LEVEL
 
 _SECTION = 1.0  # metres between cross-sections at most
 _SHORTEST = 0.05  # metres of a border
@@ -28,10 +29,8 @@ MOST_LANES = 30_000  # a city of some 1000 km of streets
 MOST_LINKS = 100  # of a lane to lanes that follow it, or lie beside it
 FAULTY = "faulty"  # in notes on elements that were left out
 _NAMED = 5  # faulty elements that a note names
-_CHUNK = 16  # edges of a middle that are looked at together
-_QUERIED = 64  # chunks whose neighbours are looked up at once
-_COMPARED = 2_000  # pairs of chunks that are compared at once
-_MOST_COMPARED = 400_000  # pairs of chunks
+_QUERIED = 64  # lanes whose neighbours are looked up at once
+_MOST_COMPARED = 400_000  # pairs of lanes whose boxes meet
 
 
 class TooLargeError(InputError):
@@ -79,8 +78,8 @@ class Draft:
 
     Attributes:
         id: the lane's name.
-        left: (A, 2) metres, left border in driving direction.
-        right: (B, 2) metres, right border.
+        left: (A, 2) metres, left border in driving direction; or (A, 3) with its height, NaN where that is not known.
+        right: (B, 2) or (B, 3) metres, right border.
         successors: names of lanes.
         beside: names of lanes to which one may change.
         speed_limit: m/s or NaN.
@@ -116,6 +115,7 @@ class MapLanes:
         faults: what else was left out.
         rules: signs, lights and rights of way.
         other_signs: how many signs and lights mean something else, and are not read.
+        origin: as of `LaneNetwork`.
     """
 
     drafts: Sequence[Draft]
@@ -124,6 +124,7 @@ class MapLanes:
     faults: Faults = field(default_factory=Faults)
     rules: Sequence[DraftRule] = ()
     other_signs: int = 0
+    origin: tuple[float, ...] = ()
 
 
 def by_id(elements: Iterable[Element], faults: Faults) -> dict[str, Element]:
@@ -191,7 +192,7 @@ def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
             if draft.id in drawn:
                 raise InputError(f"{draft.place}: lane {draft.id} is there twice, first at {drawn[draft.id][0].place}")
             left, right = (draft.left, draft.right) if draft.paired else cross_sections(draft.left, draft.right, draft.place)
-            longest = max(float(edge_lengths(border).sum()) for border in (left, right))
+            longest = max(float(edge_lengths(border[:, :2]).sum()) for border in (left, right))
             if not longest <= MOST_SECTIONS * _SECTION:  # nor is it NaN
                 raise InputError(
                     f"{draft.place}: lane {draft.id} has a border of {longest / 1000.0:.3g} km; check the coordinates"
@@ -207,26 +208,30 @@ def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
         after, beside = (
             tuple(dict.fromkeys(index[other] for other in names if other in index)) for names in (draft.successors, draft.beside)
         )
-        lanes.append(Lane(draft.id, left, right, after, beside, draft.speed_limit, draft.junction))
+        height = (left[:, 2] + right[:, 2]) / 2.0 if left.shape[1] == right.shape[1] == 3 else np.full(len(left), np.nan)
+        borders = left[:, :2], right[:, :2]
+        lanes.append(Lane(draft.id, *borders, after, beside, draft.speed_limit, draft.junction, height))
     if draft_lanes.left_out:
-        notes += (f"{draft_lanes.left_out} lanelets are for others than cars and were left out",)
+        notes += (f"{draft_lanes.left_out} lanes are for others than cars and were left out",)
     if draft_lanes.other_signs:
         notes += (f"{draft_lanes.other_signs} signs of other kinds than stop, give way, priority and speed limit are not read",)
     notes += faults.notes()
-    network = LaneNetwork(name, tuple(lanes), notes)
+    network = LaneNetwork(name, tuple(lanes), notes, origin=draft_lanes.origin)
     return with_rules(network if any(lane.junction for lane in lanes) else with_junctions(network), draft_lanes.rules)
 
 
 def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Floats]:
     """Two borders (A, 2) and (B, 2) [m] at common shares of their lengths, (M, 2) each; every vertex of both is kept.
 
+    A third column, their height, goes along.
+
     Raises:
         InputError: a border has no length.
     """
     borders, shares, longest = [], [], 0.0
     for name, border in (("left", left), ("right", right)):
-        points = border[np.concatenate(([True], edge_lengths(border) > 1e-6))] if len(border) else border
-        length = np.concatenate(([0.0], np.cumsum(edge_lengths(points))))
+        points = border[np.concatenate(([True], edge_lengths(border[:, :2]) > 1e-6))] if len(border) else border
+        length = np.concatenate(([0.0], np.cumsum(edge_lengths(points[:, :2]))))
         if length[-1] < _SHORTEST:
             raise InputError(f"{where}: the {name} border has {len(border)} point(s) and no length; a line is needed")
         borders.append(points)
@@ -239,7 +244,7 @@ def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Flo
     share = share[np.concatenate(([True], np.diff(share) > 1e-9))]
     share[-1] = 1.0
     first, second = (
-        np.column_stack([np.interp(share, own, points[:, axis]) for axis in (0, 1)])
+        np.column_stack([np.interp(share, own, column) for column in points.T])
         for own, points in zip(shares, borders, strict=True)
     )
     return first, second
@@ -268,59 +273,33 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
 
 
 def crossing_lanes(network: LaneNetwork) -> Iterator[tuple[int, int]]:
-    """Yield the pairs of lanes whose middles cross between their ends, some of them more than once.
-
-    Middles are cut into chunks of a few edges, whose boxes are looked up in a tree.
+    """Yield the pairs of lanes whose middles cross between their ends, neither above the other.
 
     Raises:
         InputError: too many of them lie upon each other.
     """
-    starts, steps, owners, edges = [], [], [], []
-    for k, lane in enumerate(network.lanes):
-        count = len(lane.centre) - 1
-        index = np.arange(math.ceil(count / _CHUNK) * _CHUNK).reshape(-1, _CHUNK)
-        there = index < count
-        starts.append(np.where(there[..., None], lane.centre[np.minimum(index, count)], np.nan))
-        steps.append(np.where(there[..., None], np.diff(lane.centre, axis=0)[np.minimum(index, count - 1)], np.nan))
-        owners.append(np.full(len(index), k))
-        edges.append(np.where(index == 0, 1, 0) + np.where(index == count - 1, 2, 0))  # its first, its last, both
-    start, step, owner, edge = (np.concatenate(part) for part in (starts, steps, owners, edges))
-    ends = np.concatenate((start, start + step), axis=1)
-    boxes = shapely.box(*np.nanmin(ends, axis=1).T, *np.nanmax(ends, axis=1).T)
-    tree, compared = shapely.STRtree(boxes), 0
-    for k in range(0, len(boxes), _QUERIED):
-        first, second = tree.query(boxes[k : k + _QUERIED])
-        first = first + k
-        ordered = owner[first] < owner[second]
-        first, second = first[ordered], second[ordered]
+    lines = np.array([shapely.LineString(lane.centre) for lane in network.lanes])
+    tree, compared = shapely.STRtree(lines), 0
+    for k in range(0, len(lines), _QUERIED):
+        first, second = tree.query(lines[k : k + _QUERIED])
+        ordered = first + k < second
+        first, second = first[ordered] + k, second[ordered]
         compared += len(first)
         if compared > _MOST_COMPARED:
             raise InputError(
                 f"map {network.name}: its lanes lie upon each other in more than {_MOST_COMPARED} places, as at lane "
-                f"{network.lanes[owner[first[0]]].id}; check the coordinates"
+                f"{network.lanes[first[0]].id}; check the coordinates"
             )
-        for n in range(0, len(first), _COMPARED):
-            a, b = first[n : n + _COMPARED], second[n : n + _COMPARED]
-            hit = _cross(start[a], step[a], start[b], step[b], edge[a], edge[b])
-            yield from zip(owner[a[hit]].tolist(), owner[b[hit]].tolist(), strict=True)
+        shapely.prepare(lines[first])
+        crossing = shapely.crosses(lines[first], lines[second])
+        pairs = zip(first[crossing].tolist(), second[crossing].tolist(), strict=True)
+        yield from (pair for pair in pairs if not network.has_levels or _on_one_level(*(network.lanes[k] for k in pair)))
 
 
-def _cross(p: Floats, u: Floats, q: Floats, v: Floats, first: Ints, second: Ints) -> Bools:
-    """Say of pairs (K,) of chunks whether edges of one cross edges of the other.
-
-    Args:
-        p: (K, C, 2) begins of the edges of one, NaN where it has fewer.
-        u: (K, C, 2) their steps.
-        q: begins of the other's.
-        v: their steps.
-        first: (K, C) of each edge of one: 1 if it is the first of its lane, 2 if it is the last, 3 if it is both.
-        second: the same of the other.
-    """
-    t, s, _ = meeting_shares(p[:, :, None], u[:, :, None], q[:, None], v[:, None])
-    with np.errstate(invalid="ignore"):
-        hit = (t >= 0.0) & (t < 1.0) & (s >= 0.0) & (s < 1.0)
-    hit &= (first[:, :, None] & second[:, None]) == 0  # two first edges part, and two last ones meet, there
-    return np.asarray(hit.any(axis=(1, 2)))
+def _on_one_level(one: Lane, other: Lane) -> bool:
+    """Whether two lanes are at one height where their middles are nearest, or a height is not known."""
+    a, b = np.unravel_index(distance.cdist(one.centre, other.centre).argmin(), (len(one.centre), len(other.centre)))
+    return not abs(one.height[a] - other.height[b]) > LEVEL
 
 
 def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
@@ -329,7 +308,7 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
     Raises:
         InputError: no lane is in the box.
     """
-    pieces: list[tuple[int, Floats, Floats, bool]] = []  # lane, borders, whether its end is there
+    pieces: list[tuple[int, Floats, bool]] = []  # lane, its borders and height, whether its end is there
     begins: dict[int, int] = {}
     for k, lane in enumerate(network.lanes):
         last = len(lane.left) - 1
@@ -339,12 +318,11 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
             if high - low < 1e-6:
                 continue
             at = np.unique(np.concatenate(([low], np.arange(math.ceil(low), math.floor(high) + 1), [high])))
-            borders = [
-                np.column_stack([np.interp(at, np.arange(last + 1), b[:, j]) for j in (0, 1)]) for b in (lane.left, lane.right)
-            ]
+            columns = np.column_stack((lane.left, lane.right, lane.height)).T
+            cut = np.column_stack([np.interp(at, np.arange(last + 1), column) for column in columns])
             if low == 0.0:
                 begins[k] = len(pieces)
-            pieces.append((k, borders[0], borders[1], high == last))
+            pieces.append((k, cut, high == last))
     if not pieces:
         raise InputError(
             f"map {network.name}: no lane in the box {box[0, 0]:g},{box[0, 1]:g},{box[1, 0]:g},{box[1, 1]:g}; {extent(network)}"
@@ -353,11 +331,12 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
     for piece, (k, *_) in enumerate(pieces):
         of_lane.setdefault(k, []).append(piece)
     lanes = []
-    for k, left, right, has_end in pieces:
+    for k, cut, has_end in pieces:
         lane = network.lanes[k]
         after = tuple(begins[other] for other in lane.successors if other in begins) if has_end else ()
         beside = tuple(of_lane[other][0] for other in lane.beside if other in of_lane)
-        lanes.append(replace(lane, left=left, right=right, successors=after, beside=beside))
+        left, right, height = cut[:, :2], cut[:, 2:4], cut[:, 4]
+        lanes.append(replace(lane, left=left, right=right, height=height, successors=after, beside=beside))
     rules = rules_of_pieces(network.rules, of_lane)
     return replace(network, lanes=tuple(lanes), notes=(*network.notes, note), rules=rules)
 

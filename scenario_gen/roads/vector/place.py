@@ -3,23 +3,25 @@
 
 """Where on a map a template goes: all ways of laying it on lanes, the best first, and the part of the map around one."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import islice
+from itertools import combinations, islice
+import math
 
 import numpy as np
+from scipy.spatial import KDTree
+from scipy.spatial.distance import cdist
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import at_home, crossing_spots, find_spots
+from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
-from scenario_gen.types import LaneNetwork, once_per_object, Scenario
+from scenario_gen.types import LaneNetwork, LEVEL, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
@@ -29,6 +31,7 @@ _WORST = 40.0  # m²: what resembles the template less is no place for it
 _PRESSED = 4.2  # m/s² across, a little less than scenarios may have: where more is forced, another scale is tried first
 _BESIDE = 12.0  # metres of the map around what is driven, and
 _FORTH = 20.0  # metres of the lanes before and after it
+_LOOK, _OVER = 2.0, 5.0  # metres between places at which heights are compared; between two of which one may lie above the other
 _SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
 
 
@@ -58,55 +61,90 @@ def placements(
         scales: s of eq 9, tried in this order where none before could be had.
 
     Raises:
-        NoPlaceError: there is none; says what is lost most often.
+        NoPlaceError: there is none; says what stands against the template where it was recorded, else where it came farthest.
     """
     chains = chains_of(network)
-    home = at_home(network, tracks)
-    reasons: Counter[str] = Counter()
-    broken_rules: Counter[str] = Counter()
+    home = spot_at(network, tracks, np.zeros(3))
     judged = _Judged(network, tracks)
+    drawn_for = network.drawn_for
+    sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
+    search = _Search(chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ())
+    found, recorded = False, ""
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
         broken = own.reason or judged.broken(own)
         if not broken:
+            found = True
             yield own, 1.0
-        elif not own.reason:
-            broken_rules[broken] += 1
-    spots = find_spots(network, tracks, lanes)[:_SPOTS]
-    spots += crossing_spots(network, tracks)[:_SPOTS] if lanes is None else []
-    streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
-    pressed: list[tuple[Match, float]] = []
-    for scale in scales:
-        matches = list(streets) if scale == 1.0 else []
-        for spot in spots:
-            stop_if_cancelled()
-            placement = match(chains, tracks, spot, scale)
-            if placement.reason or placement.cost > _WORST:
-                reasons[placement.reason or "vehicles would be too far from where they are in the template"] += 1
-            else:
-                matches.append(placement)
-        broken_by = [judged.broken(placement) for placement in matches]
-        broken_rules.update(filter(None, broken_by))
-        matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
-        matches.sort(key=lambda placement: (*judged.rank(placement), round(placement.cost, 3)))
-        pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
-        placed = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
-        yield from placed
-        if placed:
+        recorded = f"where it was recorded, {broken}; elsewhere, " if broken else ""
+    spots = find_spots(network, tracks, lanes)
+    crossed = crossing_spots(network, tracks) if lanes is None else []
+    streets = along_streets(chains, tracks, lanes)
+    for k in range(0, max(len(spots), len(crossed), 1), _SPOTS):  # where nobody takes the first ones, the next are looked at
+        if k and not found:
             break
-    yield from pressed
-    if pressed or placed:
-        return
-    named = [*broken_rules.most_common(1), *reasons.most_common(2)]
-    why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in named)
-    what = "road" if network.drawn else "map"
-    raise NoPlaceError(f"the template fits no place on {what} {network.name}: {why or 'it has no lanes of its directions'}")
+        first = [sized] if sized is not None and k == 0 else []
+        some = [*first, *spots[k : k + _SPOTS], *crossed[k : k + _SPOTS]]
+        for placed in search.near(some, list(islice(streets, _STREETS))):
+            found = True
+            yield placed
+    if not found:
+        what = "road" if network.drawn else "map"
+        *_, reason = min(search.failures, default=("it has no lanes of its directions",))
+        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {recorded}{reason}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What is laid where.
+
+    Attributes:
+        chains, tracks, scales: as of `placements`.
+        judged: whether a placement keeps the rules.
+        sized: where the road was drawn for the template, None if it was not.
+        ends: the lanes that it was drawn with, for each vehicle.
+        failures: whether it is no match at all, its cost, and the reason.
+    """
+
+    chains: Chains
+    tracks: tuple[Track, ...]
+    scales: Sequence[float]
+    judged: "_Judged"
+    sized: Spot | None
+    ends: tuple[tuple[str, str], ...]
+    failures: list[tuple[bool, float, str]] = field(default_factory=list)
+
+    def near(self, spots: Sequence[Spot], along: Sequence[Match]) -> Iterator[tuple[Match, float]]:
+        """Yield the placements near some spots and along some stretches of road, the best first, with their scales."""
+        others: list[tuple[Match, float]] = []
+        for scale in self.scales:
+            matches = list(along) if scale == 1.0 else []
+            for spot in spots:
+                stop_if_cancelled()
+                placement = match(self.chains, self.tracks, spot, scale, self.ends if spot is self.sized else ())
+                far = placement.cost > _WORST and spot is not self.sized
+                if placement.reason or far:
+                    reason = placement.reason or "vehicles would be too far from where they are"
+                    self.failures.append((True, placement.cost, reason))
+                else:
+                    matches.append(placement)
+            broken_by = [self.judged.broken(placement) for placement in matches]
+            self.failures.extend((False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken)
+            matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
+            matches.sort(key=lambda placement: (*self.judged.rank(placement), round(placement.cost, 3)))
+            placed = [p for p in matches if p.aside <= _PRESSED and self.judged.rank(p)[0] == 0]
+            others += [(p, scale) for p in matches if p not in placed]
+            yield from ((placement, scale) for placement in placed)
+            if placed:
+                break
+        yield from sorted(others, key=lambda other: (other[0].aside > _PRESSED, self.judged.rank(other[0])[0]))
 
 
 class _Judged:
-    """Whether placements keep the traffic rules of a network."""
+    """Whether placements keep the traffic rules of a network, and lie on one level where vehicles meet."""
 
     def __init__(self, network: LaneNetwork, tracks: tuple[Track, ...]) -> None:
+        self._network = network
         self._check = RuleCheck(network)
         self._tracks = tracks
         met = (conflict for conflict in conflicts_in(_motion(tracks)) if not conflict.following)
@@ -114,6 +152,8 @@ class _Judged:
 
     def broken(self, placement: Match) -> str:
         """Return what a placement breaks; "" if nothing."""
+        if self._network.has_levels and (above := self._above(placement)):
+            return above
         if not self._check.rules:
             return ""
         motion = _laid(placement, self._tracks)
@@ -121,6 +161,23 @@ class _Judged:
         if breach is None:
             return ""
         return f"vehicle {motion.vehicles[breach.vehicles[0]].id} {breach.message}; road.traffic_rules=ignored allows it"
+
+    def _above(self, placement: Match) -> str:
+        """Say which two vehicles a placement lays above each other, as on a bridge and under it; "" if none."""
+        lanes = self._network.lanes
+        driven = []
+        for course in placement.courses:
+            count = max(math.ceil((course.end - course.start) / _LOOK), 1) + 1
+            places = course.curve.at(np.linspace(course.start, course.end, count))[:, :2]
+            middles = KDTree(np.concatenate([lanes[k].centre for k in course.lanes]))
+            height = np.concatenate([lanes[k].height for k in course.lanes])[middles.query(places)[1]]
+            driven.append((places, height))
+        for (i, (one, low)), (j, (other, high)) in combinations(enumerate(driven), 2):
+            apart = np.abs(low[:, None] - high) > LEVEL
+            if (apart & (cdist(one, other) < _OVER)).any():
+                first, second = (self._tracks[n].vehicle.id for n in (i, j))
+                return f"vehicles {first} and {second} would be above each other, as on a bridge, and not meet"
+        return ""
 
     def rank(self, placement: Match) -> tuple[int, bool]:
         """Return how many that meet in the template do not, and whether nobody gives way who has to."""

@@ -24,11 +24,16 @@ _GAUSS = (  # five points on [0, 1], exact for degree 9
 _SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
 MOST_LENGTH = 1_000_000.0  # metres of a road
 _SHARPEST = 10.0  # 1/m
+_SAME = 1e-4  # metres within which a record begins where a section does
 
 
-def _piece_at(begin: Floats, s: Floats) -> Ints:
-    """Which of the pieces that begin at (K,) metres holds each s (M,); the first one also before it."""
-    return np.clip(np.searchsorted(begin, s + 1e-9, side="right") - 1, 0, len(begin) - 1)
+def _piece_at(begin: Floats, s: Floats, end: float) -> Ints:
+    """Which of the pieces that begin at (K,) metres holds each s (M,) of a section; the first one also before it.
+
+    What begins where the section ends is the next section's, and counts for none of its s.
+    """
+    inside = np.minimum(s + _SAME, max(end - _SAME, float(s[0])))
+    return np.clip(np.searchsorted(begin, inside, side="right") - 1, 0, len(begin) - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +48,9 @@ class Cubics:
     begin: Floats
     factors: Floats
 
-    def at(self, s: Floats) -> Floats:
-        """Values (M,) at s (M,) metres."""
-        piece = _piece_at(self.begin, s)
+    def at(self, s: Floats, end: float) -> Floats:
+        """Values (M,) at s (M,) metres, ascending, of a section that goes to `end`."""
+        piece = _piece_at(self.begin, s, end)
         ds, f = s - self.begin[piece], self.factors[piece]
         return np.asarray(f[:, 0] + ds * (f[:, 1] + ds * (f[:, 2] + ds * f[:, 3])))
 
@@ -71,9 +76,9 @@ class ReferenceLine:
     pieces: tuple[Element, ...]
     length: float
 
-    def at(self, s: Floats) -> Floats:
-        """Poses (M, 3) x, y [m], yaw [rad] at s (M,) metres."""
-        which = _piece_at(self.begin, s)
+    def at(self, s: Floats, end: float) -> Floats:
+        """Poses (M, 3) x, y [m], yaw [rad] at s (M,) metres, ascending, of a section that goes to `end`."""
+        which = _piece_at(self.begin, s, end)
         poses = np.empty((len(s), 3))
         for k in np.unique(which).tolist():
             poses[which == k] = _piece(self.pieces[k], np.maximum(s[which == k] - self.begin[k], 0.0))
@@ -97,8 +102,8 @@ def reference_line(road: Element) -> ReferenceLine:
         for name in ("curvature", "curvStart", "curvEnd"):
             if abs(shape.number(name, 0.0)) > _SHARPEST:
                 raise InputError(f"{shape.place}: {name} is {shape.number(name):g} 1/m; at most {_SHARPEST:g} is read")
-    length = road.number("length")
-    if not 0.0 < length <= MOST_LENGTH:
+    length, drawn = road.number("length"), sum(piece.number("length") for piece in pieces)
+    if not 0.0 <= length <= MOST_LENGTH or (length == 0.0 and drawn > 0.0):
         raise InputError(f"{road.place}: length {length:g} m; more than 0 and at most {MOST_LENGTH:g} are read")
     return ReferenceLine(np.array([piece.number("s") for piece in pieces]), tuple(pieces), length)
 
@@ -155,13 +160,21 @@ def _poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, F
 
 
 def _param_poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, Floats]:
-    p = ds / length if shape.attributes.get("pRange") == "normalized" and length > 0.0 else ds
+    p = ds / length if _is_normalized(shape, length) and length > 0.0 else ds
     values = []
     for axis in "UV":
         a, b, c, d = (shape.number(f"{name}{axis}") for name in "abcd")
         values.append((a + p * (b + p * (c + p * d)), b + p * (2.0 * c + p * 3.0 * d)))
     (u, du), (v, dv) = values
     return u, v, np.asarray(np.arctan2(dv, du))
+
+
+def _is_normalized(shape: Element, length: float) -> bool:
+    """Whether p goes from 0 to 1, which is the default; where a file does not say, the speed of p shows if it is metres."""
+    if "pRange" in shape.attributes:
+        return shape.attributes["pRange"] == "normalized"
+    speed = math.hypot(shape.number("bU"), shape.number("bV"))
+    return abs(speed - length) <= abs(speed - 1.0)
 
 
 _SHAPE = {"line": _line, "arc": _arc, "spiral": _spiral, "poly3": _poly3, "paramPoly3": _param_poly3}

@@ -185,10 +185,11 @@ def _lane_crossings(network: LaneNetwork) -> tuple[Floats, Floats]:
     return np.concatenate(points), np.concatenate(yaws)
 
 
-def at_home(network: LaneNetwork, tracks: tuple[Track, ...]) -> Spot:
-    """The template where it was recorded; the cost says whether lanes of its directions are there."""
+def spot_at(network: LaneNetwork, tracks: tuple[Track, ...], frame: Floats) -> Spot:
+    """The template where its frame (3,) x, y [m], yaw [rad] lies; the cost says whether lanes of its directions are there."""
     poses, weight = _samples(tracks)
-    return Spot(float((_field(network).squared(poses[:, :2], poses[:, 2]) * weight).sum()), 0.0, 0.0, 0.0)
+    cost = float(_costs(_field(network), poses, weight, frame[None])[0])
+    return Spot(cost, float(frame[2]), float(frame[0]), float(frame[1]))
 
 
 def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:

@@ -17,21 +17,19 @@ from scenario_gen.numerics import Floats
 from scenario_gen.types import LaneNetwork, RuleKind, TrafficRule
 
 _SIGNS = {
-    "206": RuleKind.STOP,
-    "r1-1": RuleKind.STOP,
-    "r2": RuleKind.STOP,
+    "de": {"206": RuleKind.STOP, "205": RuleKind.GIVE_WAY, "301": RuleKind.PRIORITY, "306": RuleKind.PRIORITY},
+    "us": {"r1-1": RuleKind.STOP, "r1-2": RuleKind.GIVE_WAY},
+    "es": {"r2": RuleKind.STOP, "r1": RuleKind.GIVE_WAY, "r3": RuleKind.PRIORITY},
+}
+_NAMED = {
     "stop": RuleKind.STOP,
     "stop_sign": RuleKind.STOP,
-    "205": RuleKind.GIVE_WAY,
-    "r1-2": RuleKind.GIVE_WAY,
-    "r1": RuleKind.GIVE_WAY,
     "yield": RuleKind.GIVE_WAY,
     "yield_sign": RuleKind.GIVE_WAY,
     "give_way": RuleKind.GIVE_WAY,
-    "301": RuleKind.PRIORITY,
-    "306": RuleKind.PRIORITY,
-    "r3": RuleKind.PRIORITY,
 }
+_COUNTRIES = {"deu": "de", "germany": "de", "usa": "us", "esp": "es", "spain": "es"}  # other names of those with a list
+_SPEED_LIMITS = ("274", "274.1", "r2-1", "maxspeed")
 _SUBJECT = (RuleKind.STOP, RuleKind.GIVE_WAY)
 _LEADS = 6  # lanes between a sign and its junction at most
 
@@ -51,10 +49,34 @@ class DraftRule:
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
-def kind_of_sign(name: str) -> RuleKind | None:
-    """Return what a sign means, by its number or name with or without its country (206, de206, usR1-1); None: another sign."""
-    text = name.strip().lower()
-    return _SIGNS.get(text, _SIGNS.get(re.sub(r"^[a-z]{2}(?=[r0-9])", "", text)))
+def kind_of_sign(name: str, subtype: str = "", country: str = "") -> RuleKind | None:
+    """Return what a sign means; None: another sign.
+
+    Args:
+        name: its number or name, with or without its country (206, de206, usR1-1).
+        subtype: what the number goes on with (R1 and 1: R1-1), "" or -1 if it does not.
+        country: whose number it is, in two or three letters; a country without a list of signs may have those of any.
+    """
+    numbers, own = _numbers(name, subtype, country)
+    tables = [_SIGNS[own]] if own in _SIGNS else list(_SIGNS.values())
+    return next((table[number] for number in numbers for table in (*tables, _NAMED) if number in table), None)
+
+
+def is_speed_limit(name: str, subtype: str = "", country: str = "") -> bool:
+    """Return whether a sign sets a speed limit; arguments as of `kind_of_sign`."""
+    return any(number in _SPEED_LIMITS for number in _numbers(name, subtype, country)[0])
+
+
+def _numbers(name: str, subtype: str, country: str) -> tuple[list[str], str]:
+    """The numbers, in lower case, by which a sign may be listed, and the country's two letters."""
+    text, own = name.strip().lower(), country.strip().lower()
+    prefix = re.match(r"[a-z]{2}(?=[r0-9])", text)
+    if prefix:
+        text, own = text[2:], prefix[0]
+    if subtype.strip().lower() in ("", "-1", "none"):
+        return [text], _COUNTRIES.get(own, own)
+    whole = f"{text}-{subtype.strip().lower()}"
+    return [whole, text] if text.isdigit() else [whole], _COUNTRIES.get(own, own)
 
 
 def with_rules(network: LaneNetwork, drafts: Sequence[DraftRule]) -> LaneNetwork:

@@ -8,7 +8,7 @@ driver's left become lanes beside it.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 
@@ -20,6 +20,7 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.vector.match import bending, Chains, changed_curve, Course, Match, pressed_aside, speeding, turned_more
 from scenario_gen.template import FrenetTracks, to_frenet, Track
+from scenario_gen.types import LEVEL
 
 _ROOM = 1.0  # metres between a footprint and the end of the road
 _FORTH = 25.0  # metres of road before and after what is driven, where it has them
@@ -85,7 +86,10 @@ def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int
         return
     low, high = (end + room for end, room in zip(compact.span(tracks), (-_ROOM, _ROOM), strict=True))
     stretches = sorted(_stretches(chains, high - low, lanes), key=lambda candidate: (round(candidate.bend, 4), candidate.chain))
-    for frenet in (compact.spread(), compact):
+    ways = [compact.spread(), compact]
+    if compact.swerve.any():  # where there is no room for that, others say what is lost
+        ways.append(replace(compact, swerve=np.zeros_like(compact.swerve)))
+    for frenet in ways:
         for stretch in stretches[:_TRIED]:
             stop_if_cancelled()
             match = _laid(chains, stretch, tracks, frenet, low)
@@ -156,9 +160,12 @@ def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: 
             if changed is None:
                 return None
             curve, used = changed, tuple(dict.fromkeys((*used, *sides[last].chain)))
-        begin, _ = curve.project(axis.at(station[:1])[:, :2])
-        progress = np.zeros(len(station)) if track.still else (station - station[0]) * sign
-        courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
+        if frenet.swerve[i].any():
+            courses.append(_swerving(used, curve, axis.at(station)[:, :2], frenet.swerve[i]))
+        else:
+            begin, _ = curve.project(axis.at(station[:1])[:, :2])
+            progress = np.zeros(len(station)) if track.still else (station - station[0]) * sign
+            courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
         half = track.vehicle.length / 2.0 + _ROOM / 2.0
         if courses[-1].start < half or courses[-1].end + half > curve.length or _bends_more(courses[-1], track):
             return None
@@ -171,6 +178,16 @@ def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: 
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
     cost = stretch.bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
     return Match(tuple(courses), cost, "", max(forced for _, forced in aside))
+
+
+def _swerving(used: tuple[int, ...], lane: Curve, places: Floats, swerve: Floats) -> Course:
+    """The course of a vehicle that swerves by so much (T,) [m] to the left of a lane's middle at places (T, 2) [m] of a road."""
+    at = np.maximum.accumulate(lane.project(places)[0])
+    s = np.linspace(0.0, lane.length, max(math.ceil(2.0 * lane.length), 1) + 1)
+    moves = np.concatenate(([True], np.diff(at) > 0.0))
+    curve = Curve.through(lane.beside(s, np.interp(s, at[moves], swerve[moves]))[:, :2])
+    driven = np.interp(at, s, curve.station)
+    return Course(used, curve, float(driven[0]), driven - driven[0])
 
 
 def _bends_more(course: Course, track: Track) -> bool:
@@ -187,9 +204,11 @@ def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:
     start = poses[0 if sign > 0 else -1]
     yaw = start[2] + (0.0 if sign > 0 else np.pi)
     away = np.hypot(chains.points[:, 0] - start[0], chains.points[:, 1] - start[1])
-    near = np.flatnonzero((away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL))
+    own = np.flatnonzero(np.isin(chains.owner, stretch.chain))
+    level = chains.height[own[np.argmin(away[own])]]
+    near = (away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL) & ~(np.abs(chains.height - level) > LEVEL)
     sides: list[_Side] = []
-    for first in sorted(set(chains.owner[near].tolist())):
+    for first in np.unique(chains.owner[near]).tolist():
         chain = _beside(chains, first, poses[::sign], sign)
         back = chains.network.predecessors[first]
         chain = (back[0], *chain) if back and back[0] not in chain else chain

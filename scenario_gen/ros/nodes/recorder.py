@@ -39,7 +39,8 @@ AT_ONCE = 50  # messages of a topic, before others have their turn
 HELD = 4.0  # seconds after which what came is written, whole chunk or not
 OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
 OF_A_SUITE = (
-    r"map|road/(entries|exits|info|lanes)|tracks|changepoints(/live)?|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
+    r"map|road/(entries|exits|info|lanes|markings)|"
+    r"tracks|changepoints(/live)?|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
     r"|ego/(start|goal|witness)|scenarios(/info)?|markers|report"
 )
 

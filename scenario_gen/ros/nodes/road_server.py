@@ -23,6 +23,7 @@ from msg_conventions.diagnostics import Level
 from msg_conventions.hashes import encode_hashes, template_hashes
 from msg_conventions.lanes import encode_lanes
 from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.pictures import road_markers
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
@@ -63,7 +64,7 @@ class RoadServer(StageNode):
 
     INPUTS = ("tracks",)
     STAGES = ("roads",)
-    OUTPUTS = ("map", "road/entries", "road/exits", LANES, "road/info")
+    OUTPUTS = ("map", "road/entries", "road/exits", LANES, "road/info", "road/markings")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("road_server", Config(), namespace)
@@ -105,6 +106,7 @@ class RoadServer(StageNode):
             self.outputs.send(topic, data)
         template = {"tracks": tracks} if tracks else {}
         self.outputs.send("road/info", encode_hashes("road", messages | template, stamp_ns))
+        self.outputs.send("road/markings", road_markers(road.lanes, road.frame_id, stamp_ns))
         self._grid = messages["map"]
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"

@@ -29,7 +29,7 @@ from msg_conventions.autoware import EGO, OBJECTS
 from msg_conventions.diagnostics import Level
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.arriving import TOPICS
-from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.errors import InputError, of_system, ScenarioGenError
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.results import Drives
@@ -110,7 +110,10 @@ class Traffic(Node):  # type: ignore[misc]
         """
         config = self.config
         if config.results:  # else the first drive's verdict would be lost
-            Path(config.results).mkdir(parents=True, exist_ok=True)
+            try:
+                Path(config.results).mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise of_system(error, f"parameter results is {config.results}", "; name another folder") from error
         if config.autoware:
             self._autoware = (OBJECTS, EGO)
             self._out |= {topic: create_publisher(self, topic) for topic in self._autoware}

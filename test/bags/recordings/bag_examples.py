@@ -1,12 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A small run, made by hand, for whoever needs a bag of the conventions at once."""
+"""A small run, made by hand, for whoever needs a bag of the conventions at once; copies of bags with changes."""
 
 from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
+from msg_conventions.topics import topic_entry
+from scenario_gen.bags.storage.bag import BagMessage, read_messages
+from scenario_gen.bags.storage.metadata import qos_yaml
+from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.generation import GenerationResult
@@ -14,6 +20,16 @@ from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
+
+
+def copied(bag: Path, target: Path, change: Callable[[BagMessage], bytes | None]) -> Path:
+    """Copy a bag; `change` gives the bytes of each message, or None to leave it out."""
+    with atomic_bag(target) as writer:
+        for message in read_messages(bag):
+            if (data := change(message)) is not None:
+                writer.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
+                writer.write(message.topic, data, message.stamp_ns)
+    return target
 
 
 def hand_made_run() -> GenerationResult:

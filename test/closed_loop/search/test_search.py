@@ -93,6 +93,9 @@ def test_files_say_what_was_found(found):
     result, out = found
     document = json.loads((out / "search.json").read_text())
     assert document["drives"] == BUDGET and document["rate"]["low"] <= document["rate"]["value"] <= document["rate"]["high"]
+    rates = document["rates"]  # of both, whatever is searched for
+    assert rates["collision"] == document["rate"] and 0.0 < rates["at_fault"]["value"] <= rates["collision"]["value"]
+    assert document["bound"] >= document["rate"]["high"]
     assert len(document["findings"]) == len(result.findings) and document["kinds"]
     suite = ElementTree.parse(out / "junit.xml").getroot()
     assert int(suite.get("failures")) == len(result.findings)
@@ -110,9 +113,28 @@ def test_a_stopped_search_goes_on_with_the_same_bytes(bag, found, tmp_path):
         assert (tmp_path / "out" / name).read_bytes() == (found[1] / name).read_bytes()
     with pytest.raises(InputError, match="of another search \\(objective differ"):
         search_failures(request_of(bag, "Blind", objective=Objective("goal")), tmp_path / "out", workers=1)
-    journal.write_text("nothing\n")
-    with pytest.raises(InputError, match="is no journal of a search"):
-        search_failures(request_of(bag, "Blind"), tmp_path / "out", workers=1)
+
+
+def test_what_is_beside_the_results_is_no_journal_of_this_search_and_stays(bag, found, tmp_path):
+    journal, lines = tmp_path / f"out{JOURNAL}", found[1].with_name(f"out{JOURNAL}").read_text().splitlines(keepends=True)
+    other = lines[2].replace(lines[2].split(",")[1], " 7.25", 1)
+    (tmp_path / "elsewhere").write_text("".join(lines))
+    for text, said in (
+        ("my notes", "is no journal"),
+        ("nothing\n", "is no journal"),
+        (lines[0] + lines[1] + other, "line 3: not as a search wrote it"),
+        (lines[0] + lines[2], "line 2: not as"),
+        (lines[0] + lines[1].replace("[1,", "[NaN,"), "is no journal"),
+        (None, "is a link"),
+    ):
+        journal.unlink(missing_ok=True)
+        if text is None:
+            journal.symlink_to("elsewhere")
+        else:
+            journal.write_text(text)
+        with pytest.raises(InputError, match=rf"{said}.*; move it away, or give another --out"):
+            search_failures(request_of(bag, "Blind"), tmp_path / "out", workers=1)
+        assert journal.read_text() == ("".join(lines) if text is None else text) and not (tmp_path / "out").exists()
 
 
 def test_a_planner_that_fails_is_named_and_its_drives_are_kept(bag, tmp_path):
@@ -167,7 +189,11 @@ def test_margins_are_zero_or_less_in_failures_alone(bag):
 def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
     words = f"search {LOG} --road {ROAD} --planner {__name__}:Blind --ego 2 --budget 12 --workers 1 --out {tmp_path}/out".split()
     done = CliRunner().invoke(app, [*words, "--max-rate", "0.0", "--objective", "collision"])
-    assert done.exit_code == 1 and "the failure rate may be above 0" in done.output, done.output
+    assert done.exit_code == 1 and "the failure rate may be above 0" in done.output and "by the ego's fault:" in done.output, (
+        done.output
+    )
     assert "natural drives alone" in done.output and json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 12
+    refused = CliRunner().invoke(app, [*words, "--max-rate", "0.1", "--worst"])
+    assert "a search for the worst gives no rate" in str(refused.exception)
     refused = CliRunner().invoke(app, [*words, "--encounter", "none"])
     assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(refused.exception)

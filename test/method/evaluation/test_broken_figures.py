@@ -26,8 +26,9 @@ def test_broken_figures_are_named(file):
         ("[" * 100_000, "too deep"),
         ("\xff", "the document is|not JSON"),
         (" " * 9_000_000, "at most"),
+        ('{"cases": [{}]}', r"cases\[0\]"),
     ],
-    ids=range(8),
+    ids=range(9),
 )
 def test_what_is_wrong_is_named_with_its_path(tmp_path, text, said):
     (tmp_path / "evaluation.json").write_text(text)

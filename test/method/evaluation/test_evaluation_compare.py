@@ -56,9 +56,3 @@ def test_figures_are_read_from_a_run(tmp_path, sets):
     assert len(read_evaluations(tmp_path)) == 2
     (tmp_path / "one.json").write_text(sets[0].to_json())
     assert read_evaluations(tmp_path / "one.json")[0].to_json() == sets[0].to_json()
-    for text in ("{", "[]", '{"cases": []}', '{"cases": [{}]}'):
-        (tmp_path / "bad.json").write_text(text)
-        with pytest.raises(InputError):
-            read_evaluations(tmp_path / "bad.json")
-    with pytest.raises(InputError, match="cannot be read"):
-        read_evaluations(tmp_path / "none.json")

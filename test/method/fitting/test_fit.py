@@ -220,7 +220,7 @@ def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_str
     for f in fit.fitted:
         assert f.turned[1] == pytest.approx(f.turned[0], abs=np.radians(5.0))
     assert not [loss for loss in fit.lost if loss.kind != "arm"]
-    with pytest.raises(RefusedError, match=r"vehicle 0 turns left by 80°.*would on road straight go straight on"):
+    with pytest.raises(RefusedError, match=r"vehicle 0 turns left by 80°: road straight has no way for that"):
         fit_template(encounter, every(encounter), build_road("straight", encounter))
 
 
@@ -315,5 +315,5 @@ def test_search_finds_a_road_of_the_templates_shape_wherever_it_is():
     assert relative(one[0], two[0]) == pytest.approx([60.0, 3.5], abs=0.1)
     assert one[0, 2] == pytest.approx(-np.pi / 2.0, abs=0.1)  # rows grow with y: rot90 turns clockwise
     narrow = Road("narrow", home.drivable[:, :60], 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
-    with pytest.raises(RefusedError, match="does not fit road narrow"):
+    with pytest.raises(RefusedError, match="no placement on road narrow has room"):
         fit_template(encounter, every(encounter), narrow)

@@ -13,13 +13,14 @@ from reaction_scenes import crossing, lane_encounter
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostConflictError
-from scenario_gen.method.fitting.kept import keeps_conflicts
+from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostEncounterError
+from scenario_gen.method.fitting.kept import find_losses, LOSABLE
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.tracks import clean_tracks
+from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 
@@ -44,7 +45,7 @@ def place(monkeypatch):
 def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
     place(apart(CROSSING, 120.0))
     with pytest.raises(
-        LostConflictError, match=r"vehicles 1 and 2 have crossing or merging paths .* fitting\.allow=lost_conflict"
+        LostEncounterError, match=r"vehicles 1 and 2 have crossing or merging paths .* fitting\.allow=lost_conflict"
     ):
         fit_template(CROSSING, SEGMENTATION, OPEN)
     taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"))
@@ -55,7 +56,7 @@ def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place)
     place(apart(CROSSING, 0.0))
     ends = {name: apart(CROSSING, 120.0).tracks[1].curve.points[k] for name, k in (("starts", 0), ("goals", -1))}
     request = Request(**{name: f"2: {x:.2f} {y:.2f} {yaw:.4f}" for name, (x, y, yaw) in ends.items()})
-    with pytest.raises(LostConflictError, match=r"fitting\.allow=lost_conflict"):
+    with pytest.raises(LostEncounterError, match=r"fitting\.allow=lost_conflict"):
         fit_template(CROSSING, SEGMENTATION, OPEN, request=request)
     taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"), request=request)
     assert [loss.kind for loss in taken.lost] == ["conflict"]
@@ -68,26 +69,71 @@ def test_what_is_kept_or_at_home_is_not_refused(place):
     assert [loss.kind for loss in fit_template(CROSSING, SEGMENTATION, OPEN).lost] == ["conflict"]
 
 
-def test_a_lost_leader_is_said_and_not_refused(place):
+def along(*offsets, ahead=0.0):
+    """The tracks of two vehicles that drive east at 10 m/s: for each its offsets [m, left] at start, middle and end."""
+    x = np.arange(0.0, 150.0)
+    poses = [
+        np.column_stack((x + k * ahead, np.interp(x, [0.0, 50.0, 75.0, 100.0, 149.0], own))) for k, own in enumerate(offsets)
+    ]
+    position = np.stack(poses)
+    heading = np.zeros(position.shape[:2])
+    vehicles = (Vehicle("1"), Vehicle("2"))
+    return clean_tracks(Encounter("two", vehicles, 0, 100_000_000, position, heading, np.full(heading.shape, 10.0)))
+
+
+SAME, LEFT, INTO = (0.0,) * 5, (3.5,) * 5, (3.5, 3.5, 1.75, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("template", "road", "kind"),
+    [
+        (along(SAME, SAME, ahead=20.0), along(SAME, LEFT, ahead=20.0), "following"),
+        (along(SAME, INTO, ahead=20.0), along(SAME, LEFT, ahead=20.0), "merge"),
+        (along(SAME, INTO, ahead=20.0), along(SAME, SAME, ahead=20.0), "merge"),
+        (along(SAME, INTO[::-1], ahead=20.0), along(SAME, SAME, ahead=20.0), "lane_change"),
+        (along(SAME, LEFT, ahead=1.0), along(SAME, SAME, ahead=20.0), "lane_change"),
+    ],
+)
+def test_who_drives_in_whose_lane_is_kept(template, road, kind):
+    assert not find_losses(template, template)
+    assert [loss.kind for loss in find_losses(template, road) if loss.kind in LOSABLE] == [kind]
+
+
+def test_who_passes_whom_and_on_which_side_is_kept():
+    ahead, past = np.arange(0.0, 150.0), np.arange(-30.0, 270.0, 2.0)
+    swerve = np.interp(past, [-10.0, 20.0, 60.0, 90.0], [0.0, 3.5, 3.5, 0.0])
+
+    def scene(side, still):
+        x = np.full(150, 40.0) if still else ahead / 2.0
+        position = np.stack([np.column_stack((x, np.zeros(150))), np.column_stack((past, side * swerve))])
+        speed = np.array([[0.0 if still else 5.0], [20.0]]) * np.ones((2, 150))
+        vehicles = (Vehicle("1"), Vehicle("2"))
+        return clean_tracks(Encounter("two", vehicles, 0, 100_000_000, position, np.zeros((2, 150)), speed))
+
+    for still, kind in ((False, "overtaking"), (True, "stand")):
+        template = scene(1.0, still)
+        assert not find_losses(template, template)
+        assert kind in [loss.kind for loss in find_losses(template, scene(-1.0, still))]
+
+
+def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
     speed = np.full(150, 10.0)
     encounter = lane_encounter(speed, speed)
     first, second = clean_tracks(encounter)
     beside = replace(second, curve=Curve(second.curve.points + np.array([0.0, 8.0, 0.0])))
     place(Placement((first, beside), np.ones(2), ("own path", "own path"), np.zeros(2), ()))
-    assert "following" in [loss.kind for loss in fit_template(encounter, segment(encounter), OPEN).lost]
+    with pytest.raises(LostEncounterError, match=r"drive in one lane .* fitting\.allow=lost_following takes it"):
+        fit_template(encounter, segment(encounter), OPEN)
+    taken = fit_template(encounter, segment(encounter), OPEN, FittingConfig(allow="lost_following, lost_merge"))
+    assert [loss.kind for loss in taken.lost] == ["following"]
 
 
 def test_the_refusal_names_roads_that_keep_it():
-    answer = suggest_nearest(LostConflictError("lost"), Chain(CROSSING, SEGMENTATION, OPEN, PipelineConfig()))
-    assert isinstance(answer, LostConflictError)
+    answer = suggest_nearest(LostEncounterError("lost"), Chain(CROSSING, SEGMENTATION, OPEN, PipelineConfig()))
+    assert isinstance(answer, LostEncounterError)
     assert re.match(r"lost\. Nearest possible: road (t_intersection|four_way)", str(answer))
 
 
 def test_only_what_is_known_can_be_allowed():
     with pytest.raises(InputError, match="lost_conflict"):
         FittingConfig(allow="everything")
-
-
-def test_keeping_is_about_paths_that_cross():
-    tracks = clean_tracks(CROSSING)
-    assert keeps_conflicts(tracks, tracks) and not keeps_conflicts(tracks, apart(CROSSING, 120.0).tracks)

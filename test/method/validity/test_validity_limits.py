@@ -240,10 +240,6 @@ def test_what_is_not_given_is_not_checked_and_said():
 
 def test_what_does_not_suit_the_request_is_an_error():
     scenario = good()
-    with pytest.raises(InputError, match="2 vehicle"):
-        Checker(None, BoundaryStates(np.zeros((3, 4)), np.zeros((3, 4))), None, None).check([scenario])
-    with pytest.raises(InputError, match="vehicle 4"):
-        Checker(None, None, None, (Wait(4, 0.0, 1.0),)).check([scenario])
     with pytest.raises(InputError, match="frame 'odom'"):
         Checker(ROAD, None, None, None).check([replace(scenario, frame_id="odom")])
     with pytest.raises(InputError, match="shape"):

@@ -6,8 +6,9 @@
 import json
 import xml.etree.ElementTree as ET
 
-from map_builders import opendrive
+from map_builders import lanelet2, opendrive
 import numpy as np
+import pyproj
 import pytest
 from rosbags.rosbag2 import Reader
 from typer.testing import CliRunner
@@ -17,6 +18,7 @@ from scenario_gen.bags.storage.definitions import type_store
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
 from scenario_gen.logs import read_log
+from scenario_gen.logs.geodesy import geodetic
 from scenario_gen.output.exchange.cases import read_cases
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.export import export_bag, EXPORTS, MANIFEST
@@ -36,7 +38,7 @@ def test_the_same_bag_gives_the_same_bytes(small_bag, tmp_path, target):
     first, second = (bytes_of(tmp_path / name) for name in ("one", "two"))
     assert first.keys() == second.keys() and all(first[name] == second[name] for name in first if "metadata" not in name)
     manifest = json.loads(first[MANIFEST])
-    assert [entry["lanes"] for entry in manifest["scenarios"]] == ["derived"] * 2 + ["true"] * 2
+    assert [entry["lanes"] for entry in manifest["scenarios"]] == ["true"] * 4
     assert {entry["sha256"] for entry in manifest["scenarios"]} == {
         sha256 for namespace in read_recording(small_bag).namespaces.values() for sha256 in namespace.hashes
     }
@@ -110,19 +112,81 @@ def test_a_bag_may_not_be_replaced_by_its_export(small_bag):
         export_bag(small_bag, small_bag, "commonroad", ExportConfig())
 
 
-@pytest.fixture(scope="module")
-def town(tmp_path_factory):
-    """A map of the user's, and a bag of scenarios on it."""
-    folder = tmp_path_factory.mktemp("town")
-    path = folder / "town.xodr"
-    path.write_text(opendrive())
-    log = folder / "log.csv"
+def made_on(path, text):
+    """A bag of scenarios of two that drive behind each other, on a map."""
+    path.write_text(text)
+    log = path.with_name("log.csv")
     rows = [f"1,{k / 10:.1f},{-50.0 + k:.2f},-1.75,10.0" for k in range(95)]
     rows += [f"2,{k / 10:.1f},{-30.0 + k * 0.9:.2f},-1.75,9.0" for k in range(95)]
     log.write_text("\n".join(["vehicle_id,time,x,y,speed", *rows]) + "\n")
     (encounter,) = read_log(str(log)).encounters
-    made = generate(encounter, str(path), count=2, seed=1)
-    return path, made.save(folder / "bag")
+    return path, generate(encounter, str(path), count=2, seed=1).save(path.with_name("bag"))
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """A map of the user's, and a bag of scenarios on it."""
+    return made_on(tmp_path_factory.mktemp("town") / "town.xodr", opendrive())
+
+
+ORIGIN = (59.9, 5.2)  # in Norway, whose zone of UTM is wider
+
+
+def in_degrees(x, y):
+    latitude, longitude = geodetic(np.array([x, y]), ORIGIN)
+    return f'lat="{float(latitude)!r}" lon="{float(longitude)!r}">'
+
+
+@pytest.fixture(scope="module")
+def geographic_town(tmp_path_factory):
+    """The same of a map in latitude and longitude."""
+    return made_on(tmp_path_factory.mktemp("geographic") / "town.osm", lanelet2(in_degrees))
+
+
+@pytest.mark.parametrize(
+    ("projection", "origin", "zero"),
+    [
+        ("mgrs", "", (200_000.0, 6_600_000.0)),
+        ("utm", "", (0.0, 0.0)),
+        ("utm", "60, 5", None),
+        ("local", "60, 5", None),
+        ("local", "", None),
+    ],
+)
+def test_a_map_in_degrees_is_driven_in_the_frame_in_which_others_load_it(geographic_town, tmp_path, projection, origin, zero):
+    path, bag = geographic_town
+    config = ExportConfig(map=str(path), projection=projection, projection_origin=origin)
+    made = export_bag(bag, tmp_path / "out", "openscenario", config)
+    assert ("positions in " in made.notes[0]) == (projection != "local" or bool(origin))
+    (one, *_), (entry, *_) = read_cases(bag)[0].scenarios, json.loads((tmp_path / "out" / MANIFEST).read_text())["scenarios"]
+    tracks = import_file(tmp_path / "out" / entry["files"][0], tmp_path / "log.csv").tracks
+    utm = pyproj.Transformer.from_crs(4326, 32632)
+    near = pyproj.Transformer.from_crs(4326, f"+proj=aeqd +lat_0={origin[:2]} +lon_0={origin[3:]}" if origin else 32632)
+    for n, track in enumerate(tracks):
+        degrees = geodetic(one.others.position[n], ORIGIN)
+        wanted = np.stack((near if projection == "local" else utm).transform(*degrees), axis=-1)
+        if zero is None:
+            zero = utm.transform(60.0, 5.0) if projection == "utm" else (0.0, 0.0)
+        if projection == "local" and not origin:
+            wanted = one.others.position[n]
+        assert np.abs(track.rows[:, 1:3] - (wanted - zero)).max() < 1e-3
+        step = np.gradient(wanted, axis=0)
+        assert np.abs(np.sin(track.rows[:, 4] - np.arctan2(step[:, 1], step[:, 0])))[1:-1].max() < 5e-3
+
+
+def test_autoware_gets_the_frame_of_the_map_without_being_given_it(geographic_town, tmp_path):
+    _, bag = geographic_town
+    made = export_bag(bag, tmp_path / "out", "autoware")
+    assert "positions in the MGRS square at 200000 m east and 6600000 m north of UTM zone 32 north" in made.notes[0]
+    with Reader(tmp_path / "out" / "case_1_0") as reader:
+        _, _, data = next(reader.messages([c for c in reader.connections if c.topic.endswith("/tracking/objects")]))
+    thing = type_store().deserialize_cdr(data, "autoware_perception_msgs/msg/TrackedObjects").objects[0]
+    place = thing.kinematics.pose_with_covariance.pose.position
+    latitude, longitude = pyproj.Transformer.from_crs(32632, 4326).transform(place.x + 200_000.0, place.y + 6_600_000.0)
+    first = geodetic(read_cases(bag)[0].scenarios[0].others.position[0, 0], ORIGIN)
+    assert np.allclose((latitude, longitude), first, atol=1e-8)
+    with pytest.raises(InputError, match="projection_origin: the squares of MGRS"):
+        export_bag(bag, tmp_path / "other", "autoware", ExportConfig(projection_origin="60, 5"))
 
 
 def test_scenarios_are_exported_on_the_map_of_the_user(town, tmp_path):

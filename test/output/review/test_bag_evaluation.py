@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cache, partial
 import io
 
+from bag_examples import copied
 from browser_tab import DESKTOP, PHONE, Tab
 from evaluation_worlds import report_case
 import numpy as np
@@ -88,13 +89,7 @@ def test_a_bag_without_scenarios_is_refused(tmp_path):
 
 def only(bag, folder, topics):
     """Copy the messages of these topics to another bag, as somebody else might have recorded it."""
-    with atomic_bag(folder) as copy:
-        for name in topics:
-            kind, quality = topic_entry(name)
-            copy.add_topic(f"/{name}", kind, qos_yaml(quality))
-        for message in read_messages(bag, lambda topic: topic.strip("/") in topics):
-            copy.write(message.topic, message.data, message.stamp_ns)
-    return folder
+    return copied(bag, folder, lambda message: message.data if message.topic.strip("/") in topics else None)
 
 
 def test_a_bag_becomes_a_page_with_all_its_scenarios_valid_or_not(tmp_path):

@@ -4,7 +4,9 @@
 """Every scenario of a bag is checked anew, against what the bag itself says of its request."""
 
 from dataclasses import replace
+from itertools import count
 
+from bag_examples import copied
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -43,20 +45,16 @@ def run():
     return Chain(encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7).run()
 
 
-def rewritten(bag, target, change, without=()):
-    """Copy a bag; `change(k, scenario bytes)` gives the bytes of scenario k."""
-    index = 0
-    with atomic_bag(target) as writer:
-        for message in read_messages(bag):
-            if message.topic.rpartition("/")[2] in without:
-                continue
-            kind, quality = topic_entry(message.topic)
-            writer.add_topic(message.topic, kind, qos_yaml(quality))
-            data = message.data
-            if message.topic.endswith("/scenarios"):
-                data, index = change(index, data), index + 1
-            writer.write(message.topic, data, message.stamp_ns)
-    return target
+def rewritten(bag, target, change=lambda _, data: data, without=()):
+    """Copy a bag without some topics; `change(k, bytes)` gives the bytes of scenario k."""
+    index = count()
+
+    def changed(message):
+        if message.topic.rpartition("/")[2] in without:
+            return None
+        return change(next(index), message.data) if message.topic.endswith("/scenarios") else message.data
+
+    return copied(bag, target, changed)
 
 
 def test_what_is_published_is_valid(run, tmp_path):
@@ -109,7 +107,7 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
 
 def test_what_the_bag_does_not_say_is_said(run, tmp_path):
     silent = ("tracks", "map", "fit", "info")  # scenarios/info knows what was asked, too
-    bag = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "bare", lambda _, data: data, silent)
+    bag = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "bare", without=silent)
     (found,) = validate_bag(bag)
     assert found.invalid == 0
     assert sorted(sentence.partition(":")[0] for sentence in found.left_out) == [
@@ -129,9 +127,9 @@ def test_a_scenario_is_held_against_what_was_asked_of_itself(run, tmp_path):
     )
     (found,) = validate_bag(write_recording(tmp_path / "other", replace(run, fit=fit)))
     assert found.found["boundary_state"].count == 4
-    without_fit = rewritten(tmp_path / "other", tmp_path / "info", lambda _, data: data, ("fit",))
+    without_fit = rewritten(tmp_path / "other", tmp_path / "info", without=("fit",))
     assert validate_bag(without_fit)[0].found["boundary_state"].count == 4
-    own = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "own", lambda _, data: data, ("fit",))
+    own = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "own", without=("fit",))
     assert validate_bag(own)[0].found == {} and validate_bag(own)[0].left_out == {}
 
 
@@ -216,13 +214,7 @@ def test_a_scenario_without_account_is_held_against_no_map_where_there_are_sever
 
 def without_infos(bag, target, infos):
     """Copy a bag without these messages of `scenarios/info`."""
-    with atomic_bag(target) as writer:
-        for message in read_messages(bag):
-            if not message.topic.endswith("/scenarios/info") or message.data not in infos:
-                kind, quality = topic_entry(message.topic)
-                writer.add_topic(message.topic, kind, qos_yaml(quality))
-                writer.write(message.topic, message.data, message.stamp_ns)
-    return target
+    return copied(bag, target, lambda m: None if m.topic.endswith("/scenarios/info") and m.data in infos else m.data)
 
 
 def test_the_command_answers_with_its_exit_code(run, tmp_path):
@@ -235,7 +227,7 @@ def test_the_command_answers_with_its_exit_code(run, tmp_path):
     with pytest.raises(InputError, match="does not exist"):
         validate_bag(tmp_path / "none")
     with pytest.raises(InputError, match="nothing to check"):
-        validate_bag(rewritten(bag, tmp_path / "empty", lambda _, data: data, ("scenarios",)))
+        validate_bag(rewritten(bag, tmp_path / "empty", without=("scenarios",)))
 
 
 def test_an_ego_is_checked_with_its_witness(run, tmp_path):
@@ -245,13 +237,7 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
     assert (whole.scenarios, whole.found, whole.left_out) == (3, {}, {})
 
     def bag_with(name, change):
-        with atomic_bag(tmp_path / name) as bag:
-            for message in read_messages(tmp_path / "whole"):
-                data = change(message.data) if message.topic == "/ego/witness" else message.data
-                if data is not None:
-                    bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
-                    bag.write(message.topic, data, message.stamp_ns)
-        return tmp_path / name
+        return copied(tmp_path / "whole", tmp_path / name, lambda m: change(m.data) if m.topic == "/ego/witness" else m.data)
 
     (lost,) = validate_bag(bag_with("lost", lambda _: None))
     assert (lost.found, lost.left_out) == ({}, {NO_WITNESS: 3})

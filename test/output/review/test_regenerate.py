@@ -5,18 +5,16 @@
 
 from dataclasses import replace
 
+from bag_examples import copied
 import map_builders
 import pytest
 
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics
 from msg_conventions.scenario_info import ADAPTATION
 from msg_conventions.scenarios import digest
-from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.bags.storage.metadata import qos_yaml
-from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
@@ -77,17 +75,6 @@ def published(bag, namespace):
     return [message.data for message in read_messages(bag) if message.topic == f"{namespace}/scenarios"]
 
 
-def rewritten(bag, target, change):
-    """Copy a bag; `change(message)` gives the bytes instead, or None to leave it out."""
-    with atomic_bag(target) as writer:
-        for message in read_messages(bag):
-            data = change(message)
-            if data is not None:
-                writer.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
-                writer.write(message.topic, data, message.stamp_ns)
-    return target
-
-
 @pytest.mark.parametrize("name", REQUESTS)
 def test_bit_for_bit(bag, name):
     for index, data in enumerate(published(bag, f"/{name}")):
@@ -119,10 +106,10 @@ def test_what_is_ambiguous_or_missing_is_said(bag, tmp_path):
     with pytest.raises(InputError, match="no scenario of index 77; there are: 0, 1, 2"):
         regenerate_scenario(bag, 77)
     with pytest.raises(InputError, match="has no fit, vehicle_2/route with"):
-        bare = rewritten(bag, tmp_path / "bare", lambda m: None if m.topic.endswith(("/fit", "/vehicle_2/route")) else m.data)
+        bare = copied(bag, tmp_path / "bare", lambda m: None if m.topic.endswith(("/fit", "/vehicle_2/route")) else m.data)
         regenerate_scenario(bare, 0, namespace="/plain")
     with pytest.raises(InputError, match="no scenario has an entry"):
-        silent = rewritten(bag, tmp_path / "silent", lambda m: None if m.topic.endswith("/info") else m.data)
+        silent = copied(bag, tmp_path / "silent", lambda m: None if m.topic.endswith("/info") else m.data)
         regenerate_scenario(silent, 0)
 
 
@@ -143,10 +130,10 @@ def with_summary(change):
 def test_other_parameters_or_versions_are_said(bag, tmp_path):
     other = with_summary(lambda values: values | {"sampling.lateral_sigma": "0.31", "numpy": "1.0"})
     with pytest.raises(ScenarioGenError, match=r"scenario 1 comes out differently: numpy 1\.0 there"):
-        regenerate_scenario(rewritten(bag, tmp_path / "other", other), 1, namespace="/plain")
+        regenerate_scenario(copied(bag, tmp_path / "other", other), 1, namespace="/plain")
     less = with_summary(lambda values: {name: text for name, text in values.items() if name != "sampling.time_sigma"})
     with pytest.raises(InputError, match=r"parameter sampling\.time_sigma is not there"):
-        regenerate_scenario(rewritten(bag, tmp_path / "less", less), 1, namespace="/plain")
+        regenerate_scenario(copied(bag, tmp_path / "less", less), 1, namespace="/plain")
 
 
 def test_a_missing_or_changed_log_is_said(bag, tmp_path):

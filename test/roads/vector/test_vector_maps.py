@@ -85,7 +85,7 @@ def test_a_lanelet_for_both_directions_is_two_lanes_and_others_are_left_out(tmp_
     assert len(read_network(write(tmp_path, ".osm", both)).lanes) == 21
     walk = lanelet2().replace('<tag k="subtype" v="road"/>', '<tag k="subtype" v="walkway"/>', 1)
     network = read_network(write(tmp_path, ".osm", walk))
-    assert len(network.lanes) == 19 and "1 lanelets are for others than cars" in network.notes[1]
+    assert len(network.lanes) == 19 and "1 lanes are for others than cars" in network.notes[1]
     bus = lanelet2(tags='<tag k="participant:vehicle:bus" v="yes"/>')
     with pytest.raises(InputError, match="none of its 20 lanelets is for cars"):
         read_network(write(tmp_path, ".osm", bus))
@@ -307,7 +307,7 @@ def test_reference_lines(shape):
 
     text = f'<road length="50"><planView><geometry s="0" x="0" y="0" hdg="0" length="50">{shape}</geometry></planView></road>'
     s = np.linspace(0.0, 50.0, 101)
-    poses = reference_line(parse_xml(text.encode(), "map")).at(s)
+    poses = reference_line(parse_xml(text.encode(), "map")).at(s, float(s[-1]))
     if shape.startswith("<spiral"):
         a = math.sqrt(math.pi / (0.05 / 50.0))
         y, x = fresnel(s / a)

@@ -22,8 +22,24 @@ function show(number) {
   shown = { drive, motion, view: new View(byId("stage"), box, 8), duration: motion.durations[0] };
   document.querySelectorAll("tr[data-show]").forEach((row) => row.setAttribute("aria-current", String(Number(row.dataset.show) === number)));
   byId("title").textContent = `Scenario ${drive.name}: ${drive.sentence}`;
+  listFigures(document.querySelector(`tr[data-show="${number}"]`));
   byId("time").value = 0;
   draw();
+}
+
+// What the row of a drive says, under its heads, in the columns that the table hides too.
+function listFigures(row) {
+  const list = byId("figures");
+  list.replaceChildren();
+  const heads = row.closest("table").querySelectorAll("thead th");
+  row.querySelectorAll("td").forEach((cell, k) => {
+    if (k < 2) return;
+    const name = document.createElement("dt");
+    const value = document.createElement("dd");
+    name.textContent = heads[k].textContent;
+    value.textContent = cell.textContent;
+    list.append(name, value);
+  });
 }
 
 function draw() {
@@ -35,7 +51,7 @@ function draw() {
   view.road(all.roads[drive.road], pictures[drive.road]);
   context.globalAlpha = 0.9;
   context.lineWidth = 1;
-  context.strokeStyle = "#0f172a";
+  context.strokeStyle = themed("ink");
   context.beginPath();
   drive.witness.forEach(([x, y], i) => (i ? context.lineTo(view.x(x), view.y(y)) : context.moveTo(view.x(x), view.y(y))));
   context.stroke();
@@ -45,7 +61,7 @@ function draw() {
     const [came, gone] = drive.spans[n];
     const there = n === drive.ego || (time >= came - 1e-6 && time <= gone + 1e-6);
     const state = motion.state(0, n, share);
-    const colour = n === drive.ego ? "#0f172a" : vehicleColour(n);
+    const colour = n === drive.ego ? themed("ink") : vehicleColour(n);
     if (there) {
       context.globalAlpha = 0.35;
       context.lineWidth = 2;
@@ -83,13 +99,20 @@ function tick(now) {
   if (playing) requestAnimationFrame(tick);
 }
 
-byId("play").addEventListener("click", () => {
+function toggle() {
   if (!shown) return;
   playing = !playing;
   if (playing && Number(byId("time").value) >= 1) byId("time").value = 0;
   byId("play").textContent = playing ? "❚❚" : "▶";
   last = performance.now();
   if (playing) requestAnimationFrame(tick);
+}
+
+byId("play").addEventListener("click", toggle);
+document.addEventListener("keydown", (event) => {
+  if (event.key !== " " || event.target.closest("button, input, select, summary")) return;
+  event.preventDefault();
+  toggle();
 });
 byId("time").addEventListener("input", draw);
 document.querySelectorAll("tr[data-show]").forEach((row) => row.addEventListener("click", () => show(Number(row.dataset.show))));

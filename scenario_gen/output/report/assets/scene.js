@@ -3,6 +3,8 @@
 
 const VEHICLE_COLOURS = ["#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b", "#0e7490", "#7c4a21", "#4b5563"];
 const PRIMITIVE_COLOURS = ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#edc948", "#76b7b2", "#ff9da7", "#9c755f", "#79706e"];
+/** What is painted on a road: width, dash and gap in metres; 0 is filled. */
+const PAINT = { edge: [0.15], lane: [0.12, 3, 4.5], centre: [0.15, 3, 1.5], stop: [0.5], give_way: [0.4, 0.6, 0.4], arrow: [0] };
 const vehicleColour = (n) => VEHICLE_COLOURS[n % VEHICLE_COLOURS.length];
 const isEgo = (data, n) => data.left_out.includes(n);
 const primitiveColour = (label) => PRIMITIVE_COLOURS[label % PRIMITIVE_COLOURS.length];
@@ -148,20 +150,23 @@ class View {
     this.context.imageSmoothingEnabled = true;
     this.context.drawImage(picture, this.x(road.origin[0]), top, road.size[0] * side, road.size[1] * side);
     this.context.globalAlpha = 1;
-    this.context.lineWidth = 1;
-    this.context.strokeStyle = themed("lane");
-    this.lines(road.lanes);
-    this.context.lineWidth = 3;
-    this.lines(road.stops);
+    this.context.strokeStyle = this.context.fillStyle = themed("lane");
+    Object.entries(road.markings).forEach(([kind, lines]) => this.lines(lines, ...PAINT[kind]));
   }
 
-  /** Draw lines, each x, y, x, y … in metres. */
-  lines(drawn) {
-    this.context.beginPath();
-    (drawn || []).forEach((line) => {
-      for (let i = 0; i < line.length; i += 2) this.context[i ? "lineTo" : "moveTo"](this.x(line[i]), this.y(line[i + 1]));
+  /** Draw lines, each x, y, x, y … in metres, so many metres wide, with dashes and gaps of so many metres; or fill them. */
+  lines(drawn, width, ...dashes) {
+    const context = this.context;
+    context.lineWidth = Math.max(width * this.scale, 1);
+    context.setLineDash(dashes.map((metres) => metres * this.scale));
+    context.lineCap = "butt";
+    context.beginPath();
+    drawn.forEach((line) => {
+      for (let i = 0; i < line.length; i += 2) context[i ? "lineTo" : "moveTo"](this.x(line[i]), this.y(line[i + 1]));
     });
-    this.context.stroke();
+    context[width ? "stroke" : "fill"]();
+    context.setLineDash([]);
+    context.lineCap = "round";
   }
 
   /** A bar that says how long some metres are. */

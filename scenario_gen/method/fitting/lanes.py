@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Placing a template on the lanes of a road: each vehicle along a chain of lanes, in their direction."""
+
+from dataclasses import replace
+import math
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.fitting.config import FittingConfig
+from scenario_gen.method.fitting.kept import find_losses, find_unused, refused_losses
+from scenario_gen.method.fitting.placement import check_scale, max_repair, Placement, SCALES, separated
+from scenario_gen.numerics import frozen
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.roads import Course, placements, tracks_on, ways_through
+from scenario_gen.template import in_words, MOST_CHANGE, to_frenet, Track, turn_of
+from scenario_gen.types import LaneNetwork, Road
+
+_END_ROOM = 1.0  # metres kept between a footprint and the end of the road
+_ASTRAY = 0.3  # metres that a footprint may be from room on the best place
+_TRIED, _MORE = 12, 40  # placements that are looked at cell by cell; where something is lost on all of these, more
+
+
+def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:
+    """Lay a template on a road's lanes at the best place where all have room: where nothing of its encounter is lost, or least.
+
+    One that is longer than a drawn road is scaled.
+
+    Raises:
+        RefusedError: there is none; the message says what stands against the attempt that came farthest.
+    """
+    network = _lanes_of(road)
+    own = tracks if network.drawn else ()
+    reason, best = "", None
+    if network.drawn:
+        _refuse_turns(tracks, road)
+    shortened = _shortened(tracks, road, config) if network.drawn else 1.0
+    laid = tracks if shortened == 1.0 else tuple(_scaled(track, shortened) for track in tracks)
+    scales = list(filter(config.accepts, SCALES)) if shortened == 1.0 else [1.0]
+    for tried, (match, scale) in enumerate(placements(network, laid, scales=scales)):
+        if tried >= (_TRIED if best is None else _MORE):
+            break
+        notes = [*network.notes, *(_note(c, t, network) for c, t in zip(match.courses, tracks, strict=True))]
+        if scale * shortened != 1.0:
+            notes.append(f"scaled by {scale * shortened:.3g} to fit the lanes")
+        placement = Placement.of(tracks_on(match, laid), scale * shortened, notes, map(_manoeuvre, match.courses))
+        try:
+            placement = separated(placement, config, sideways=0.0, own=own)
+            astray = max_repair(placement.tracks, road, config.max_move) > _ASTRAY
+        except RefusedError as error:
+            reason = reason or str(error)
+            continue
+        lost = find_losses(tracks, placement.tracks)
+        lacks = len(refused_losses(lost, config.allow)), astray
+        if best is None or lacks < best[0]:
+            unused = find_unused(road, (k for course in match.courses for k in course.lanes))
+            best = lacks, replace(placement, unused=unused)
+        if not any(lacks):
+            break
+    if best is None:
+        raise RefusedError(f"the template does not fit the lanes of road {road.name}: {reason}")
+    return best[1]
+
+
+def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
+    """Refuse a template of which a vehicle turns as no way of a drawn road does, or that needs a junction where that has none.
+
+    Raises:
+        RefusedError: it does.
+    """
+    if not any(lane.junction for lane in _lanes_of(road).lanes):
+        to_frenet(tracks)
+    ways = list(ways_through(road).values()) or [Curve.through(lane.centre) for lane in _lanes_of(road).lanes]
+    yaws = [way.points[:, 2] for way in ways]
+    left = max(float((yaw - np.minimum.accumulate(yaw)).max()) for yaw in yaws)
+    right = max(float((np.maximum.accumulate(yaw) - yaw).max()) for yaw in yaws)
+    for track in tracks:
+        if not -right - MOST_CHANGE <= turn_of(track) <= left + MOST_CHANGE:
+            raise RefusedError(f"vehicle {track.vehicle.id} {in_words(turn_of(track))}: road {road.name} has no way for that")
+
+
+def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> float:
+    """The scale at which a template that drives along one road is no longer than the longest way of a drawn road, 1 at most."""
+    try:
+        low, high = to_frenet(tracks).span(tracks)
+    except RefusedError:  # turns or crossings
+        return 1.0
+    lanes = _lanes_of(road).lanes
+    ways = [way.length for way in ways_through(road).values()] or [float(edge_lengths(lane.centre).sum()) for lane in lanes]
+    size = max(ways)
+    if high - low <= size - 2.0 * _END_ROOM:
+        return 1.0
+    cars = max(track.vehicle.length for track in tracks)
+    scale = (size - 2.0 * _END_ROOM - cars) / (high - low - cars)
+    check_scale(scale, f"the template is {high - low:.0f} m long, road {road.name} {size:.0f} m: it", config)
+    return scale
+
+
+def _scaled(track: Track, scale: float) -> Track:
+    """A track of which all distances are so many times what they are."""
+    points = track.curve.points * np.array([scale, scale, 1.0])
+    return replace(track, curve=Curve(points), progress=frozen(track.progress * scale))
+
+
+def _lanes_of(road: Road) -> LaneNetwork:
+    if road.lanes is None:
+        raise RefusedError(f"road {road.name} has no lanes; choose another way of placing (fitting.placement)")
+    return road.lanes
+
+
+def _manoeuvre(course: Course) -> str:
+    yaw = course.curve.at(np.array([course.start, course.end]))[:, 2]
+    turn = float(yaw[1] - yaw[0])
+    return "straight" if abs(turn) < math.radians(20.0) else "left" if turn > 0.0 else "right"
+
+
+def _note(course: Course, track: Track, network: LaneNetwork) -> str:
+    """Which lanes a vehicle drives, and how fast against their limit."""
+    lanes = ", ".join(network.lanes[k].id for k in course.lanes)
+    limit = max((network.lanes[k].speed_limit for k in course.lanes), default=math.nan)
+    fastest = float(track.speed.max())
+    speed = f"; its {fastest:.1f} m/s are more than their limit of {limit:.1f} m/s" if fastest > limit + 0.5 else ""
+    return f"vehicle {track.vehicle.id} drives on lanes {lanes}{speed}"
