@@ -6,6 +6,7 @@
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
+import re
 from typing import Any
 from xml.parsers import expat
 
@@ -35,8 +36,10 @@ class Element:
         return f"{self.file}, line {self.line}, <{self.tag}>"
 
     def all(self, tag: str) -> list["Element"]:
-        """Return the children of that name."""
-        return [child for child in self.children if child.tag == tag]
+        """Return the children of that name, or the descendants along a path of names (a/b)."""
+        tag, _, rest = tag.partition("/")
+        found = [child for child in self.children if child.tag == tag]
+        return [below for child in found for below in child.all(rest)] if rest else found
 
     def first(self, *path: str) -> "Element | None":
         """Return the first descendant along a path of names, None if there is none."""
@@ -46,15 +49,16 @@ class Element:
         return at
 
     def one(self, tag: str) -> "Element":
-        """Return the first child of that name.
+        """Return the first child of that name, or the first one along a path of names (a/b).
 
         Raises:
             InputError: there is none.
         """
+        tag, _, rest = tag.partition("/")
         element = self.first(tag)
         if element is None:
             raise InputError(f"{self.place} has no <{tag}>")
-        return element
+        return element.one(rest) if rest else element
 
     def get(self, name: str) -> str:
         """Return an attribute.
@@ -114,9 +118,8 @@ def read_xml(path: Path, what: str, skip: frozenset[str] = frozenset()) -> Eleme
     data = read_bytes(path, MOST_BYTES, what, ": cut the map")
     if not data.strip():
         raise InputError(f"{what} is empty")
-    if (stripped := data.lstrip()).startswith(b"<?xml"):  # blank lines above it move below it: lines keep their numbers
-        declaration, end, rest = stripped.partition(b"?>")
-        data = declaration + end + data[: len(data) - len(stripped)] + rest
+    if above := re.match(rb"((?:\s|<!--.*?-->)+)(<\?xml.*?\?>)", data, re.DOTALL):  # moves below it: lines keep their numbers
+        data = above[2] + above[1] + data[above.end() :]
     return parse_xml(data, what, skip)
 
 

@@ -78,7 +78,11 @@ class Generate:
         str, typer.Option(help="Who goes first. keep: as recorded. free: anyone. swap: the other one at the closest crossing.")
     ] = "keep"
     allow: Annotated[
-        str, typer.Option(help="lost_conflict: accept a road on which vehicles no longer meet that met in the recording.")
+        str,
+        typer.Option(
+            help="What may be lost on the road, with commas between: lost_conflict, lost_order, lost_following, lost_merge, "
+            "lost_lane_change, lost_overtaking, lost_stand, lost_turn."
+        ),
     ] = ""
     obstacle: Annotated[
         list[str] | None,

@@ -144,9 +144,10 @@ def _place(track: Track, shift: Floats) -> Track:
 
 def _too_close(tracks: Sequence[Track], gap: _Gap, clearance: float, max_shift: float) -> str:
     first, second = (tracks[k].vehicle.id for k in gap.pair)
+    how = f"overlap by {-gap.size:.2f} m" if gap.size < 0.0 else f"come within {gap.size:.2f} m of each other"
     return (
-        f"vehicles {first} and {second} come within {gap.size:.2f} m of each other and cannot be kept {clearance:.2f} m "
-        f"apart by shifting their paths up to {max_shift:.1f} m"
+        f"vehicles {first} and {second} {how} and cannot be kept {clearance:.2f} m apart by shifting their paths up to "
+        f"{max_shift:.1f} m"
     )
 
 

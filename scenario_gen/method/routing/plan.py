@@ -36,6 +36,8 @@ from scenario_gen.types import Fit, FittedVehicle, Road, Route, Vehicle
 STANDS = 0.05  # [m] a vehicle whose start and end are nearer than this has no path
 CLOSE = 0.3  # [m] anchors nearer to each other than this are one waypoint
 SHORTEST = 0.1  # [m] what a moving primitive covers at least, else it is a dwell
+DENSE = 0.05  # metres between places of a curve at which an anchor may lie,
+MOST_DENSE = 20_000  # so many at most: each is compared with each anchor
 SHARP = np.deg2rad(100.0)  # a waypoint farther off the heading than this lies behind
 SOFT_WEIGHT = 0.1  # weight of an anchor that is no waypoint
 FIRMNESS = ((1.0, 12), (10.0, 12), (100.0, 12), (1000.0, 24))  # by which a guess is held, ever more firmly, and rounds for each
@@ -418,7 +420,7 @@ def _joined(legs: list[Guess]) -> Guess:
 
 def _sampled(task: _Task, poses_at: Callable[[Floats], Floats], total: float) -> Route:
     """A curve of length `total` at points at most `spacing` apart, one of them beside every anchor."""
-    dense = np.linspace(0.0, total, int(np.ceil(total / 0.05)) + 1)
+    dense = np.linspace(0.0, total, min(int(np.ceil(total / DENSE)), MOST_DENSE) + 1)
     stops = _stops(task, dense, poses_at(dense))
     for k in range(1, len(stops)):  # what hardly moves is a dwell
         if stops[k] - stops[k - 1] < SHORTEST:

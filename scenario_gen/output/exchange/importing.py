@@ -7,9 +7,11 @@ Columns: vehicle, t_s from the file's time zero, x_m and y_m of the footprint's 
 counter-clockwise, length_m, width_m. A missing speed is derived. OpenSCENARIO
 poses the rear axle, and its vertices have no speeds: the centre follows from the bounding box; the speeds are those of our own
 files' property; in others' files they are derived from positions and times, but for the first, which the initial action says.
+Times relative to an event count from the time that its trigger waits for; headings that are missing follow the path.
 CommonRoad (2018b, 2020a), traces of OSI and tables of omega-prime are read as logs are (`logs.adapters`).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -21,13 +23,16 @@ from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.markup import Element, read_xml
 from scenario_gen.logs import is_commonroad, is_known, is_osi, LogConfig, read_raw
 from scenario_gen.numerics import Floats, frozen
-from scenario_gen.numerics.plane import place
+from scenario_gen.numerics.plane import edge_lengths, place
 from scenario_gen.output.exchange.openscenario import SPEEDS
+from scenario_gen.output.exchange.substitution import resolved
 from scenario_gen.output.exchange.xml import number
 from scenario_gen.types import Vehicle
 
 HEADER = "vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m"
 MOST_ROWS = 2_000_000
+_CATEGORIES = ("car", "van", "truck", "bus")  # of vehicles
+_FOLLOWS = "PrivateAction/RoutingAction/FollowTrajectoryAction"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +70,7 @@ def read_scenario_file(path: Path) -> Imported:
     root = read_xml(path, str(path))
     if root.tag != "OpenSCENARIO":
         raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read, and OSI's .mcap")
-    result = _openscenario(root)
+    result = _openscenario(resolved(root, path))
     if not result.tracks:
         raise InputError(f"{path}: no vehicle with a trajectory in it" + "".join(f"; {note}" for note in result.notes))
     return result
@@ -92,52 +97,56 @@ def import_file(path: Path, out: Path) -> Imported:
     return result
 
 
-def _each(element: Element, path: str) -> list[Element]:
-    """Return every descendant along a path of names."""
-    found = [element]
-    for tag in path.split("/"):
-        found = [child for parent in found for child in parent.all(tag)]
-    return found
-
-
-def _one(element: Element, path: str) -> Element:
-    """Return the first descendant along a path of names; what is missing is an error."""
-    for tag in path.split("/"):
-        element = element.one(tag)
-    return element
-
-
 def _openscenario(root: Element) -> Imported:
-    """Return what an OpenSCENARIO file has on vehicles that follow timed polylines."""
-    boxes: dict[str, Element] = {}
-    own: dict[str, Floats | None] = {}
-    notes = []
-    for entity in _each(root, "Entities/ScenarioObject"):
-        name, box = entity.get("name"), entity.first("Vehicle", "BoundingBox")
-        if box is None:
-            notes.append(f"{name} left out: it is no vehicle with a bounding box in this file")
+    """Return what an OpenSCENARIO file has on vehicles that follow polylines."""
+    vehicles: dict[str, Element] = {}
+    tracks, notes = list[Track](), list[str]()
+    for entity in root.all("Entities/ScenarioObject"):
+        name, vehicle = entity.get("name"), entity.first("Vehicle")
+        category = vehicle.attributes.get("vehicleCategory", "car") if vehicle else ""
+        if vehicle is None or vehicle.first("BoundingBox") is None:
+            notes.append(f"{name} left out: it is no vehicle with a bounding box in this file or its catalogs")
+        elif category not in _CATEGORIES:
+            notes.append(f"{name} left out: it is a {category}")
         else:
-            boxes[name], own[name] = box, _own_speeds(entity)
+            vehicles[name] = vehicle
     speeds = {
-        private.get("entityRef"): target.number("value")
-        for private in _each(root, "Storyboard/Init/Actions/Private")
-        for target in _each(private, "PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed")
+        private.get("entityRef"): target
+        for private in root.all("Storyboard/Init/Actions/Private")
+        for target in private.all("PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed")
     }
-    tracks = []
-    for group in _each(root, "Storyboard/Story/Act/ManeuverGroup"):
-        for follow in _each(group, "Maneuver/Event/Action/PrivateAction/RoutingAction/FollowTrajectoryAction"):
-            for actor in _each(group, "Actors/EntityRef"):
-                name = actor.get("entityRef")
-                if name in boxes:
-                    tracks.append(_followed(follow, name, boxes[name], speeds.get(name), own[name]))
-    still = sorted(set(boxes) - {track.vehicle for track in tracks})
+    still = dict.fromkeys(vehicles)
+    for name, follow, start in _followers(root):
+        if name in vehicles:
+            still.pop(name, None)
+            try:
+                tracks.append(_followed(follow, name, vehicles[name], speeds.get(name), start))
+            except InputError as error:
+                notes.append(f"{name} left out: {error}")
+            else:
+                if follow.first("TimeReference", "Timing") is None:
+                    notes.append(
+                        f"{name} follows its trajectory without a time reference: its first speed, or its vertices' times, count"
+                    )
     notes += [f"{name} left out: it follows no trajectory" for name in still]
     return Imported(tuple(tracks), tuple(notes))
 
 
-def _own_speeds(entity: Element) -> Floats | None:
+def _followers(root: Element) -> Iterator[tuple[str, Element, float]]:
+    """Yield who follows a trajectory, the action, and the second at which it begins; 0 where that is no matter of time."""
+    for private in root.all("Storyboard/Init/Actions/Private"):
+        yield from ((private.get("entityRef"), follow, 0.0) for follow in private.all(_FOLLOWS))
+    for group in root.all("Storyboard/Story/Act/ManeuverGroup"):
+        for event in group.all("Maneuver/Event"):
+            conditions = event.all("StartTrigger/ConditionGroup/Condition/ByValueCondition/SimulationTimeCondition")
+            start = conditions[0].number("value") if conditions else 0.0
+            for follow in event.all(f"Action/{_FOLLOWS}"):
+                yield from ((actor.get("entityRef"), follow, start) for actor in group.all("Actors/EntityRef"))
+
+
+def _own_speeds(vehicle: Element) -> Floats | None:
     """Return the speeds (K,) [m/s] that a file of ours has as a property of the vehicle; None if it has none, or damaged ones."""
-    for own in _each(entity, "Vehicle/Properties/Property"):
+    for own in vehicle.all("Properties/Property"):
         if own.attributes.get("name") == SPEEDS:
             try:
                 speeds = np.array(own.get("value").split(), dtype=np.float64)
@@ -147,23 +156,35 @@ def _own_speeds(entity: Element) -> Floats | None:
     return None
 
 
-def _followed(follow: Element, name: str, box: Element, speed: float | None, speeds: Floats | None) -> Track:
-    """Return the track of a vehicle that follows a trajectory in absolute time."""
-    timing = _one(follow, "TimeReference/Timing")
-    if timing.get("domainAbsoluteRelative") != "absolute":
-        raise InputError(f"{timing.place}: its times are relative to a trigger; only absolute ones are read")
-    scale, offset = timing.number("scale"), timing.number("offset")
+def _followed(follow: Element, name: str, vehicle: Element, target: Element | None, start: float) -> Track:
+    """Return the track of a vehicle that follows a trajectory.
+
+    Args:
+        follow: the action.
+        name: of the vehicle.
+        vehicle: with its bounding box.
+        target: its first speed, if it has one.
+        start: seconds at which the action begins.
+    """
+    trajectory = follow.first("TrajectoryRef", "Trajectory") or follow.one("Trajectory")  # before, in 1.0
     rows = []
-    for vertex in _one(follow, "TrajectoryRef/Trajectory/Shape/Polyline").all("Vertex"):
-        world = _one(vertex, "Position/WorldPosition")
-        time = vertex.number("time") * scale + offset
-        rows.append((time, world.number("x"), world.number("y"), float("nan"), world.number("h", 0.0)))
+    for vertex in trajectory.one("Shape/Polyline").all("Vertex"):
+        world = vertex.one("Position/WorldPosition")
+        x, y, heading = world.number("x"), world.number("y"), world.number("h", math.nan)
+        rows.append((vertex.number("time", math.nan), x, y, math.nan, heading))
     if len(rows) < 2:
         raise InputError(f"{follow.place}: its polyline has {len(rows)} vertices; at least 2 are needed")
-    result = np.array(rows)
-    result[:, 4] = np.unwrap(result[:, 4])
-    center, size = box.one("Center"), box.one("Dimensions")
+    result, speed = np.array(rows), target.number("value") if target else None
+    timing = follow.first("TimeReference", "Timing")
+    if timing is not None:
+        from_start = start if timing.get("domainAbsoluteRelative") == "relative" else 0.0
+        result[:, 0] = result[:, 0] * timing.number("scale") + timing.number("offset") + from_start
+    elif speed is not None and speed > 0.0:
+        result[:, 0] = start + np.concatenate(([0.0], np.cumsum(edge_lengths(result[:, 1:3])))) / speed
+    result[:, 4] = np.unwrap(np.where(np.isnan(result[:, 4]), _directions(result[:, 1:3]), result[:, 4]))
+    center, size = vehicle.one("BoundingBox/Center"), vehicle.one("BoundingBox/Dimensions")
     result[:, 1:3] = place(result[:, [1, 2, 4]], center.number("x"), center.number("y"))
+    speeds = _own_speeds(vehicle)
     if speeds is not None and len(speeds) == len(result):
         result[:, 3] = speeds
     return _track(follow.place, name, (size.number("length"), size.number("width")), result, speed)
@@ -179,7 +200,7 @@ def _track(place: str, vehicle: str, size: tuple[float, float], rows: Floats, sp
         raise InputError(f"{place}: {len(rows)} states; at most {MOST_ROWS} are read")
     if min(size) <= 0.0:
         raise InputError(f"{place}: a footprint of {size[0]:g} m × {size[1]:g} m; both must be positive")
-    if len(rows) < 2 or (np.diff(rows[:, 0]) <= 0.0).any():
+    if len(rows) < 2 or not (np.diff(rows[:, 0]) > 0.0).all():
         raise InputError(f"{place}: times must ascend, and be two at least")
     if np.isnan(rows[:, 3]).any():
         rows[:, 3] = _speeds(rows, speed)

@@ -4,7 +4,7 @@
 """Where on a map a template goes: all ways of laying it on lanes, the best first, and the part of the map around one."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import combinations, islice
 import math
@@ -18,7 +18,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import crossing_spots, find_spots, spot_at
+from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
 from scenario_gen.types import LaneNetwork, LEVEL, once_per_object, Scenario
@@ -66,46 +66,78 @@ def placements(
     chains = chains_of(network)
     home = spot_at(network, tracks, np.zeros(3))
     judged = _Judged(network, tracks)
-    failures: list[tuple[bool, bool, float, str]] = []
+    drawn_for = network.drawn_for
+    sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
+    search = _Search(chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ())
+    found, recorded = False, ""
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
         broken = own.reason or judged.broken(own)
         if not broken:
+            found = True
             yield own, 1.0
-        failures += [(False, False, own.cost, f"where it was recorded, {broken}")] if broken else []
-    drawn_for = network.drawn_for
-    sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
-    spots = [] if sized is None else [sized]
-    spots += find_spots(network, tracks, lanes)[:_SPOTS]
-    spots += crossing_spots(network, tracks)[:_SPOTS] if lanes is None else []
-    streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
-    others: list[tuple[Match, float]] = []
-    for scale in scales:
-        matches = list(streets) if scale == 1.0 else []
-        for spot in spots:
-            stop_if_cancelled()
-            ends = drawn_for.lanes if drawn_for is not None and spot is sized else ()
-            placement = match(chains, tracks, spot, scale, ends)
-            far = placement.cost > _WORST and spot is not sized
-            if placement.reason or far:
-                failures.append((True, True, placement.cost, placement.reason or "vehicles would be too far from where they are"))
-            else:
-                matches.append(placement)
-        broken_by = [judged.broken(placement) for placement in matches]
-        failures += [(True, False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken]
-        matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
-        matches.sort(key=lambda placement: (*judged.rank(placement), round(placement.cost, 3)))
-        placed = [p for p in matches if p.aside <= _PRESSED and judged.rank(p)[0] == 0]
-        others += [(p, scale) for p in matches if p not in placed]
-        yield from ((placement, scale) for placement in placed)
-        if placed:
+        recorded = f"where it was recorded, {broken}; elsewhere, " if broken else ""
+    spots = find_spots(network, tracks, lanes)
+    crossed = crossing_spots(network, tracks) if lanes is None else []
+    streets = along_streets(chains, tracks, lanes)
+    for k in range(0, max(len(spots), len(crossed), 1), _SPOTS):  # where nobody takes the first ones, the next are looked at
+        if k and not found:
             break
-    yield from sorted(others, key=lambda other: (other[0].aside > _PRESSED, judged.rank(other[0])[0]))
-    if others or placed:
-        return
-    what = "road" if network.drawn else "map"
-    *_, reason = min(failures, default=("it has no lanes of its directions",))
-    raise NoPlaceError(f"the template fits no place on {what} {network.name}: {reason}")
+        first = [sized] if sized is not None and k == 0 else []
+        some = [*first, *spots[k : k + _SPOTS], *crossed[k : k + _SPOTS]]
+        for placed in search.near(some, list(islice(streets, _STREETS))):
+            found = True
+            yield placed
+    if not found:
+        what = "road" if network.drawn else "map"
+        *_, reason = min(search.failures, default=("it has no lanes of its directions",))
+        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {recorded}{reason}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What is laid where.
+
+    Attributes:
+        chains, tracks, scales: as of `placements`.
+        judged: whether a placement keeps the rules.
+        sized: where the road was drawn for the template, None if it was not.
+        ends: the lanes that it was drawn with, for each vehicle.
+        failures: whether it is no match at all, its cost, and the reason.
+    """
+
+    chains: Chains
+    tracks: tuple[Track, ...]
+    scales: Sequence[float]
+    judged: "_Judged"
+    sized: Spot | None
+    ends: tuple[tuple[str, str], ...]
+    failures: list[tuple[bool, float, str]] = field(default_factory=list)
+
+    def near(self, spots: Sequence[Spot], along: Sequence[Match]) -> Iterator[tuple[Match, float]]:
+        """Yield the placements near some spots and along some stretches of road, the best first, with their scales."""
+        others: list[tuple[Match, float]] = []
+        for scale in self.scales:
+            matches = list(along) if scale == 1.0 else []
+            for spot in spots:
+                stop_if_cancelled()
+                placement = match(self.chains, self.tracks, spot, scale, self.ends if spot is self.sized else ())
+                far = placement.cost > _WORST and spot is not self.sized
+                if placement.reason or far:
+                    reason = placement.reason or "vehicles would be too far from where they are"
+                    self.failures.append((True, placement.cost, reason))
+                else:
+                    matches.append(placement)
+            broken_by = [self.judged.broken(placement) for placement in matches]
+            self.failures.extend((False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken)
+            matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
+            matches.sort(key=lambda placement: (*self.judged.rank(placement), round(placement.cost, 3)))
+            placed = [p for p in matches if p.aside <= _PRESSED and self.judged.rank(p)[0] == 0]
+            others += [(p, scale) for p in matches if p not in placed]
+            yield from ((placement, scale) for placement in placed)
+            if placed:
+                break
+        yield from sorted(others, key=lambda other: (other[0].aside > _PRESSED, self.judged.rank(other[0])[0]))
 
 
 class _Judged:

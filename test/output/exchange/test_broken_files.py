@@ -40,7 +40,7 @@ def refused(tmp_path, kind, data):
         ("xml", b'timeStepSize="0.1"', b'timeStepSize="0"', "timeStepSize"),
         ("xml", b"<length>4.8</length>", b"<length>-1</length>", "both must be positive"),
         ("xml", b"<exact>17</exact>", b"<exact>3</exact>", "times must ascend"),
-        ("xosc", b'domainAbsoluteRelative="absolute"', b'domainAbsoluteRelative="relative"', "only absolute ones are read"),
+        ("xosc", b"Polyline", b"Nurbs", "<Shape> has no <Polyline>"),
         ("xosc", b"WorldPosition", b"LanePosition", "<Position> has no <WorldPosition>"),
         ("xosc", b'time="0.5"', b'time="nan"', "<Vertex>, attribute time"),
         ("xosc", b'time="0.5"', b'time="$start"', "'$start'"),

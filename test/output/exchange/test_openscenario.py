@@ -3,6 +3,7 @@
 
 """OpenSCENARIO and OpenDRIVE: references, reference points and edges, which no schema sees; the road's geometry; and back."""
 
+import re
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -100,6 +101,66 @@ def test_what_was_written_is_read_back_and_others_speeds_are_derived(tmp_path):
             assert np.allclose(track.rows[:, 0], scenario.time[there], atol=1e-9)
             assert np.abs(track.rows[:, 1:3] - scenario.position[n, there]).max() < 1e-6
             assert np.abs(track.rows[:, 3] - scenario.speed[n, there])[1:].max() < most
+
+
+THEIRS = {  # what others write in place of what we write, and by how many seconds it is later
+    "parameters": (b'time="0.5"', b'time="$half"', 0.0),
+    "expressions": (b'time="0.5"', b'time="${($half + sqrt(4) * 1.5 - 3) % 2}"', 0.0),
+    "declared after its use": (b'time="0.5"', b'time="${$later}"', 0.0),
+    "relative times": (b'"absolute" scale="1" offset="0"', b'"relative" scale="1" offset="2"', 2.0),
+    "no heading": (b' h="', b' z="', 0.0),
+    "no time reference": (b'<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"', b"<None", 0.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", THEIRS)
+def test_what_others_write_is_read_as_it_is_meant(tmp_path, kind):
+    scenario = crossing()
+    data, _ = written(scenario)
+    theirs, ours, later = (THEIRS[kind][k] for k in (1, 0, 2))
+    assert ours in data
+    names = b'<ParameterDeclaration name="later" value="$half"/><ParameterDeclaration name="half" value="0.5"/>'
+    data = data.replace(b"<ParameterDeclarations", b"<ParameterDeclarations>" + names + b"</ParameterDeclarations><Gone", 1)
+    path = tmp_path / "one.xosc"
+    path.write_bytes(data.replace(ours, theirs).replace(b"speed_mps", b"theirs").replace(b"AbsoluteTargetSpeed", b"Gone"))
+    made = read_scenario_file(path)
+    for n, track in enumerate(made.tracks):
+        assert np.allclose(track.rows[:, 0], scenario.time + later, atol=1e-9)
+        assert np.abs(track.rows[:, 1:3] - scenario.position[n]).max() < (0.2 if kind == "no heading" else 1e-6)
+    assert len(made.tracks) == 2 and (kind == "no time reference") == any(
+        "without a time reference" in note for note in made.notes
+    )
+
+
+def test_without_times_a_first_speed_is_kept(tmp_path):
+    data, _ = written(crossing())
+    path = tmp_path / "one.xosc"
+    path.write_bytes(re.sub(rb' time="[^"]*"', b"", data.replace(b"<Timing", b"<None").replace(b"speed_mps", b"theirs")))
+    for track, speed in zip(read_scenario_file(path).tracks, (9.0, 6.0), strict=True):
+        assert np.allclose(track.rows[:, 3], speed, rtol=0.02)
+
+
+def test_vehicles_may_stand_in_a_catalog(tmp_path):
+    data, _ = written(crossing())
+    first = data.index(b"<Vehicle "), data.index(b"</Vehicle>") + len(b"</Vehicle>")
+    entry = data[slice(*first)].replace(b'name="car"', b'name="mine"', 1).replace(b'length="4.8"', b'length="$long"')
+    (tmp_path / "catalogs").mkdir()
+    (tmp_path / "catalogs" / "ours.xosc").write_bytes(
+        b'<OpenSCENARIO><Catalog name="Cars">' + entry + b"</Catalog></OpenSCENARIO>"
+    )
+    (tmp_path / "catalogs" / "broken.xosc").write_bytes(b"<OpenSCENARIO>")
+    reference = (
+        b'<CatalogReference catalogName="Cars" entryName="mine"><ParameterAssignments><ParameterAssignment parameterRef="long" '
+    )
+    reference += b'value="${2 * 2.6}"/></ParameterAssignments></CatalogReference>'
+    folder = b'<CatalogLocations><VehicleCatalog><Directory path="catalogs"/></VehicleCatalog></CatalogLocations><Gone'
+    text = (data[: first[0]] + reference + data[first[1] :]).replace(b"<CatalogLocations", folder, 1)
+    (tmp_path / "one.xosc").write_bytes(text)
+    assert [track.length for track in read_scenario_file(tmp_path / "one.xosc").tracks] == [5.2, 4.5]
+    text = text.replace(b'vehicleCategory="car"', b'vehicleCategory="bicycle"')
+    (tmp_path / "one.xosc").write_bytes(text)
+    made = read_scenario_file(tmp_path / "one.xosc")
+    assert len(made.tracks) == 1 and "vehicle_2 left out: it is a bicycle" in made.notes
 
 
 def along(geometry, s):

@@ -245,3 +245,10 @@ def test_a_map_on_the_180th_meridian_is_one_map(tmp_path):
 
     network = read_network(write(tmp_path, ".osm", lanelet2(place)))
     assert np.allclose(network.box, [[-60.0, -60.0], [60.0, 60.0]], atol=0.02)
+
+
+def test_places_beyond_the_shortlist_are_looked_at_where_nobody_takes_those_on_it(tmp_path, monkeypatch):
+    network, tracks = read_network(write(tmp_path, ".xodr")), clean_tracks(template(crossing()))
+    everywhere = {match.courses[0].lanes for match, _ in placements(network, tracks)}
+    monkeypatch.setattr("scenario_gen.roads.vector.place._SPOTS", 1)
+    assert {match.courses[0].lanes for match, _ in placements(network, tracks)} == everywhere and len(everywhere) > 3
