@@ -85,8 +85,11 @@ def _in_environment(environment: dict[str, str], target, args) -> None:
 def _become(arguments: list[str], folder: str, environment: dict[str, str], log: str) -> None:
     """Turn this process into what `python -m` would have made of it."""
     from scenario_gen.base.interrupts import end_with_parent
+    from scenario_gen.ros.nodes.recorder import Recorder
+    from scenario_gen.ros.plumbing import process as node_process
     from scenario_gen.ros.plumbing import start
 
+    node_process.ENDING = Recorder.ENDING = 120.0  # on a busy machine 5 s are few
     end_with_parent()
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     os.dup2(descriptor, 1)
