@@ -5,7 +5,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from scenario_gen.types import Encounter, GenerationResult, Request
 Select = Callable[[GenerationResult], GenerationResult]
 Advance = Callable[[str, int, int], None]
 """Called with the progress of a case: its name, scenarios so far, scenarios requested."""
+EGO_AUTO = "auto"  # the vehicle that has to react, by --ego
 NOTES = 5  # on logs, that the terminal shows
 OPTIONS = {
     "starts:='": "--start '", "goals:='": "--goal '", "sampling.max_stretch:=": "--set sampling.max_stretch=",
@@ -193,10 +194,16 @@ def generate_all(
         def report(done: int, total: int, _candidates: int, name: str = name) -> None:
             advance(name, done, total)
 
+        own = request
         try:
-            case = generate(encounter, road, config, count=drawn, seed=seed, request=request, progress=report, **further)
+            if request.ego == EGO_AUTO:
+                own = with_ego_that_reacts(encounter, road, config, seed, request)
+            case = generate(encounter, road, config, count=drawn, seed=seed, request=own, progress=report, **further)
         except RefusedError as error:
-            answer = answer_refusal(error, encounter, road, config, request, drawn, seed)
+            if own.ego == EGO_AUTO:
+                refusals.append(f"{encounter.name} on {road}: {error}")
+                continue
+            answer = answer_refusal(error, encounter, road, config, own, drawn, seed)
             refusals.append(f"{encounter.name} on {road}: {as_options(str(answer))}")
             continue
         if for_testing and not case.generated.scenarios:
@@ -209,6 +216,18 @@ def generate_all(
             causes = case.generated.adaptations[-1] if for_testing else causes
             refusals.append(f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}")
     return cases, refusals
+
+
+def with_ego_that_reacts(encounter: Encounter, road: str, config: PipelineConfig, seed: int, request: Request) -> Request:
+    """Return a request with the vehicle as ego that has to react in most of some scenarios.
+
+    Raises:
+        RefusedError: none has to, or there are no scenarios.
+    """
+    from scenario_gen.closed_loop.reacting import PROBED, who_reacts
+
+    case = generate(encounter, road, config, count=PROBED, seed=seed, request=replace(request, ego=""))
+    return replace(request, ego=who_reacts(case))
 
 
 def chosen(encounters: Sequence[Encounter], names: Sequence[str]) -> list[Encounter]:

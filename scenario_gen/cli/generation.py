@@ -42,7 +42,10 @@ class Generate:
     encounter: Annotated[list[str] | None, typer.Option(help="Name of an encounter in the log. Repeatable; default: all.")] = None
     ego: Annotated[
         str,
-        typer.Option(help="Id of the vehicle to leave out for a planner under test. The bag has its start, goal and track."),
+        typer.Option(
+            help="Id of the vehicle to leave out for a planner under test, or auto: the one that has to react. The bag has its "
+            "start, goal and track."
+        ),
     ] = ""
     start: Annotated[
         list[str] | None, typer.Option(help=r"Start state of a vehicle on the road, 'id: x y yaw \[speed]'. Repeatable.")
@@ -59,7 +62,8 @@ class Generate:
         bool,
         typer.Option(
             "--for-testing",
-            help="Keep only scenarios in which the --ego has to react: a planner that ignores the others collides.",
+            help="Keep only scenarios in which the --ego has to react: a planner that ignores the others collides, and a simple "
+            "one that looks passes.",
         ),
     ] = False
     compare: Annotated[
@@ -74,7 +78,11 @@ class Generate:
         str, typer.Option(help="Who goes first. keep: as recorded. free: anyone. swap: the other one at the closest crossing.")
     ] = "keep"
     allow: Annotated[
-        str, typer.Option(help="lost_conflict: accept a road on which vehicles no longer meet that met in the recording.")
+        str,
+        typer.Option(
+            help="What may be lost on the road, with commas between: lost_conflict, lost_order, lost_following, lost_merge, "
+            "lost_lane_change, lost_overtaking, lost_stand, lost_turn."
+        ),
     ] = ""
     obstacle: Annotated[
         list[str] | None,

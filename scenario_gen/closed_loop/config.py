@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from scenario_gen.base.parameters import parameter, Parameters
 
-REPLAY, REACTIVE = "replay", "reactive"
+REPLAY, REACTIVE, COMMITTED = "replay", "reactive", "committed"
+FORESIGHT = {REACTIVE: 5.0, COMMITTED: 0.5}
+"""Seconds that drivers look ahead for the ego. To the committed a conflict is evident 1.5 s before it; they brake 1 s later."""
 TEMPLATE, NEVER = "template", "never"
 
 
@@ -18,8 +20,8 @@ class ClosedLoopConfig(Parameters):
     step: float = parameter(0.1, "time between two decisions", unit="s", low=0.005, high=0.5)
     policy: str = parameter(
         REACTIVE,
-        "the others replay what was certified, or react to the ego on their certified paths",
-        choices=(REPLAY, REACTIVE),
+        "the others replay what was certified, react to the ego early, or keep their course until a conflict is evident",
+        choices=(REPLAY, REACTIVE, COMMITTED),
     )
     yield_to_ego: str = parameter(
         TEMPLATE,

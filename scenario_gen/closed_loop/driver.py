@@ -35,7 +35,7 @@ class Self(NamedTuple):
 
 
 class Manner(NamedTuple):
-    """How the others drive: fields of `ClosedLoopConfig`; whether they react at all, and (N,) the reaction times in steps."""
+    """How the others drive: fields of `ClosedLoopConfig`; how far they look ahead [s]; whether, and after (N,) how many steps."""
 
     headway: float
     standstill: float
@@ -44,12 +44,13 @@ class Manner(NamedTuple):
     strongest: float
     jerk: float
     patience: float
+    foresight: float
     yields: bool
     reacts: bool
     delay: Ints
 
 
-MANNER = named(Manner, F, F, F, F, F, F, F, B, B, I1)
+MANNER = named(Manner, F, F, F, F, F, F, F, F, B, B, I1)
 
 
 @kernel(inline=True)

@@ -16,7 +16,6 @@ from scenario_gen.numerics.kernels import kernel
 
 SLOW = 0.2  # m/s; a certified speed below it counts as this one where it divides
 SPARE = 0.3  # metres that a driver who brakes for the ego leaves
-FORESEEN = 5.0  # seconds that a driver looks ahead
 HALVINGS = 5  # of the range that holds the braking it looks for
 LATE = 0.05  # seconds by which the ego's clock is uncertain
 HARDER = 1.0  # m/s² by which an ego on its witness' path must brake harder than that one to be foreseen to go on so

@@ -36,7 +36,7 @@ from scenario_gen.closed_loop.driver import (
     STAND,
     WAITED,
 )
-from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, FORESEEN, Foreseen, weakest
+from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, Foreseen, weakest
 from scenario_gen.closed_loop.order import Clocks, keep_order, limit
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
@@ -86,7 +86,7 @@ def react(world: World, manner: Manner, seen: Floats, drivers: Floats, after: Fl
             it back.
     """
     n = drivers.shape[0]
-    now = _begin(world, drivers, seen, manner.delay)
+    now = _begin(world, manner, drivers, seen)
     level, rate = np.full(n, FREE), drivers[:, RATE].copy()
     _regard_ego(world, manner, now, level, rate, after)
     if n > 2:
@@ -100,9 +100,9 @@ def react(world: World, manner: Manner, seen: Floats, drivers: Floats, after: Fl
 
 
 @kernel(inline=True)
-def _begin(world: World, drivers: Floats, seen: Floats, delay: Ints) -> Now:
+def _begin(world: World, manner: Manner, drivers: Floats, seen: Floats) -> Now:
     """Where everyone is."""
-    n, steps = drivers.shape[0], int(np.ceil(FORESEEN / world.step))
+    n, steps = drivers.shape[0], int(np.ceil(manner.foresight / world.step))
     pose, goes, here = np.empty((n, 5)), np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
     for i in range(n):
         clock = drivers[i, CLOCK]
@@ -112,7 +112,7 @@ def _begin(world: World, drivers: Floats, seen: Floats, delay: Ints) -> Now:
     coming = np.empty((n, steps + 1))
     for m in range(steps + 1):
         coming[:, m] = drivers[:, CLOCK] + m * world.step  # of those who have left
-    return Now(drivers, pose, goes, here, seen, delay, np.empty((n, steps + 1, 4)), coming)
+    return Now(drivers, pose, goes, here, seen, manner.delay, np.empty((n, steps + 1, 4)), coming)
 
 
 @kernel(inline=True)

@@ -111,7 +111,12 @@ class IdmFollower(RouteFollower):
 
 @dataclass
 class Unlooking(IdmFollower):
-    """Drives as `IdmFollower` does, slows down in bends and stops at its goal, but looks at nobody."""
+    """The baseline: drives as `IdmFollower` does, as fast as its witness, slows down in bends and stops, but looks at nobody."""
+
+    def reset(self, task: Task) -> None:
+        """Take route and speed in."""
+        super().reset(task)
+        self.speed = task.speed
 
     def act(self, observation: Observation) -> Command:
         """Drive as if nobody else were there."""

@@ -3,11 +3,12 @@
 
 """What a test of a planner leaves: JSON, JUnit's XML and a page, in one folder; the same drives give the same bytes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import json
 import math
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -19,12 +20,14 @@ from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.reacting import EASY
 from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
 from scenario_gen.output.report.html import render_page
 
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
 DRIVEN = Kind("driven")
+EMPTY: Mapping[str, str] = MappingProxyType({})
 NAMED = 12  # encounters up to which each is named
 MOST_DRAWN = 100
 """Drives that the page replays, the worst first; its table lists all."""
@@ -57,6 +60,14 @@ class Drives:
         order = range(len(self.outcomes))
         return sorted(order, key=lambda k: (*(-value for value in self.outcomes[k].verdict.severity), k))
 
+    @property
+    def easy(self) -> str:
+        """A sentence if a planner that looks at nobody passes most scenarios, else ""."""
+        passed = sum(one.verdict.passed for one in self.unlooking)
+        if passed <= EASY * len(self.unlooking):
+            return ""
+        return f"these scenarios hardly test a planner: one that looks at nobody passes {passed} of {len(self.unlooking)}"
+
     def scores(self) -> dict[str, float]:
         """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""
         terms = [outcome.verdict.document()["terms"] for outcome in self.outcomes]
@@ -79,6 +90,8 @@ class Drives:
             each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
             parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
             messages.append(f"a planner that looks at nobody passes {passed_of(self.unlooking)}{parts}")
+            if self.easy:
+                messages.append(self.easy)
         if self.comparison is not None:
             messages.append(self.comparison.sentence())
         if found := self.scores():
@@ -137,18 +150,22 @@ class Drives:
             OSError: the disk is full, or the folder may not be written.
         """
         write_text(folder / JSON, self.json())
-        write_text(folder / JUNIT, as_junit(self.outcomes, self.planner))
+        facts = {"policy": self.config.policy} | ({"hardly tests": self.easy} if self.easy else {})
+        write_text(folder / JUNIT, as_junit(self.outcomes, self.planner, facts))
         if self.trials:
             write_text(folder / PAGE, self.page())
 
 
-def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
-    """Return one test case per scenario, as JUnit's XML; collision, off_road, jump and goal are failures."""
+def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str] = EMPTY) -> str:
+    """Return one test case per scenario, as JUnit's XML, and facts as properties; collision, off_road, jump and goal fail."""
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
     suite = ElementTree.Element(
         "testsuite", name=planner, tests=str(len(outcomes)), failures=str(len(failed)), errors="0", time=f"{lasted:.3f}"
     )
+    properties = ElementTree.SubElement(suite, "properties")
+    for name, value in facts.items():
+        ElementTree.SubElement(properties, "property", name=name, value=value)
     for outcome in outcomes:
         verdict = outcome.verdict
         case = ElementTree.SubElement(

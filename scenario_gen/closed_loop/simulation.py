@@ -17,7 +17,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.advance import advance, ego_hits
 from scenario_gen.closed_loop.certified import world_of
-from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
+from scenario_gen.closed_loop.config import ClosedLoopConfig, FORESIGHT, REPLAY, TEMPLATE
 from scenario_gen.closed_loop.driver import Manner
 from scenario_gen.closed_loop.ego import Command, EgoState, misplaced, move, Pose
 from scenario_gen.numerics import Bools, Floats, wrap_angle
@@ -72,6 +72,7 @@ class Task:
         road: what is drivable, if it is known.
         step: time between two decisions [s].
         config: the body's limits among the rest.
+        speed: the witness' highest speed [m/s].
     """
 
     vehicle: Vehicle
@@ -81,6 +82,7 @@ class Task:
     road: Road | None
     step: float
     config: ClosedLoopConfig
+    speed: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +184,7 @@ class ClosedLoop:
         self.scenario, self.road, self.config = scenario, road, config
         self.world = world_of(scenario, ego, config.step)
         self.ego = self.world.ego
-        reactive = config.policy == REACTIVE
+        reactive = config.policy != REPLAY
         self.reactions = np.array(
             [reaction_time(scenario, vehicle.id, config.reaction * reactive) for vehicle in scenario.vehicles]
         )
@@ -194,6 +196,7 @@ class ClosedLoop:
             config.strongest_braking,
             config.jerk,
             config.patience,
+            FORESIGHT.get(config.policy, 0.0),
             config.yield_to_ego == TEMPLATE,
             reactive,
             np.round(self.reactions / config.step).astype(np.int64),
@@ -211,7 +214,8 @@ class ClosedLoop:
         """Return what a planner is told beforehand."""
         own = self.world.motion[self.ego]
         route = own[np.concatenate([[True], edge_lengths(own[:, :2]) > 1e-3]), :3]
-        return Task(self.scenario.vehicles[self.ego], own[0, :4], own[-1, :4], route, self.road, self.config.step, self.config)
+        vehicle, config = self.scenario.vehicles[self.ego], self.config
+        return Task(vehicle, own[0, :4], own[-1, :4], route, self.road, config.step, config, float(own[:, 3].max()))
 
     def start(self) -> State:
         """Return the first instant: where everyone is when the ego's witness comes onto the scene."""

@@ -105,11 +105,21 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     return pieces, quality
 
 
-def driven_backwards(pieces: Sequence[Piece]) -> list[Piece]:
-    """Return the pieces whose recorded headings are opposite to the path; none where most are: these are no headings."""
+def driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], tuple[str, ...]]:
+    """Return the pieces without those whose recorded headings are opposite to the path, and a note on each of these.
+
+    Where most are, these are no headings of cars, and all pieces stay.
+    """
     known = [piece for piece in pieces if len(piece.smooth.turned)]
     opposite = [piece for piece in known if np.median(np.abs(piece.smooth.turned)) > BACKWARDS]
-    return opposite if 2 * len(opposite) <= len(known) else []
+    if 2 * len(opposite) > len(known):
+        return list(pieces), ()
+    notes = tuple(
+        f"vehicle {piece.track.id} drives backwards for {(piece.last - piece.first) * config.period:.1f} s, by its recorded "
+        "headings; that is left out, for only driving forwards is generated"
+        for piece in opposite
+    )
+    return [piece for piece in pieces if piece not in opposite], notes
 
 
 def moved_ahead(smooth: Smooth, metres: float) -> Smooth:

@@ -25,7 +25,7 @@ from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import LogConfig, picked
-from scenario_gen.logs.encounters import driven_backwards, Piece, pieces_of
+from scenario_gen.logs.encounters import driven_forwards, Piece, pieces_of
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
 from scenario_gen.logs.groups import distances, driven, find_groups, ticks
 from scenario_gen.logs.growing import Group, Meeting
@@ -115,17 +115,11 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         vehicles.append(quality)
     if not pieces and any(vehicle.lost for vehicle in vehicles):
         raise InputError(f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units")
-    backwards = driven_backwards(pieces)
-    pieces = [piece for piece in pieces if piece not in backwards]
-    left_out = tuple(
-        f"vehicle {piece.track.id} drives backwards for {(piece.last - piece.first) * config.period:.1f} s, by its recorded "
-        "headings; that is left out, for only driving forwards is generated"
-        for piece in backwards
-    )
+    pieces, backwards = driven_forwards(pieces, config)
     groups, notes = find_groups(pieces, config)
     if not groups:
-        raise NoEncounterError("; ".join((*left_out, explain_no_encounter(log, pieces, config))))
-    notes += left_out
+        raise NoEncounterError("; ".join((*backwards, explain_no_encounter(log, pieces, config))))
+    notes += backwards
     notes += notes_on_origin(tracks, config)
     notes += notes_on_vehicles(
         vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.spans}, config

@@ -126,9 +126,9 @@ def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
         sheet.shape("polygon", lane.outline, **{"class": "turn" if lane.junction else "lane"})
         if lane.junction and not network.drawn:
             junctions[lane.junction].append(lane.centre.mean(axis=0))
-    for kind, lines in markings(network).items():
+    for marking, lines in markings(network).items():
         for line in lines:
-            sheet.shape("polyline", line, **{"class": f"paint {kind}"})
+            sheet.shape("polyline", line, **{"class": f"paint {marking}"})
     for kind, lanes, at in (("in", network.entries, 0), ("out", network.exits, -1)):
         for k in lanes:
             _arrow(sheet, network.lanes[k].centre, at, kind)

@@ -13,14 +13,16 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import Arm, draw_lanes, draw_plan, Plan
+from scenario_gen.roads.drawn import Arm, draw_lanes, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
+from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
 from scenario_gen.types import Encounter, LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells
 _U_TURN = 12.0  # metres between the lanes of a U-turn
+_TURNING = (5.0, 3.5)  # metres, length of who turns round, and the width that it needs
 _SAME_WAY = np.radians(25.0)
 _WIDEST = 12.0
 _ONCOMING = 20.0  # metres sideways within which oncoming vehicles are on the same road
@@ -36,6 +38,7 @@ class Layout:
     main: float
     side: float
     lanes: int
+    u_turns: bool = False
 
 
 def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
@@ -50,10 +53,14 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
     arms = [Arm.towards(yaw, layout.main, layout.lanes) for yaw in (np.pi, 0.0)]
     arms += [Arm.towards(yaw, layout.side, layout.lanes) for yaw in sides]
     axis = Curve(np.array([[-layout.main, 0.0, 0.0], [layout.main, 0.0, 0.0]]))
+    outermost = layout.lanes - 1
+    ends = [[arm.lane(outermost, config, inward=inward) for inward in (True, False)] for arm in arms[:2] if layout.u_turns]
+    turns = ((k, draw_u_turn(entry, leave, layout.main)) for k, (entry, leave) in enumerate(ends))
+    driven = [Driven((k, outermost, k, outermost), way, _TURNING[0], _TURNING[1]) for k, way in turns if way is not None]
     verge = layout.side if config.paper else half + _VERGE
     south, north = (layout.side if side in sides else verge for side in SIDE_ARMS)
     low = -half - cell * np.ceil((np.array([layout.main, south]) - half) / cell - 1e-6)  # kerbs on cell edges
-    return draw_plan(Plan(arms, axis), name, config, np.array([low, [layout.main, north]]))
+    return draw_plan(Plan(arms, axis, driven), name, config, np.array([low, [layout.main, north]]))
 
 
 def draw_paper(name: str, config: RoadConfig) -> Road:
@@ -83,7 +90,7 @@ def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) 
     main, side = (config.arm_length, config.arm_length) if config.arm_length else (layout.main, layout.side)
     lanes = config.lanes or layout.lanes
     mouth = lanes * config.lane_width + config.corner_radius + 5.0 if name != "straight" else 5.0
-    return Layout(max(main, mouth), max(side, mouth), lanes)
+    return Layout(max(main, mouth), max(side, mouth), lanes, layout.u_turns)
 
 
 def junction_centre(tracks: tuple[Track, ...]) -> Floats:
@@ -110,9 +117,10 @@ def _at_a_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
     across = np.abs(np.sin(wrap_angle(poses[:, 2] - poses[np.argmax(required), 2])))
     side = float(required[across > np.sin(np.radians(30.0))].max(initial=SHORTEST))
     lanes = _parallel_lanes(tracks, config.lane_width)
-    if any(track.makes_u_turn for track in tracks):  # from one outermost lane to the other in a half circle
+    turns_round = any(track.makes_u_turn for track in tracks)
+    if turns_round:  # from one outermost lane to the other in a half circle
         lanes = max(lanes, int(np.ceil((_U_TURN / config.lane_width + 1.0) / 2.0)))
-    return Layout(max(float(required.max()), SHORTEST), side, lanes)
+    return Layout(max(float(required.max()), SHORTEST), side, lanes, turns_round)
 
 
 def _parallel_lanes(tracks: tuple[Track, ...], lane_width: float) -> int:

@@ -10,7 +10,7 @@ wider than a lane, as far as the road is.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import pairwise, permutations
 
 import numpy as np
 import shapely
@@ -179,12 +179,17 @@ class _Drawing:
     def __init__(self, plan: Plan, config: RoadConfig) -> None:
         self._plan, self._config, self._width = plan, config, config.lane_width
         self._sign = 1.0 if config.traffic_side == "right" else -1.0  # lanes in lie so many times their offset to the right
-        self._joined = len(plan.arms) > 2 or plan.axis is None
+        self._joined = len(plan.arms) > 2 or plan.axis is None or len(plan.driven) > 0
         self._lines = [self._line(k) for k in range(len(plan.arms))]
         rounded = self._joined and not plan.ring and all(arm.outward for arm in plan.arms)
         self._corner_radius = config.corner_radius if rounded else 0.0
         self._surface = paved(self._pieces(), self._corner_radius)
         self._drivable: Inside = inside(self._surface)
+        self._driven = {way.places: way.curve for way in reversed(plan.driven)}
+        self._mouths = [self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)]
+        for places in self._usual() if self._joined else ():
+            if self._way(places) is None and (way := self._from_end_to_end(places)) is not None:  # its mouths lie too near
+                self._driven[places] = way
         self._mouths = [self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)]
 
     def drawn(self) -> tuple[tuple[Lane, ...], BaseGeometry]:
@@ -266,9 +271,8 @@ class _Drawing:
             edge = side * (count * self._width + _WIDER_THAN_LANES_M)
             wider |= self._drivable(line.beside(along, edge)[:, :2])
         mouth = float(along[int(np.argmax(wider))]) if wider.any() else line.length
-        for way in self._plan.driven:
-            a, _, b, _ = way.places
-            for own, curve in ((a, way.curve), (b, way.curve.reversed())):
+        for (a, _, b, _), way in self._driven.items():
+            for own, curve in ((a, way), (b, way.reversed())):
                 bent = np.abs(curve.points[:, 2] - curve.points[0, 2]) > _BENT
                 if own == k and bent.any():
                     mouth = min(mouth, float(curve.station[max(int(np.argmax(bent)) - 1, 0)]))
@@ -281,32 +285,41 @@ class _Drawing:
         borders = [line.beside(line.station, side * self._width * n)[:, :2] for n in range(count + 1)]
         return borders if inward else [border[::-1] for border in borders]
 
-    def _ways(self) -> dict[Way, Curve]:
-        """The ways of the template, those from each lane straight on to the same lane of each other arm, and those that lack."""
+    def _usual(self) -> list[Way]:
+        """From each lane to the same lane of each other arm."""
         arms = self._plan.arms
-        pairs = [(a, b) for a, b in product(range(len(arms)), repeat=2) if a != b]
-        usual = [
+        return [
             (a, i, b, j)
-            for a, b in pairs
+            for a, b in permutations(range(len(arms)), 2)
             for i in range(arms[a].inward)
             if 0 <= (j := i if arms[a].outward else i + arms[b].outward - arms[a].inward) < arms[b].outward
         ]
-        driven = {way.places: way.curve for way in reversed(self._plan.driven)}
-        ways = {places: way for places in dict.fromkeys((*driven, *usual)) if (way := self._way(places, driven)) is not None}
-        for a, b in pairs:
+
+    def _ways(self) -> dict[Way, Curve]:
+        """The ways of the template, the usual ones, and those that lack."""
+        arms = self._plan.arms
+        everywhere = dict.fromkeys((*self._driven, *self._usual()))
+        ways = {places: way for places in everywhere if (way := self._way(places)) is not None}
+        for a, b in permutations(range(len(arms)), 2):
             lacking = [(a, i, b, arms[b].outward - 1) for i in range(arms[a].inward) if all(w[:2] != (a, i) for w in ways)]
             lacking += [(a, arms[a].inward - 1, b, j) for j in range(arms[b].outward) if all(w[2:] != (b, j) for w in ways)]
             for places in lacking:
-                if min(places) >= 0 and (way := self._way(places, driven)) is not None:
+                if min(places) >= 0 and (way := self._way(places)) is not None:
                     ways[places] = way
         return ways
 
-    def _way(self, places: Way, driven: Mapping[Way, Curve]) -> Curve | None:
+    def _from_end_to_end(self, places: Way) -> Curve | None:
+        """The way from the end of one lane to that of another; None if no car could drive it."""
+        (a, i, b, j), arms = places, self._plan.arms
+        start, goal = arms[a].lane(i, self._config, inward=True), arms[b].lane(j, self._config, inward=False)
+        return None if abs(angle_between(goal[2], start[2])) > _TURN_BACK else draw_route(start, goal)
+
+    def _way(self, places: Way) -> Curve | None:
         """The way from the middle of one lane at its mouth to another's; None if no car could drive it."""
         a, i, b, j = places
         begin, end = self._mouths[a], self._mouths[b]
-        if places in driven:
-            return driven[places].cut(begin, driven[places].length - end, _WAY_STEP_M)
+        if (driven := self._driven.get(places)) is not None:
+            return driven.cut(begin, driven.length - end, _WAY_STEP_M)
         start = self._lines[a].beside(np.array([begin]), -self._sign * (i + 0.5) * self._width)[0]
         goal = reverse(self._lines[b].beside(np.array([end]), self._sign * (j + 0.5) * self._width)[0])
         if self._plan.axis is not None and max(a, b) < 2 and i == j:
@@ -315,7 +328,7 @@ class _Drawing:
             return Curve(line.beside(line.station, -self._sign * (i + 0.5) * self._width))
         if abs(angle_between(goal[2], start[2])) > _TURN_BACK:
             return None
-        way = draw_route(start, goal, lambda _: True)
+        way = draw_route(start, goal)
         return None if way is None else way.cut(0.0, way.length, _WAY_STEP_M)
 
     def _wider(self, way: Curve) -> Floats | float:
@@ -336,7 +349,7 @@ class _Drawing:
             own = way.beside(way.station, sign * (self._width / 2.0 + wider))[:, :2]
             edges.append(own + (1.0 - share) * (ends[0] - own[0]) + share * (ends[1] - own[-1]))
             edges[-1][[0, -1]] = ends
-        return Lane(f"{start.id}>{goal.id}", *edges, junction="1")
+        return Lane(f"{start.id}>{goal.id}", edges[0], edges[1], junction="1")
 
 
 def ways_through(road: Road) -> dict[tuple[int, int], Curve]:

@@ -117,7 +117,7 @@ def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
         if (i, True) in lane_of and (i, False) in lane_of and not track.still:
             (a, first), (b, last) = lane_of[i, True], lane_of[i, False]
             ends = arms[a].lane(first, config, inward=True), arms[b].lane(last, config, inward=False)
-            way = draw_route(*ends, lambda _: True, sharpness_of(track))
+            way = draw_route(*ends, sharpness=sharpness_of(track))
             if way is not None:
                 driven.append(Driven((a, first, b, last), way, track.vehicle.length, track.vehicle.width + 2.0 * _SWEPT))
     aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
@@ -176,7 +176,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     driven = []
     for a, b in product(range(len(arms)), repeat=2):
         ends = arms[a].lane(0, config, inward=True), arms[b].lane(0, config, inward=False)
-        way = draw_ring_route(*ends, np.zeros(2), radius, lambda _: True)
+        way = draw_ring_route(*ends, np.zeros(2), radius)
         if way is not None:
             driven.append(Driven((a, 0, b, 0), way, length, wide + 2.0 * _SWEPT))
     lane_of = {end.key: (a, 0) for a, direction in enumerate(directions) for end in direction.members}

@@ -69,7 +69,8 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it,
             or the template needs a junction.
     """
-    lanes, before, after, sharpness, yields = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 0.02, True
+    lanes, before, after, approach, yields = max(config.lanes, 1), 2.0 * SHORTEST, 2.0 * SHORTEST, 2.0 * SHORTEST, True
+    sharpness = 0.02
     tracks: tuple[Track, ...] = ()
     who, joins = list[int](), np.zeros(3)  # where the template's vehicles join, heading as they do
     if encounter is not None:
@@ -83,19 +84,20 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         low, high = sorted(along * end for end in frenet.span(tracks))
         join = float(np.median([along * frenet.station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
         before, after = join - low, high - join
+        approach = join - min(along * float(frenet.station[i][0]) - tracks[i].vehicle.length / 2.0 for i in who)
         sharpness = max(sharpness_of(tracks[i]) for i in who)
         yields = any(edge.kind == YIELD and edge.who in who for edge in reactions_of(encounter).edges)
         joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
         joins[2] += 0.0 if along > 0.0 else np.pi
-    reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after)]
+    reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after, approach)]
     width = config.lane_width
     side = -1.0 if config.traffic_side == "right" else 1.0  # of the dividing line on which the traffic to the east drives
     arms = [Arm.towards(yaw, length, lanes) for yaw, length in ((np.pi, reach[0]), (0.0, reach[1]))]
     yaw = np.pi - side * _RAMP_ANGLE  # out along the ramp
     joined = np.array([0.0, side * (lanes - 0.5) * width])
-    ramp = np.array([*(joined + reach[0] * unit(yaw)), yaw + np.pi])
+    ramp = np.array([*(joined + reach[2] * unit(yaw)), yaw + np.pi])
     axis = Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]]))
-    way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), lambda _: True, sharpness)
+    way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), sharpness=sharpness)
     driven = () if way is None else (Driven((2, 0, 1, lanes - 1), way, 1.0, width),)
     lane_of = {(i, inward): (2, 0) if inward else (1, lanes - 1) for i in who for inward in (True, False)}
     aim = aligned(tracks, lane_of, joins, np.array([*joined, 0.0]))

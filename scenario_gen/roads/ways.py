@@ -33,7 +33,7 @@ _FLARE = 14.0  # metres, radius of the bends into a roundabout and out of it
 _TIGHTEST_U_TURN = 6.0  # metres
 
 
-def draw_route(entry: Floats, leave: Floats, fits: Fits, sharpness: float | None = None) -> Curve | None:
+def draw_route(entry: Floats, leave: Floats, fits: Fits = lambda _: True, sharpness: float | None = None) -> Curve | None:
     """The way from an entry pose (3,) x, y [m], yaw [rad] to an exit pose, or None if `fits` allows none.
 
     Args:
@@ -67,21 +67,19 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits, sharpness: float | None
     return None
 
 
-def draw_u_turn(entry: Floats, leave: Floats, apex: float, fits: Fits) -> Curve | None:
+def draw_u_turn(entry: Floats, leave: Floats, apex: float) -> Curve | None:
     """The route between two poses (3,) that drives `apex` metres, makes a half circle and leaves by the lane beside it."""
-    turn = angle_between(leave[2], entry[2])
     ahead, left = relative(entry, leave[:2])
     radius = abs(left) / 2.0
-    if abs(turn) < np.pi - _PARALLEL or radius < _TIGHTEST_U_TURN or apex - ahead <= 1.0 or apex <= 1.0:
+    if radius < _TIGHTEST_U_TURN or apex <= max(ahead, 0.0):
         return None
-    half = np.copysign(np.pi, left)
-    angle = np.linspace(0.0, half, int(np.ceil(np.pi * radius / _STEP)) + 1)
+    angle = np.linspace(0.0, np.copysign(np.pi, left), int(np.ceil(np.pi * radius / _STEP)) + 1)
     signed = np.copysign(radius, left)
     arc = np.column_stack((signed * np.sin(angle), signed * (1.0 - np.cos(angle)), angle))
-    return _accepted(_joined(entry, apex, arc, apex - ahead), fits)
+    return _joined(entry, apex, arc, apex - ahead)
 
 
-def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float, fits: Fits) -> Curve | None:
+def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float) -> Curve | None:
     """The way from an entry pose (3,) to an exit pose about a roundabout, or None if there is none.
 
     Args:
@@ -89,7 +87,6 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
         leave: where it ends.
         centre: (2,) [m] of the roundabout.
         radius: [m] of its lane.
-        fits: whether poses (M, 3) have room.
     """
     ahead, left = relative(entry, centre)
     behind, right = relative(leave, centre)
@@ -98,7 +95,7 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
         return None
     bends = []
     for distance, aside in ((ahead, abs(left)), (-behind, abs(right))):
-        along = flare_begins(radius, aside)
+        along = float(np.sqrt(np.square(radius + _FLARE) - np.square(aside + _FLARE)))  # from the bend's centre to the ring's
         if distance - along < 0.5:
             return None
         bends.append((distance - along, float(np.arctan2(along, aside + _FLARE))))
@@ -116,12 +113,7 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
     if np.hypot(*(xy[-1] - end)) > 1.0:
         return None
     xy += np.linspace(0.0, 1.0, len(xy))[:, None] * (end - xy[-1])  # what rounding leaves
-    return _accepted(Curve(np.column_stack((place(entry, xy[:, 0], xy[:, 1]), entry[2] + turned))), fits)
-
-
-def flare_begins(radius: float, aside: float) -> float:
-    """How far [m] from a roundabout's centre a lane begins to bend to it, by the ring's radius and how far aside it lies [m]."""
-    return float(np.sqrt(np.square(radius + _FLARE) - np.square(aside + _FLARE)))  # from the bend's centre to the ring's
+    return Curve(np.column_stack((place(entry, xy[:, 0], xy[:, 1]), entry[2] + turned)))
 
 
 def relative(pose: Floats, xy: Floats) -> tuple[float, float]:

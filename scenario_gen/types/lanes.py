@@ -202,13 +202,6 @@ class LaneNetwork:
         return arms
 
     @cached_property
-    def turns_back(self) -> bool:
-        """Whether one can turn back to the arm from which one comes, as in a roundabout."""
-        arm = {k: name for name, lanes in self.arms.items() for k in lanes}
-        ways = [(k, goal) for k in self.entries for way in self.lanes[k].successors for goal in self.lanes[way].successors]
-        return any(k in arm and arm[k] == arm.get(goal) for k, goal in ways)
-
-    @cached_property
     def traffic_side(self) -> str:
         """Return "right" or "left": on which side of the road traffic drives; "" where no lane has an oncoming one beside it.
 

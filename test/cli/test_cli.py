@@ -105,8 +105,8 @@ def test_an_unknown_topic_type_is_named(run, tmp_path, data):
 
 
 def test_a_road_with_no_way_through_is_refused(run, tmp_path):
-    """Two strips of road with a wall between: the cars' own path crosses it, and no strip is long enough for them."""
-    cells = np.full((60, 300), 254, dtype=np.uint8)
+    """Strips of road with walls between: the cars' own path crosses them, and no strip is long enough."""
+    cells = np.full((60, 900), 254, dtype=np.uint8)
     cells[:, ::100] = 0
     Image.fromarray(cells).save(tmp_path / "walled.pgm")
     facts = {"image": "walled.pgm", "resolution": 0.2, "origin": [-10.0, -6.0, 0.0], "negate": 0}
@@ -114,5 +114,5 @@ def test_a_road_with_no_way_through_is_refused(run, tmp_path):
     (tmp_path / "walled.yaml").write_text(yaml.safe_dump(facts))
     code, printed = run("generate", table(tmp_path / "log.csv"), "--road", tmp_path / "walled.yaml", "--out", "out")
     assert code == 2
-    assert "walled" in printed and "does not fit" in printed
+    assert "walled" in printed and "no way leads from" in printed
     assert not (tmp_path / "out").exists()

@@ -37,11 +37,11 @@ def test_one_entry_and_one_exit_per_lane_on_the_right_side(name, lanes, side):
 
 @pytest.mark.parametrize("name", ["t_intersection", "four_way"])
 def test_corners_are_rounded_with_the_asked_radius(name):
-    sharp = build_road(name, None, RoadConfig(lanes=1, corner_radius=1.0)).drivable
+    sharp = build_road(name, None, RoadConfig(lanes=1, corner_radius=5.0)).drivable
     round_ = build_road(name, None, RoadConfig(lanes=1, corner_radius=9.0)).drivable
     corners = 2 if name == "t_intersection" else 4
     gained = (round_.sum() - sharp.sum()) * 0.2**2
-    assert gained == pytest.approx(corners * (81.0 - 1.0) * (1.0 - np.pi / 4.0), rel=0.05)
+    assert gained == pytest.approx(corners * (81.0 - 25.0) * (1.0 - np.pi / 4.0), rel=0.05)
 
 
 def test_resolution_and_arm_length_are_kept():

@@ -10,7 +10,7 @@ import pytest
 from scipy import ndimage
 
 from msg_conventions.lanes import decode_lanes, encode_lanes
-from scenario_gen.roads import build_road, BUILT_IN, RoadConfig
+from scenario_gen.roads import Arm, build_road, BUILT_IN, draw_plan, Plan, RoadConfig
 
 FORMER = np.load(Path(__file__).with_name("cells_without_lanes.npz"))  # as roads were drawn before they were drawn from lanes
 
@@ -28,7 +28,7 @@ def test_a_road_is_its_lanes_and_they_travel_in_messages(name, side):
         assert all(np.allclose(network.lanes[k].left[0], lane.left[-1]) for k in lane.successors)
     assert network.traffic_side == side and road.map_lanes is None
     _, again = decode_lanes(encode_lanes(network, "map", 0))
-    assert again.drawn and again.arms == network.arms and again.turns_back == (name == "roundabout")
+    assert again.drawn and again.arms == network.arms
 
 
 @pytest.mark.parametrize("lanes, side", [(1, "right"), (2, "left")])
@@ -43,3 +43,11 @@ def test_cells_are_those_of_the_road_that_was_drawn_without_lanes_but_for_its_ke
     kerb = ndimage.binary_dilation(former, around) ^ ndimage.binary_erosion(former, around, border_value=1)
     assert (differ & ~kerb).sum() < 0.01 * former.sum()  # 0.7 % of a roundabout, 0.3 % of the others at most
     assert differ.sum() < 0.07 * former.sum()
+
+
+def test_a_road_of_ones_own_has_all_ways_also_where_its_arms_meet_at_a_sharp_angle():
+    arms = [Arm.towards(np.pi, 80.0, 2), *(Arm.towards(yaw, 80.0, 1) for yaw in (0.87, -0.87))]
+    network = draw_plan(Plan(arms, yielding=(1, 2)), "y", RoadConfig()).lanes
+    ways = {tuple(end.partition(".")[0] for end in lane.id.split(">")) for lane in network.lanes if lane.junction}
+    assert ways == {(a, b) for a in "123" for b in "123" if a != b}
+    assert (len(network.entries), len(network.exits), len(network.rules)) == (4, 4, 2)

@@ -128,7 +128,7 @@ def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_dri
         out = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in (come, leave)]
         beside = [1.75 * np.array([-y, x]) for x, y in out]
         start, goal = np.array([*(90.0 * out[0] + beside[0]), come + np.pi]), np.array([*(90.0 * out[1] - beside[1]), leave])
-        way = draw_ring_route(start, goal, np.zeros(2), 16.0, lambda _: True)
+        way = draw_ring_route(start, goal, np.zeros(2), 16.0)
         away = np.maximum(np.hypot(*way.points[:, :2].T) - 19.0, 0.0)
         speed = np.minimum(np.sqrt(36.0 + 4.0 * away), 14.0)
         time = np.concatenate(([0.0], np.cumsum(2.0 * np.diff(way.station) / (speed[1:] + speed[:-1]))))

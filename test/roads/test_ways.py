@@ -11,10 +11,6 @@ import pytest
 from scenario_gen.roads.ways import draw_ring_route, draw_route
 
 
-def anywhere(_):
-    return True
-
-
 @settings(max_examples=60)
 @given(
     turn=st.floats(0.2, 2.6).flatmap(lambda t: st.sampled_from((t, -t))),
@@ -26,7 +22,7 @@ def anywhere(_):
 def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(turn, before, after, yaw, sharpness):
     corner = before * np.array([np.cos(yaw), np.sin(yaw)])
     leave = np.array([*(corner + after * np.array([np.cos(yaw + turn), np.sin(yaw + turn)])), yaw + turn])
-    way = draw_route(np.array([0.0, 0.0, yaw]), leave, anywhere, sharpness)
+    way = draw_route(np.array([0.0, 0.0, yaw]), leave, sharpness=sharpness)
     assert way is not None
     assert way.points[0] == pytest.approx([0.0, 0.0, yaw], abs=1e-6)
     assert way.points[-1] == pytest.approx(leave, abs=1e-4)
@@ -40,7 +36,7 @@ def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(turn, 
 def test_a_roundabout_is_gone_about_in_the_direction_of_traffic(leave, turn):
     out = np.array([np.cos(leave), np.sin(leave)])
     goal = np.array([*(70.0 * out + 1.75 * np.array([out[1], -out[0]])), leave])
-    way = draw_ring_route(np.array([-70.0, -1.75, 0.0]), goal, np.zeros(2), 20.0, anywhere)
+    way = draw_ring_route(np.array([-70.0, -1.75, 0.0]), goal, np.zeros(2), 20.0)
     assert way is not None
     assert way.points[-1, 2] - way.points[0, 2] == pytest.approx(turn, abs=0.02)
     assert np.hypot(*way.points[:, :2].T).min() == pytest.approx(20.0, abs=0.3)

@@ -5,7 +5,6 @@
 
 from collections.abc import Iterable, Iterator
 from functools import partial
-import itertools
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +19,9 @@ COUNT, SEED = 30, 7
 def results(setting: dict[str, str], logs: list[Path], state: Path) -> Iterator[tuple[str, Any]]:
     """Yield the results of each log on each road; what lies in `state` already is not run again."""
     state.mkdir(parents=True, exist_ok=True)
-    for log, road in itertools.product(logs, ROADS):
-        found = kept(state / f"{log.stem} {road}.json", partial(results_under, setting, COUNT, SEED, str(log), road))
+    for log in logs:
+        pairs = [word for road in ROADS for word in (str(log), road)]
+        found = kept(state / f"{log.stem}.json", partial(results_under, setting, COUNT, SEED, *pairs))
         yield from ((f"{log.stem}: {name}", each) for name, each in found.items())
 
 

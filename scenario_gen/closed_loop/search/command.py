@@ -211,7 +211,7 @@ def search_failures(
 def _write(folder: Path, result: SearchResult, request: SearchRequest, identity: dict[str, Any], asked: Any) -> None:
     document = _document(result, request, identity)
     write_text(folder / JSON, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    write_text(folder / JUNIT, as_junit([one.outcome for one in result.findings], request.planner))
+    write_text(folder / JUNIT, as_junit([one.outcome for one in result.findings], request.planner, _facts(request)))
     write_text(folder / PAGE, _page(result, request))
     if result.findings:
         encounter, fit = request.planned.encounter, request.planned.placed()[1]
@@ -228,6 +228,10 @@ def _write(folder: Path, result: SearchResult, request: SearchRequest, identity:
         delivered = replace(request.planned, fit=replace(fit, requested=asked), generated=drawn, provenance=provenance)
         with BagWriter(folder / BAG) as bag:
             add_results(bag, {"": delivered})
+
+
+def _facts(request: SearchRequest) -> dict[str, str]:
+    return {"policy": request.drive_config().policy}
 
 
 def _document(result: SearchResult, request: SearchRequest, identity: dict[str, Any]) -> dict[str, Any]:

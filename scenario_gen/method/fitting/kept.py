@@ -106,9 +106,10 @@ def _lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterato
 @lru_cache(maxsize=2)  # of one template many places are looked at
 def _meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
     """The conflicts of some motion, by the vehicles."""
-    poses, time = np.stack([track.poses for track in tracks]), np.arange(len(tracks[0].progress)) * tracks[0].dt
+    poses = np.stack([track.poses for track in tracks])
+    time = np.arange(poses.shape[1], dtype=np.float64) * tracks[0].dt
     vehicles, present = tuple(track.vehicle for track in tracks), np.stack([track.present for track in tracks])
-    found = find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], present)
+    found = find_conflicts(vehicles, np.asarray(time), poses[..., :2], poses[..., 2], present)
     return {(min(c.first, c.second), max(c.first, c.second)): c for c in found}
 
 

@@ -3,7 +3,6 @@
 
 """Lanes as other formats want them: numbered, with their neighbours, and gathered into strips of lanes that lie side by side."""
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -56,41 +55,24 @@ class LaneMap:
 
     @cached_property
     def strips(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
-        """Lanes that share their borders: those of one direction and those of the other, from the middle outwards.
+        """The lanes of each arm of a drawn road, in and out, from the middle outwards; of a road through, in both directions.
 
-        A way through the junction of a drawn road is alone.
+        Every other lane is alone.
         """
-        everything = range(len(self.network.lanes))
-        lanes = [k for k in everything if not self.turn(k)]
-        by_inner = {self._border(k, inner=True).tobytes(): k for k in lanes}
-        outer = {self._border(k, inner=False).tobytes() for k in lanes}
-        strips, taken = list[tuple[tuple[int, ...], tuple[int, ...]]](), set[int]()
-        for k in everything:
-            border = self._border(k, inner=True)
-            if self.turn(k):
-                strips.append(((k,), ()))
-            elif border.tobytes() not in outer and k not in taken:
-                against = by_inner.get(border[::-1].tobytes())
-                strips.append((tuple(self._outwards(k, by_inner)), tuple(self._outwards(against, by_inner))))
-                taken.update(*strips[-1])
-        return tuple(strips)
+        lanes, strips = self.network.lanes, dict[int, tuple[tuple[int, ...], tuple[int, ...]]]()
+        for arm in self.network.arms.values():
+            inward = tuple(k for k in arm if ".-" in lanes[k].id)
+            if inward:
+                strips[inward[0]] = inward, tuple(k for k in arm if k not in inward)
+        taken = {k for strip in strips.values() for side in strip for k in side}
+        strips |= {k: ((k,), ()) for k in range(len(lanes)) if k not in taken}
+        return tuple(strips[k] for k in sorted(strips))
 
     @cached_property
     def _across(self) -> dict[int, int]:
         """The oncoming lane beside each lane that has one."""
         pairs = [(along[0], against[0]) for along, against in self.strips if against]
         return dict(pairs) | {b: a for a, b in pairs}
-
-    def _border(self, k: int, *, inner: bool) -> Floats:
-        lane = self.network.lanes[k]
-        return lane.left if inner == (self.side == "right") else lane.right
-
-    def _outwards(self, k: int | None, by_inner: Mapping[bytes, int]) -> Iterator[int]:
-        done = set[int]()
-        while k is not None and k not in done:
-            yield k
-            done.add(k)
-            k = by_inner.get(self._border(k, inner=False).tobytes())
 
     def neighbours(self, k: int) -> dict[str, tuple[int, bool]]:
         """The lanes "left" and "right" of lane k, and whether they have its direction."""

@@ -129,7 +129,7 @@ class _Network:
 
     def __init__(self, lane_map: LaneMap) -> None:
         network = lane_map.network
-        strips = lane_map.strips if network.drawn else [((k,), ()) for k in range(len(network.lanes))]
+        strips = lane_map.strips
         self.strips = [_Strip.of(lane_map, *strip) for strip in strips]
         self.places = {
             k: _Place(n, side, m, k in strips[n][0])
@@ -138,7 +138,7 @@ class _Network:
             for m, k in enumerate(lanes)
         }
         self.ways = connecting(network)
-        self.ends: dict[tuple[int, str], dict[str, object]] = {}
+        self.ends: dict[tuple[int, str], dict[str, str | float]] = {}
         self.beyond: dict[tuple[int, bool], int] = {}
         self.connections: dict[int, list[tuple[int, int, str]]] = {}
         self.numbers = {name: JUNCTION + n for n, name in enumerate(dict.fromkeys(self.ways.values()))}
@@ -178,7 +178,11 @@ class _Network:
     def _join(self, k: int, other: int, *, end: bool = True) -> None:
         """Note that a lane's end, or its begin, lies at another one's begin or end."""
         place, there = self.places[k], self.places[other]
-        link = {"elementType": "road", "elementId": ROADS + there.road, "contactPoint": there.contact(end=not end)}
+        link: dict[str, str | float] = {
+            "elementType": "road",
+            "elementId": ROADS + there.road,
+            "contactPoint": there.contact(end=not end),
+        }
         self.ends[place.road, place.contact(end=end)] = link
         self.beyond[k, end] = there.lane_id
 
@@ -219,7 +223,7 @@ def _road(root: Element, lane_map: LaneMap, network: _Network, n: int) -> None:
         if (n, contact) in network.ends:
             add(link, tag, **network.ends[n, contact])
     limit = max(lanes[k].speed_limit for k in members)
-    speed = {"max": "no limit"} if math.isnan(limit) else {"max": limit, "unit": "m/s"}
+    speed: dict[str, str | float] = {"max": "no limit"} if math.isnan(limit) else {"max": limit, "unit": "m/s"}
     add(add(road, "type", s=0.0, type="town"), "speed", **speed)
     view = add(road, "planView")
     for s, x, y, yaw, length, curve in _merged(strip.reference, pieces, station):

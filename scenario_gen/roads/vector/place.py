@@ -69,14 +69,14 @@ def placements(
     drawn_for = network.drawn_for
     sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
     search = _Search(chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ())
-    found = False
+    found, recorded = False, ""
     if lanes is None and home.cost <= _HOME:
         own = match(chains, tracks, home)
         broken = own.reason or judged.broken(own)
         if not broken:
             found = True
             yield own, 1.0
-        search.failures.extend([(False, False, own.cost, f"where it was recorded, {broken}")] if broken else [])
+        recorded = f"where it was recorded, {broken}; elsewhere, " if broken else ""
     spots = find_spots(network, tracks, lanes)
     crossed = crossing_spots(network, tracks) if lanes is None else []
     streets = along_streets(chains, tracks, lanes)
@@ -91,7 +91,7 @@ def placements(
     if not found:
         what = "road" if network.drawn else "map"
         *_, reason = min(search.failures, default=("it has no lanes of its directions",))
-        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {reason}")
+        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {recorded}{reason}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class _Search:
         judged: whether a placement keeps the rules.
         sized: where the road was drawn for the template, None if it was not.
         ends: the lanes that it was drawn with, for each vehicle.
-        failures: whether it is not at home, and no match at all; its cost; the reason.
+        failures: whether it is no match at all, its cost, and the reason.
     """
 
     chains: Chains
@@ -112,7 +112,7 @@ class _Search:
     judged: "_Judged"
     sized: Spot | None
     ends: tuple[tuple[str, str], ...]
-    failures: list[tuple[bool, bool, float, str]] = field(default_factory=list)
+    failures: list[tuple[bool, float, str]] = field(default_factory=list)
 
     def near(self, spots: Sequence[Spot], along: Sequence[Match]) -> Iterator[tuple[Match, float]]:
         """Yield the placements near some spots and along some stretches of road, the best first, with their scales."""
@@ -125,11 +125,11 @@ class _Search:
                 far = placement.cost > _WORST and spot is not self.sized
                 if placement.reason or far:
                     reason = placement.reason or "vehicles would be too far from where they are"
-                    self.failures.append((True, True, placement.cost, reason))
+                    self.failures.append((True, placement.cost, reason))
                 else:
                     matches.append(placement)
             broken_by = [self.judged.broken(placement) for placement in matches]
-            self.failures.extend((True, False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken)
+            self.failures.extend((False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken)
             matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
             matches.sort(key=lambda placement: (*self.judged.rank(placement), round(placement.cost, 3)))
             placed = [p for p in matches if p.aside <= _PRESSED and self.judged.rank(p)[0] == 0]

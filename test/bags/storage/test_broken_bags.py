@@ -31,7 +31,8 @@ def test_a_bag_without_metadata_is_read_and_that_is_said(tmp_path):
     bag = write_recording(tmp_path / "bag", hand_made_run())
     assert not remarks(bag)
     (bag / "metadata.yaml").unlink()
-    assert "no metadata.yaml" in remarks(bag)[0] and len(list(read_messages(bag))) == 30
+    assert "no metadata.yaml" in remarks(bag)[0]
+    assert len(list(read_messages(bag))) == len(list(result_messages(hand_made_run())))
 
 
 def bomb(path, size, chunks=1):
