@@ -302,7 +302,7 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
         raise InputError(
             f"{log.where(int(longest.fix_row[after]))}: the stamp of vehicle {longest.id[:50]} is {gap * 1e-9:g} s after the one "
             f"before, so the clock has {ticks} ticks of {config.period:g} s in all; at most {config.tick_limit} are made: "
-            "correct the stamp, cut the log (parameters start, end), or raise the parameter tick_limit"
+            "correct the stamp, cut the log (parameters start, end), or raise --set log.tick_limit=…"
         )
 
 

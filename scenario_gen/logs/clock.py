@@ -23,6 +23,8 @@ ROWS = 5  # on either side of a step: fewer are rows out of order
 LONGER = {"min": 60.0, "h": 3600.0, "d": 86400.0}  # units of time, in s
 QUICKEST_S, SOURCE_S = 0.005, (0.02, 2.0)  # s between fixes: less is another unit's; and what is usual
 LEAST = 2  # rows in the time that is there twice
+SLOW_S = 0.4  # s between fixes: of a slower source a single row counts, if the next follows after a usual step, and so does a
+USUAL, FEW = 1.5, 3  # stamp that stands: a usual step is so many medians at most; stamps of a vehicle that stand, at most
 APART = 3.0  # m between two places at one time: not one vehicle
 ONWARD = 0.5  # share of that distance within which the next row lies, if the vehicle drives on and its clock does not
 SAME_NS = 2_000_000_000  # steps of two vehicles this near are one
@@ -110,9 +112,10 @@ def _own_steps(own: Observations, log: RawLog) -> list[_Step]:
     """Return where a vehicle's stamps go back while it is at another place than it was at those stamps."""
     sound = np.isfinite(own.fix).all(axis=1) & ~beyond(own.fix_ns)
     stamps, rows, fix = own.fix_ns[sound], own.fix_row[sound], own.fix[sound]
-    back = np.flatnonzero(np.diff(stamps) < 0) + 1
+    back = _backs(stamps)
     if not len(back):
         return []
+    usual = float(np.median(np.diff(stamps)))
     edges = np.concatenate([[0], back, [len(stamps)]])
     places = on_sphere(fix) if log.geographic else fix
     steps = []
@@ -120,7 +123,8 @@ def _own_steps(own: Observations, log: RawLog) -> list[_Step]:
         if min(at - begin, end - at) < ROWS or log.segment(int(rows[at])) != log.segment(int(rows[at - 1])):
             continue
         again = at + np.flatnonzero((stamps[at:end] <= stamps[at - 1]) & (stamps[at:end] >= stamps[begin]))
-        if len(again) < LEAST:
+        onwards = at + 1 < end and 0 < stamps[at + 1] - stamps[at] < USUAL * usual
+        if len(again) < LEAST and not (onwards and usual > SLOW_S * 1e9):
             continue
         then = _at(stamps[begin:at], places[begin:at], stamps[again])
         apart = float(np.percentile(np.linalg.norm(places[again] - then, axis=1), 25))
@@ -128,6 +132,12 @@ def _own_steps(own: Observations, log: RawLog) -> list[_Step]:
         if apart > APART or (apart > APART / 4.0 and onward < ONWARD * apart):
             steps.append(_Step(int(stamps[at - 1]), int(stamps[at]), int(rows[at])))
     return steps
+
+
+def _backs(stamps: Ints) -> Ints:
+    """Return where stamps (T,) go back, or stand if they seldom do."""
+    step = np.diff(stamps)
+    return np.flatnonzero((step < 0) | ((step == 0) & ((step == 0).sum() <= FEW))) + 1
 
 
 def _at(stamps: Ints, places: Floats, when: Ints) -> Floats:
@@ -140,7 +150,7 @@ def _run_on(log: RawLog, steps: list[_Step], config: LogConfig) -> RawLog:
     """Return the log with what comes after each step later than all before it, by more than any gap that is bridged."""
 
     def eras(stamps: Ints, rows: Ints) -> Ints:
-        back = np.flatnonzero(np.diff(stamps) < 0) + 1
+        back = _backs(stamps)
         same = [[i for i in back.tolist() if _is_same(int(stamps[i - 1]), int(stamps[i]), step)] for step in steps]
         own = sorted({i[0] for i in same if i})
         if own:

@@ -358,8 +358,10 @@ def is_spmd(path: Path) -> bool:
 
 
 def is_bsm(path: Path) -> bool:
-    """Return whether a file is of basic safety messages in JSON, by its name and beginning."""
-    return path.suffix.lower() in BSM_ENDINGS and path.is_file() and b'"coreData"' in beginning(path)
+    """Return whether a file is of basic safety messages, in JSON or in a table made of it, by its name and beginning."""
+    if path.suffix.lower() not in (*BSM_ENDINGS, ".csv") or not path.is_file():
+        return False
+    return (b"coredata_position_lat" if path.suffix.lower() == ".csv" else b'"coredata"') in beginning(path).lower()
 
 
 def is_fcd(path: Path) -> bool:

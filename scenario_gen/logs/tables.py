@@ -17,7 +17,7 @@ import pandas as pd
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.cleaning import LONGEST_M
-from scenario_gen.logs.columns import Column, find_columns, notes_on, UNITS
+from scenario_gen.logs.columns import Column, find_columns, notes_on, SHOWN, UNITS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Observations, RawLog, Segment
 from scenario_gen.logs.text import layout_of
@@ -32,7 +32,7 @@ LONGEST_NUMBER = 300  # characters
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
 OTHERS = re.compile(  # a word in the kinds of road users that are no cars, vans, trucks or buses
     r"(?<![a-z])(ped(estrian)?s?|persons?|people|human|walkers?|adult|child|wheelchair|stroller|skater|vru|(bi|motor)?cycles?|"
-    r"(bi|motor)?cyclists?|(motor)?bikes?|e?scooter|moped|rider|animal|dog|cone)(?![a-z])"
+    r"(bi|motor)?cyclists?|(motor)?bikes?|e?scooter|moped|rider|animal|dog|cone|no car)(?![a-z])"
 )
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
     *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
@@ -101,8 +101,12 @@ def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -
         texts = {columns[quantity].name: object for quantity in ("vehicle", "kind") if quantity in columns}
         frame = read_text(path, before, config, **form, dtype=texts)  # a number of 64 bits, or in hexadecimal, is no float64
         above = layout.above
-        if "kind" in columns and pd.to_numeric(frame[columns["kind"].name], errors="coerce").notna().any():
-            del columns["kind"]  # numbers whose meaning is not known
+    if "kind" in columns and not columns["kind"].cars and len(kinds := reals(frame[columns["kind"].name]).dropna().unique()):
+        name, some = columns.pop("kind").name, ", ".join(f"{kind:g}" for kind in sorted(kinds)[:SHOWN])
+        notes.append(
+            f"column {name} has numbers ({some}), whose meaning is not known: all are read as cars; those that are, say 1 and 2, "
+            f"are named with --set log.columns=kind={name}:1+2"
+        )
     notes += notes_on(columns, config.columns, header)
     numbers = to_numbers(frame, columns, path)
     if "vehicle=none" not in config.columns.replace(" ", ""):
@@ -181,7 +185,10 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
         if quantity == "vehicle":
             out["vehicle"] = vehicle_names(values)
         elif quantity == "kind":
-            out["kind"] = values.astype(str)
+            car = reals(values).isin(column.cars)
+            out["kind"] = (
+                values.astype(str).where(~car, "car").where(car | (not column.cars), "no car (" + values.astype(str) + ")")
+            )
         elif pd.api.types.is_bool_dtype(values):
             raise InputError(f"{path}, column {column.name!r} ({quantity}): true or false is no {quantity}; name another column")
         elif quantity == "time":

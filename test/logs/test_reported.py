@@ -34,6 +34,11 @@ def with_kind(rows):
     return pd.concat([rows, walker]).assign(type=lambda own: own.vehicle_id.map(names))
 
 
+def numbered(rows):
+    own = with_kind(rows)
+    return own.assign(type=own.vehicle_id.map({"a": 1, "b": 2, "w": 3}))
+
+
 def mirrored(rows):
     return rows.assign(y_m=-rows.y_m, yaw_deg=np.where(rows.vehicle_id == "a", 0.0, -90.0))
 
@@ -77,6 +82,7 @@ READ = {  # name: what is changed, columns, what is said
     "the front's position": (lambda rows: ahead(rows, 2.4), "point=front", ""),
     "the rear axle's position": (lambda rows: ahead(rows, -1.44), "point=rear_axle", ""),
     "pedestrians": (with_kind, "", "1 × walker.pedestrian.0007"),
+    "pedestrians by a number": (numbered, "kind=type:1+2", "no car (3)"),
     "columns not read": (lambda rows: rows.assign(lane=3), "", "not read: lane"),
     "brackets": (lambda rows: rows.rename(columns={"x_m": "Ost X [m]", "y_m": "Nord [y] "}), "x=Ost X [m],y=Nord [y]", ""),
     "spaces": (lambda rows: rows.rename(columns={"x_m": "Pos X [m]", "y_m": "Pos Y [m]"}), "", ""),
@@ -110,6 +116,7 @@ SAID = {  # what is read, but looks otherwise
         lambda rows: rows.assign(x_m=rows.x_m.where(rows.vehicle_id == "a", rows.x_m.shift(1) + 2.0), y_m=0.0),
         "overlap",
     ),
+    "kinds without a meaning": (lambda rows: rows.assign(type=1), "column type has numbers (1), whose meaning is not known"),
     "y down": (lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)), "y=-…"),
 }
 
@@ -120,9 +127,9 @@ def test_what_looks_otherwise_is_said_once(tmp_path, change, said):
     assert sum(said in note for note in notes) == 1
 
 
-@pytest.mark.parametrize("back", [0.5, 1.0])
-def test_a_clock_set_back_cuts(tmp_path, back):
-    rows = crossing(seconds=14.0)
+@pytest.mark.parametrize(("back", "rate"), [(0.5, 10.0), (1.0, 10.0), (1.0, 1.0), (1.5, 1.0), (0.7, 2.0)])
+def test_a_clock_set_back_cuts(tmp_path, back, rate):
+    rows = crossing(seconds=14.0, rate=rate)
     rows["t_s"] -= np.where(rows["t_s"] > 1006.0, back, 0.0)
     result = read_log(save(rows, tmp_path))
     assert len(result.encounters) == 2 and max(encounter.speed.max() for encounter in result.encounters) < 8.2

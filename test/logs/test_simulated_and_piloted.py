@@ -48,6 +48,20 @@ def new_york(row):
     return {"bsmRecord": {"bsmMsg": {"coreData": core | {"speed_mps": row.speed_mps, "heading_deg": row.course}}}}
 
 
+def as_table(records):
+    """The messages as they stand on data.transportation.gov, where dates are to the second."""
+    rows = []
+    for record in records:
+        core = record["payload"]["data"]["coreData"]
+        place = core.get("position", {"latitude": core.get("lat"), "longitude": core.get("long")})
+        own = {f"coreData_{name}": core[name] for name in ("id", "secMark", "speed", "heading")} | {
+            "coreData_size": json.dumps(core["size"])
+        }
+        own |= {"coreData_position_lat": place["latitude"], "coreData_position_long": place["longitude"], "randomNum": 0.5}
+        rows.append({"metadata_generatedAt": record["metadata"]["recordGeneratedAt"][:19].replace("T", " ")} | own)
+    return pd.DataFrame(rows).to_csv(index=False)
+
+
 @pytest.mark.parametrize("pilot", [wyoming, tampa, new_york])
 def test_messages_of_the_pilots(tmp_path, pilot):
     (plain,) = read_log(save(crossing(), tmp_path)).encounters
@@ -59,15 +73,17 @@ def test_messages_of_the_pilots(tmp_path, pilot):
     }
     if pilot is new_york:
         texts = {"events": "\n".join(json.dumps({"eventHeader": {}, "bsmList": records}) for _ in range(2))}
-    for name, text in texts.items():
-        (tmp_path / f"{name}.json").write_text(text)
-        found = read_log(tmp_path / f"{name}.json").encounters
+    names = {f"{name}.json": text for name, text in texts.items()}
+    names |= {} if pilot is new_york else {"table.csv": as_table(records)}
+    for name, own in names.items():
+        (tmp_path / name).write_text(own)
+        found = read_log(tmp_path / name).encounters
         assert len(found) == (2 if pilot is new_york else 1)
         for encounter in found:
             assert [(one.id, one.length, one.width) for one in encounter.vehicles] == [("0aE1", 4.5, 1.8), ("0bE1", 4.5, 1.8)]
             np.testing.assert_allclose(np.ptp(encounter.position, axis=1), np.ptp(plain.position, axis=1), atol=0.3)
             np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.02)
-    (tmp_path / "cut.json").write_text(text[:-20])
+    (tmp_path / "cut.json").write_text(own[:-20] if pilot is new_york else texts["pretty"][:-20])
     with pytest.raises(InputError, match=r"cut\.json"):
         read_log(tmp_path / "cut.json", LogConfig(format="bsm"))
 

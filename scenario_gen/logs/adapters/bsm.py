@@ -12,11 +12,13 @@
 | heading, clockwise from north | heading, degrees | heading, 0.0125 degrees; 28800: unknown | heading_deg |
 | length, width | size, cm | likewise | likewise |
 
+The tables of Wyoming and Tampa on data.transportation.gov have the same values, in columns such as coreData_position_lat.
 Source: the samples and data dictionaries of the ITS JPO's sandbox. Messages stand one a line, in a list, or one after the other;
 each event of New York has a clock and a frame of its own, and is read as `EVENT_S` later than the one before.
 """
 
 from collections.abc import Iterator, Sequence
+import csv
 import json
 import math
 from pathlib import Path
@@ -62,7 +64,11 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
 
 
 def _records(path: Path) -> Iterator[Any]:
-    """Yield the documents of a file: one, several one after the other, or the entries of a list."""
+    """Yield the documents of a file: one, several one after the other, or the entries of a list; or the rows of a table."""
+    if path.suffix.lower() == ".csv":
+        with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+            yield from map(_of_table, csv.DictReader(file))
+        return
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     decoder, at = json.JSONDecoder(), 0
     while match := re.compile(r"[^\s,]").search(text, at):
@@ -71,6 +77,20 @@ def _records(path: Path) -> Iterator[Any]:
         except (ValueError, RecursionError) as error:
             raise InputError(f"{path} is no JSON: {str(error)[:200]}; copy it again") from None
         yield from found if isinstance(found, list) else [found]
+
+
+def _of_table(row: dict[str, str]) -> Row:
+    """Return a row of a table as the document that it was made of."""
+    found = {name.strip().lower(): text or None for name, text in row.items() if isinstance(name, str)}
+    core: Row = {name: found.get(f"coredata_{name}") for name in ("id", "speed", "heading")}
+    size, mark = found.get("coredata_size"), found.get("coredata_secmark")
+    core |= {"size": json.loads(size) if size else {}, "secMark": None if mark is None else float(mark)}
+    lat, long = (float(found.get(f"coredata_position_{name}") or math.nan) for name in ("lat", "long"))
+    if abs(lat) > 90.0:  # in the units of the messages
+        core |= {"lat": lat, "long": long, "speed": core["speed"] or 8191, "heading": core["heading"] or 28800}
+    else:
+        core["position"] = {"latitude": lat, "longitude": long}
+    return {"metadata": {"recordGeneratedAt": found["metadata_generatedat"]}, "payload": {"data": {"coreData": core}}}
 
 
 def _rows_of(record: Any, number: int) -> list[Row]:

@@ -27,7 +27,7 @@ from scenario_gen.method.routing.search.planner import (  # fmt: skip
 )
 from scenario_gen.method.routing.search.pose_planner import PlansPoses, PoseQuery, Wishes
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
+from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, squared_gaps, Targets
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
 from scenario_gen.roads import clearance_field, footprint_fits, nearest_pose_with_room, own_ground
@@ -446,7 +446,7 @@ def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
         poses: (M, 3) the curve there.
     """
     group = np.concatenate(([0], np.cumsum(~task.fitted.stands)))
-    square = (np.square(poses[None, :, :2] - task.anchors[:, None, :2])).sum(axis=-1)
+    square = squared_gaps(task.anchors[:, :2], poses[:, :2])
     per_group = np.zeros((group[-1] + 1, len(poses)))
     np.add.at(per_group, group, square)
     per_group[0, 1:] = np.inf

@@ -177,11 +177,19 @@ def _assigned(points: Floats, targets: Targets) -> tuple[Floats, Floats]:
     """Give each target to the point of the band that a monotone matching says: positions (M, 2), weights (M,)."""
     anchor, pull = points.copy(), np.zeros(len(points))
     if len(targets.points):
-        index = monotone_matching((np.square(points[None] - targets.points[:, None])).sum(axis=-1))
+        index = monotone_matching(squared_gaps(targets.points, points))
         for m, point, weight in zip(index, targets.points, targets.weight, strict=True):
             if weight * ANCHOR_WEIGHT > pull[m]:
                 anchor[m], pull[m] = point, weight * ANCHOR_WEIGHT
     return anchor, pull
+
+
+def squared_gaps(rows: Floats, columns: Floats) -> Floats:
+    """Return the squares (A, M) of the distances [m] of places (A, 2) from others (M, 2), axis by axis: a long drive has many."""
+    squares = np.zeros((len(rows), len(columns)))
+    for axis in (0, 1):
+        squares += np.square(rows[:, axis, None] - columns[None, :, axis])
+    return squares
 
 
 def monotone_matching(cost: Floats) -> Ints:
@@ -190,7 +198,7 @@ def monotone_matching(cost: Floats) -> Ints:
     Source: dynamic programming (Bellman 1957).
     """
     total = cost[0]
-    came_from = np.empty(cost.shape, dtype=np.int64)
+    came_from = np.empty(cost.shape, dtype=np.int32)
     for k in range(1, len(cost)):
         lowest = np.minimum.accumulate(total)
         new = np.concatenate(([True], total[1:] < lowest[:-1]))

@@ -66,7 +66,9 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
         _lane(f"along vehicle {name}", paths[name], set(members), scenarios, road, lane_width, run_out)
         for name, members in sharing_lanes(paths).items()
     ]
-    origin = "derived: one lane along each path that the scenarios drive; the road itself is a grid without lanes"
+    known = road is not None and road.lanes is not None
+    why = "--map writes those of the road's map" if known else "the road itself is a grid without lanes"
+    origin = f"derived: one lane along each path that the scenarios drive; {why}"
     return LaneMap(LaneNetwork("derived", tuple(derived)), len(derived), origin)
 
 
