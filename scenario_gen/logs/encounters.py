@@ -20,6 +20,7 @@ TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop h
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
 SHARPEST = 0.4  # 1/m: no car turns sharper, noise included
 BACKWARDS = np.radians(150.0)  # headings further off the path are those of a vehicle that drives backwards
+REVERSES_MPS = 5.0  # the fastest that cars are driven backwards; above, the axes are mirrored (`remarks_on_units`)
 LEVER = 3.0  # m over which the course before and after a stop is measured
 
 
@@ -111,7 +112,11 @@ def driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Pi
     Where most are, these are no headings of cars, and all pieces stay.
     """
     known = [piece for piece in pieces if len(piece.smooth.turned)]
-    opposite = [piece for piece in known if np.median(np.abs(piece.smooth.turned)) > BACKWARDS]
+    opposite = [
+        piece
+        for piece in known
+        if np.median(np.abs(piece.smooth.turned)) > BACKWARDS and piece.smooth.speed.max() <= REVERSES_MPS
+    ]
     if 2 * len(opposite) > len(known):
         return list(pieces), ()
     notes = tuple(
