@@ -15,7 +15,8 @@ from msg_conventions.layouts import MARKERS, POLYGON
 from msg_conventions.markers import CUBE, DELETE_ALL, LINE_LIST, LINE_STRIP, Marker
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.types import LaneNetwork, Marking, markings, Scenario, tokens, Vehicle
+from scenario_gen.types import LaneNetwork, Scenario, tokens, Vehicle
+from scenario_gen.types.markings import Marking, markings
 
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
 COLOURS = ((0.12, 0.47, 0.71), (0.84, 0.15, 0.16), (0.17, 0.63, 0.17), (1.0, 0.5, 0.05), (0.58, 0.4, 0.74), (0.55, 0.34, 0.29))

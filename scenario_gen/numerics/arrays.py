@@ -69,7 +69,7 @@ def canonical_heading(heading: npt.ArrayLike) -> Floats:
 def canonical_poses(poses: npt.ArrayLike, *, continuous: bool = False) -> Floats:
     """Poses (..., 3+) of x, y, yaw, ... with the yaw canonical; `continuous` unwraps it along the first axis."""
     array = np.array(poses, dtype=np.float64, order="C")
-    array[..., 2] = canonical_heading(array[..., 2]) if continuous else canonical_angle(array[..., 2])
+    array[..., 2] = canonical_heading(array[..., 2]) if continuous else canonical_angle(array[..., 2]) + 0.0  # no -0
     return frozen(array)
 
 

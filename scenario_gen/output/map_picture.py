@@ -15,7 +15,8 @@ from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
 from scenario_gen.template import clean_tracks
-from scenario_gen.types import Encounter, LaneNetwork, markings, Road
+from scenario_gen.types import Encounter, LaneNetwork, Road
+from scenario_gen.types.markings import markings
 
 PLACES = 8  # that are shown
 WIDE, HEAD, FOOT = 1200.0, 70.0, 45.0  # pixels, of the sheet, and of the title above and the scale below

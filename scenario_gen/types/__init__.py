@@ -12,7 +12,6 @@ from scenario_gen.types.evaluation import as_markdown, CheckCounts, Evaluation, 
 from scenario_gen.types.fit import Fit, FittedVehicle, Loss
 from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, LEVEL, MIRRORED, RuleKind, TrafficRule
-from scenario_gen.types.markings import Marking, markings
 from scenario_gen.types.measures import Measure, Measures
 from scenario_gen.types.names import token, tokens, vehicle_index
 from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
@@ -41,11 +40,11 @@ __all__ = [
     "ALWAYS", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LEVEL", "MIRRORED", "NARROW", "NOT_KEPT",
     "ORACLE", "ORDERS", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates",
     "Cause", "CheckCounts", "Coverage", "DrawnFor", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle",
-    "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Marking", "Measure", "Measures",
+    "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures",
     "Metric", "Pair", "Quality", "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind",
     "Sample", "Scenario", "ScenarioSet", "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "Vehicle",
     "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut", "formatted",
-    "height", "is_truck", "join_ego", "join_pieces", "lost_pairs", "markings", "mask", "once_per_object", "reaction_facts",
+    "height", "is_truck", "join_ego", "join_pieces", "lost_pairs", "mask", "once_per_object", "reaction_facts",
     "read_numbers", "read_states", "rear_axle", "routes_in_words", "shifted", "split_off", "split_pieces", "together", "token",
     "tokens", "vehicle_index", "with_witness", "yielders_of",
 ]  # fmt: skip

@@ -96,7 +96,7 @@ def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
     assert not found.invalid
     kept = replace(made.generated, scenarios=tuple(replace(one, facts={}) for one in made.generated.scenarios))
     (found,) = validate_bag(write_recording(tmp_path / "kept", replace(made, generated=kept)))
-    assert found.found.keys() == {"passing_order"} and found.invalid == 3
+    assert "passing_order" in found.found and found.invalid == 3, "and signs, which a swapped order does not keep"
 
 
 def test_a_diverse_set_covers_more_bins_and_carries_no_weights(chain):

@@ -53,4 +53,4 @@ def test_vehicles_that_are_not_where_they_can_be_are_refused(metres):
 def test_too_many_samples_are_refused_however_short_their_period():
     with pytest.raises(RefusedError, match=r"a sample every 0.001 s have 200000 samples, 45000 are possible.*log\.period=0\.1"):
         refuse_too_large(driving(samples=100_000, period_ns=1_000_000))
-    refuse_too_large(driving(samples=20_000))
+    refuse_too_large(driving(samples=20_000, period_ns=50_000_000))

@@ -12,7 +12,8 @@ from msg_conventions.cdr import decode
 from msg_conventions.layouts import MARKERS
 from msg_conventions.pictures import PAINT, road_markers
 from scenario_gen.roads import build_road, RoadConfig
-from scenario_gen.types import Marking, markings, RuleKind, TrafficRule
+from scenario_gen.types import RuleKind, TrafficRule
+from scenario_gen.types.markings import Marking, markings
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
