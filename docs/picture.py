@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 
 from scenario_gen import build_road, bundled, Encounter, generate, read_log, Road, Scenario, segment
-from scenario_gen.types import Marking, markings
+from scenario_gen.types.markings import Marking, markings
 
 matplotlib.use("agg")
 from matplotlib import pyplot

@@ -16,7 +16,6 @@ from scenario_gen.types import (
     Encounter,
     Fit,
     GenerationResult,
-    markings,
     Road,
     Route,
     Scenario,
@@ -24,6 +23,7 @@ from scenario_gen.types import (
     UNIFORM,
     WITHOUT,
 )
+from scenario_gen.types.markings import markings
 
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""

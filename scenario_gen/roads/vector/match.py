@@ -189,8 +189,8 @@ def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.
         if course is None:
             return Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
         courses.append(course)
-    courses = _tied(chains.network, courses, tracks, scale)
-    return judged(chains, courses, tracks, spot)
+    tied = (_tied(chains.network, courses, tracks, scale, turning) for turning in (False, True))
+    return min((judged(chains, each, tracks, spot) for each in tied), key=lambda laid: (bool(laid.reason), laid.cost))
 
 
 def _placed(track: Track, spot: Spot) -> Floats:
@@ -277,9 +277,10 @@ def changed_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
     return Curve.through(mixed) if len(mixed) > 3 else None
 
 
-def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], scale: float) -> list[Course]:
+def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], scale: float, turning: bool) -> list[Course]:
     """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares).
 
+    With `turning` everybody begins where it turns as far as in the template, which may leave a crossing behind.
     Who stops a little beyond a stop line in the template stops before it.
     """
     known = [Equation(((i, 1.0),), course.start, _PRIOR) for i, course in enumerate(courses)]
@@ -304,8 +305,8 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
                     shift = float(station[0]) - courses[first].start
                     known.append(Equation(((first, 1.0), (second, -1.0)), scale * gap - shift, _FOLLOWED))
     for i, (course, track) in enumerate(zip(courses, tracks, strict=True)):
-        turning = _start_to_turn(course, track)
-        known += [] if turning is None else [Equation(((i, 1.0),), turning, _TURNED)]
+        begin = _start_to_turn(course, track) if turning else None
+        known += [] if begin is None else [Equation(((i, 1.0),), begin, _TURNED)]
         known += [Equation(((i, 1.0),), start, _STOPPED) for start in _starts_to_stop(network, course, track, scale)]
     starts = solve_starts(range(len(courses)), known)
     return [replace(course, start=starts[i]) for i, course in enumerate(courses)]
