@@ -21,6 +21,7 @@ APART = 0.5  # metres between points of a path that it is laid through
 MARGIN = 0.1  # metres between a footprint and its lane's edge
 AROUND = 0.5  # metres by which a lane goes on beyond its footprints at least
 ACROSS = 0.6  # rad by which a vehicle in a lane may be turned in it
+SEAM_M = 0.1  # half of what may be open between two lanes of a map that follow or adjoin each other
 CUT = 5.0  # metres of a path that may lie across all lanes, as where a corner is cut
 NEAR = 3  # points of a lane on both sides over which it keeps its widest
 
@@ -75,7 +76,7 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
 def _not_kept(network: LaneNetwork, scenarios: Sequence[Scenario]) -> dict[str, Curve]:
     """Return the paths, by id, of vehicles that leave the lanes or drive across them."""
     shapes = [Polygon(lane.outline) for lane in network.lanes]
-    area = union_all(make_valid(shapes))
+    area = union_all(make_valid(shapes)).buffer(SEAM_M, join_style="mitre").buffer(-SEAM_M, join_style="mitre")
     prepare(area)
     missing: dict[str, Curve] = {}
     for scenario in scenarios:

@@ -109,6 +109,16 @@ def test_a_vector_maps_own_lanes_are_written():
     assert made.network.lanes[:3] == own
 
 
+@pytest.mark.parametrize(("gap", "added"), [(0.15, 0), (0.5, 2)])
+def test_seams_between_lanes_are_no_edge_of_the_road(gap, added):
+    road = build_road("straight", None, RoadConfig())
+    borders = [np.column_stack((np.array(x), np.full(2, y))) for x in ((0.0, 50.0), (50.0 + gap, 100.0)) for y in (1.75, -1.75)]
+    lanes = (VectorLane("a", borders[0], borders[1], (1,)), VectorLane("b", borders[2], borders[3]))
+    scenario = moving([[30.0, 0.0, 0.0, 8.0, 0.0, 0.0], [5.0, 0.0, 0.0, 8.0, 0.0, 0.0]])
+    made = lane_map_of(replace(road, lanes=LaneNetwork("town", lanes)), [scenario], 3.5, 5.0)
+    assert made.added == added
+
+
 def test_derived_lanes_hold_every_footprint_and_followers_share_one():
     rows = [[0.0, 0.0, 0.3, 8.0, 0.0, 0.05], [-15.0, -4.64, 0.3, 8.0, 0.0, 0.0], [60.0, 40.0, -2.0, 5.0, -1.2, 0.1]]
     scenarios = [moving(rows), moving([[x, y + 0.4, *rest] for x, y, *rest in rows])]
