@@ -59,7 +59,7 @@ def needs(extra: str, *modules: str) -> None:
 def presentable(text: str, longest: int = LONGEST) -> str:
     """Return a message with at most `longest` characters, all of which print, or are line breaks.
 
-    Of a long one each part (a reason, a remedy; they are joined by `; `) has its share, and loses its middle where that is less.
+    Of a long one each part (a reason, a remedy; a semicolon joins them) has its share, and loses its middle where that is less.
     """
     if len(text) > 4 * longest:  # a first cut, for a quoted field may hold megabytes
         text = text[: 2 * longest] + text[-2 * longest :]
