@@ -173,8 +173,12 @@ def middle(points: Floats) -> Curve:
     return Curve.through(even[index[:, None] + np.clip(offset, -room, room)].mean(axis=1))
 
 
-def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.0, ends: Sequence[tuple[str, str]] = ()) -> Match:
+def match(
+    chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.0, ends: Sequence[tuple[str, str]] = ()
+) -> Iterator[Match]:
     """Give every vehicle its course near a placement of the template as one piece.
+
+    Yields one match, and where somebody turns otherwise there, another, in which it turns as it does: it may leave a crossing.
 
     Args:
         chains: of the map or the part of it.
@@ -187,10 +191,12 @@ def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.
     for track, (first, last) in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
         course = _course(chains, track, _placed(track, spot), scale, first, last)
         if course is None:
-            return Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
+            yield Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
+            return
         courses.append(course)
-    tied = (_tied(chains.network, courses, tracks, scale, turning) for turning in (False, True))
-    return min((judged(chains, each, tracks, spot) for each in tied), key=lambda laid: (bool(laid.reason), laid.cost))
+    yield judged(chains, _tied(chains.network, courses, tracks, scale, turning=False), tracks, spot)
+    if any(_start_to_turn(course, track) is not None for course, track in zip(courses, tracks, strict=True)):
+        yield judged(chains, _tied(chains.network, courses, tracks, scale, turning=True), tracks, spot)
 
 
 def _placed(track: Track, spot: Spot) -> Floats:

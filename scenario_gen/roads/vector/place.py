@@ -71,7 +71,7 @@ def placements(
     search = _Search(chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ())
     found, recorded = False, ""
     if lanes is None and home.cost <= _HOME:
-        own = match(chains, tracks, home)
+        own = next(match(chains, tracks, home))
         broken = own.reason or judged.broken(own)
         if not broken:
             found = True
@@ -121,13 +121,13 @@ class _Search:
             matches = list(along) if scale == 1.0 else []
             for spot in spots:
                 stop_if_cancelled()
-                placement = match(self.chains, self.tracks, spot, scale, self.ends if spot is self.sized else ())
-                far = placement.cost > _WORST and spot is not self.sized
-                if placement.reason or far:
-                    reason = placement.reason or "vehicles would be too far from where they are"
-                    self.failures.append((True, placement.cost, reason))
-                else:
-                    matches.append(placement)
+                for placement in match(self.chains, self.tracks, spot, scale, self.ends if spot is self.sized else ()):
+                    far = placement.cost > _WORST and spot is not self.sized
+                    if placement.reason or far:
+                        reason = placement.reason or "vehicles would be too far from where they are"
+                        self.failures.append((True, placement.cost, reason))
+                    else:
+                        matches.append(placement)
             broken_by = [self.judged.broken(placement) for placement in matches]
             self.failures.extend((False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken)
             matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
