@@ -11,7 +11,6 @@ moves each vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
-import os
 from pathlib import Path
 import sys
 from typing import Any
@@ -20,14 +19,14 @@ import numpy as np
 
 from benchmarks._naturalness_cuts import cuts, recorded
 from benchmarks._size import sized
+from benchmarks.naturalness import DATA
 from benchmarks.row import Row
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
-from scenario_gen.method.evaluation.population import Population, population_of
+from scenario_gen.method.evaluation.population import in_words, Population, population_of
 from scenario_gen.pipeline import generate
 from scenario_gen.types import Encounter, Scenario
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 COUNT, MOST = sized((50, None), (3, 12))
 TEMPLATES = sized((5, 10, 20), (1,))
 SHIFT_S, PACE = 1.0, 0.06
@@ -62,9 +61,11 @@ def run() -> list[Row]:
             f"{name} {sets.curve[k].generated.value:.2f} at precision {sets.curve[k].precision.value:.2f}"
             for name, sets in beside.items()
         )
-        peer = f"templates alone {point.alone}; {others}"
+        peer = f"templates alone {in_words(point.alone)}; {others}"
         rows.append(Row(f"coverage with {n} templates", point.generated.value, "", "higher", TARGETS.get(n), peer))
-        rows.append(Row(f"precision with {n}", point.precision.value, "", "higher", None, f"of the recorded {point.recorded}"))
+        rows.append(
+            Row(f"precision with {n}", point.precision.value, "", "higher", None, f"of the recorded {in_words(point.recorded)}")
+        )
         rows.append(Row(f"multiplier with {n} (inf: more than there are)", point.multiplier, "", "higher", 10.0))
     return rows
 

@@ -6,7 +6,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenario_gen.bags.recordings.read import load, read_recording, SCENARIOS
+from scenario_gen.bags.recordings.read import read_recording, result_in
 from scenario_gen.corpus.page import curve, sketch, write_page
 from scenario_gen.method.evaluation.population import Population
 from scenario_gen.types import GenerationResult
@@ -25,8 +25,7 @@ def results_of(bags: Sequence[Path]) -> list[tuple[str, GenerationResult]]:
     for bag in bags:
         recording = read_recording(bag)
         logs = ", ".join(sorted(key.removeprefix(LOG) for key in recording.provenance if key.startswith(LOG)))
-        spaces = [name for name, found in recording.namespaces.items() if {"tracks", SCENARIOS} <= found.messages.keys()]
-        results += [(logs or str(bag), load(bag, name)) for name in spaces or [""]]
+        results += [(logs or str(bag), result_in(recording, name)) for name in recording.results or [""]]
     return results
 
 

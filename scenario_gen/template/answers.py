@@ -3,6 +3,8 @@
 
 """How a reaction shows in a motion, recorded or generated: when one passes behind another, how near one drives behind another."""
 
+from collections.abc import Iterable
+from functools import lru_cache
 from itertools import permutations
 from typing import Protocol
 
@@ -13,6 +15,7 @@ from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template.interaction import Conflict, find_conflicts, WAIT_SPEED
+from scenario_gen.template.tracks import Track
 from scenario_gen.types import once_per_object, together, Vehicle
 
 FAR = 60.0  # m, within which one follows
@@ -63,8 +66,20 @@ def conflicts_in(motion: Motion) -> tuple[Conflict, ...]:
 @once_per_object
 def _conflicts(motion: Motion) -> dict[tuple[int, int], Conflict]:
     """Return the conflict of each pair of vehicles that has one."""
-    found = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present)
-    return {(min(one.first, one.second), max(one.first, one.second)): one for one in found}
+    return _by_pair(find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present))
+
+
+def _by_pair(conflicts: Iterable[Conflict]) -> dict[tuple[int, int], Conflict]:
+    return {(min(one.first, one.second), max(one.first, one.second)): one for one in conflicts}
+
+
+@lru_cache(maxsize=4)  # of one template many places are looked at
+def meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
+    """Return the conflicts of some tracks by their vehicles, the lower index first."""
+    poses, present = (np.stack([getattr(track, name) for track in tracks]) for name in ("poses", "present"))
+    time = np.arange(poses.shape[1], dtype=np.float64) * tracks[0].dt
+    vehicles = tuple(track.vehicle for track in tracks)
+    return _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], present))
 
 
 def departure(motion: Motion, who: int, entry: float) -> float:

@@ -62,6 +62,11 @@ class Recording:
     namespaces: Mapping[str, "Namespace"]
 
     @property
+    def results(self) -> tuple[str, ...]:
+        """The namespaces that hold a template with scenarios."""
+        return tuple(name for name, one in self.namespaces.items() if {"tracks", SCENARIOS} <= one.messages.keys())
+
+    @property
     def provenance(self) -> dict[str, str]:
         """How its scenarios were generated: logs, seed, versions, parameters; different values side by side."""
         found: dict[str, list[str]] = {}
@@ -320,13 +325,21 @@ def load(path: Path | str, namespace: str = "", config: BagConfig = BagConfig())
     Raises:
         InputError: the bag cannot be read, the namespace is not there, or a scenario of the request is missing.
     """
-    recording = read_recording(Path(path), config)
-    found = recording.namespaces.get(namespace)
-    if found is None or not {"tracks", SCENARIOS} <= found.messages.keys():
-        names = [repr(name) for name, one in recording.namespaces.items() if {"tracks", SCENARIOS} <= one.messages.keys()]
-        remedy = f"choose one of {', '.join(names)}" if names else "no namespace has any; is it a log?"
-        raise InputError(f"{path}: namespace {namespace!r} holds no template with scenarios; {remedy}")
-    with within(Path(path)):
+    return result_in(read_recording(Path(path), config), namespace)
+
+
+def result_in(recording: Recording, namespace: str = "") -> GenerationResult:
+    """Return a result of a recording, as `load` does.
+
+    Raises:
+        InputError: the namespace is not among its `results`, or a scenario of the request is missing.
+    """
+    if namespace not in recording.results:
+        names = ", ".join(map(repr, recording.results))
+        remedy = f"choose one of {names}" if names else "no namespace has any; is it a log?"
+        raise InputError(f"{recording.path}: namespace {namespace!r} holds no template with scenarios; {remedy}")
+    found = recording.namespaces[namespace]
+    with within(recording.path):
         fit, routes = found.fit
         generated = found.scenario_set()
         seed = next((scenario.seed for scenario in generated), 0)

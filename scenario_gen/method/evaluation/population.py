@@ -24,10 +24,10 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.geometry import footprint_distance
 from scenario_gen.method.evaluation.measures import figures_of, PERIOD
 from scenario_gen.method.evaluation.motion import at_period, Motion
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template import Conflict, conflict_of
-from scenario_gen.types import Encounter, GenerationResult, join_ego, Pair, Scenario
+from scenario_gen.types import Encounter, GenerationResult, Interval, join_ego, Pair, Scenario
 
 APART = "apart"  # a scenario whose pair shares no area any more: it is near nothing
 KINDS = ("crossing", "turn", "merge", "following", APART)
@@ -56,27 +56,10 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Share:
-    """A share, its median over draws of templates and the 5 and 95 % quantiles."""
-
-    value: float
-    low: float
-    high: float
-
-    def __str__(self) -> str:
-        return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
-
-    @classmethod
-    def of(cls, values: Sequence[float]) -> "Share":
-        """Take one value per draw."""
-        known = np.array(values)[np.isfinite(values)]
-        low, middle, high = np.quantile(known, [0.05, 0.5, 0.95]).tolist() if len(known) else [math.nan] * 3
-        return cls(middle, low, high)
-
-
-@dataclass(frozen=True)
 class Point:
     """What so many templates cover, alone and with what is generated from them, and how precise the generated are.
+
+    Shares are medians over draws of templates, with the 5 and 95 % quantiles.
 
     Attributes:
         templates: drawn.
@@ -87,10 +70,10 @@ class Point:
     """
 
     templates: int
-    alone: Share
-    generated: Share
-    precision: Share
-    recorded: Share
+    alone: Interval
+    generated: Interval
+    precision: Interval
+    recorded: Interval
     multiplier: float
 
 
@@ -136,7 +119,7 @@ class Population:
         for point in self.curve:
             stands = f"{point.multiplier * point.templates:.0f}" if math.isfinite(point.multiplier) else "more than there are"
             shares = (point.alone, point.generated, point.precision, point.recorded)
-            rows.append((str(point.templates), *map(str, shares), stands))
+            rows.append((str(point.templates), *map(in_words, shares), stands))
         return columns, rows
 
     def remarks(self) -> list[str]:
@@ -148,6 +131,18 @@ class Population:
             farthest = f"the farthest is {worst.encounter} ({worst.kind}): {worst.feature}"
             lines.append(f"{len(self.unreached)} encounters are never reached; {farthest}")
         return lines
+
+
+def in_words(share: Interval) -> str:
+    """Return a share with its quantiles in brackets."""
+    return f"{share.value:.2f} [{share.low:.2f}, {share.high:.2f}]"
+
+
+def _over_draws(values: Iterable[float]) -> Interval:
+    """The median of one value per draw, and the 5 and 95 % quantiles; NaN are draws of which nothing is told."""
+    told = [value for value in values if math.isfinite(value)]
+    low, middle, high = np.quantile(told, [0.05, 0.5, 0.95]).tolist() if told else [math.nan] * 3
+    return Interval(middle, low, high)
 
 
 def member_of(motion: Encounter | Scenario, recording: str, template: int, pair: Pair | None = None) -> Member:
@@ -255,11 +250,11 @@ def population_of(
             f"{len(recorded)} encounters share an area: at most {most} templates can be drawn; ask for fewer, or give more logs"
         )
     near, rng = _Near.of(recorded, made), np.random.default_rng(seed)
-    alone = {n: Share.of([near.draw(rng, n)[0] for _ in range(draws)]) for n in range(1, len(recorded))}
+    alone = {n: _over_draws(near.alone(near.chosen(rng, n)) for _ in range(draws)) for n in range(1, len(recorded))}
     points = []
     for n in drawn:
         by_templates, covered, precision, own_precision = (
-            Share.of(list(values)) for values in zip(*(near.draw(rng, n) for _ in range(draws)), strict=True)
+            _over_draws(values) for values in zip(*(near.judged(near.chosen(rng, n)) for _ in range(draws)), strict=True)
         )
         equal = next((m for m, share in alone.items() if share.value >= covered.value), math.inf)
         points.append(Point(n, by_templates, covered, precision, own_precision, equal / n))
@@ -314,25 +309,38 @@ class _Near:
                 apart[np.ix_(rows, columns)] = between / max(float(np.median(known)), SMALLEST_R)
         return cls(recorded, recording, np.array([member.template for member in made], dtype=np.int64), scaled, apart)
 
-    def draw(self, rng: np.random.Generator, count: int) -> tuple[float, float, float, float]:
-        """Return coverage by `count` templates alone, with the generated, and precision of generated and of templates."""
+    def chosen(self, rng: np.random.Generator, count: int) -> Ints:
+        """Draw `count` templates, recording by recording in a random order."""
         names = rng.permutation(self.recording.max() + 1)
         shuffled = rng.permutation(len(self.recording))
         rank = np.argsort(names)[self.recording[shuffled]]
-        chosen = shuffled[np.argsort(rank, kind="stable")][:count]  # recording by recording, in a random order
-        unseen = ~np.isin(self.recording, self.recording[chosen])
-        members = len(self.recording) + np.flatnonzero(np.isin(self.template, chosen))
+        return shuffled[np.argsort(rank, kind="stable")][:count]
+
+    def alone(self, chosen: Ints) -> float:
+        """Return the share of unseen encounters that templates cover; NaN if all are seen."""
+        return self._covered(chosen, self._unseen(chosen))
+
+    def judged(self, chosen: Ints) -> tuple[float, float, float, float]:
+        """Return coverage by templates alone, with what is generated, and precision of generated and of templates."""
+        unseen = self._unseen(chosen)
         if not unseen.any():
             return (math.nan,) * 4
-        alone = self.apart[chosen][:, unseen].min(axis=0)
-        generated = np.minimum(alone, self.apart[members][:, unseen].min(axis=0, initial=math.inf))
+        members = len(self.recording) + np.flatnonzero(np.isin(self.template, chosen))
         own = self.recording[self.template[members - len(self.recording)]]
         return (
-            float((alone <= 1.0).mean()),
-            float((generated <= 1.0).mean()),
+            self._covered(chosen, unseen),
+            self._covered(np.concatenate([chosen, members]), unseen),
             self._precision(members, own),
             self._precision(chosen, self.recording[chosen]),
         )
+
+    def _unseen(self, chosen: Ints) -> Bools:
+        """(R,) which encounters are of other recordings than those of some templates."""
+        return ~np.isin(self.recording, self.recording[chosen])
+
+    def _covered(self, members: Ints, unseen: Bools) -> float:
+        """The share of unseen encounters within r of a member."""
+        return float((self.apart[members][:, unseen].min(axis=0) <= 1.0).mean()) if unseen.any() else math.nan
 
     def _precision(self, members: Ints, own: Ints) -> float:
         """The share of members within r of an encounter of another recording than their own."""

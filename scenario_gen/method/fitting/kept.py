@@ -4,7 +4,6 @@
 """Is the encounter kept? Who turns, who meets whom and goes first, who drives in whose lane, who passes whom on which side."""
 
 from collections.abc import Iterable, Iterator
-from functools import lru_cache
 from itertools import combinations, permutations
 
 import numpy as np
@@ -12,7 +11,8 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.template import Conflict, find_conflicts, in_words, keeps, Track, turn_of, turns_to_keep
+from scenario_gen.template import in_words, keeps, Track, turn_of, turns_to_keep
+from scenario_gen.template.answers import meetings
 from scenario_gen.types import Loss, Road
 
 LOSABLE = {
@@ -103,18 +103,8 @@ def _lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterato
             yield Loss("turn", (name,), f"vehicle {name} {in_words(lost)} in the template, {in_words(there)} on this road")
 
 
-@lru_cache(maxsize=2)  # of one template many places are looked at
-def _meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
-    """The conflicts of some motion, by the vehicles."""
-    poses = np.stack([track.poses for track in tracks])
-    time = np.arange(poses.shape[1], dtype=np.float64) * tracks[0].dt
-    vehicles, present = tuple(track.vehicle for track in tracks), np.stack([track.present for track in tracks])
-    found = find_conflicts(vehicles, np.asarray(time), poses[..., :2], poses[..., 2], present)
-    return {(min(c.first, c.second), max(c.first, c.second)): c for c in found}
-
-
 def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
-    before, after = _meetings(tracks), _meetings(placed)
+    before, after = meetings(tracks), meetings(placed)
     for pair in sorted(before.keys() | after.keys()):
         a, b = (tracks[k].vehicle.id for k in pair)
         if pair not in after:

@@ -10,7 +10,6 @@ to crossings and between vehicles on one lane (least squares, weighted).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import islice, product
 import math
 
@@ -22,7 +21,6 @@ from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
 from scenario_gen.template import (
     Equation,
-    find_conflicts,
     in_words,
     pair_crossings,
     solve_starts,
@@ -31,6 +29,7 @@ from scenario_gen.template import (
     turns_to_keep,
     WAIT_SPEED,
 )
+from scenario_gen.template.answers import meetings
 from scenario_gen.types import LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -194,9 +193,10 @@ def match(
             yield Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
             return
         courses.append(course)
-    yield judged(chains, _tied(chains.network, courses, tracks, scale, turning=False), tracks, spot)
-    if any(_start_to_turn(course, track) is not None for course, track in zip(courses, tracks, strict=True)):
-        yield judged(chains, _tied(chains.network, courses, tracks, scale, turning=True), tracks, spot)
+    yield judged(chains, _tied(chains.network, courses, tracks, scale, [None] * len(courses)), tracks, spot)
+    begins = [_start_to_turn(course, track) for course, track in zip(courses, tracks, strict=True)]
+    if any(begin is not None for begin in begins):
+        yield judged(chains, _tied(chains.network, courses, tracks, scale, begins), tracks, spot)
 
 
 def _placed(track: Track, spot: Spot) -> Floats:
@@ -283,15 +283,17 @@ def changed_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
     return Curve.through(mixed) if len(mixed) > 3 else None
 
 
-def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], scale: float, turning: bool) -> list[Course]:
+def _tied(
+    network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], scale: float, begins: Sequence[float | None]
+) -> list[Course]:
     """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares).
 
-    With `turning` everybody begins where it turns as far as in the template, which may leave a crossing behind.
+    `begins` [m] are those from which vehicles turn as far as in the template, if any; they may leave a crossing behind.
     Who stops a little beyond a stop line in the template stops before it.
     """
     known = [Equation(((i, 1.0),), course.start, _PRIOR) for i, course in enumerate(courses)]
     crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
-    met = _met(tuple(tracks))
+    met = meetings(tuple(tracks))
     for a in range(len(tracks)):
         for b in range(a):
             crossing = crossing_of.get((a, b))
@@ -300,7 +302,7 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
                 along = scale * np.array([crossing.first, crossing.second])
                 target = np.array([courses[a].start, courses[b].start]) + along
                 at = crossing_points[int(np.argmin(np.abs(crossing_points - target).sum(axis=1)))] - along
-                weight = _CROSSED if crossing.driven else _MET if (b, a) in met else _BEYOND
+                weight = _CROSSED if crossing.driven else _MET if (b, a) in met and not met[b, a].following else _BEYOND
                 known += [Equation(((i, 1.0),), float(station), weight) for i, station in zip((a, b), at, strict=True)]
             for first, second in ((a, b), (b, a)):
                 gap = _follows(tracks[first], tracks[second])
@@ -310,20 +312,11 @@ def _tied(network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], 
                 if abs(float(offset[0])) < _SAME:  # of `first`, its start lies so far along the course of `second`
                     shift = float(station[0]) - courses[first].start
                     known.append(Equation(((first, 1.0), (second, -1.0)), scale * gap - shift, _FOLLOWED))
-    for i, (course, track) in enumerate(zip(courses, tracks, strict=True)):
-        begin = _start_to_turn(course, track) if turning else None
+    for i, (course, track, begin) in enumerate(zip(courses, tracks, begins, strict=True)):
         known += [] if begin is None else [Equation(((i, 1.0),), begin, _TURNED)]
         known += [Equation(((i, 1.0),), start, _STOPPED) for start in _starts_to_stop(network, course, track, scale)]
     starts = solve_starts(range(len(courses)), known)
     return [replace(course, start=starts[i]) for i, course in enumerate(courses)]
-
-
-@lru_cache(maxsize=2)  # of one template many places are looked at
-def _met(tracks: tuple[Track, ...]) -> frozenset[tuple[int, int]]:
-    """The pairs of vehicles, the lower index first, that are in conflict in the template."""
-    time, poses = np.arange(len(tracks[0].progress), dtype=np.float64), np.stack([track.poses for track in tracks])
-    conflicts = find_conflicts(tuple(track.vehicle for track in tracks), time, poses[..., :2], poses[..., 2])
-    return frozenset((min(c.first, c.second), max(c.first, c.second)) for c in conflicts if not c.following)
 
 
 def _starts_to_stop(network: LaneNetwork, course: Course, track: Track, scale: float) -> Iterator[float]:
