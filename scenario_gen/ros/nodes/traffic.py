@@ -83,7 +83,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._arriving = ArrivingTrials()
         self._verdict = ""
         self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
-        self._out["/tf"] = create_frames_publisher(self, "/tf")
+        self._out["/tf"] = create_frames_publisher(self)
         self._autoware: tuple[str, ...] = ()
         for topic in INPUTS:
             create_subscription(self, topic, lambda data, topic=topic: self._receive_command(topic, data))
