@@ -25,7 +25,6 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.driving import encode_clock
@@ -35,6 +34,7 @@ from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
+from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.topics import message_class, OVERRIDABLE, Pace, publish, qos, unacknowledged
 
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
@@ -75,8 +75,8 @@ class Player(Node):  # type: ignore[misc]
         self._offered: dict[str, tuple[Any, bool, int]] = {}
         self._paces: dict[str, Pace] = {}
         self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
-        self.create_service(Trigger, "~/pause", lambda _, response: self._set_running(response, running=False))
-        self.create_service(Trigger, "~/resume", lambda _, response: self._set_running(response, running=True))
+        offer_trigger(self, "~/pause", partial(self._set_running, running=False))
+        offer_trigger(self, "~/resume", partial(self._set_running, running=True))
 
     def autostart(self) -> None:
         """Offer the bag's topics and begin.
@@ -197,11 +197,11 @@ class Player(Node):  # type: ignore[misc]
         if self._clock_publisher is not None:
             publish(self, self._clock_publisher, encode_clock(stamp_ns))
 
-    def _set_running(self, response: Trigger.Response, *, running: bool) -> Trigger.Response:
-        response.success = running != self._running.is_set()
-        response.message = ("playing" if running else "paused") if response.success else "it is so already"
+    def _set_running(self, *, running: bool) -> str:
+        if running == self._running.is_set():
+            raise InputError("it is so already")
         (self._running.set if running else self._running.clear)()
-        return response
+        return "playing" if running else "paused"
 
     def destroy_node(self) -> None:
         """End playing, then the node."""
