@@ -12,13 +12,13 @@ has its speed, and is left to the controller under test; its goal is a routing a
 
 from datetime import datetime, UTC
 
+from scenario_gen.logs import OPENSCENARIO_SPEEDS
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.xml import add, Element, number, serialized
 from scenario_gen.types import height, is_truck, rear_axle, Scenario, shifted, token, Vehicle, WHEELBASE
 
 EGO = "Ego"
-SPEEDS = "speed_mps"  # name of the property that holds a vehicle's speed at each vertex, for `scenario-gen import`
 WHEEL = 0.65  # metres of diameter
 LIMITS = {"maxSpeed": 70.0, "maxAcceleration": 10.0, "maxDeceleration": 10.0}  # beyond what any published scenario does
 STEERING = 0.7  # rad
@@ -89,7 +89,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
         add(axles, tag, maxSteering=steering, wheelDiameter=WHEEL, trackWidth=track, positionX=x, positionZ=WHEEL / 2.0)
     properties = add(element, "Properties")
     if speeds:
-        add(properties, "Property", name=SPEEDS, value=speeds)
+        add(properties, "Property", name=OPENSCENARIO_SPEEDS, value=speeds)
 
 
 def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:
