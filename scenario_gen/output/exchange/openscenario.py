@@ -10,12 +10,10 @@ A vehicle that arrives late is added to the simulation then, and one that leaves
 has its speed, and is left to the controller under test; its goal is a routing action.
 """
 
-from datetime import datetime, UTC
-
 from scenario_gen.logs import OPENSCENARIO_SPEEDS
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.xml import add, Element, number, serialized
+from scenario_gen.output.exchange.xml import add, date_of, Element, number, serialized
 from scenario_gen.types import height, is_truck, rear_axle, Scenario, shifted, token, Vehicle, WHEELBASE
 
 EGO = "Ego"
@@ -37,7 +35,7 @@ def write_openscenario(case: Case, exported: Exported, road_file: str, export: E
         "FileHeader",
         revMajor="1",
         revMinor="2",
-        date=datetime.fromtimestamp(case.start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S"),
+        date=date_of(case.start_ns),
         description=f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}",
         author="scenario_gen",
     )
