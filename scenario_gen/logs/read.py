@@ -22,6 +22,7 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.base.stores import local, naming_objects, renamed, temporary
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
+from scenario_gen.logs.adapters.openscenario import is_openscenario
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import LogConfig, picked
@@ -430,6 +431,7 @@ FORMATS = Registry[LogFormat](
         "osi": LogFormat(is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))),
         "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
         "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
+        "openscenario": LogFormat(is_openscenario, late("adapters.openscenario")),
         "bsm": LogFormat(is_bsm, late("adapters.bsm")),
         "fcd": LogFormat(is_fcd, late("adapters.fcd")),
         "nocturne": LogFormat(is_nocturne, late("adapters.nocturne")),
@@ -468,8 +470,8 @@ def _read_files(files: Sequence[Path], config: LogConfig) -> RawLog:
     if known is None:
         raise UnknownFormatError(
             f"{files[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and GPUDrive (.json), "
-            "rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
+            "CommonRoad and OpenSCENARIO scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and "
+            "GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
             "If its name misleads: --set log.format=table"
         )
     with reading(files[0]):
