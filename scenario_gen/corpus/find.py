@@ -17,7 +17,7 @@ from scenario_gen.corpus.messages import database, quoted
 from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerated
 
 MEMORY = 500  # MiB
-COLUMNS = ("template", "kind", "road", "vehicles", "index", "seconds", "distance", "ttc", "pet", "speed", "braking")
+COLUMNS = ("template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet", "speed", "braking")
 PET = (0.0, 1.0, 2.0, 4.0)  # s: bounds of the classes of the table of coverage
 CLASSES = "CASE WHEN pet IS NULL THEN 'none' " + " ".join(f"WHEN pet < {b:g} THEN '< {b:g} s'" for b in PET) + " ELSE 'more' END"
 
@@ -36,7 +36,7 @@ def find(batch: Place, condition: str = "true") -> Hits:
     Args:
         batch: that `run_batch` wrote, finished or not.
         condition: SQL over the columns template, kind, road, vehicles, index, seed, seconds [s], distance [m], ttc [s],
-            pet [s], speed [m/s], braking [m/s²], sha256.
+            pet [s], speed [m/s], braking [m/s²], type (of the most exposed road user), types (of all), sha256.
 
     Raises:
         InputError: there is no batch, or the condition is none.
@@ -46,7 +46,7 @@ def find(batch: Place, condition: str = "true") -> Hits:
     tables = [table for table in listed if below(table, batch / "scenarios") in done]
     if not tables:
         raise InputError(f"{batch} holds no scenarios; write them with `scenario-gen batch DIR --roads … --out {batch}`")
-    columns = f"the columns are {', '.join(COLUMNS)}, seed, sha256"
+    columns = f"the columns are {', '.join(COLUMNS)}, types, seed, sha256"
     what = f"{batch}: condition {condition!r}"
     with fetched(tables) as here, database(workplace(batch), MEMORY, what, columns) as base:
         base.execute(

@@ -11,6 +11,7 @@ from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_ti
 from scenario_gen.logs.geodesy import azimuthal, latitude_longitude, local_frame, metres_per_degree, middle_of, reprojected, utm
 from scenario_gen.logs.groups import APART, shortest, ticks, windows
 from scenario_gen.logs.growing import Growth, Meeting
+from scenario_gen.logs.kinds import is_road_user, type_called, typed, usual_size
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
 from scenario_gen.logs.read import (
     encounters_of,
@@ -33,7 +34,7 @@ from scenario_gen.logs.synthetic import bundled, CASES
 __all__ = [
     "APART", "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "Growth", "LogConfig", "LogFormat", "LogResult", "Meeting",
     "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "UnknownFormatError", "azimuthal", "bundled",
-    "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_known", "is_nocturne", "is_osi", "is_spmd",
-    "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log", "read_raw",
-    "reprojected", "shortest", "space_time_gap", "ticks", "utm", "windows",
+    "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_known", "is_nocturne", "is_osi", "is_road_user",
+    "is_spmd", "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log",
+    "read_raw", "reprojected", "shortest", "space_time_gap", "ticks", "type_called", "typed", "usual_size", "utm", "windows",
 ]  # fmt: skip

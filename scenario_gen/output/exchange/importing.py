@@ -21,17 +21,16 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.markup import Element, read_xml
-from scenario_gen.logs import is_commonroad, is_known, is_osi, LogConfig, read_raw
+from scenario_gen.logs import is_commonroad, is_known, is_osi, is_road_user, LogConfig, read_raw, type_called, typed, usual_size
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.plane import edge_lengths, place
 from scenario_gen.output.exchange.openscenario import SPEEDS
 from scenario_gen.output.exchange.substitution import resolved
 from scenario_gen.output.exchange.xml import number
-from scenario_gen.types import Vehicle
+from scenario_gen.types import Vehicle, VEHICLE_TYPES
 
-HEADER = "vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m"
+HEADER = "vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m,type"
 MOST_ROWS = 2_000_000
-_CATEGORIES = ("car", "van", "truck", "bus")  # of vehicles
 _FOLLOWS = "PrivateAction/RoutingAction/FollowTrajectoryAction"
 
 
@@ -42,12 +41,14 @@ class Track:
     Attributes:
         vehicle: id.
         length, width: metres.
+        type: of `VEHICLE_TYPES`.
         rows: (K, 5) time [s], x [m], y [m] of the footprint's centre, speed [m/s], heading [rad].
     """
 
     vehicle: str
     length: float
     width: float
+    type: str
     rows: Floats
 
 
@@ -85,7 +86,7 @@ def import_file(path: Path, out: Path) -> Imported:
     result = read_scenario_file(path)
     lines = [HEADER]
     for track in result.tracks:
-        size = f"{number(track.length)},{number(track.width)}"
+        size = f"{number(track.length)},{number(track.width)},{track.type}"
         lines += [f"{track.vehicle},{','.join(map(number, row))},{size}" for row in track.rows.tolist()]
     try:
         with out.open("x", encoding="utf-8", newline="") as file:
@@ -102,12 +103,11 @@ def _openscenario(root: Element) -> Imported:
     vehicles: dict[str, Element] = {}
     tracks, notes = list[Track](), list[str]()
     for entity in root.all("Entities/ScenarioObject"):
-        name, vehicle = entity.get("name"), entity.first("Vehicle")
-        category = vehicle.attributes.get("vehicleCategory", "car") if vehicle else ""
+        name, vehicle = entity.get("name"), entity.first("Vehicle") or entity.first("Pedestrian")
         if vehicle is None or vehicle.first("BoundingBox") is None:
-            notes.append(f"{name} left out: it is no vehicle with a bounding box in this file or its catalogs")
-        elif category not in _CATEGORIES:
-            notes.append(f"{name} left out: it is a {category}")
+            notes.append(f"{name} left out: it is no road user with a bounding box in this file or its catalogs")
+        elif not is_road_user(_category(vehicle)):
+            notes.append(f"{name} left out: it is a {_category(vehicle)}")
         else:
             vehicles[name] = vehicle
     speeds = {
@@ -130,6 +130,14 @@ def _openscenario(root: Element) -> Imported:
                     )
     notes += [f"{name} left out: it follows no trajectory" for name in still]
     return Imported(tuple(tracks), tuple(notes))
+
+
+def _category(entity: Element) -> str:
+    """Return what a file calls the type of a vehicle or a pedestrian: its name where that is a type, as in our files."""
+    named = entity.attributes.get("name", "")
+    other = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory"}[entity.tag]
+    category = entity.attributes.get(other, "car" if entity.tag == "Vehicle" else "pedestrian")
+    return named if named in VEHICLE_TYPES and VEHICLE_TYPES[named].openscenario == category else category
 
 
 def _followers(root: Element) -> Iterator[tuple[str, Element, float]]:
@@ -187,10 +195,11 @@ def _followed(follow: Element, name: str, vehicle: Element, target: Element | No
     speeds = _own_speeds(vehicle)
     if speeds is not None and len(speeds) == len(result):
         result[:, 3] = speeds
-    return _track(follow.place, name, (size.number("length"), size.number("width")), result, speed)
+    named = Vehicle(name, size.number("length"), size.number("width"), type_called(_category(vehicle)) or "")
+    return _track(follow.place, named, result, speed)
 
 
-def _track(place: str, vehicle: str, size: tuple[float, float], rows: Floats, speed: float | None) -> Track:
+def _track(place: str, seen: Vehicle, rows: Floats, speed: float | None) -> Track:
     """Return a track whose times ascend; speeds that are not given are derived. `place` begins messages.
 
     Raises:
@@ -198,22 +207,22 @@ def _track(place: str, vehicle: str, size: tuple[float, float], rows: Floats, sp
     """
     if len(rows) > MOST_ROWS:
         raise InputError(f"{place}: {len(rows)} states; at most {MOST_ROWS} are read")
-    if min(size) <= 0.0:
-        raise InputError(f"{place}: a footprint of {size[0]:g} m × {size[1]:g} m; both must be positive")
+    if min(seen.half) <= 0.0:
+        raise InputError(f"{place}: a footprint of {seen.length:g} m × {seen.width:g} m; both must be positive")
     if len(rows) < 2 or not (np.diff(rows[:, 0]) > 0.0).all():
         raise InputError(f"{place}: times must ascend, and be two at least")
     if np.isnan(rows[:, 3]).any():
         rows[:, 3] = _speeds(rows, speed)
     if not np.isfinite(rows).all():
         raise InputError(f"{place}: its times, places or speeds are beyond all numbers")
-    if any(not c.isprintable() or c in ',"' for c in vehicle) or not vehicle:
-        raise InputError(f"{place}: the id {vehicle[:40]!r} cannot stand in a table; rename it")
-    return Track(vehicle, *size, rows)
+    if any(not c.isprintable() or c in ',"' for c in seen.id) or not seen.id:
+        raise InputError(f"{place}: the id {seen.id[:40]!r} cannot stand in a table; rename it")
+    return Track(seen.id, seen.length, seen.width, seen.type, rows)
 
 
 def _log(path: Path) -> Imported:
-    """Return the vehicles of a file that is read as logs are; sizes that are not given are a car's."""
-    log = read_raw([path], LogConfig())
+    """Return the vehicles of a file that is read as logs are; sizes that are not given are the usual ones of the type."""
+    log = typed(read_raw([path], LogConfig()), LogConfig())
     tracks = []
     for seen in log.vehicles:
         speed = np.full(len(seen.fix_ns), np.nan)
@@ -221,10 +230,9 @@ def _log(path: Path) -> Imported:
         speed[:] = [known.get(row, math.nan) for row in seen.fix_row.tolist()]
         heading = np.unwrap(np.where(np.isnan(seen.heading), _directions(seen.fix), seen.heading))
         rows = np.column_stack((seen.fix_ns * 1e-9, seen.fix, speed, heading))
-        usual = Vehicle(seen.id)
-        sizes = (seen.length, usual.length), (seen.width, usual.width)
-        length, width = (known_size if math.isnan(own) or own == 0.0 else own for own, known_size in sizes)
-        tracks.append(_track(f"{path}, vehicle {seen.id}", seen.id, (length, width), rows, None))
+        sizes = zip((seen.length, seen.width), usual_size(seen.kind, LogConfig()), strict=True)
+        length, width = (usual if math.isnan(own) or own == 0.0 else own for own, usual in sizes)
+        tracks.append(_track(f"{path}, vehicle {seen.id}", Vehicle(seen.id, length, width, seen.kind), rows, None))
     return Imported(tuple(tracks), log.notes)
 
 

@@ -197,28 +197,29 @@ def _boundary(scenario, asked, limits):
 
 def _kinematics(scenario, velocity, limits):
     h = np.diff(scenario.time)
-    for i in range(len(scenario.vehicles)):
+    for i, vehicle in enumerate(scenario.vehicles):
+        own = limits.of(vehicle.type)
         speed, turn = scenario.speed[i], np.abs(np.diff(scenario.heading[i]))
         rate = np.diff(speed) / h
-        if speed.min() < 0 or speed.max() > limits.max_speed + 1e-5:
+        if speed.min() < 0 or speed.max() > own.max_speed + 1e-5:
             yield f"speed: vehicle {i} from {speed.min():.3f} to {speed.max():.3f} m/s"
-        if np.linalg.norm(velocity[i], axis=-1).max() > limits.max_speed + 1e-5:
+        if np.linalg.norm(velocity[i], axis=-1).max() > own.max_speed + 1e-5:
             yield f"speed: vehicle {i} between samples"
         for a in (scenario.acceleration[i], rate):
-            if a.max() > limits.max_acceleration + 1e-5 or a.min() < -limits.max_deceleration - 1e-5:
+            if a.max() > own.max_acceleration + 1e-5 or a.min() < -own.max_deceleration - 1e-5:
                 yield f"longitudinal_acceleration: vehicle {i} from {a.min():.3f} to {a.max():.3f} m/s²"
-        if (np.maximum(speed[1:], speed[:-1]) * turn / h).max() > limits.max_lateral_acceleration + 1e-5:
+        if (np.maximum(speed[1:], speed[:-1]) * turn / h).max() > own.max_lateral_acceleration + 1e-5:
             yield f"lateral_acceleration: vehicle {i}"
         chord = np.diff(np.diff(scenario.position[i], axis=0) / h[:, None], axis=0) / (0.5 * (h[1:] + h[:-1]))[:, None]
         if (
             np.abs(chord[:, 1] * np.cos(scenario.heading[i, 1:-1]) - chord[:, 0] * np.sin(scenario.heading[i, 1:-1])).max(
                 initial=0.0
             )
-            > limits.max_lateral_acceleration + limits.acceleration_tolerance + 1e-5
+            > own.max_lateral_acceleration + limits.acceleration_tolerance + 1e-5
         ):
             yield f"lateral_acceleration: vehicle {i} by its positions"
         length = np.linalg.norm(np.diff(scenario.position[i], axis=0), axis=-1)
-        if (turn > limits.max_curvature * length + 1.1e-4).any():
+        if (turn > np.minimum(own.sharpest, 1e9) * length + 1.1e-4).any():
             yield f"curvature: vehicle {i}"
 
 

@@ -44,7 +44,7 @@ def refused(tmp_path, kind, data):
         ("xosc", b"WorldPosition", b"LanePosition", "<Position> has no <WorldPosition>"),
         ("xosc", b'time="0.5"', b'time="nan"', "<Vertex>, attribute time"),
         ("xosc", b'time="0.5"', b'time="$start"', "'$start'"),
-        ("xosc", b"BoundingBox", b"Box", "no vehicle with a bounding box"),
+        ("xosc", b"BoundingBox", b"Box", "no road user with a bounding box"),
     ],
 )
 def test_what_is_broken_is_named_with_its_place(tmp_path, kind, old, new, said):
@@ -71,8 +71,10 @@ def test_nothing_is_overwritten(tmp_path):
     assert out.read_bytes() == before
 
 
-def test_pedestrians_are_counted_and_left_out(tmp_path):
+def test_animals_are_counted_and_left_out_and_pedestrians_are_read(tmp_path):
     path = tmp_path / "one.xml"
-    path.write_bytes(GOOD["xml"].replace(b"<type>car</type>", b"<type>pedestrian</type>", 1))
-    made = read_scenario_file(path)
-    assert len(made.tracks) == 1 and "1 × pedestrian" in made.notes[-1]
+    for kind, types in ((b"pedestrian", ["pedestrian", "car"]), (b"animal", ["car"])):
+        path.write_bytes(GOOD["xml"].replace(b"<type>car</type>", b"<type>" + kind + b"</type>", 1))
+        made = read_scenario_file(path)
+        assert [track.type for track in made.tracks] == types
+    assert "1 × animal" in made.notes[-1]

@@ -78,7 +78,7 @@ def test_what_is_exported_is_read_back_and_as_a_log(small_bag, exported, tmp_pat
             assert np.allclose(rows[:, 3], scenario.speed[n, scenario.there[n]], atol=1e-6)
     name, _ = next(scenarios(small_bag))
     import_file(exported / name, tmp_path / "log.csv")
-    assert (tmp_path / "log.csv").read_text().startswith("vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m\n1,0,")
+    assert (tmp_path / "log.csv").read_text().startswith("vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m,type\n1,0,")
 
 
 def test_ids_that_are_no_numbers_are_counted_and_that_is_said(small_bag, tmp_path):
