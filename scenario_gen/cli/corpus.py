@@ -81,9 +81,9 @@ class Batch:
     corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote, or s3://….")]
     roads: Annotated[list[str], typer.Option(help="Roads, as for `generate`: separated by commas, or repeated.")]
     out: Annotated[Path, typer.Option(help="Folder for tables and bags, or s3://…. An unfinished batch is continued.")]
-    count: Annotated[int, typer.Option(min=1, max=100_000, help="Scenarios per template and road.")] = 50
+    count: Annotated[int, typer.Option(min=1, max=100_000, help="Scenarios per encounter and road.")] = 50
     seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 0
-    templates: Annotated[int, typer.Option(min=0, help="Use the first so many templates of the corpus. 0: all.")] = 0
+    templates: Annotated[int, typer.Option(min=0, help="Use the first so many encounters of the corpus. 0: all.")] = 0
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
     assignments: Annotated[
@@ -95,7 +95,7 @@ class Batch:
 @commands.command(urls=("corpus", "out"))
 @takes(Batch)
 def batch(options: Batch) -> None:
-    """Generate scenarios from all templates of a corpus on all given roads."""
+    """Generate scenarios from all encounters of a corpus on all given roads."""
     from scenario_gen.corpus.batch import BatchRequest, run_batch
     from scenario_gen.method.config import PipelineConfig
 
@@ -124,7 +124,7 @@ def find(
     condition: Annotated[str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")] = "true",
     limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list here. 0: all.")] = 20,
     bag: Annotated[
-        Path | None, typer.Option(help="Write the scenarios found to this bag, with their templates and roads.")
+        Path | None, typer.Option(help="Write the scenarios found to this bag, with their recordings and roads.")
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Folder for the page of that bag.")] = None,
     again: Annotated[
@@ -141,9 +141,10 @@ def find(
     found = finding.find(source, condition)
     give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
     listed = found.rows[: limit or None]
-    say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3)
+    titles = [f"{name} [{finding.UNITS[name]}]" if name in finding.UNITS else name for name in finding.COLUMNS]
+    say_rows(titles, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3)
     rest = f", the first {len(listed)} are listed; --limit 0 lists all" if len(listed) < len(found.rows) else ""
-    say(f"{len(found.rows)} scenarios found{rest}")
+    say(f"{len(found.rows)} scenarios found{rest}; a ttc above evaluation.ttc_horizon (10 s) counts as this")
     say(*finding.coverage_lines(found, source), sep="\n")
     if again:
         for row in found.rows:
@@ -193,7 +194,7 @@ def coverage(
     seed: Annotated[int, typer.Option(min=0, help="Random seed of the draws.")] = 0,
     out: Annotated[Path, typer.Option(help="The page to write, HTML.")] = Path("coverage.html"),
 ) -> None:
-    """Measure how much unseen traffic recordings and the scenarios generated from them stand for."""
+    """Measure how much unseen traffic recordings and the scenarios generated from them represent."""
     from scenario_gen.corpus.coverage import results_of, write_coverage
     from scenario_gen.method.evaluation.population import population_of
 

@@ -108,7 +108,7 @@ class Batch:
 
     def lines(self) -> list[str]:
         """Return the summary for people."""
-        lines = [f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (template and road)"]
+        lines = [f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (encounter and road)"]
         lines += [f"{count} cases without any: {cause}" for cause, count in Counter(self.failures).most_common()]
         lines += [f"{count} candidates refused: {cause}" for cause, count in Counter(self.refused).most_common()]
         return lines + self.failed

@@ -18,6 +18,7 @@ from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerat
 
 MEMORY = 500  # MiB
 COLUMNS = ("template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet", "speed", "braking")
+UNITS = {"seconds": "s", "distance": "m", "ttc": "s", "pet": "s", "speed": "m/s", "braking": "m/s²"}
 PET = (0.0, 1.0, 2.0, 4.0)  # s: bounds of the classes of the table of coverage
 CLASSES = "CASE WHEN pet IS NULL THEN 'none' " + " ".join(f"WHEN pet < {b:g} THEN '< {b:g} s'" for b in PET) + " ELSE 'more' END"
 

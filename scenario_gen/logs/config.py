@@ -11,7 +11,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 
 FORMATS = (
     *("auto", "spmd", "table", "bag", "argoverse2", "interaction", "ind", "highd", "commonroad", "nocturne", "osi"),
-    *("omega_prime", "bsm", "fcd"),
+    *("omega_prime", "bsm", "fcd", "openscenario"),
 )
 
 

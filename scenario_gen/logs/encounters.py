@@ -109,6 +109,13 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     return pieces, quality
 
 
+def plausible(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], tuple[str, ...]]:
+    """Return the pieces that are driven forwards, of types that suit their motion; and notes on what was doubtful."""
+    typed, contradictions = of_types(pieces)
+    kept, backwards = driven_forwards(typed, config)
+    return kept, (*contradictions, *backwards)
+
+
 def of_types(pieces: Sequence[Piece]) -> tuple[list[Piece], tuple[str, ...]]:
     """Return the pieces; a vehicle that is much faster than its type is of type `other`, and a note says so."""
     fastest: dict[tuple[str, str], float] = {}

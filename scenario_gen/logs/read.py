@@ -22,10 +22,11 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.base.stores import local, naming_objects, renamed, temporary
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
+from scenario_gen.logs.adapters.openscenario import is_openscenario
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import LogConfig, picked
-from scenario_gen.logs.encounters import driven_forwards, of_types, Piece, pieces_of
+from scenario_gen.logs.encounters import Piece, pieces_of, plausible
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
 from scenario_gen.logs.groups import distances, driven, find_groups, ticks
 from scenario_gen.logs.growing import Group, Meeting
@@ -116,12 +117,11 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         vehicles.append(quality)
     if not pieces and any(vehicle.lost for vehicle in vehicles):
         raise InputError(f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units")
-    pieces, contradictions = of_types(pieces)
-    pieces, backwards = driven_forwards(pieces, config)
+    pieces, doubts = plausible(pieces, config)
     groups, notes = find_groups(pieces, config)
     if not groups:
-        raise NoEncounterError("; ".join((*backwards, explain_no_encounter(log, pieces, config))))
-    notes += (*contradictions, *backwards)
+        raise NoEncounterError("; ".join((*doubts, explain_no_encounter(log, pieces, config))))
+    notes += doubts
     notes += notes_on_origin(tracks, config)
     notes += notes_on_vehicles(
         vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.spans}, config
@@ -432,6 +432,7 @@ FORMATS = Registry[LogFormat](
         "osi": LogFormat(is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))),
         "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
         "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
+        "openscenario": LogFormat(is_openscenario, late("adapters.openscenario")),
         "bsm": LogFormat(is_bsm, late("adapters.bsm")),
         "fcd": LogFormat(is_fcd, late("adapters.fcd")),
         "nocturne": LogFormat(is_nocturne, late("adapters.nocturne")),
@@ -470,8 +471,8 @@ def _read_files(files: Sequence[Path], config: LogConfig) -> RawLog:
     if known is None:
         raise UnknownFormatError(
             f"{files[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and GPUDrive (.json), "
-            "rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
+            "CommonRoad and OpenSCENARIO scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and "
+            "GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
             "If its name misleads: --set log.format=table"
         )
     with reading(files[0]):

@@ -25,12 +25,13 @@ from scenario_gen.roads.ways import draw_ring_route, draw_route
 from scenario_gen.template import clean_tracks, reactions_of, sharpness_of, Track, turn_of
 from scenario_gen.types import Encounter, Road, YIELD
 
-_RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
+_RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane where none was recorded
+_LEAST_RING = 8.0  # metres, of one that was recorded
 _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
 _NEAR_RING = 4.0  # metres beyond the middle of its lane within which a vehicle's speed is one on the ring
 _EVERY = 1.0  # metres between the poses of a path by which a ring is found
 _WIDEST_RING = 60.0  # metres of its radius, in the template
-_LEAST_ARC = 15.0  # metres that are driven about it
+_LEAST_ARC, _LONG_ARC = 12.0, 30.0  # metres that are driven about it, by all; by one who neither comes nor goes
 _OFF_RING = 2.5  # metres to its lane
 _FLARED = np.radians(15.0)  # by which those who come or go turn away from it
 _SAME_ARM = np.radians(30.0)  # directions that differ by less are those of one arm
@@ -153,8 +154,9 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
-        centre, recorded = _ring_driven(tracks, config)
-        radius, fastest = _ring(tracks, centre, recorded)
+        driven_about = _ring_driven(tracks, config)
+        centre = junction_centre(tracks) if driven_about is None else driven_about[0]
+        radius, fastest = _ring(tracks, centre, None if driven_about is None else driven_about[1])
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
     if fastest > np.sqrt(_RING_FASTEST * radius):
@@ -186,10 +188,10 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     return draw_plan(Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim), name, config)
 
 
-def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float]:
-    """Centre (2,) and radius [m] of the circle about which those drive who bend to the other side before or after.
+def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float] | None:
+    """Centre (2,) and radius [m] of the circle about which those drive who bend to the other side before or after, or go far.
 
-    The junction's centre and the smallest radius, where nobody does.
+    None where nobody does.
     """
     sign, points = 1.0 if config.traffic_side == "right" else -1.0, np.zeros((0, 2))
     for track in tracks:
@@ -197,7 +199,7 @@ def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats,
         turned = sign * np.gradient(np.convolve(poses[:, 2], np.full(5, 0.2), "same")) if len(poses) > 9 else np.zeros(len(poses))
         turned[:3] = turned[-3:] = 0.0
         about = turned > _EVERY / _WIDEST_RING
-        if -turned[turned < 0.0].sum() > _FLARED:
+        if -turned[turned < 0.0].sum() > _FLARED or about.sum() * _EVERY > _LONG_ARC:
             points = np.concatenate((points, poses[about, :2]))
     for _ in range(3):
         if len(points) < _LEAST_ARC / _EVERY:
@@ -207,21 +209,26 @@ def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats,
         centre, radius = np.array([x, y]), float(np.sqrt(rest + x * x + y * y))
         near = np.abs(np.hypot(*(points - centre).T) - radius) < _OFF_RING
         if near.all() and radius < _WIDEST_RING:
-            return centre, radius
+            return centre, max(radius, _LEAST_RING)
         points = points[near]
-    return junction_centre(tracks), _RING[0]
+    return None
 
 
-def _ring(tracks: tuple[Track, ...], centre: Floats, least: float) -> tuple[float, float]:
-    """The radius [m] of a roundabout's lane that suits the template's speeds on it, not on its arms; the fastest [m/s] there."""
+def _ring(tracks: tuple[Track, ...], centre: Floats, recorded: float | None) -> tuple[float, float]:
+    """The radius [m] of a roundabout's lane that suits the template's speeds on it, not on its arms; the fastest [m/s] there.
+
+    One that was recorded is drawn as it was, if cars can drive it so fast.
+    """
     there = [slice(track.present[0], track.present[1] + 1) for track in tracks]
     speed = np.concatenate([track.speed[own] for track, own in zip(tracks, there, strict=True)])
     place = np.concatenate([track.poses[own, :2] for track, own in zip(tracks, there, strict=True)])
     away = np.hypot(*(place - centre).T)
-    lateral = _RING_FASTEST if least > _RING[0] else _RING_LATERAL  # a ring that was recorded is drawn as it was
-    for radius in np.append(np.arange(max(least, _RING[0]), _RING[1], 0.25), _RING[1]):
+    if recorded is not None:
+        fastest = float(speed[away < recorded + _OFF_RING].max(initial=0.0))
+        return min(max(recorded, fastest**2 / _RING_FASTEST), _RING[1]), fastest
+    for radius in np.append(np.arange(*_RING, 0.25), _RING[1]):
         fastest = float(speed[away < radius + _NEAR_RING].max(initial=0.0))
-        if np.square(fastest) <= lateral * radius:
+        if np.square(fastest) <= _RING_LATERAL * radius:
             break
     return float(radius), fastest
 
@@ -231,7 +238,7 @@ def _ends(i: int, track: Track, centre: Floats, ring: float) -> list[_End]:
     poses = track.curve.at(s) - np.array([*centre, 0.0])
     ends = []
     turn = turn_of(track)
-    goes_on = 0.0 if abs(turn) < _THROUGH else float(np.sign(turn))
+    goes_on = 0.0 if ring or abs(turn) < _THROUGH else float(np.sign(turn))
     for inward in (True, False):
         along = poses if inward else poses[::-1]
         turning = np.flatnonzero(np.abs(along[:, 2] - along[0, 2]) > _STEADY)

@@ -47,6 +47,7 @@ class Track:
         present: (2,) first and last sample at which it is there; before and after, progress and speed are those at these.
         recorded_turn: how far [rad, left positive] the recorded heading turns from start to end; NaN for one that stands.
         dt: seconds between samples.
+        lane: the middle of the lanes that it drives on a road, before and beyond its path too; None: they are not known.
     """
 
     vehicle: Vehicle
@@ -58,6 +59,7 @@ class Track:
     present: Ints
     recorded_turn: float
     dt: float
+    lane: Curve | None = None
 
     @cached_property
     def there(self) -> Bools:

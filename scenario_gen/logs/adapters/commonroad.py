@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, read_xml
+from scenario_gen.base.markup import Element, has_root, read_xml
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
 
@@ -35,10 +35,7 @@ _SKIPPED = frozenset(("lanelet", "trafficSign", "trafficLight", "intersection", 
 
 def is_commonroad(path: Path) -> bool:
     """Return whether a file is CommonRoad by its name and beginning."""
-    if path.suffix.lower() != ".xml":
-        return False
-    with path.open("rb") as file:
-        return b"<commonRoad" in file.read(4096)
+    return has_root(path, "commonRoad", ".xml")
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:

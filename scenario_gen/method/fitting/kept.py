@@ -34,7 +34,10 @@ _SAME_WAY = np.radians(30.0)
 _ENOUGH = 0.5  # share of that time in which they are beside each other on the road, on the same side
 _IN_LANE, _OFF_LANE = 1.4, 2.3  # metres sideways up to which a vehicle is in another one's lane, and from which on beside it
 _STILL_IN_LANE = 2.0  # metres, likewise on the road
-_BEYOND, _DRIFT = 30.0, 1.0  # metres beyond a path's ends, straight on, for which it says where its lane lies, to so many
+_BEYOND, _DRIFT = (
+    30.0,
+    1.0,
+)  # metres beyond a path's, or its lanes', ends, straight on, for which it says where its lane lies, to so many
 _PASSED = 2.0  # metres by which one that passes another is behind it first, and then before it
 
 
@@ -149,10 +152,10 @@ def _differs(own: float, there: float, farthest: float) -> bool:
 
 def _aside(track: Track, other: Track, end: int) -> float:
     """How far [m, left positive] beside a path another vehicle starts (`end` 0) or ends (1); NaN if it does not lead there."""
-    pose = other.curve.at(other.progress[other.present[end]])
-    station, offset = track.curve.project(pose[None, :2])
-    beyond = max(-float(station[0]), float(station[0]) - track.travelled)
-    turned = abs(float(wrap_angle(track.curve.at(station)[0, 2] - pose[2])))
+    pose, lane = other.curve.at(other.progress[other.present[end]]), track.lane or track.curve
+    station, offset = lane.project(pose[None, :2])
+    beyond = max(-float(station[0]), float(station[0]) - (lane.length if track.lane else track.travelled))
+    turned = abs(float(wrap_angle(lane.at(station)[0, 2] - pose[2])))
     leads = turned < _SAME_WAY if beyond <= 0.0 else beyond < _BEYOND and turned * beyond < _DRIFT
     return float(offset[0]) if leads and not (track.still or other.still) else np.nan
 

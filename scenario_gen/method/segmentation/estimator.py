@@ -266,7 +266,7 @@ class StickyHDPHMM:
         every = np.zeros((len(x), self.n_states_))
         every[rows] = density
         proba = np.empty_like(every)
-        total = smooth(every, self.transitions_, self.startprob_, ends, proba)
+        total = smooth(every, self.transitions_, self.startprob_, ends, proba, np.empty(len(x)))
         return proba, total
 
     def _concerns(self, x: Floats, visible: Floats, requested: float) -> list[str]:

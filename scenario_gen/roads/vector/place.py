@@ -216,7 +216,7 @@ def tracks_on(placement: Match, tracks: Sequence[Track]) -> tuple[Track, ...]:
         driven = float(course.progress[-1])
         curve = course.curve.cut(course.start, course.start + max(driven, 1.0), 0.25)
         progress = course.progress * (curve.length / driven if driven > 1.0 else 1.0)
-        placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length))))
+        placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length)), lane=course.curve))
     return tuple(placed)
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from motions import arc, open_road, scenario_of, straight
 import numpy as np
-from oracle import oracle_violations
 import pytest
 
 from scenario_gen.base.errors import InputError
@@ -43,11 +42,9 @@ def asked_of(scenario):
 
 
 def causes(scenario, *, road=ROAD, requested=None, conflicts=None, waits=None, limits=None):
-    """Causes found by the checker; the oracle must find nothing where the checker finds nothing."""
+    """Causes found by the checker."""
     (verdict,) = Checker(road, requested, conflicts, waits, limits).check([scenario])
     assert all(violation.message and np.isfinite(violation.time) for violation in verdict.violations)
-    if verdict.valid:
-        assert oracle_violations(scenario, road, requested, conflicts, waits, limits, dt=0.02) == []
     return [violation.cause for violation in verdict.violations]
 
 
@@ -56,7 +53,6 @@ def test_a_good_scenario_is_valid():
     waits = (Wait(0, 3.0, 6.0),)
     (verdict,) = Checker(ROAD, asked_of(scenario), (), waits).check([scenario])
     assert verdict.violations == ()
-    assert oracle_violations(scenario, ROAD, asked_of(scenario), (), waits) == []
 
 
 @pytest.mark.parametrize(
@@ -165,7 +161,6 @@ def test_passing_order_is_that_of_the_template():
     assert causes(scenario, conflicts=kept) == []
     reverse = (Conflict(kept[0].second, kept[0].first, False, 0.0, 1.0, 2.0),)
     assert causes(scenario, conflicts=reverse) == [Cause.PASSING_ORDER]
-    assert oracle_violations(scenario, ROAD, None, reverse, None) != []
 
 
 def test_a_conflict_that_the_scenario_does_not_have_is_counted_not_refused():
