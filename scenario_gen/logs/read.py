@@ -106,8 +106,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     said_first = (*notes, *notes_on_drops(log, drops), *drops.notes)
     if len({track.id for track in tracks}) < 2:
         raise NoEncounterError(explain_few_vehicles(log, [track.id for track in tracks], drops))
-    tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
-    dt_ns = round(config.period * 1e9)
+    tracks, dt_ns = tuple(sorted(tracks, key=lambda track: natural(track.id))), round(config.period * 1e9)
     origin_ns = min(int(track.fix_ns[0]) for track in tracks) // dt_ns * dt_ns
     pieces: list[Piece] = []
     vehicles = []
