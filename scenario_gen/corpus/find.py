@@ -23,8 +23,8 @@ MEMORY = 500  # MiB
 COLUMNS = ("template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet", "speed", "braking")
 UNITS = {"seconds": "s", "distance": "m", "ttc": "s", "pet": "s", "speed": "m/s", "braking": "m/s²"}
 RECORDED = (  # an encounter's columns, with the names of a scenario's
-    "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index, NULL AS type, seconds, closest AS distance, ttc, pet, "
-    "speed, NULL AS braking, gap"
+    "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index, NULL AS type, seconds, closest AS distance, "
+    "ttc, pet, speed, NULL AS braking, gap"
 )
 PET = (0.0, 1.0, 2.0, 4.0)  # s: bounds of the classes of the table of coverage
 CLASSES = "CASE WHEN pet IS NULL THEN 'none' " + " ".join(f"WHEN pet < {b:g} THEN '< {b:g} s'" for b in PET) + " ELSE 'more' END"

@@ -30,9 +30,9 @@ def sparse(rows):
 
 
 def with_kind(rows):
-    walker = rows[rows.vehicle_id == "a"].assign(vehicle_id="w", y_m=5.0)
+    dog = rows[rows.vehicle_id == "a"].assign(vehicle_id="w", y_m=5.0)
     names = {"a": "Car", "b": "vehicle.car", "w": "animal.dog.0007"}
-    return pd.concat([rows, walker]).assign(type=lambda own: own.vehicle_id.map(names))
+    return pd.concat([rows, dog]).assign(type=lambda own: own.vehicle_id.map(names))
 
 
 def numbered(rows):
