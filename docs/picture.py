@@ -1,83 +1,145 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Draw docs/picture.png, the picture of the README: `python docs/picture.py` (matplotlib; the bundled log, seed 7)."""
+"""Draw docs/picture.svg, the animated picture of the README: `python docs/picture.py` (the first case of the demo, seed 7)."""
 
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 
-from scenario_gen import build_road, bundled, Encounter, generate, read_log, Road, Scenario, segment
-from scenario_gen.types.markings import Marking, markings
+from scenario_gen import build_road, bundled, Encounter, generate, read_log, Road, Scenario
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.types.markings import markings
 
-matplotlib.use("agg")
-from matplotlib import pyplot
-from matplotlib.axes import Axes
-
-COLOURS = ("#0b6e99", "#d9622b", "#4b8b3b")
-PAINT = {
-    Marking.EDGE: {"linewidth": 0.8},
-    Marking.LANE: {"linewidth": 0.6, "dashes": (5, 7)},
-    Marking.CENTRE: {"linewidth": 0.8, "dashes": (5, 3)},
-    Marking.STOP: {"linewidth": 2.0},
-    Marking.GIVE_WAY: {"linewidth": 1.6, "dashes": (1, 1)},
-    Marking.ARROW: {"linewidth": 0.6},
-}
-PICTURE = Path(__file__).with_name("picture.png")
-CASE, COUNT, SEED = "b", 30, 7
+PICTURE = Path(__file__).with_name("picture.svg")
+CASE, ROAD, COUNT, SEED = "left_turn", "four_way", 30, 7
+LABELS = ("vehicle 1 goes straight on", "vehicle 2 turns left and waits")
+TURNS = 1  # index of the one that waits
+PANELS = 4  # the recording and three scenarios; the speeds are of all
+WIDTH, PANEL, GAP, TOP, PLOT_TOP, PLOT_HEIGHT = 900, 216, 12, 24, 280, 120  # pixels
+LEFT = 36
+HALF_M = 30.0  # what a panel shows around the meeting
+STEP_S = 0.2
+PAUSE_S = 1.0  # at the end of the film
+STANDS_MPS = 0.3
+MAX_MPS = 16.0
+STYLE = """
+text { font: 12px sans-serif; fill: #333 } .small { font-size: 11px }
+.back { fill: #f3f3f5 } .road { fill: #d3d5da } .axis { stroke: #888; fill: none }
+.marking { stroke: #fff; fill: none; stroke-width: 1 }
+.dashed { stroke-dasharray: 3 5 } .thick { stroke-width: 3 }
+.path { fill: none; stroke-width: 1.2; opacity: .5 }
+.recorded { fill: none; stroke-width: 2.4 } .thin { fill: none; stroke-width: .7; opacity: .3 }
+.s0 { stroke: #0b6e99 } .s1 { stroke: #d9622b } .f0 { fill: #0b6e99 } .f1 { fill: #d9622b; font-weight: bold }
+@media (prefers-color-scheme: dark) {
+text { fill: #ddd } .back { fill: #22242a } .road { fill: #454851 } .marking { stroke: #9a9ca3 }
+.s0 { stroke: #4fb3e0 } .s1 { stroke: #ff8a50 } .f0 { fill: #4fb3e0 } .f1 { fill: #ff8a50 } }
+"""
 
 
 def main() -> None:
-    """Draw the recording, what was generated from it on a road, and the speeds of both."""
+    """Draw the recording and what was generated from it side by side, moving, and the speeds of both."""
     (encounter,) = read_log(bundled(CASE)).encounters
-    found = segment(encounter, seed=SEED)
-    road = build_road("t_intersection", encounter)
-    result = generate(encounter, road, count=COUNT, seed=SEED)
-    pyplot.rcParams |= {"font.size": 8}
-    figure, axes_of = pyplot.subplot_mosaic("ac;bc", figsize=(9.0, 4.2), width_ratios=(1.4, 1.0), layout="constrained")
-    recorded, generated, speeds = (axes_of[name] for name in "abc")
-    draw(recorded, encounter, 1.0)
-    for n, position in enumerate(encounter.position):
-        recorded.plot(*position[found.changepoints].T, "o", color="white", markeredgecolor=COLOURS[n], markersize=5)
-        speeds.plot(
-            encounter.time, encounter.speed[n], color=COLOURS[n], linewidth=2.0, label=f"vehicle {encounter.vehicles[n].id}"
-        )
-    for time in encounter.time[found.changepoints]:
-        speeds.axvline(time, color="#bbbbbb", linewidth=0.8, linestyle=":")
-    for scenario in result.generated.scenarios:
-        draw(generated, scenario, 0.4)
-        for n, speed in enumerate(scenario.speed):
-            speeds.plot(scenario.time, speed, color=COLOURS[n], alpha=0.4, linewidth=0.7)
-    draw_road(generated, road)
-    recorded.set_title(f"recorded: {encounter.name}, {len(found.changepoints)} changepoints")
-    generated.set_title(f"generated: {len(result.generated.scenarios)} scenarios on {road.name}")
-    speeds.set_title("speeds: recorded (thick), generated (thin)")
-    speeds.set(xlabel="time [s]", ylabel="speed [m/s]")
-    speeds.legend(frameon=False)
-    for axes in (recorded, generated):
-        axes.set_aspect("equal")
-        axes.set(xlabel="x [m]", ylabel="y [m]")
-    figure.savefig(PICTURE, dpi=110)
+    road = build_road(ROAD, encounter)
+    scenarios = generate(encounter, road, count=COUNT, seed=SEED).generated.scenarios
+    motions: list[Encounter | Scenario] = [encounter, *spread(scenarios)]
+    clock = np.arange(0.0, max(motion.time[-1] for motion in (encounter, *scenarios)) + PAUSE_S, STEP_S)
+    height = PLOT_TOP + PLOT_HEIGHT + 40
+    lines = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}">']
+    lines += [f"<style>{STYLE}</style>", f'<clipPath id="panel"><rect width="{PANEL}" height="{PANEL}"/></clipPath>']
+    for k, motion in enumerate(motions):
+        scenario = f"scenario {motion.index}" if isinstance(motion, Scenario) else "recorded"
+        title = f"generated on {road.name}, {scenario}" if k == 1 else scenario
+        lines.append(f'<text x="{k * (PANEL + GAP)}" y="15">{title}</text>')
+        lines.append(f'<g transform="translate({k * (PANEL + GAP)} {TOP})" clip-path="url(#panel)">')
+        lines += [f'<rect class="back" width="{PANEL}" height="{PANEL}"/>', *panel(motion, road if k else None, clock), "</g>"]
+    lines += [*speeds(encounter, scenarios, clock), "</svg>"]
+    PICTURE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def draw(axes: Axes, motion: Encounter | Scenario, alpha: float) -> None:
-    """Draw every vehicle's way, its start as a dot."""
-    for n, position in enumerate(motion.position):
-        axes.plot(*position.T, color=COLOURS[n], alpha=alpha, linewidth=1.0)
-        axes.plot(*position[0], "o", color=COLOURS[n], alpha=alpha, markersize=3)
+def spread(scenarios: Sequence[Scenario]) -> list[Scenario]:
+    """Return scenarios that differ in when the one that waits drives off: the earliest, the middle and the latest."""
+    leaves = [scenario.time[scenario.speed[TURNS] < STANDS_MPS][-1:].sum() for scenario in scenarios]
+    order = np.argsort(leaves, kind="stable")
+    return [scenarios[k] for k in order[np.linspace(0, len(order) - 1, PANELS - 1).astype(int)]]
 
 
-def draw_road(axes: Axes, road: Road) -> None:
-    """Draw what is drivable and what is painted on it underneath, as far as the axes reach."""
-    bounds = axes.axis()
-    height, width = road.drivable.shape
-    x, y = (low + road.resolution * (np.arange(cells) + 0.5) for low, cells in zip(road.origin, (width, height), strict=True))
-    axes.contourf(x, y, road.drivable, levels=(0.5, 1.5), colors=("#d9dade",), zorder=0)
-    for kind, lines in (markings(road.lanes) if road.lanes is not None else {}).items():
-        for line in lines:
-            axes.plot(*line.T, color="white", zorder=0.5, **PAINT[kind])
-    axes.axis(bounds)
+def panel(motion: Encounter | Scenario, road: Road | None, clock: Floats) -> Iterator[str]:
+    """Yield the road, and every vehicle's path and moving footprint; the word "waits" beside the one that stands."""
+    apart = np.linalg.norm(motion.position[0][:, None] - motion.position[1][None], axis=-1)
+    centre = motion.position[0][np.unravel_index(np.argmin(apart), apart.shape)[0]]
+    pixels = PANEL / (2.0 * HALF_M)
+
+    def place(points: Floats) -> Floats:
+        return (points - centre) * (pixels, -pixels) + PANEL / 2.0
+
+    if road is not None and road.lanes is not None:
+        for lane in road.lanes.lanes:
+            yield f'<path class="road" d="M{path(place(np.concatenate([lane.left, lane.right[::-1]])))}Z"/>'
+        for kind, painted in markings(road.lanes).items():
+            css = {"lane": " dashed", "centre": " dashed", "stop": " thick"}.get(kind.value, "")
+            yield from (f'<path class="marking{css}" d="M{path(place(line))}"/>' for line in painted)
+    seconds = f'dur="{clock[-1]:.1f}s" repeatCount="indefinite"'
+    for n, vehicle in enumerate(motion.vehicles):
+        at = np.minimum(np.searchsorted(motion.time, clock), len(motion.time) - 1)
+        xy, turned = place(motion.position[n][at]), -np.degrees(heading(motion, n)[at])
+        length, width = vehicle.length * pixels, vehicle.width * pixels
+        moves = animated("translate", path(xy, ";"), seconds)
+        turns = animated("rotate", ";".join(f"{angle:.0f}" for angle in turned), seconds)
+        box = f'<rect class="f{n}" x="{-length / 2:.1f}" y="{-width / 2:.1f}" width="{length:.1f}" height="{width:.1f}" rx="2"/>'
+        yield f'<path class="path s{n}" d="M{path(place(motion.position[n][::3]))}"/>'
+        yield f"<g>{moves}<g>{turns}{box}</g>{waits(motion, at, seconds) if n == TURNS else ''}</g>"
+
+
+def animated(kind: str, values: str, seconds: str) -> str:
+    """Return a transformation that changes with time."""
+    return f'<animateTransform attributeName="transform" type="{kind}" values="{values}" {seconds}/>'
+
+
+def waits(motion: Encounter | Scenario, at: Ints, seconds: str) -> str:
+    """Return the word, seen while the vehicle stands."""
+    stands = ";".join("1" if speed < STANDS_MPS else "0" for speed in motion.speed[TURNS][at])
+    seen = f'<animate attributeName="opacity" calcMode="discrete" values="{stands}" {seconds}/>'
+    return f'<text class="f{TURNS}" x="-14" y="20">waits{seen}</text>'
+
+
+def heading(motion: Encounter | Scenario, n: int) -> Floats:
+    """Return a vehicle's heading [rad]; of a recording the direction in which it last moved."""
+    if isinstance(motion, Scenario):
+        return motion.heading[n]
+    step = np.gradient(motion.position[n], axis=0)
+    moving = np.maximum.accumulate(np.where(np.hypot(*step.T) > 0.1, np.arange(len(step)), 0))
+    return np.unwrap(np.arctan2(step[moving, 1], step[moving, 0]))
+
+
+def speeds(encounter: Encounter, scenarios: Sequence[Scenario], clock: Floats) -> Iterator[str]:
+    """Yield the speeds of the recording, thick, and of all scenarios, thin, under a cursor."""
+    right, bottom = WIDTH - 8, PLOT_TOP + PLOT_HEIGHT
+
+    def curve(time: Floats, speed: Floats) -> str:
+        x, y = LEFT + (right - LEFT) * time / clock[-1], bottom - PLOT_HEIGHT * speed / MAX_MPS
+        return path(np.stack([x, y], axis=-1)[::2])
+
+    yield f'<text x="0" y="{PLOT_TOP - 12}">speeds [m/s]: recorded (thick) and of {len(scenarios)} scenarios (thin)</text>'
+    for n, label in enumerate(LABELS):
+        yield f'<text class="f{n}" x="{480 + 200 * n}" y="{PLOT_TOP - 12}">{label}</text>'
+        yield from (f'<path class="thin s{n}" d="M{curve(scenario.time, scenario.speed[n])}"/>' for scenario in scenarios)
+        yield f'<path class="recorded s{n}" d="M{curve(encounter.time, encounter.speed[n])}"/>'
+    yield f'<path class="axis" d="M{LEFT} {PLOT_TOP}V{bottom}H{right}"/>'
+    for speed in (0, 5, 10, 15):
+        y = bottom + 4 - PLOT_HEIGHT * speed / MAX_MPS
+        yield f'<text class="small" x="{LEFT - 6}" y="{y:.0f}" text-anchor="end">{speed}</text>'
+    for time in range(0, int(clock[-1]) + 1, 5):
+        x = LEFT + (right - LEFT) * time / clock[-1]
+        yield f'<text class="small" x="{x:.0f}" y="{bottom + 16}" text-anchor="middle">{time} s</text>'
+    moves = f'<animate attributeName="x" from="{LEFT}" to="{right}" dur="{clock[-1]:.1f}s" repeatCount="indefinite"/>'
+    yield f'<rect x="{LEFT}" y="{PLOT_TOP}" width="1.5" height="{PLOT_HEIGHT}" fill="#888">{moves}</rect>'
+
+
+def path(points: Iterable[Floats], separator: str = "L") -> str:
+    """Return points (K, 2) in pixels as SVG has them."""
+    return separator.join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
 if __name__ == "__main__":

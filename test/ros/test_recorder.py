@@ -117,7 +117,8 @@ def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(start, client, da
     from std_srvs.srv import Trigger
 
     source, copy = data / "bags" / storage / "talker", tmp_path / "copy"
-    player = start("player", bag=source, topics="/topic", paused=True, rate=100.0)
+    kept = [word for p in ("durability:=transient_local", "depth:=10") for word in ("-p", f"qos_overrides./topic.publisher.{p}")]
+    player = start("player", *kept, bag=source, topics="/topic", paused=True, rate=100.0)  # a late match loses nothing
     recorder = start("recorder", bag=copy, topics="/topic", split_bytes=100)
     client.until(lambda: client.node.count_subscribers("/topic") > 0, "a subscriber of /topic")
     client.until(lambda: client.node.count_publishers("/topic") > 0, "a publisher of /topic")

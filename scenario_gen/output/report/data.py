@@ -58,6 +58,7 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "road": road_data(case.road) if case.road else None,
         "template": _template(case.encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
+        "reactions": _reactions(case),
         "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
         "causes": [cause.value.replace("_", " ") for cause, _ in refused],
         "turn": _turn(case.encounter, case.fit),
@@ -211,6 +212,15 @@ def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
             }
         )
     return vehicles
+
+
+def _reactions(case: GenerationResult) -> list[dict[str, Any]]:
+    """Return who reacts to whom, as indices of vehicles, and from which to which share of the recording."""
+    duration = case.encounter.duration
+    return [
+        {"who": e.who, "whom": e.whom, "kind": e.kind, "from": _short(e.since / duration), "to": _short(e.until / duration)}
+        for e in (case.generated.graph.edges if case.generated.graph is not None else ())
+    ]
 
 
 def _features(encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shared: Sequence[str]) -> list[dict[str, Any]]:

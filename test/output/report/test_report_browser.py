@@ -61,7 +61,7 @@ def test_it_loads_without_errors_or_requests(tab, report):
     tab.page.wait_for_timeout(300)
     assert tab.troubles == []
     assert tab.asked() == [report.as_uri()]
-    assert tab.page.locator('[data-case="0"] .plot').count() == 10  # template, two arms, motion, six matrices
+    assert tab.page.locator('[data-case="0"] .plot').count() == 11  # shown scenario, recording, two arms, motion, six matrices
     for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
         pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
         assert len(pixels.getcolors(1_000_000)) > 10, role
@@ -119,6 +119,25 @@ def test_samples_and_sets_can_be_chosen(tab):
     tab.part("follow").check()
     assert tab.picture("stage") != far
     assert tab.troubles == []
+
+
+def test_the_speeds_follow_the_film_and_a_click_on_them_sets_it(tab):
+    place = tab.part("speeds-now")
+    cursor = place.locator(".cursor")
+    before = cursor.get_attribute("x1")
+    place.click(position={"x": 48 + 0.5 * (place.bounding_box()["width"] - 58), "y": 60})
+    duration = float(tab.part("clock").inner_text().split("/")[1].removesuffix("s"))
+    assert abs(tab.time() - duration / 2) < 0.2 and cursor.get_attribute("x1") != before
+    drawn = place.inner_html()
+    tab.part("next").click()
+    assert place.inner_html() != drawn
+
+
+def test_a_folded_part_is_opened_by_the_contents_and_drawn(tab):
+    chart = tab.page.locator('[data-case="0"] [data-role="motion"]')
+    assert not chart.is_visible()
+    tab.page.get_by_role("link", name="How it is driven").first.click()
+    tab.wait(lambda: chart.is_visible() and chart.locator("svg").bounding_box()["width"] > 600)
 
 
 def test_another_case_opens(tab):

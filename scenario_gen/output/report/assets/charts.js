@@ -13,14 +13,19 @@ function speeds(set, sample, vehicle) {
   return Array.from({ length: set.frames }, (_, f) => (set.there(sample, vehicle, f / (set.frames - 1)) ? at(f) : null));
 }
 
-/** How one figure is distributed over the set, with the template's place in it. */
-function drawSpread(place, figure) {
+/** How one figure is distributed over the set, with the recording's place in it; `choose(k)` shows the k-th scenario, or is null if it is not drawn. */
+function drawSpread(place, figure, choose) {
   const values = figure.values.filter((value) => value !== null);
   const [low, high] = values.length ? extent(values) : [0, 1];
   const count = high > low ? 20 : 1;
   const step = (high - low || 1) / count;
   const bars = Array.from({ length: count }, (_, k) => ({ from: low + k * step, to: low + (k + 1) * step, count: 0 }));
-  values.forEach((value) => { bars[Math.min(count - 1, Math.floor((value - low) / step))].count += 1; });
+  figure.values.forEach((value, k) => {
+    if (value === null) return;
+    const bar = bars[Math.min(count - 1, Math.floor((value - low) / step))];
+    bar.count += 1;
+    bar.choose = bar.choose || choose(k);
+  });
   const title = `${figure.label} [${figure.unit}], ${values.length} of ${figure.values.length}`;
   const marks = figure.template === null ? [] : [figure.template];
   const range = extent([...marks, low, high === low ? low + 1 : high]);
@@ -46,7 +51,16 @@ function drawTemplate(place, data, template) {
   });
 }
 
-/** Figure 4, lower half: the speeds of all samples, the template's dashed. */
+/** The speeds of one scenario, those of the recording on its own clock dashed, under a cursor. */
+function drawSpeedsNow(place, data, set, sample, template, cursor) {
+  const lines = data.vehicles.flatMap((vehicle, n) => [
+    { x: clock(template, 0), y: speeds(template, 0, n), colour: vehicleColour(n), width: 1.2, dash: "5 4", name: `${vehicle.id}, recorded` },
+    { x: clock(set, sample), y: speeds(set, sample, n), colour: vehicleColour(n), width: 2.2, name: vehicle.id },
+  ]);
+  chart(place, { label: "speeds of the shown scenario; dashed: recorded", x: { title: "time [s]" }, cursor, panels: [{ title: "speed [m/s]", share: 1, zero: true, lines }] });
+}
+
+/** Figure 4, lower half: the speeds of all scenarios, those of the recording dashed. */
 function drawSpeeds(place, data, set, template, top) {
   const lines = [];
   data.vehicles.forEach((vehicle, n) => {
@@ -59,10 +73,10 @@ function drawSpeeds(place, data, set, template, top) {
     lines.push({ x, y, colour: vehicleColour(n), width: isEgo(data, n) ? 2 : 1, dash: isEgo(data, n) ? "7 5" : "", opacity: Math.max(0.3, 1 - set.samples / 30), name: vehicle.id });
   });
   data.vehicles.forEach((vehicle, n) => lines.push({ x: clock(template, 0), y: speeds(template, 0, n), width: 1.5, dash: "6 4", name: `${vehicle.id}, recorded` }));
-  chart(place, { label: "speeds of all samples; dashed: recorded", x: { title: "time [s]" }, panels: [{ title: "speed [m/s]", share: 1, range: [0, top], lines }] });
+  chart(place, { label: "speeds of all scenarios; dashed: recorded", x: { title: "time [s]" }, panels: [{ title: "speed [m/s]", share: 1, range: [0, top], lines }] });
 }
 
-/** One vehicle's speed, acceleration and lateral acceleration: the template bold, samples (all, or the one chosen) thin. */
+/** One vehicle's speed, acceleration and lateral acceleration: the recording bold, scenarios (all, or the one chosen) thin. */
 function drawMotion(place, motion, colour, chosen) {
   const lines = [[], [], []];
   const add = (packed, line) => {

@@ -2,7 +2,7 @@
 // The page: which case is shown, and the player.
 
 const CASES = JSON.parse(document.getElementById("data").textContent);
-const ARM_NAMES = { oracle: "fitted template", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints", refused: "refused candidates" };
+const ARM_NAMES = { oracle: "recording as fitted", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints", refused: "refused candidates" };
 
 function option(value, text) {
   const element = document.createElement("option");
@@ -28,7 +28,7 @@ function chipLine(vehicle, n, ...rest) {
   return line;
 }
 
-/** The animation: play, pause, scrub, choose the set and the sample, or see all samples at once. */
+/** The animation: play, pause, scrub, choose the set and the scenario, or see all scenarios at once. */
 class Player {
   constructor(section, data, sets, picture, box, record) {
     this.data = data;
@@ -72,14 +72,14 @@ class Player {
   listSamples() {
     const list = this.find("sample");
     const before = Math.max(0, list.selectedIndex);
-    list.replaceChildren(...this.set.index.map((index) => option(index, this.name(index, this.set.index.indexOf(index)))));
+    list.replaceChildren(...this.set.index.map((index) => option(index, this.title(index, this.set.index.indexOf(index)))));
     list.selectedIndex = Math.min(before, this.set.samples - 1);
     this.time = Math.min(this.time, this.duration);
   }
 
-  name(index, k) {
-    if (this.arm === "oracle") return "the template";
-    return this.arm === "refused" ? `${this.data.causes[k]} (candidate ${index})` : `sample ${index}`;
+  title(index, k) {
+    if (this.arm === "oracle") return "the recording";
+    return this.arm === "refused" ? `${this.data.causes[k]} (candidate ${index})` : `scenario ${index}`;
   }
 
   /** Give the shown scenario as a file: every 0.2 s or so as CSV, or the picture as PNG. */
@@ -162,6 +162,37 @@ class Player {
     this.draw();
   }
 
+  /** What a vehicle does for another one at a share of a clip's duration, by the reactions of the recording: its words and the other one, or null. */
+  reaction(clip, sample, n, share) {
+    const { reactions, vehicles } = this.data;
+    const duration = clip.durations[sample];
+    const slow = (at) => clip.state(sample, n, at).speed < 0.5;
+    for (const { who, whom, kind, from, to } of reactions) {
+      if (who !== n || !clip.there(sample, whom, share)) continue;
+      const other = vehicles[whom].id;
+      if (kind === "yield" && slow(share) && share > from - 0.15 && share < to + 0.15) {
+        let since = share;
+        while (since > 0 && slow(since)) since -= 1 / clip.frames;
+        return { whom, words: `waits for ${other}, ${((share - since) * duration).toFixed(1)} s` };
+      }
+      if (share < from || share > to) continue;
+      if (kind === "yield") return { whom, words: `slows for ${other}` };
+      const [self, leader] = [clip.state(sample, n, share), clip.state(sample, whom, share)];
+      const gap = Math.hypot(leader.x - self.x, leader.y - self.y) - (vehicles[n].length + vehicles[whom].length) / 2;
+      return { whom, words: self.speed > 1 ? `follows ${other}, ${(gap / self.speed).toFixed(1)} s` : `follows ${other}` };
+    }
+    return null;
+  }
+
+  /** Name a vehicle, and draw an arrow to the one that it waits for or follows. */
+  name(view, clip, sample, n, share) {
+    const state = clip.state(sample, n, share);
+    const reaction = this.reaction(clip, sample, n, share);
+    const other = reaction && clip.state(sample, reaction.whom, share);
+    if (reaction) view.arrow(state, other, vehicleColour(n));
+    view.label(state.x, state.y, [this.data.vehicles[n].id, reaction && reaction.words].filter(Boolean).join(" "), vehicleColour(n), reaction && other.y > state.y);
+  }
+
   /** The part of the road that is shown: all of it, or the vehicles with some room around them. */
   frame(states, whole) {
     if (!this.find("follow").checked || !states.length) return whole;
@@ -207,12 +238,13 @@ class Player {
         view.label(states[n].x, states[n].y, "ego", vehicleColour(n));
       } else {
         view.footprint(states[n], vehicle, vehicleColour(n), 1, true);
-        view.label(states[n].x, states[n].y, vehicle.id, vehicleColour(n));
+        this.name(view, set, sample, n, share);
       }
       this.readouts[n].textContent = `${states[n].speed.toFixed(1)} m/s`;
     });
     view.ruler();
     this.find("scrub").value = Math.round(1000 * share);
+    this.drawSpeeds();
     this.find("clock").textContent = `${this.time.toFixed(1)} / ${this.duration.toFixed(1)} s`;
     this.sayPrimitive(share);
   }
@@ -234,12 +266,21 @@ class Player {
       context.strokeStyle = vehicleColour(n);
       record.path(context, view, 0, n, Math.max(0, share - 3 / record.durations[0]), share);
       view.footprint(states[n], vehicle, vehicleColour(n), 1, true);
-      view.label(states[n].x, states[n].y, vehicle.id, vehicleColour(n));
+      this.name(view, record, 0, n, share);
     });
     view.ruler();
   }
 
-  /** Samples share the template's clock, so the same share of the duration is the same primitive. */
+  /** The speeds of the shown scenario, drawn anew when it is another one, and the cursor in them. */
+  drawSpeeds() {
+    const place = this.find("speeds-now");
+    const shown = `${this.arm} ${this.sample}`;
+    if (this.charted !== shown) drawSpeedsNow(place, this.data, this.set, this.sample, this.record, (time) => { this.pause(); this.time = Math.min(time, this.duration); this.draw(); });
+    this.charted = shown;
+    place.moveCursor(this.time);
+  }
+
+  /** Scenarios share the recording's clock, so the same share of the duration is the same primitive. */
   sayPrimitive(share) {
     const { bounds, labels, descriptions } = this.data.template;
     const time = share * bounds[bounds.length - 1];
@@ -277,7 +318,7 @@ function open(section, data) {
   const which = find("motion-sample");
   const motion = () => drawMotion(find("motion"), data.motion[who.selectedIndex], vehicleColour(who.selectedIndex), which.selectedIndex - 1);
   const listed = () => {
-    which.replaceChildren(option("", "all drawn samples"), ...data.motion[who.selectedIndex].index.map((index) => option(index, `sample ${index}`)));
+    which.replaceChildren(option("", "all drawn scenarios"), ...data.motion[who.selectedIndex].index.map((index) => option(index, `scenario ${index}`)));
     motion();
   };
   who.append(...data.vehicles.map((vehicle, n) => option(n, vehicle.id)));
@@ -296,7 +337,8 @@ function open(section, data) {
       if (feature[kind][arm]) drawFeature(place, feature[kind][arm], template.durations[0], feature.pair.map((n) => data.vehicles[n].id));
     });
   };
-  section.querySelectorAll("[data-spread]").forEach((place) => drawSpread(place, data.coverage.figures[place.dataset.spread]));
+  const choose = (k) => (sets.with && sets.with.index.includes(data.coverage.index[k]) ? () => player.showSample(data.coverage.index[k]) : null);
+  section.querySelectorAll("[data-spread]").forEach((place) => drawSpread(place, data.coverage.figures[place.dataset.spread], choose));
   section.querySelectorAll("[data-pick]").forEach((button) => button.addEventListener("click", () => player.showSample(Number(button.dataset.pick))));
   pairs.addEventListener("change", features);
   features();
@@ -319,12 +361,14 @@ document.querySelectorAll("[data-show]").forEach((row) => {
   row.addEventListener("click", () => show(Number(row.dataset.show)));
 });
 
-/** Whatever changes the width of the page, canvases and charts follow. */
-new ResizeObserver(() => {
+/** Whatever changes the width of the page, or unfolds a part of it: canvases and charts follow. */
+function fit() {
   if (shown < 0) return;
-  opened.get(shown).draw();
   redraw(document.querySelector(`[data-case="${shown}"]`));
-}).observe(document.querySelector("main"));
+  opened.get(shown).draw();
+}
+new ResizeObserver(fit).observe(document.querySelector("main"));
+document.querySelectorAll("details.part").forEach((part) => part.addEventListener("toggle", () => { if (part.open) fit(); }));
 document.addEventListener("keydown", (event) => {
   const player = shown >= 0 && opened.get(shown).player;
   if (!player || /^(INPUT|SELECT|BUTTON)$/.test(document.activeElement.tagName)) return;

@@ -29,7 +29,8 @@ function extent(values, low = Infinity, high = -Infinity) {
 /**
  * Draw a chart into a place.
  * @param spec {label, x: {title, range?}, panels: [{title, share, range?, lines, bands?, marks?, bars?}]}
- *   lines: {x, y (null parts it), colour, width, dash?, opacity?, fill?, name?}; bands: {from, to, colour, name}; marks: [x]; bars: {from, to, count}.
+ *   lines: {x, y (null parts it), colour, width, dash?, opacity?, fill?, name?}; bands: {from, to, colour, name}; marks: [x];
+ *   bars: {from, to, count, choose?}, the last called by a click; `cursor`: a line that `place.moveCursor(x)` moves, and what a click on an x calls.
  */
 function chart(place, spec) {
   if (!place) return;
@@ -65,6 +66,10 @@ function chart(place, spec) {
     bars.forEach((bar) => {
       const shape = svgElement("rect", { x: px(bar.from) + 0.5, y: py(bar.count), width: Math.max(px(bar.to) - px(bar.from) - 1, 1), height: py(0) - py(bar.count), class: "bar" }, root);
       svgElement("title", {}, shape, `${bar.count} from ${+bar.from.toPrecision(3)} to ${+bar.to.toPrecision(3)}`);
+      if (bar.choose) {
+        shape.classList.add("choice");
+        shape.addEventListener("click", bar.choose);
+      }
     });
     panel.lines.forEach((line) => {
       let path = "";
@@ -90,6 +95,14 @@ function chart(place, spec) {
     svgElement("text", { x: px(value), y: height - bottom + 14, "text-anchor": "middle" }, root, String(value));
   });
   svgElement("text", { x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, root, spec.x.title);
+  if (spec.cursor) {
+    const cursor = svgElement("line", { x1: left, x2: left, y1: top, y2: height - bottom, class: "cursor" }, root);
+    place.moveCursor = (x) => ["x1", "x2"].forEach((end) => cursor.setAttribute(end, px(x)));
+    root.addEventListener("click", (event) => {
+      const share = (event.clientX - root.getBoundingClientRect().left - left) / (width - left - right);
+      spec.cursor(x0 + Math.min(Math.max(share, 0), 1) * (x1 - x0));
+    });
+  }
   place.replaceChildren(root);
 }
 

@@ -19,7 +19,7 @@ function bytesOf(text) {
   return bytes;
 }
 
-/** A set of scenarios: S samples of N vehicles at F frames, channels x, y, yaw, speed. */
+/** A set of S scenarios of N vehicles at F frames, channels x, y, yaw, speed. */
 class Trajectories {
   constructor(packed) {
     const { shape, low, step, data } = packed.states;
@@ -226,6 +226,28 @@ class View {
     context.restore();
   }
 
+  /** A dashed arrow between two vehicles: from the one that reacts to the one it reacts to. */
+  arrow(from, to, colour) {
+    const context = this.context;
+    const [x0, y0, x1, y1] = [this.x(from.x), this.y(from.y), this.x(to.x), this.y(to.y)];
+    const angle = Math.atan2(y1 - y0, x1 - x0);
+    context.globalAlpha = 0.8;
+    context.strokeStyle = colour;
+    context.lineWidth = 1.5;
+    context.setLineDash([6, 4]);
+    context.beginPath();
+    context.moveTo(x0, y0);
+    context.lineTo(x1, y1);
+    context.stroke();
+    context.setLineDash([]);
+    context.beginPath();
+    [-0.4, 0.4].forEach((turn) => {
+      context.moveTo(x1, y1);
+      context.lineTo(x1 - 10 * Math.cos(angle + turn), y1 - 10 * Math.sin(angle + turn));
+    });
+    context.stroke();
+  }
+
   dot(x, y, colour, radius = 4) {
     const context = this.context;
     context.globalAlpha = 1;
@@ -238,14 +260,16 @@ class View {
     context.stroke();
   }
 
-  label(x, y, text, colour) {
+  /** Write beside a point, above it, or below: to leave what it points at free. */
+  label(x, y, text, colour, below = false) {
     const context = this.context;
+    const [left, base] = [this.x(x) + 8, this.y(y) + (below ? 24 : -8)];
     context.globalAlpha = 1;
     context.font = "600 12px system-ui, sans-serif";
     context.lineWidth = 3;
     context.strokeStyle = themed("card");
-    context.strokeText(text, this.x(x) + 8, this.y(y) - 8);
+    context.strokeText(text, left, base);
     context.fillStyle = colour;
-    context.fillText(text, this.x(x) + 8, this.y(y) - 8);
+    context.fillText(text, left, base);
   }
 }

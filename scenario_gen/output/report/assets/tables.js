@@ -29,6 +29,7 @@ document.querySelectorAll("nav.contents").forEach((nav, n) => {
     const link = document.createElement("a");
     link.href = `#${heading.id}`;
     link.textContent = heading.textContent;
+    link.addEventListener("click", () => { if (heading.closest("details")) heading.closest("details").open = true; });
     item.append(link);
     list.append(item);
   });
