@@ -113,6 +113,8 @@ def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Ite
         if pair not in after:
             following = before[pair].following
             if following and _in_two_lanes(*(tracks[k] for k in pair)):
+                how = "drive side by side less than a lane apart in the template, in two lanes on this road"
+                yield Loss("beside", (a, b), f"vehicles {a} and {b} {how}")
                 continue
             what = "follow each other" if following else "have crossing or merging paths"
             kind = "following" if following else "conflict"
