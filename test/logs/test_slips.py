@@ -30,9 +30,9 @@ def sparse(rows):
 
 
 def with_kind(rows):
-    walker = rows[rows.vehicle_id == "a"].assign(vehicle_id="w", y_m=5.0)
-    names = {"a": "Car", "b": "vehicle.truck", "w": "walker.pedestrian.0007"}
-    return pd.concat([rows, walker]).assign(type=lambda own: own.vehicle_id.map(names))
+    dog = rows[rows.vehicle_id == "a"].assign(vehicle_id="w", y_m=5.0)
+    names = {"a": "Car", "b": "vehicle.car", "w": "animal.dog.0007"}
+    return pd.concat([rows, dog]).assign(type=lambda own: own.vehicle_id.map(names))
 
 
 def numbered(rows):
@@ -97,8 +97,8 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
     "a left-handed frame": (mirrored, "y=-y_m,heading=-yaw_deg", ""),
     "the front's position": (lambda rows: ahead(rows, 2.4), "point=front", ""),
     "the rear axle's position": (lambda rows: ahead(rows, -1.44), "point=rear_axle", ""),
-    "pedestrians": (with_kind, "", "1 × walker.pedestrian.0007"),
-    "pedestrians by a number": (numbered, "kind=type:1+2", "no car (3)"),
+    "dogs": (with_kind, "", "1 × animal.dog.0007"),
+    "dogs by a number": (numbered, "kind=type:1+2", "1 × unnamed 3"),
     "columns not read": (lambda rows: rows.assign(lane=3), "", "not read: lane"),
     "brackets": (lambda rows: rows.rename(columns={"x_m": "Ost X [m]", "y_m": "Nord [y] "}), "x=Ost X [m],y=Nord [y]", ""),
     "spaces": (lambda rows: rows.rename(columns={"x_m": "Pos X [m]", "y_m": "Pos Y [m]"}), "", ""),
@@ -272,7 +272,7 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
     "hours": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0), "the time may be in h: --set log.columns=time="),
     "degrees and minutes": (nmea, "lat=…:ddmm"),
     "1e-7 degrees": (lambda rows: geographic(rows).assign(lat_deg=4.8e8, lon_deg=1.1e8), "lat=…:e7"),
-    "a pedestrian": (lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "pedestrian"})), "1 × pedestrian"),
+    "a dog": (lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "dog"})), "1 × dog"),
     "another unknown point": (lambda rows: rows, "point is one of centre, front"),
     "ids of one ROS name": (
         lambda rows: rows.assign(vehicle_id=rows.vehicle_id.map({"a": "car-1", "b": "car_1"})),

@@ -121,9 +121,9 @@ def _result(
 
 def _left_out(namespace: Namespace) -> tuple[str, ...]:
     """Say what the bag has not, and what follows from it; and what its requests say they came to."""
-    messages = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not asked"]
+    messages = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not checked"]
     if "map" not in namespace.messages:
         messages.append("the bag has no map: whether vehicles leave the road was not checked")
     if "changepoints" not in namespace.messages:
-        messages.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
+        messages.append("the bag has no changepoints: the recording counts as one primitive, and its waits were not checked")
     return (*messages, *(summary.sentence() for summary in namespace.summaries))

@@ -40,7 +40,7 @@ from scenario_gen.types import (
 )
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
-NO_WITNESS = f"the ego: its witness is not on {WITNESS}"
+NO_WITNESS = f"the ego: its reference drive is not on {WITNESS}"
 ALTERED = "altered_message"  # not the bytes that scenarios/info has an entry for
 
 
@@ -209,7 +209,7 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
         silent = message
         if entry is not None and namespace.without_witness(entry):
             if namespace.strange_witnesses:
-                wrong.append((ALTERED, f"the ego's witness is not what was published for index {entry.index}"))
+                wrong.append((ALTERED, f"the ego's reference drive is not what was published for index {entry.index}"))
             silent = (*message, NO_WITNESS)
         try:
             stamp, scenario = namespace.scenario(k)
