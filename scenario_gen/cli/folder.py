@@ -100,15 +100,7 @@ def generate_folder(
             for road in roads
         ]
         with progress() as advance:
-            cases, refusals = generate_all(
-                pairs,
-                requested.config,
-                count=requested.count,
-                seed=requested.seed,
-                request=requested.request,
-                advance=advance,
-                for_testing=requested.for_testing,
-            )
+            cases, refusals = generate_all(pairs, requested, advance)
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         unlooking: list[str] = []
@@ -170,18 +162,12 @@ def notes_of(readings: Sequence[LogResult]) -> list[str]:
 
 
 def generate_all(
-    pairs: Sequence[tuple[Encounter, str]],
-    config: PipelineConfig,
-    *,
-    count: int,
-    seed: int,
-    request: Request = Request(),
-    advance: Advance = lambda *_: None,
-    for_testing: bool = False,
+    pairs: Sequence[tuple[Encounter, str]], requested: FolderRequest, advance: Advance = lambda *_: None
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
+    config, count, seed, request = requested.config, requested.count, requested.seed, requested.request
     drawn, further = count, dict[str, Select]()
-    if for_testing:
+    if requested.for_testing:
         from scenario_gen.closed_loop.reacting import reacting, TRIED
 
         drawn, further = count * TRIED, {"select": partial(reacting, count=count)}
@@ -206,14 +192,14 @@ def generate_all(
             answer = answer_refusal(error, encounter, road, config, own, drawn, seed)
             refusals.append(f"{encounter.name} on {road}: {as_options(str(answer))}")
             continue
-        if for_testing and not case.generated.scenarios:
+        if requested.for_testing and not case.generated.scenarios:
             refusals.append(f"{encounter.name} on {road}: none kept: {case.generated.adaptations[-1]}")
             continue
         cases.append(case)
         n_scenarios, refused = len(case.generated.scenarios), case.generated.refused
         if n_scenarios < count:
             causes = ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
-            causes = case.generated.adaptations[-1] if for_testing else causes
+            causes = case.generated.adaptations[-1] if requested.for_testing else causes
             refusals.append(f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}")
     return cases, refusals
 
