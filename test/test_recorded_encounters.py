@@ -18,6 +18,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types.generation import GenerationResult, WITHOUT
+from scenario_gen.types.road_users import Dynamics
 
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
@@ -57,8 +58,8 @@ def at_the_recorded_pace(case: GenerationResult) -> GenerationResult:
     E compares at equal shares of the duration, and a clock that is slowed ahead of a bend shifts positions in all rows by more
     than changepoints do.
     """
-    fast = replace(NARROW.sampling, max_lateral_acceleration=12.0, bend_acceleration=10.0)
-    config = replace(NARROW, sampling=fast, limits=replace(CONFIG.limits, max_lateral_acceleration=12.0))
+    fast = replace(NARROW.sampling, bend_acceleration=10.0)
+    config = replace(NARROW, sampling=fast, limits=replace(CONFIG.limits, car=Dynamics(max_lateral_acceleration=14.4)))
     made = generate(case.encounter, case.road, config, count=COUNT, seed=7)
     assert made.generated.scenarios and not any("the pace is lowered" in sentence for sentence in made.generated.adaptations)
     return made

@@ -20,11 +20,11 @@ from scenario_gen.corpus.messages import database, quoted
 from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerated
 
 MEMORY = 500  # MiB
-COLUMNS = ("template", "kind", "road", "vehicles", "index", "seconds", "distance", "ttc", "pet", "speed", "braking")
+COLUMNS = ("template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet", "speed", "braking")
 UNITS = {"seconds": "s", "distance": "m", "ttc": "s", "pet": "s", "speed": "m/s", "braking": "m/s²"}
 RECORDED = (  # an encounter's columns, with the names of a scenario's
-    "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index, seconds, closest AS distance, ttc, pet, "
-    "speed, NULL AS braking, gap"
+    "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index, NULL AS type, seconds, closest AS distance, "
+    "ttc, pet, speed, NULL AS braking, gap"
 )
 PET = (0.0, 1.0, 2.0, 4.0)  # s: bounds of the classes of the table of coverage
 CLASSES = "CASE WHEN pet IS NULL THEN 'none' " + " ".join(f"WHEN pet < {b:g} THEN '< {b:g} s'" for b in PET) + " ELSE 'more' END"
@@ -44,7 +44,8 @@ def find(batch: Place, condition: str = "true") -> Hits:
     Args:
         batch: that `run_batch` wrote, finished or not; or a corpus that `mine` wrote.
         condition: SQL over the columns template, kind, road, vehicles, index, seed, seconds [s], distance [m], ttc [s],
-            pet [s], speed [m/s], braking [m/s²], sha256; of encounters also gap [m], without index, seed, braking and sha256.
+            pet [s], speed [m/s], braking [m/s²], type (of the most exposed road user), types (of all), sha256; of encounters
+            also gap [m], without index, seed, braking, types and sha256.
 
     Raises:
         InputError: there is no batch, or the condition is none.
@@ -55,7 +56,7 @@ def find(batch: Place, condition: str = "true") -> Hits:
     tables: list[Place] = generated or sorted((batch / "encounters").glob("*.parquet"), key=str)
     if not tables:
         raise InputError(f"{batch} holds no scenarios; write them with `scenario-gen batch DIR --roads … --out {batch}`")
-    columns = f"the columns are {', '.join(COLUMNS)}, seed, sha256{'' if generated else '; mine a corpus of before anew'}"
+    columns = f"the columns are {', '.join(COLUMNS)}, types, seed, sha256{'' if generated else '; mine a corpus of before anew'}"
     what = f"{batch}: condition {condition!r}"
     with fetched(tables) as here, database(workplace(batch), MEMORY, what, columns) as base:
         base.execute(

@@ -6,7 +6,7 @@
 | quantity | element | unit |
 |---|---|---|
 | vehicle | Entities/ScenarioObject: attribute name | |
-| class | Vehicle: vehicleCategory car, van, truck or bus | |
+| class | Vehicle: vehicleCategory; Pedestrian: pedestrianCategory; in our own files the name | |
 | length, width | BoundingBox/Dimensions | m |
 | time | Polyline/Vertex: time, by Timing: scale, offset; relative ones from when the event's trigger fires | s |
 | position | Vertex/Position/WorldPosition: x, y of the rear axle, from which BoundingBox/Center says where the middle is | m |
@@ -31,10 +31,10 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import edge_lengths, place
+from scenario_gen.types import VEHICLE_TYPES
 
 OPENSCENARIO_SPEEDS = "speed_mps"
 """Name of a vehicle's property that holds its speed at each vertex, for which the format has no place."""
-_CATEGORIES = ("car", "van", "truck", "bus")
 _FOLLOWS = "PrivateAction/RoutingAction/FollowTrajectoryAction"
 
 
@@ -90,15 +90,20 @@ def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
     """Return the vehicles by name; who is none that is read is noted."""
     vehicles: dict[str, Element] = {}
     for entity in root.all("Entities/ScenarioObject"):
-        name, vehicle = entity.get("name"), entity.first("Vehicle")
-        category = vehicle.attributes.get("vehicleCategory", "car") if vehicle else ""
+        name, vehicle = entity.get("name"), entity.first("Vehicle") or entity.first("Pedestrian")
         if vehicle is None or vehicle.first("BoundingBox") is None:
-            notes.append(f"{name} left out: it is no vehicle with a bounding box in this file or its catalogs")
-        elif category not in _CATEGORIES:
-            notes.append(f"{name} left out: it is a {category}")
+            notes.append(f"{name} left out: it is no road user with a bounding box in this file or its catalogs")
         else:
             vehicles[name] = vehicle
     return vehicles
+
+
+def _category(entity: Element) -> str:
+    """Return what a file calls the type of a road user: its name where that is a type of the category, as in our own files."""
+    named = entity.attributes.get("name", "")
+    key = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory"}[entity.tag]
+    category = entity.attributes.get(key, entity.tag)
+    return named if named in VEHICLE_TYPES and VEHICLE_TYPES[named].openscenario == category else category
 
 
 def _followers(root: Element) -> Iterator[tuple[str, Element, float]]:
@@ -147,7 +152,7 @@ def _observations(follow: Element, name: str, vehicle: Element, start: float, gi
     states = np.column_stack((middle, heading, speeds if speeds is not None else np.zeros(len(rows))))
     return Observations.of_rows(
         name, np.round(time * 1e9).astype(np.int64), states, np.arange(first, first + len(rows)),
-        (size.number("length"), size.number("width")), measured=speeds is not None,
+        (size.number("length"), size.number("width")), kind=_category(vehicle), measured=speeds is not None,
     )  # fmt: skip
 
 

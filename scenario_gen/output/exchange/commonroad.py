@@ -22,7 +22,7 @@ from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
-from scenario_gen.types import is_truck, Lane, LaneNetwork, Scenario
+from scenario_gen.types import Lane, LaneNetwork, Scenario
 
 OBSTACLES, PROBLEM, INTERSECTION, SIGNS = 100_000, 200_000, 300_000, 400_000  # ids from here on; lanelets count from 1
 MAX_SPEED = "274"
@@ -221,7 +221,7 @@ def _state(parent: Element, tag: str, scenario: Scenario, n: int, k: int) -> Ele
 def _obstacle(root: Element, scenario: Scenario, n: int) -> None:
     vehicle = scenario.vehicles[n]
     obstacle = add(root, "dynamicObstacle", id=OBSTACLES + n + 1)
-    add(obstacle, "type", "truck" if is_truck(vehicle) else "car")
+    add(obstacle, "type", vehicle.kind.commonroad)
     rectangle = add(add(obstacle, "shape"), "rectangle")
     add(rectangle, "length", vehicle.length)
     add(rectangle, "width", vehicle.width)

@@ -23,7 +23,7 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.motion import at_times, EVEN
 from scenario_gen.output.exchange.xml import date_of
-from scenario_gen.types import height, is_truck, rear_axle, Scenario, Vehicle, WHEELBASE
+from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE
 
 OBJECTS, MAP = "ground_truth", "ground_truth_map"  # omega-prime's topics
 WHEEL_RADIUS = 0.325  # metres, as in OpenSCENARIO files
@@ -165,13 +165,15 @@ def _objects(part: _Part, k: int) -> Iterator[Any]:
             acceleration=osi.Vector3d(x=along * cos - across * sin, y=along * sin + across * cos, z=0.0),
             orientation_rate=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=rate),
         )
-        kinds, roles = osi.MovingObject.VehicleClassification.Type, osi.MovingObject.VehicleClassification.Role
-        kind = kinds.HEAVY_TRUCK if is_truck(vehicle) else kinds.CAR
+        number, classes = osi.Identifier(value=part.numbers[n]), osi.MovingObject.VehicleClassification
+        if vehicle.kind.walks:
+            yield osi.MovingObject(id=number, type=osi.MovingObject.Type.PEDESTRIAN, base=base)
+            continue
         yield osi.MovingObject(
-            id=osi.Identifier(value=part.numbers[n]),
+            id=number,
             type=osi.MovingObject.Type.VEHICLE,
             base=base,
-            vehicle_classification=osi.MovingObject.VehicleClassification(type=kind, role=roles.CIVIL),
+            vehicle_classification=classes(type=classes.Type[vehicle.kind.osi], role=classes.Role.CIVIL),
             vehicle_attributes=_attributes(vehicle),
         )
 

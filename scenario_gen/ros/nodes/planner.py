@@ -33,6 +33,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import make_planner, plan_with_retry, PlanningConfig, Query
+from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.plumbing.services import REQUESTS
 from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
@@ -47,6 +48,7 @@ class Config(Parameters):
 
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
+    limits: Limits = field(default_factory=Limits)
     seed: int = parameter(0, "seed of the planner", low=0)
     radius: float = parameter(1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0)
     pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
@@ -83,7 +85,7 @@ class Planner(StageNode):
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
         _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
-        stages = PipelineConfig(fitting=config.fitting, planning=config.planning)
+        stages = PipelineConfig(fitting=config.fitting, planning=config.planning, limits=config.limits)
         planned = Chain(encounter, segmentation, road, stages, seed=config.seed).plan()
         (_, fit), routes = planned.placed(), planned.routes
         stop_if_cancelled()

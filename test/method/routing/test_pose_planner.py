@@ -22,6 +22,7 @@ from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import BoundaryStates
 
@@ -173,7 +174,7 @@ def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
     case = obstructed(113)
     ends = (case.query.start, case.query.goal)
     route = route_on(case.road, *ends)
-    assert np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max() <= PlanningConfig().max_curvature
+    assert np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max() <= Dynamics().planned.max_curvature
     monkeypatch.setattr(plan, "TIGHTEST", plan.TIGHTEST[:1])
     with pytest.raises(RefusedError, match="its curvature reaches"):
         route_on(case.road, *ends)

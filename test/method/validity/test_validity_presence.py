@@ -19,6 +19,7 @@ from scenario_gen.method.validity import Checker, checker
 from scenario_gen.template.interaction import Wait
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.lanes import Lane, LaneNetwork
+from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario
 
 TIME = np.arange(101) * 0.1
@@ -131,13 +132,13 @@ def test_each_vehicle_is_checked_as_if_cut_out(seed):
     present = np.sort(np.array([rng.choice(101, 2, replace=False) for _ in range(3)]), axis=1)
     whole = scenario_of(tracks, TIME)
     road = open_road(60.0)
-    found, _ = causes(replace(whole, present=present), road=road, limits=replace(FREE, max_speed=12.0))
+    found, _ = causes(replace(whole, present=present), road=road, limits=replace(FREE, car=Dynamics(12.0, 1e6, 1e6, 1e6, 1e6)))
     expected = []
     for row, (first, last) in enumerate(present):
         own = slice(first, last + 1)
         values = (getattr(whole, name)[[row], own] for name in ("position", "heading", "speed", "acceleration"))
         part = Scenario((whole.vehicles[row],), TIME[own] - TIME[first], *values)
-        expected += causes(part, road=road, limits=replace(FREE, max_speed=12.0))[0]
+        expected += causes(part, road=road, limits=replace(FREE, car=Dynamics(12.0, 1e6, 1e6, 1e6, 1e6)))[0]
     assert sorted(cause for cause in found if cause != Cause.OVERLAP) == sorted(expected)
 
 

@@ -8,6 +8,7 @@ from small_scenarios import crossing, observed
 from test_commonroad import case_of
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs.kinds import type_called
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.openscenario import write_openscenario
 
@@ -32,7 +33,7 @@ GOOD = {
         ("xosc", b"WorldPosition", b"LanePosition", "<Position> has no <WorldPosition>"),
         ("xosc", b'time="0.5"', b'time="nan"', "<Vertex>, attribute time"),
         ("xosc", b'time="0.5"', b'time="$start"', "'$start'"),
-        ("xosc", b"BoundingBox", b"Box", "no vehicle with a bounding box"),
+        ("xosc", b"BoundingBox", b"Box", "no road user with a bounding box"),
     ],
 )
 def test_what_is_broken_is_named_with_its_place(tmp_path, kind, old, new, said):
@@ -49,8 +50,9 @@ def test_what_is_no_file_is_refused(tmp_path, name):
         observed(tmp_path / name)
 
 
-def test_pedestrians_are_counted_and_left_out(tmp_path):
+def test_what_a_file_calls_its_road_users_is_kept(tmp_path):
     path = tmp_path / "one.xml"
-    path.write_bytes(GOOD["xml"].replace(b"<type>car</type>", b"<type>pedestrian</type>", 1))
-    made = observed(path)
-    assert len(made.vehicles) == 1 and "1 × pedestrian" in made.notes[-1]
+    for kind, types in ((b"pedestrian", ["pedestrian", "car"]), (b"animal", [None, "car"])):
+        path.write_bytes(GOOD["xml"].replace(b"<type>car</type>", b"<type>" + kind + b"</type>", 1))
+        made = observed(path)
+        assert [type_called(seen.kind) for seen in made.vehicles] == types
