@@ -192,6 +192,11 @@ class _Loop:
         for _, together in itertools.groupby(index, lambda number: number // BLOCK):
             yield from plain.redraw(list(together))
 
+    def _take(self, number: int, scenario: Scenario) -> None:
+        """Keep a valid candidate of all vehicles if it is accepted."""
+        if self.callbacks.accepts(scenario):
+            self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+
     def _keep(self, number: int, scenario: Scenario) -> None:
         self.index.append(number)
         if len(self.kept) < self.keep:
@@ -246,7 +251,7 @@ class _Loop:
             if scenario is None or cause is not None or not self._in_range(scenario):
                 self.refused[cause or (Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE)] += 1
             else:
-                self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+                self._take(number, scenario)
 
     def run(self, budget: int) -> None:
         """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
@@ -290,7 +295,7 @@ class _Loop:
                 cause = next(causes) if ok else Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE
                 if scenario is not None and cause is None:
                     good += 1
-                    self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+                    self._take(number, scenario)
                 else:
                     self.refused[cause or Cause.SPEED_PROFILE] += 1
                     if scenario is not None and cause is not None and self.refused[cause] <= EXAMPLES:
