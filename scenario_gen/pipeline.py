@@ -3,7 +3,7 @@
 
 """The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -31,6 +31,7 @@ def generate(
     seed: int = 0,
     request: Request = Request(),
     progress: Progress = lambda *_: None,
+    population: Sequence[Encounter] = (),
     select: Callable[[GenerationResult], GenerationResult] = lambda sampled: sampled,
 ) -> GenerationResult:
     """Segment, fit, plan, sample (every candidate is checked) and evaluate.
@@ -44,6 +45,7 @@ def generate(
         seed: of all randomness.
         request: a vehicle to be left out for a planner under test, start and end states, a target, a choice, an order.
         progress: called with scenarios so far, scenarios wanted, candidates so far.
+        population: recorded encounters that say, with `sampling.variety=population`, how encounters differ; the template is one.
         select: leaves out some of the `count` valid scenarios before the set is evaluated.
 
     Raises:
@@ -52,11 +54,20 @@ def generate(
             cannot be had, or no candidate is valid; the message says why.
     """
     if road == AUTO:
-        again = partial(generate, config=config, count=count, seed=seed, request=request, progress=progress, select=select)
+        again = partial(
+            generate,
+            config=config,
+            count=count,
+            seed=seed,
+            request=request,
+            progress=progress,
+            population=population,
+            select=select,
+        )
         return on_first_suitable_road(partial(again, encounter), encounter, config, seed)
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
-    chain = Chain(encounter, segmentation, road, config, request, count, seed)
+    chain = Chain(encounter, segmentation, road, config, request, count, seed, population=population)
     planned = replace(chain.plan(), provenance=what_makes_it_again(config, request))
     sampled = chain.sample(planned, Callbacks(progress))
     if not sampled.generated.scenarios:

@@ -185,6 +185,7 @@ def generate_all(
         from scenario_gen.closed_loop.reacting import reacting, TRIED
 
         drawn, further = count * TRIED, {"select": partial(reacting, count=count)}
+    population = [encounter for encounter, _ in pairs]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:
@@ -198,7 +199,9 @@ def generate_all(
         try:
             if request.ego == EGO_AUTO:
                 own = with_ego_that_reacts(encounter, road, config, seed, request)
-            case = generate(encounter, road, config, count=drawn, seed=seed, request=own, progress=report, **further)
+            case = generate(
+                encounter, road, config, count=drawn, seed=seed, request=own, progress=report, population=population, **further
+            )
         except RefusedError as error:
             if own.ego == EGO_AUTO:
                 refusals.append(f"{encounter.name} on {road}: {error}")

@@ -15,7 +15,7 @@ from scenario_gen.types import GenerationResult, NARROW, Request, UNIFORM, WITHO
 def with_references(result: GenerationResult, config: PipelineConfig, request: Request = Request()) -> GenerationResult:
     """Add what a result is measured against: sets without changepoints and with uniform ones.
 
-    They are drawn as the result is, with the same parameters and seed; beside preset `wide` there is a set of `narrow`, too.
+    They are drawn as the result is, with the same parameters and seed; beside any preset but `narrow` there is a set of that.
     A reference keeps no waits of the template: the ends of a wait would be two more changepoints. It has no target, choice or
     order either, and a result that has one is not compared. A reference has only as many scenarios as are measured.
 
@@ -28,7 +28,7 @@ def with_references(result: GenerationResult, config: PipelineConfig, request: R
     chains = {WITHOUT: replace(plain, segmentation=without_changepoints(result.segmentation), waits=())}
     if result.segmentation.changepoints.size:
         chains[UNIFORM] = replace(plain, segmentation=uniform_changepoints(result.segmentation), waits=())
-    if config.sampling.variety == "wide":
+    if config.sampling.variety != "narrow":
         narrow = replace(config, sampling=replace(config.sampling, variety="narrow"))
         chains[NARROW] = replace(plain, config=narrow)
     references, refusals = {}, {}
