@@ -33,7 +33,7 @@ def natural_scenarios() -> NaturalScenarios:
     (encounter,) = read_log([bundled("b")]).encounters
     road, encounter = road_and_template("t_intersection", encounter, config.road)
     attempt = Chain(encounter, segment(encounter, config.segmentation, SEED), road, config, seed=SEED)
-    plan = plan_of(attempt.plan(), config.sampling, Request())
+    plan = plan_of(attempt.plan(), config.sampling, config.limits, Request())
     checker = checker_of(plan, config.sampling, config.limits, Request())
     return NaturalScenarios.of(plan, checker.check, config.sampling, SEED)
 

@@ -17,11 +17,11 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.evaluation import without_changepoints
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import PAPER, plan_routes, PlanningConfig
-from scenario_gen.method.sampling import Features, Observations, Posterior, Regression, SamplingConfig, speed_knots
+from scenario_gen.method.sampling import Features, Observations, Posterior, Regression, speed_knots
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads import build_road, draw, layout_for, RoadConfig
 from scenario_gen.template import clean_tracks, find_waits, Wait
-from scenario_gen.types import Encounter, Fit, Road, Route, Segmentation
+from scenario_gen.types import Dynamics, Encounter, Fit, Road, Route, Segmentation
 
 SIGMA, LENGTH, NOISE, DEGREE = 10.0, 100.0, 10.0, 3
 """The paper's σ_f and l of eq 14 and σ_ω, the standard deviation at an interior anchor, in cells; degree of the mean."""
@@ -36,7 +36,7 @@ END_SPEEDS, KNOTS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.5, None, 0.3, 0.7, 0.1, 0.9)
 """Shares of the asked end speeds, and places of a primitive's knot, that are tried in this order until a speed profile exists."""
 FITTING = FittingConfig(allow="lost_conflict", scale_low=0.01, scale_high=1000.0, max_move=100.0, clearance=0.0)
 PLANNING = PlanningConfig(iterations=ITERATIONS, drivable=False, rrt_star_connect=PAPER)
-UNLIMITED = SamplingConfig(max_speed=1e6, max_acceleration=1e6, max_deceleration=1e6, max_lateral_acceleration=1e6)
+UNLIMITED = Dynamics(max_speed=1e6, max_acceleration=1e6, max_deceleration=1e6, max_lateral_acceleration=1e6)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,10 @@ import daqp
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.method.sampling import SamplingConfig, SpeedKnots
+from scenario_gen.method.sampling import SpeedKnots
 from scenario_gen.numerics import Bools, Floats, frozen, Ints
 from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT2, OUT3
+from scenario_gen.types import Dynamics
 
 Marks = npt.NDArray[np.intc]
 
@@ -96,8 +97,8 @@ class SpeedBounds:
 class SpeedProfileQP:
     """Solves the speeds of one vehicle for many samples of clock and lengths."""
 
-    def __init__(self, knots: SpeedKnots, config: SamplingConfig, bounds: SpeedBounds | None = None) -> None:
-        self.knots, self.config = knots, config
+    def __init__(self, knots: SpeedKnots, limits: Dynamics, bounds: SpeedBounds | None = None) -> None:
+        self.knots, self.limits = knots, limits
         self.bounds = bounds or SpeedBounds.none()
         n, groups = knots.size, len(knots.bounds)
         loose = (knots.unknown[:-1] >= 0) | (knots.unknown[1:] >= 0)
@@ -153,8 +154,8 @@ class SpeedProfileQP:
         knots, samples, n = self.knots, len(knot), self.knots.size
         h, f, a = np.zeros((samples, n, n)), np.zeros((samples, n)), np.zeros((samples, self._rows, n))
         low, high = np.zeros((samples, n + self._rows)), np.zeros((samples, n + self._rows))
-        high[:, :n] = self.config.max_speed
-        limits = np.array([self.config.max_deceleration, self.config.max_acceleration])
+        high[:, :n] = self.limits.max_speed
+        limits = np.array([self.limits.max_deceleration, self.limits.max_acceleration])
         bounds = self.bounds
         given = (knots.group, knots.moments, knots.interior, knots.unknown, knots.given, self._rated, limits)
         _assemble(knot, lengths, *given, bounds.interval, bounds.at, bounds.most, h, f, a, low, high)

@@ -20,6 +20,7 @@ import shapely
 from benchmarks._recheck_motion import advance, boxes_at, Lanes, Paces, SLOT, TOUCH
 from benchmarks._sampling_cases import cases, Prepared
 from scenario_gen.method.validity import Limits
+from scenario_gen.method.validity.dynamics import OF_TYPE
 from scenario_gen.numerics.arrays import Bools, Floats, Ints
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
@@ -139,6 +140,9 @@ class Recheck:
     def _states(self, s: Scenario, account: Account) -> None:
         """End states, and the limits of the motion."""
         one = self.limits
+        top, speeding, braking, sideways, bend = np.array(
+            [[getattr(one.of(v.type), name) for v in s.vehicles] for name in OF_TYPE]
+        )
         for k, asked in ((0, self.asked.start), (-1, self.asked.end)):
             driven, gained = _unseen(s, k)
             far = (np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1) - self.asked.relaxed[:, k, 0] - driven).max()
@@ -150,12 +154,13 @@ class Recheck:
         turn = np.abs(np.diff(s.heading, axis=1))
         way = np.hypot(*np.moveaxis(np.diff(s.position, axis=1), -1, 0))
         pace = np.maximum(s.speed[:, 1:], s.speed[:, :-1])
-        high, low = max(rate.max(), s.acceleration.max()), min(rate.min(), s.acceleration.min())
+        high = np.maximum(rate.max(axis=1), s.acceleration.max(axis=1))
+        low = np.minimum(rate.min(axis=1), s.acceleration.min(axis=1))
         broken = {
-            "speed": s.speed.min() < 0.0 or s.speed.max() > one.max_speed,
-            "longitudinal_acceleration": high > one.max_acceleration + slack or -low > one.max_deceleration + slack,
-            "lateral_acceleration": (pace * turn / h).max() > one.max_lateral_acceleration + slack,
-            "curvature": bool((turn > one.max_curvature * way + 1.1e-4).any()),
+            "speed": s.speed.min() < 0.0 or (s.speed.max(axis=1) > top).any(),
+            "longitudinal_acceleration": ((high > speeding + slack) | (-low > braking + slack)).any(),
+            "lateral_acceleration": ((pace * turn / h).max(axis=1) > sideways + slack).any(),
+            "curvature": bool((turn > np.nan_to_num(bend[:, None], posinf=1e9) * way + 1.1e-4).any()),
         }
         for cause in (name for name, wrong in broken.items() if wrong):
             account.add(cause, f"scenario {s.index}")

@@ -23,13 +23,12 @@ from benchmarks.row import Row
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.cli.demo import ROADS
 from scenario_gen.cli.folder import generate_all
-from scenario_gen.logs import read_log
+from scenario_gen.logs import LogConfig, read_log, read_raw
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.export import export_bag
-from scenario_gen.output.exchange.importing import read_scenario_file
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
@@ -125,10 +124,10 @@ def _round_trip(folder: Path, bags: Sequence[Path], target: str) -> list[Row]:
         known = {one.sha256: one.others for case in read_cases(bag) for one in case.scenarios}
         for entry in entries:
             scenario: Scenario = known[entry["sha256"]]
-            for n, track in enumerate(read_scenario_file(folder / str(k) / entry["files"][0]).tracks):
+            for n, track in enumerate(read_raw([folder / str(k) / entry["files"][0]], LogConfig()).vehicles):
                 there = slice(int(scenario.present[n, 0]), int(scenario.present[n, 1]) + 1)
-                place = max(place, float(np.abs(track.rows[:, 1:3] - scenario.position[n, there]).max()))
-                speed = max(speed, float(np.abs(track.rows[:, 3] - scenario.speed[n, there]).max()))
+                place = max(place, float(np.abs(track.fix - scenario.position[n, there]).max()))
+                speed = max(speed, float(np.abs(track.speed - scenario.speed[n, there]).max()))
     return [
         Row(f"bridges.{target}.round_trip.position", place, "m", "lower", 1e-3),
         Row(f"bridges.{target}.round_trip.speed", speed, "m/s", "lower", 1e-2),

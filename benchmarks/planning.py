@@ -36,6 +36,7 @@ from scenario_gen.roads.connectivity import common_component, component_at, comp
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.road import Road
+from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import BoundaryStates
 
 SEEDS = sized(20, quick=1)
@@ -284,7 +285,9 @@ def _drivable() -> list[Row]:
         curvature = np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max()
         shortest = RrtStarConnect().plan(road, Query(poses[0, :2], poses[1, :2], 0.95), Budget(2000), 0).cost
         rows.append(Row(f"drivable, {name} turn: time", 1e3 * median(times[1:]), "ms", "lower", 150.0))
-        rows.append(Row(f"drivable, {name} turn: largest curvature", float(curvature), "1/m", "lower", config.max_curvature))
+        rows.append(
+            Row(f"drivable, {name} turn: largest curvature", float(curvature), "1/m", "lower", Dynamics().planned.max_curvature)
+        )
         rows.append(
             Row(f"drivable, {name} turn: length", float(route.length[-1]), "m", "lower", None, f"shortest {shortest:.2f} m")
         )

@@ -22,13 +22,12 @@ from msg_conventions.layouts import PREDICTED, TRACKED
 from msg_conventions.odometry import encode_odometry
 from msg_conventions.poses import pose_rows
 from scenario_gen.numerics import Floats
-from scenario_gen.types import height, is_truck, Quality, rear_axle, Scenario, shifted, Vehicle
+from scenario_gen.types import height, Quality, rear_axle, Scenario, shifted, Vehicle
 
 OBJECTS, TRACKS = "/perception/object_recognition/objects", "/perception/object_recognition/tracking/objects"
 EGO, BASE_LINK = "/localization/kinematic_state", "base_link"
 QUALITY = Quality(depth=1, transient_local=False)
 STEP_NS, HORIZON_NS = 500_000_000, 10_000_000_000
-CAR, TRUCK = 1, 2  # labels of ObjectClassification
 BOUNDING_BOX = 0  # type of Shape
 ORIENTATION_KNOWN = 2  # TrackedObjectKinematics.AVAILABLE
 
@@ -113,7 +112,7 @@ def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
     return {
         "id": np.frombuffer(uuid_of(vehicle), dtype=np.uint8),
         "existence": 1.0,
-        "classes": [{"label": TRUCK if is_truck(vehicle) else CAR, "probability": 1.0}],
+        "classes": [{"label": vehicle.kind.autoware, "probability": 1.0}],
         "pose": _shape_poses(vehicle, state[None, :3]),
         "twist": (speed, 0.0, 0.0, 0.0, 0.0, rate),
         "acceleration": (acceleration, 0.0, 0.0, 0.0, 0.0, 0.0),

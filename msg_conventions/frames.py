@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Coordinate frames ⇄ tf2_msgs/TFMessage: `/tf`, of the vehicles that the player moves, and `/tf_static`.
+"""Coordinate frames ⇄ tf2_msgs/TFMessage: `/tf`, of the vehicles of a scenario in motion.
 
-Parent: the frame of the trajectory that is played (`local_enu` of tracks, the road's of scenarios). Child: `vehicle_<id>`, at the
-footprint's centre, x ahead. QoS: reliable; /tf volatile, /tf_static transient_local, depth 1.
+Parent: the road's frame. Child: `vehicle_<id>`, at the footprint's centre, x ahead. QoS: reliable, volatile, depth 100.
 """
 
 from collections.abc import Sequence

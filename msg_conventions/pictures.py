@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from msg_conventions.cdr import decode, encode
+from msg_conventions.cdr import encode
 from msg_conventions.layouts import MARKERS, POLYGON
 from msg_conventions.markers import CUBE, DELETE_ALL, LINE_LIST, LINE_STRIP, Marker
 from scenario_gen.numerics import Bools, Floats
@@ -37,16 +37,6 @@ def encode_footprint(vehicle: Vehicle, stamp_ns: int, frame_id: str) -> bytes:
     x, y = 0.5 * vehicle.length, 0.5 * vehicle.width
     corners = ((x, y, 0.0), (-x, y, 0.0), (-x, -y, 0.0), (x, -y, 0.0))
     return encode(POLYGON, stamp=stamp_ns, frame_id=frame_id, points=corners)
-
-
-def decode_footprint(data: bytes, what: str = "footprint") -> Floats:
-    """Return corners (n, 2) [m].
-
-    Raises:
-        InputError: the message is damaged.
-    """
-    points: Floats = decode(POLYGON, data, what).points[:, :2].astype(np.float64)
-    return points
 
 
 def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:

@@ -57,7 +57,6 @@ _TABLE: tuple[tuple[str, Quality, str], ...] = (
     (odometry.TYPE, autoware.QUALITY, autoware.EGO),
     ("autoware_perception_msgs/msg/PredictedObjects", autoware.QUALITY, autoware.OBJECTS),
     (frames.TYPE, LIVE, "tf"),
-    (frames.TYPE, LATCHED, "tf_static"),
     (diagnostics.TYPE, LATCHED, "road/info fit/info report"),
     (diagnostics.TYPE, MANY, "scenarios/info verdicts"),
     (diagnostics.TYPE, Quality(depth=100), "diagnostics"),  # in a bag written without nodes: one message, which is latched

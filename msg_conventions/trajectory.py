@@ -4,7 +4,8 @@
 """trajectory_msgs/MultiDOFJointTrajectory, the one message for tracks, changepoints, fits and scenarios.
 
 Frame: `header.frame_id`. `header.stamp`: the template's first sample; what derives from a template repeats it.
-`joint_names[i]`: `<id>:<length>x<width>`, metres (a bare `<id>` is read as a default car).
+`joint_names[i]`: `<id>:<length>x<width>`, metres (a bare `<id>` is read as a default car), then `:<type>` of who is neither a car
+shorter than 7 m nor a truck from 7 m on.
 `points[k].time_from_start`: time since `header.stamp`. `points[k].transforms[i]`: pose of the footprint's centre,
 z = 0 (`ABSENT` where the vehicle is not there: far below the ground; x, y and yaw are then those of its first or last instant),
 yaw as a quaternion. `velocities[i].linear.x`: speed along the heading, m/s. `accelerations[i].linear.x`: likewise,
@@ -23,7 +24,7 @@ from msg_conventions.cdr import encode as encode_fields
 from msg_conventions.yaw import check_quaternions, quaternion, yaw
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.types import tokens, Vehicle
+from scenario_gen.types import tokens, usual_type, Vehicle
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
@@ -59,18 +60,23 @@ class Trajectory:
 
 
 def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
-    """Return `<token>:<length>x<width>` of each vehicle, metres, so that no second message is needed for sizes."""
+    """Return `<token>:<length>x<width>:<type>` of each vehicle, metres, so that no second message is needed for these.
+
+    The type is left out where it is the usual one of the length, as of all vehicles of older bags.
+    """
     names = tokens(vehicle.id for vehicle in vehicles)
-    return tuple(f"{name}:{vehicle.length!r}x{vehicle.width!r}" for name, vehicle in zip(names, vehicles, strict=True))
+    types = ("" if one.type == usual_type(one.length) else f":{one.type}" for one in vehicles)
+    return tuple(f"{name}:{one.length!r}x{one.width!r}{kind}" for name, one, kind in zip(names, vehicles, types, strict=True))
 
 
 def vehicle_of(joint_name: str) -> Vehicle:
     """Return the vehicle of a joint name; one without a footprint gets the default size of a car.
 
     Raises:
-        InputError: the footprint is not two lengths of a vehicle.
+        InputError: the footprint is not two lengths of a vehicle, or the type is not known.
     """
-    name, colon, size = joint_name.partition(":")
+    name, colon, rest = joint_name.partition(":")
+    size, _, kind = rest.partition(":")
     if not colon:
         return Vehicle(name)
     match = re.fullmatch(r"([0-9.eE+-]+)x([0-9.eE+-]+)", size)
@@ -80,9 +86,10 @@ def vehicle_of(joint_name: str) -> Vehicle:
         length = width = 0.0
     if not (SMALLEST <= length <= LARGEST and SMALLEST <= width <= LARGEST):
         raise InputError(
-            f"joint name {joint_name!r}: expected <id>:<length>x<width>, {SMALLEST:g} to {LARGEST:g} m each, e.g. car:4.8x1.9"
+            f"joint name {joint_name!r}: expected <id>:<length>x<width> (and :<type>), {SMALLEST:g} to {LARGEST:g} m each, "
+            "e.g. car:4.8x1.9"
         )
-    return Vehicle(name, length, width)
+    return Vehicle(name, length, width, kind)
 
 
 def _point_type(n: int) -> np.dtype[np.void]:

@@ -76,12 +76,6 @@ def recorded() -> Path:
     return recorded_folder(DATA)
 
 
-@pytest.fixture(scope="session", params=JUDGES)
-def crashes(request: pytest.FixtureRequest) -> Path:
-    """The folder of files that break a reader, first made here, then those that once did."""
-    return request.getfixturevalue("made_crashes") if request.param == "made" else recorded_folder(DATA.parent / "crashes")
-
-
 @pytest.fixture
 def file(request: pytest.FixtureRequest) -> Path:
     """One of them, of `crash_files`: made here if its path is relative."""

@@ -27,7 +27,7 @@ from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.request import Request
 
 QUICK = EvaluationConfig(resamples=50, compare=True)
-WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replayed": ORACLE}
+WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replay": ORACLE}
 
 
 @pytest.fixture(scope="module")

@@ -10,15 +10,15 @@ from dataclasses import replace
 
 from lengths import LONG, SOME_ENCOUNTERS
 import numpy as np
-from oracle import oracle_violations
 import pytest
 
+from benchmarks._recheck import Account, Recheck
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.template.interaction import find_conflicts, find_waits
 from scenario_gen.types.generation import GenerationResult, WITHOUT
+from scenario_gen.types.road_users import Dynamics
 
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
@@ -28,16 +28,12 @@ NARROW = replace(CONFIG, sampling=replace(CONFIG.sampling, variety="narrow"), ev
 pytestmark = pytest.mark.spread
 
 
-def recheck(case: GenerationResult) -> list[str]:
-    """Return what the independent oracle finds wrong with the published scenarios."""
-    encounter = case.encounter
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-    waits = find_waits(encounter)
-    return [
-        f"scenario {scenario.index}: {violation}"
-        for scenario in case.generated.scenarios
-        for violation in oracle_violations(scenario, case.road, case.fit.requested, conflicts, waits, CONFIG.limits, dt=0.05)
-    ]
+def recheck(case: GenerationResult) -> dict[str, str]:
+    """Return what an independent checker finds wrong with the published scenarios, and the first of each kind."""
+    account = Account()
+    own = Recheck(case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size))
+    own.check(case.generated.scenarios, account)
+    return account.first
 
 
 def assert_sound(case: GenerationResult) -> None:
@@ -45,7 +41,7 @@ def assert_sound(case: GenerationResult) -> None:
     made = case.generated
     assert len(made.scenarios) == COUNT, made.refused
     assert made.candidates == COUNT + sum(made.refused.values())
-    assert recheck(case) == []
+    assert recheck(case) == {}
     assert len(case.segmentation.changepoints) <= case.encounter.duration / 2.0
 
 
@@ -62,8 +58,8 @@ def at_the_recorded_pace(case: GenerationResult) -> GenerationResult:
     E compares at equal shares of the duration, and a clock that is slowed ahead of a bend shifts positions in all rows by more
     than changepoints do.
     """
-    fast = replace(NARROW.sampling, max_lateral_acceleration=12.0, bend_acceleration=10.0)
-    config = replace(NARROW, sampling=fast, limits=replace(CONFIG.limits, max_lateral_acceleration=12.0))
+    fast = replace(NARROW.sampling, bend_acceleration=10.0)
+    config = replace(NARROW, sampling=fast, limits=replace(CONFIG.limits, car=Dynamics(max_lateral_acceleration=14.4)))
     made = generate(case.encounter, case.road, config, count=COUNT, seed=7)
     assert made.generated.scenarios and not any("the pace is lowered" in sentence for sentence in made.generated.adaptations)
     return made

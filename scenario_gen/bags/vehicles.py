@@ -30,7 +30,6 @@ from scenario_gen.types import Encounter
 
 FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, odometry.TYPE, trajectory.TYPE
 KINDS = ("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian")  # by label
-VEHICLES = ("car", "truck", "bus", "trailer")
 UNAVAILABLE, SIGN_UNKNOWN = 0, 1  # of orientation_availability
 _SLOW = 0.5  # m/s: below, a velocity does not tell which way an object faces
 

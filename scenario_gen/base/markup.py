@@ -104,6 +104,14 @@ def finite(text: str, where: str) -> float:
     return number
 
 
+def has_root(path: Path, tag: str, *suffixes: str) -> bool:
+    """Return whether a file's name ends with one of these suffixes, and an element of that name is in its beginning."""
+    if path.suffix.lower() not in suffixes:
+        return False
+    with path.open("rb") as file:
+        return f"<{tag}".encode() in file.read(4096)
+
+
 def read_xml(path: Path, what: str, skip: frozenset[str] = frozenset()) -> Element:
     """Return the root element of an XML file.
 

@@ -3,11 +3,12 @@
 
 """Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from scenario_gen.base.documents import parse_yaml, read_yaml, shown, WHOLE
 from scenario_gen.base.errors import did_you_mean, InputError
@@ -46,9 +47,14 @@ def parameter(
 class Parameters:
     """Base of every configuration: its values are checked when it is created.
 
+    Attributes:
+        replaced: of names that parameters had in earlier versions, the parameters that are set instead.
+
     Raises:
         InputError: a value has the wrong type or is out of range.
     """
+
+    replaced: ClassVar[Mapping[str, str]] = {}
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -93,6 +99,19 @@ def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]
     return flat
 
 
+def _unknown(config: Any, name: str, prefix: str = "") -> str:
+    """Return the message on a name that is no parameter of a configuration, or no longer one."""
+    holder, own = config, name
+    while "." in own and is_dataclass(getattr(holder, own.partition(".")[0], None)):
+        head, _, own = own.partition(".")
+        holder = getattr(holder, head)
+    replaced = getattr(holder, "replaced", {})
+    if own in replaced:
+        return f"parameter {prefix}{name} is no longer there; set {replaced[own]}, by which all stages go"
+    near = did_you_mean(name, flatten(config))
+    return f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them{near}"
+
+
 def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     """Return a copy of `config` with the dotted names in `values` set.
 
@@ -105,10 +124,7 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     for name, value in values.items():
         head, _, rest = name.partition(".")
         if head not in known or bool(rest) != is_dataclass(getattr(config, head)):
-            raise InputError(
-                f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them"
-                f"{did_you_mean(name, flatten(config))}"
-            )
+            raise InputError(_unknown(config, name, prefix))
         if rest:
             nested.setdefault(head, {})[rest] = value
         else:
@@ -130,7 +146,7 @@ def assigned(config: Config, assignment: str) -> Config:
         raise InputError(f"--set {shown(assignment)}: write it as name=value")
     known = flatten(config)
     if name not in known:
-        raise InputError(f"unknown parameter {shown(name)}; `scenario-gen parameters` lists them{did_you_mean(name, known)}")
+        raise InputError(_unknown(config, name))
     is_text = isinstance(known[name][0].default, str)  # stays text: vehicle "007" is no number
     value = text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")
     if isinstance(known[name][0].default, float) and isinstance(value, str):

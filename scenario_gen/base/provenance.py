@@ -42,7 +42,7 @@ def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what:
     """
     values: dict[str, Any] = {}
     for name, (entry, _) in flatten(config).items():
-        text = texts.get(prefix + name)
+        text = texts.get(prefix + name, texts.get(prefix + name.rpartition(".")[2]))  # older bags: a limit of all types
         if text is None:
             raise InputError(f"{what}: parameter {prefix}{name} is not there, so it cannot be made again")
         kind = type(entry.default)

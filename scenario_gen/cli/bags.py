@@ -16,7 +16,6 @@ from scenario_gen.cli.options import assigned_all, configured, ParametersOption,
 from scenario_gen.cli.output import bars, beside, Commands, give, open_page, say, say_rows
 
 commands = Commands("Look at a bag of scenarios")
-OTHER = "Other formats"
 
 
 @commands.command()
@@ -98,7 +97,7 @@ def validate(
         raise typer.Exit(1)
 
 
-@commands.command("export", panel=OTHER)
+@commands.command("export", panel="Other formats")
 def export_scenarios(
     bag: Annotated[Path, typer.Argument(help="A bag with the topic `scenarios`, from this suite or another.")],
     to: Annotated[str, typer.Option(help="commonroad, openscenario (with OpenDRIVE), autoware or scenarionet (MetaDrive).")],
@@ -139,21 +138,6 @@ def export_scenarios(
         )
     give(scenarios=result.scenarios, folder=folder, notes=result.notes)
     say("\n".join((*result.notes, f"{result.scenarios} scenarios: {folder}")))
-
-
-@commands.command("import", panel=OTHER)
-def import_scenario(
-    file: Annotated[Path, typer.Argument(help="A CommonRoad XML file, or an OpenSCENARIO XML file with timed polylines.")],
-    out: Annotated[Path | None, typer.Option(help="The new table. Default: the file's name with .csv.")] = None,
-) -> None:
-    """Convert the trajectories of a CommonRoad or OpenSCENARIO file to a table that `generate` reads."""
-    from scenario_gen.output.exchange.importing import import_file
-
-    target = out or beside(file, f"{file.stem}.csv")
-    result = import_file(file, target)
-    rows = sum(len(track.rows) for track in result.tracks)
-    give(vehicles=len(result.tracks), rows=rows, file=target, notes=result.notes)
-    say("\n".join((*result.notes, f"{len(result.tracks)} vehicles, {rows} rows: {target}")))
 
 
 @commands.command("reindex")

@@ -37,13 +37,14 @@ def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
         yield Workers(count, scheduler, partial(advance, "tasks"))
 
 
-def conclude(failed: Sequence[str], out: Place) -> None:
-    """Give the failed tasks.
+def conclude(summary: list[str], failed: Sequence[str], out: Place, **files: Place) -> None:
+    """Give and print the summary of tasks, and the files.
 
     Raises:
         RefusedError: a task failed.
     """
-    give(out=out, failed=failed)
+    give(summary=summary, **files, out=out, failed=failed)
+    say(*summary, *(f"{name}: {path}" for name, path in files.items()), sep="\n")
     if failed:
         raise RefusedError(f"{len(failed)} tasks failed, see above; the rest is in {out}; the same command tries them again")
 
@@ -69,9 +70,7 @@ def mine(
     config, corpus = assigned_all(CorpusConfig(), assignments), place(out, to_write=True)
     with workers_of(workers, scheduler) as who:
         result = mined([place(one) for one in archive], corpus, config, workers=who)
-    give(summary=result.lines(), page=corpus / PAGE)
-    say(*result.lines(), f"page: {corpus / PAGE}", sep="\n")
-    conclude(result.failed, corpus)
+    conclude(result.lines(), result.failed, corpus, page=corpus / PAGE)
 
 
 @dataclass(frozen=True)
@@ -81,9 +80,9 @@ class Batch:
     corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote, or s3://….")]
     roads: Annotated[list[str], typer.Option(help="Roads, as for `generate`: separated by commas, or repeated.")]
     out: Annotated[Path, typer.Option(help="Folder for tables and bags, or s3://…. An unfinished batch is continued.")]
-    count: Annotated[int, typer.Option(min=1, max=100_000, help="Scenarios per template and road.")] = 50
+    count: Annotated[int, typer.Option(min=1, max=100_000, help="Scenarios per encounter and road.")] = 50
     seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 0
-    templates: Annotated[int, typer.Option(min=0, help="Use the first so many templates of the corpus. 0: all.")] = 0
+    templates: Annotated[int, typer.Option(min=0, help="Use the first so many encounters of the corpus. 0: all.")] = 0
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
     assignments: Annotated[
@@ -95,7 +94,7 @@ class Batch:
 @commands.command(urls=("corpus", "out"))
 @takes(Batch)
 def batch(options: Batch) -> None:
-    """Generate scenarios from all templates of a corpus on all given roads."""
+    """Generate scenarios from all encounters of a corpus on all given roads."""
     from scenario_gen.corpus.batch import BatchRequest, run_batch
     from scenario_gen.method.config import PipelineConfig
 
@@ -106,9 +105,7 @@ def batch(options: Batch) -> None:
             place(options.corpus), names, out, BatchRequest(config, options.count, options.seed),
             templates=options.templates, workers=who,
         )  # fmt: skip
-    give(summary=result.lines())
-    say(*result.lines(), sep="\n")
-    conclude(result.failed, out)
+    conclude(result.lines(), result.failed, out)
 
 
 def shown(value: object) -> str:
@@ -120,18 +117,18 @@ def shown(value: object) -> str:
 
 @commands.command(urls=("batch",))
 def find(
-    batch: Annotated[Path, typer.Argument(help="A batch, finished or not; or s3://….")],
+    batch: Annotated[Path, typer.Argument(help="A batch, finished or not, or a corpus that `mine` wrote; or s3://….")],
     condition: Annotated[str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")] = "true",
     limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list here. 0: all.")] = 20,
     bag: Annotated[
-        Path | None, typer.Option(help="Write the scenarios found to this bag, with their templates and roads.")
+        Path | None, typer.Option(help="Write the scenarios found to this bag, with their recordings and roads.")
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Folder for the page of that bag.")] = None,
     again: Annotated[
         bool, typer.Option("--again", help="Generate each scenario found again and check that it is byte-identical.")
     ] = False,
 ) -> None:
-    """Find scenarios of a batch by kind, road, PET, time to collision, …."""
+    """Find scenarios of a batch, or recorded encounters of a corpus, by kind, road, PET, time to collision, …."""
     from scenario_gen.corpus import find as finding
     from scenario_gen.output.review.evaluation import write_page
 
@@ -141,9 +138,10 @@ def find(
     found = finding.find(source, condition)
     give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
     listed = found.rows[: limit or None]
-    say_rows(finding.COLUMNS, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3)
+    titles = [f"{name} [{finding.UNITS[name]}]" if name in finding.UNITS else name for name in finding.COLUMNS]
+    say_rows(titles, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3)
     rest = f", the first {len(listed)} are listed; --limit 0 lists all" if len(listed) < len(found.rows) else ""
-    say(f"{len(found.rows)} scenarios found{rest}")
+    say(f"{len(found.rows)} found{rest}; a ttc above evaluation.ttc_horizon (10 s) counts as this")
     say(*finding.coverage_lines(found, source), sep="\n")
     if again:
         for row in found.rows:
@@ -178,9 +176,7 @@ def library(
     config, source = assigned_all(SHARED, assignments), place(corpus, to_write=True)
     with workers_of(workers, scheduler) as who:
         built = build(source, config, most=most, seed=seed, workers=who)
-    give(summary=built.lines())
-    say(*built.lines(), sep="\n")
-    conclude(built.failed, source / "library")
+    conclude(built.lines(), built.failed, source / "library")
 
 
 @commands.command()
@@ -193,7 +189,7 @@ def coverage(
     seed: Annotated[int, typer.Option(min=0, help="Random seed of the draws.")] = 0,
     out: Annotated[Path, typer.Option(help="The page to write, HTML.")] = Path("coverage.html"),
 ) -> None:
-    """Measure how much unseen traffic recordings and the scenarios generated from them stand for."""
+    """Measure how much unseen traffic recordings and the scenarios generated from them represent."""
     from scenario_gen.corpus.coverage import results_of, write_coverage
     from scenario_gen.method.evaluation.population import population_of
 

@@ -62,8 +62,8 @@ class Generate:
         bool,
         typer.Option(
             "--for-testing",
-            help="Keep only scenarios in which the --ego has to react: a planner that ignores the others collides, and a simple "
-            "one that looks passes.",
+            help="Keep only scenarios in which the --ego has to react: a baseline that ignores the others collides, and a simple "
+            "reactive planner passes.",
         ),
     ] = False
     compare: Annotated[
@@ -164,7 +164,7 @@ def roads(
 def regenerate(
     bag: Annotated[Path, typer.Argument(help="A bag that `generate` or the ROS nodes wrote.")],
     index: Annotated[int, typer.Argument(help="Index of the scenario, as in scenarios/info.", min=0)],
-    out: Annotated[Path | None, typer.Option(help="Folder for a bag with this scenario, its template and its road.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for a bag with this scenario, its recording and its road.")] = None,
     namespace: Annotated[str | None, typer.Option(help="Namespace of the scenario, if several have that index.")] = None,
     request: Annotated[str | None, typer.Option(help="Id of the request, if several have that index.")] = None,
     log: Annotated[

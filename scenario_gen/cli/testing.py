@@ -31,10 +31,7 @@ class Drive:
     bag: Annotated[Path, typer.Argument(help="A bag of this suite with scenarios.")]
     planner: Annotated[
         str,
-        typer.Option(
-            help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower. With --ros: the command that "
-            "starts its node."
-        ),
+        typer.Option(help="MODULE:CLASS of the planner, e.g. mine:MyPlanner. With --ros: the command that starts its node."),
     ]
     ego: Annotated[
         str, typer.Option(help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first.")
@@ -52,13 +49,13 @@ class Drive:
         typer.Option(help="drives.json of another planner on the same bag. Exit code 1 if this planner is worse."),
     ] = None
     unlooking: Annotated[
-        bool, typer.Option(help="Also drive a planner that ignores the others, to show how many scenarios need no reaction.")
+        bool, typer.Option(help="Also drive a baseline that ignores the others, to show how many scenarios need no reaction.")
     ] = True
     out: Annotated[Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")] = Path("out/drives")
     assignments: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", help="Set a parameter of the drive (step, policy, …) or a bar (bars.collisions, …), as name=value."
+            "--set", help="Set a parameter of the drive (step, policy, …) or a threshold (bars.collisions, …), as name=value."
         ),
     ] = None
 
@@ -66,7 +63,7 @@ class Drive:
 @commands.command()
 @takes(Drive)
 def drive(options: Drive) -> None:
-    """Test a planner in closed loop in every scenario of a bag. Exit code 1: a bar is not met."""
+    """Test a planner in closed loop in every scenario of a bag. Exit code 1: a threshold is not met."""
     from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
 
     remind(options.bag)
@@ -82,7 +79,7 @@ def drive(options: Drive) -> None:
         )
     _report(result, options.out)
     if result.broken:
-        say("bars not met: " + "; ".join(result.broken))
+        say("thresholds not met: " + "; ".join(result.broken))
     if result.easy:
         say(result.easy)
     if result.broken:
@@ -133,9 +130,9 @@ class Search:
 
     source: Annotated[
         Path,
-        typer.Argument(help="A bag of `generate`: the search uses its template, road and parameters. Or a log, with --road."),
+        typer.Argument(help="A bag of `generate`: the search uses its recording, road and parameters. Or a log, with --road."),
     ]
-    planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower.")]
+    planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. mine:MyPlanner.")]
     budget: Annotated[
         int, typer.Option(min=1, max=10_000_000, help="Most drives. A larger budget continues an earlier search.")
     ] = 1000

@@ -37,7 +37,7 @@ from scenario_gen.method.evaluation import at_period, criticality
 from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
-from scenario_gen.types import GenerationResult
+from scenario_gen.types import GenerationResult, most_exposed
 
 BATCH = "batch.json"
 TEMPLATES = 10  # of one task
@@ -108,7 +108,7 @@ class Batch:
 
     def lines(self) -> list[str]:
         """Return the summary for people."""
-        lines = [f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (template and road)"]
+        lines = [f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (encounter and road)"]
         lines += [f"{count} cases without any: {cause}" for cause, count in Counter(self.failures).most_common()]
         lines += [f"{count} candidates refused: {cause}" for cause, count in Counter(self.refused).most_common()]
         return lines + self.failed
@@ -264,12 +264,14 @@ def _scenario_rows(case: Mapping[str, Any], result: GenerationResult, task: Part
             "sha256": scenario_bytes(scenario, result.encounter)[1], "seconds": float(scenario.time[-1]),
             "distance": measures.min_distance, "ttc": measures.min_ttc, "pet": measures.pet,
             "speed": float(scenario.speed.max()), "braking": float(-scenario.acceleration.min()),
+            "type": most_exposed(scenario.vehicles), "types": [vehicle.type for vehicle in scenario.vehicles],
         })  # fmt: skip
     return rows
 
 
 SCENARIO_COLUMNS = {
-    **dict.fromkeys(("template", "kind", "namespace", "sha256"), "string"),
+    **dict.fromkeys(("template", "kind", "namespace", "sha256", "type"), "string"),
+    "types": "string[]",
     **dict.fromkeys(("vehicles", "part", "index", "seed"), "int64"),
     **dict.fromkeys(("seconds", "distance", "ttc", "pet", "speed", "braking"), "double"),
 }

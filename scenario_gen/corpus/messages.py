@@ -170,7 +170,7 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     for file, cause, count, back in base.execute(counts).fetchall():
         found = account[true[file]]
         found["rows"] += count
-        found["said: stamps that run backwards"] += back
+        found["kept: stamps that run backwards"] += back
         if cause:
             found[CAUSES[cause - 1]] += count
     rejected = (  # those with several faults count once
@@ -183,12 +183,12 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     for file, day, count in base.execute(days).fetchall():
         named = NAMED_DAY.search(Path(true[file]).name)
         if named and abs(day - (int(named[1]) - DAY_OF_2004)) > 1:
-            account[true[file]]["said: stamps of another day"] += count
+            account[true[file]]["kept: stamps of another day"] += count
     hours = base.execute(f"SELECT t // {HOUR}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL ORDER BY ALL").fetchall()
     return {
         "files": {name: {why: n for why, n in sorted(found.items()) if n} for name, found in sorted(account.items())},
         "hours": {str(hour): rows for hour, rows in hours},
-        "notes": [f"{true[file]}: DSecond disagrees with Gentime in most rows, and is not asked" for file in unchecked],
+        "notes": [f"{true[file]}: DSecond disagrees with Gentime in most rows, and is ignored" for file in unchecked],
     }
 
 

@@ -395,7 +395,7 @@ def summary(out: Place, config: CorpusConfig, tables: _Encounters, failed: list[
         shared.update(json.loads((parquet.read_schema(here).metadata or {}).get(b"shared", b"{}")).keys())
     if shared:
         first = ", ".join(sorted(shared)[:10])
-        notes.append(f"{len(shared)} ids are borne by several vehicles at once, and told apart by place: {first} …")
+        notes.append(f"{len(shared)} ids are shared by several vehicles at once, and separated by place: {first} …")
     total: Counter[str] = Counter()
     for causes in files.values():
         total.update(causes)

@@ -5,6 +5,7 @@
 
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
+from scenario_gen.logs.adapters.openscenario import OPENSCENARIO_SPEEDS
 from scenario_gen.logs.cleaning import parse_origin
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_time_gap
@@ -17,8 +18,6 @@ from scenario_gen.logs.read import (
     is_bag,
     is_bsm,
     is_fcd,
-    is_known,
-    is_osi,
     is_spmd,
     is_table,
     LogFormat,
@@ -31,9 +30,9 @@ from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
-    "APART", "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "Growth", "LogConfig", "LogFormat", "LogResult", "Meeting",
-    "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "UnknownFormatError", "azimuthal", "bundled",
-    "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_known", "is_nocturne", "is_osi", "is_spmd",
-    "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log", "read_raw",
-    "reprojected", "shortest", "space_time_gap", "ticks", "utm", "windows",
+    "APART", "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "OPENSCENARIO_SPEEDS", "Growth", "LogConfig", "LogFormat",
+    "LogResult", "Meeting", "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "UnknownFormatError",
+    "azimuthal", "bundled", "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_nocturne", "is_spmd", "is_table",
+    "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log", "read_raw", "reprojected",
+    "shortest", "space_time_gap", "ticks", "utm", "windows",
 ]  # fmt: skip

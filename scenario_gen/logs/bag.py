@@ -14,10 +14,10 @@ import numpy as np
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.definitions import TRACKED
-from scenario_gen.bags.vehicles import decode_sample, decode_tracked, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST, VEHICLES
+from scenario_gen.bags.vehicles import decode_sample, decode_tracked, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, RawLog, Rows, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, RawLog, Rows, Segment
 from scenario_gen.types import Encounter
 
 AT_START_M = 0.5  # m from a frame's origin, in which two vehicles cannot be at once
@@ -244,7 +244,7 @@ def read_tracks(topics: list[Topic], name: str, others: list[str]) -> RawLog:
 
 
 def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
-    """Read the objects that a perception tracks; those that are no vehicles are counted and left out.
+    """Read the objects that a perception tracks; a type is the most frequent label.
 
     Args:
         topics: of tracked objects, one.
@@ -260,7 +260,7 @@ def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
         raise InputError(f"{topic.label} has {listed_topics}; choose one with the parameter topics")
     vehicles: dict[str, Rows] = {}
     sizes: dict[str, list[tuple[float, float]]] = {}
-    left_out: dict[str, str] = {}
+    kinds: dict[str, Counter[str]] = {}
     for row, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
         where = f"{topic.where}, message {row + 1}"
         stamp, frame, objects = decode_tracked(data, where)
@@ -269,19 +269,17 @@ def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
         if len(frames) > 1:
             raise InputError(f"{where}: frame {frame!r} differs from that of the messages before")
         for item in objects:
-            if item.kind not in VEHICLES:
-                left_out.setdefault(item.id, item.kind)
-                continue
+            kinds.setdefault(item.id, Counter())[item.kind] += 1
             rows = vehicles.setdefault(item.id, Rows())
             rows.fixes.append((stamp or received, row, *item.position, item.heading))
             rows.speeds.append((stamp or received, row, item.speed))
             sizes.setdefault(item.id, []).append(item.size)
     notes = [f"read from {topic.name} in frame {next(iter(frames), '')!r}"]
-    notes += left_out_note(Counter(left_out.values()), "car, truck, bus or trailer")
     if others:
         notes.append(f"the parameter topics can choose {', '.join(others)}")
     found = []
     for vehicle, rows in vehicles.items():
         length, width = np.median(np.array(sizes[vehicle]), axis=0).tolist()
-        found.append(replace(rows.observations(vehicle), length=length, width=width))
+        kind = kinds[vehicle].most_common(1)[0][0]
+        found.append(replace(rows.observations(vehicle), length=length, width=width, kind=kind))
     return RawLog(name, False, tuple(found), len(topic.data), (topic.segment(0),), tuple(notes))

@@ -13,9 +13,11 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs.clock import beyond
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
+from scenario_gen.logs.kinds import usual_size
 from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.types import CAR, VEHICLE_TYPES
 
 SLOWEST = 5.0  # s between fixes: a slower source does not show how a vehicle drives, or its unit of time is another one
 FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
@@ -324,15 +326,16 @@ def sized(vehicles: list[Observations], config: LogConfig) -> tuple[list[Observa
     """Return the vehicles with lengths and widths, those of `config` where there are none, or such as no car has; and notes."""
     found, wrong = [], []
     for vehicle in vehicles:
-        length, width = vehicle.length, vehicle.width
+        length, width, usual = vehicle.length, vehicle.width, usual_size(vehicle.kind, config)
+        walks = VEHICLE_TYPES[vehicle.kind or CAR].walks  # wider than long
         # comparisons with NaN, where one is not recorded, are false
-        if width <= 0.0 or width > WIDEST_M or width > length:
+        if width <= 0.0 or width > WIDEST_M or (width > length and not walks):
             wrong.append(vehicle)
             length, width = np.nan, np.nan
         elif length <= 0.0 or length > LONGEST_M:
             wrong.append(vehicle)
             length = np.nan
-        length, width = (own if np.isfinite(own) else usual for own, usual in ((length, config.length), (width, config.width)))
+        length, width = (own if np.isfinite(own) else known for own, known in zip((length, width), usual, strict=True))
         found.append(replace(vehicle, length=length, width=width))
     if not wrong:
         return found, []
@@ -346,7 +349,7 @@ def sized(vehicles: list[Observations], config: LogConfig) -> tuple[list[Observa
     return found, [
         f"vehicle {wrong[0].id} is recorded as {size[0]:g} m long and {size[1]:g} m wide, which no car is{more}"
         + (f"; it looks {way}" if way else "")
-        + f": what is wrong is taken as {config.length:g} m × {config.width:g} m"
+        + ": what is wrong is taken as {:g} m × {:g} m".format(*usual_size(wrong[0].kind, config))
     ]
 
 

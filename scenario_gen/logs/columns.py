@@ -62,10 +62,12 @@ IN_BRACKETS = re.compile(r"(.+?)\s*[\[(]\s*([^\])]+?)\s*[\])]")  # x [m]
 SPELLED = {"m/s": "mps", "km/h": "kmh", "°": "deg", "degrees": "deg", "seconds": "s", "metres": "m", "meters": "m", "feet": "ft"}
 NGSIM = {  # columns of the trajectory files, in feet, and their units; positions are those of the middle of the front
     "time": ("global_time", "ms"), "vehicle": ("vehicle_id", ""), "x": ("local_x", "ft"), "y": ("local_y", "ft"),
-    "speed": ("v_vel", "fps"), "length": ("v_length", "ft"), "width": ("v_width", "ft"), "kind": ("v_class", "2+3"),
+    "speed": ("v_vel", "fps"), "length": ("v_length", "ft"), "width": ("v_width", "ft"),
+    "kind": ("v_class", "motorcycle1+car2+truck3"),
 }  # fmt: skip
 FRAMES = re.compile(r"(\d+(?:\.\d+)?)fps")  # a unit of time: frames, so many each second
-KINDS = re.compile(r"\d+(?:\+\d+)*")  # a unit of kinds that are numbers: which of them are cars
+KINDS = re.compile(r"([a-z_]*)(\d+)(?:\+|$)")  # in a unit of kinds that are numbers: which of them are of which type
+ALL_KINDS = re.compile(r"[a-z_]*\d+(?:\+[a-z_]*\d+)*")
 SHOWN = 12  # columns that are not read, by name
 CLOCKWISE = ("course", "bearing")  # by convention degrees clockwise from north
 
@@ -79,14 +81,14 @@ class Column:
         factor: to the unit used here; negative if the axis is flipped.
         clockwise: it is a heading clockwise from north.
         minutes: its last two whole digits and what follows are minutes of a degree, as receivers of NMEA write.
-        cars: it is of kinds that are numbers, and these are cars, vans, trucks and buses.
+        types: it is of kinds that are numbers, and these are of these types; cars, where none is named.
     """
 
     name: str
     factor: float = 1.0
     clockwise: bool = False
     minutes: bool = False
-    cars: tuple[float, ...] = ()
+    types: tuple[tuple[float, str], ...] = ()
 
 
 def named(header: Sequence[str], path: Path, option: str) -> dict[str, Column | None]:
@@ -112,7 +114,7 @@ def named(header: Sequence[str], path: Path, option: str) -> dict[str, Column | 
             own, _, unit = (p.strip() for p in own.rpartition(":"))
         if own.lower() not in spelled:
             raise InputError(f"{path} has no column {name!r} (asked for as {quantity}); it has {', '.join(header)}")
-        form = {"time": FRAMES, "kind": KINDS}.get(quantity)
+        form = {"time": FRAMES, "kind": ALL_KINDS}.get(quantity)
         if unit and unit not in UNITS[quantity] and not (form and form.fullmatch(unit)):
             raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
         column = as_column(quantity, spelled[own.lower()], unit)
@@ -206,7 +208,7 @@ def as_column(quantity: str, name: str, unit: str = "") -> Column:
     """Return the column in the given unit; by default its suffix names the unit."""
     lower = normal(name)
     if quantity == "kind":
-        return Column(name, cars=tuple(map(float, unit.split("+"))) if unit else ())
+        return Column(name, types=tuple((float(number), word or "car") for word, number in KINDS.findall(unit)))
     if quantity == "time" and (frames := FRAMES.fullmatch(unit)):
         return Column(name, 1.0 / max(float(frames[1]), 1e-3))
     unit = unit or max((unit for unit in UNITS[quantity] if lower.endswith("_" + unit)), key=len, default="")

@@ -11,7 +11,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 
 FORMATS = (
     *("auto", "spmd", "table", "bag", "argoverse2", "interaction", "ind", "highd", "commonroad", "nocturne", "osi"),
-    *("omega_prime", "bsm", "fcd"),
+    *("omega_prime", "bsm", "fcd", "openscenario"),
 )
 
 
@@ -32,6 +32,9 @@ class LogConfig(Parameters):
     )
     topics: str = parameter("", "topics of a bag to read, separated by commas; empty: all that can be used")
     vehicles: str = parameter("", "vehicles to keep, separated by commas; empty: all")
+    types: str = parameter(
+        "", "types of road users to keep, e.g. car,van,truck,bus; `other` is who is of no type that is known; empty: all"
+    )
     start: float = parameter(0.0, "start of the time window, counted from the log's first stamp", unit="s", low=0.0)
     end: float = parameter(0.0, "end of the time window, counted from the log's first stamp; 0: to the end", unit="s", low=0.0)
     origin: str = parameter("", "latitude,longitude of the local frame's origin in degrees; empty: the middle of the log's fixes")

@@ -15,12 +15,15 @@ from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing, UnreconciledError
 from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES
 
 TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
-SHARPEST = 0.4  # 1/m: no car turns sharper, noise included
+SHARPEST = 0.4  # 1/m: no car turns sharper, noise included;
+NOISY = 1.6  # times as sharp as others can turn, if that is sharper
 BACKWARDS = np.radians(150.0)  # headings further off the path are those of a vehicle that drives backwards
 REVERSES_MPS = 5.0  # the fastest that cars are driven backwards; above, the axes are mirrored (`remarks_on_units`)
+CONTRADICTS = 1.2  # times the highest speed of its type, from which on it is of another one
 LEVER = 3.0  # m over which the course before and after a stop is measured
 
 
@@ -59,7 +62,7 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     usual = float(np.median(seconds))
     longest = longest_bridge(seconds, config)
     gaps = (seconds > longest) | abrupt(seconds, np.hypot(*np.diff(track.fix, axis=0).T))
-    back = reversals(track, config)
+    back = np.zeros_like(gaps) if VEHICLE_TYPES[track.kind or CAR].walks else reversals(track, config)
     cuts = gaps | back | laps(track, config)
     bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
     whole = parts(track, cuts)
@@ -106,6 +109,32 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     return pieces, quality
 
 
+def plausible(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], tuple[str, ...]]:
+    """Return the pieces that are driven forwards, of types that suit their motion; and notes on what was doubtful."""
+    typed, contradictions = of_types(pieces)
+    kept, backwards = driven_forwards(typed, config)
+    return kept, (*contradictions, *backwards)
+
+
+def of_types(pieces: Sequence[Piece]) -> tuple[list[Piece], tuple[str, ...]]:
+    """Return the pieces; a vehicle that is much faster than its type is of type `other`, and a note says so."""
+    fastest: dict[tuple[str, str], float] = {}
+    for piece in pieces:
+        key = piece.track.id, piece.track.kind
+        fastest[key] = max(fastest.get(key, 0.0), float(piece.smooth.speed.max()))
+    wrong = {
+        key: speed for key, speed in fastest.items() if key[1] and speed > CONTRADICTS * VEHICLE_TYPES[key[1]].dynamics.max_speed
+    }
+    notes = tuple(
+        f"vehicle {vehicle} is a {name} by the log and as fast as {speed:.1f} m/s: it is read as of type {OTHER}"
+        for (vehicle, name), speed in wrong.items()
+    )
+    others = {vehicle for vehicle, _ in wrong}
+    return [
+        replace(piece, track=replace(piece.track, kind=OTHER)) if piece.track.id in others else piece for piece in pieces
+    ], notes
+
+
 def driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], tuple[str, ...]]:
     """Return the pieces without those whose recorded headings are opposite to the path, and a note on each of these.
 
@@ -141,7 +170,11 @@ def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple
     smooth = smooth_piece(part, origin_ns, config)
     if smooth is None:
         return [(part, None)]
-    turn = np.abs(np.diff(smooth.heading)) - SHARPEST * np.hypot(*np.diff(smooth.position, axis=0).T)
+    kind = VEHICLE_TYPES[part.kind or CAR]
+    if kind.walks:  # turns on the spot
+        return [(part, smooth)]
+    sharpest = max(SHARPEST, NOISY * kind.dynamics.sharpest)
+    turn = np.abs(np.diff(smooth.heading)) - sharpest * np.hypot(*np.diff(smooth.position, axis=0).T)
     if not (turn > 1e-6).any():
         return [(part, smooth)]
     at = origin_ns + round((smooth.first + int(np.argmax(turn)) + 0.5) * config.period * 1e9)

@@ -4,7 +4,6 @@
 """Raw logs, the result of every reader: observations per vehicle, with the places they came from, within bounds."""
 
 from bisect import bisect_right
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,6 +36,7 @@ class Observations:
         speed_row: (S,) rows of the log.
         length: metres, NaN if it is not recorded.
         width: metres, NaN if it is not recorded.
+        kind: what the log calls its type of road user, "" if nothing; `kinds.typed` makes it a type.
         origin: latitude and longitude [degrees] of the frame into which `fix` was projected, if it was.
     """
 
@@ -50,11 +50,20 @@ class Observations:
     speed_row: Ints
     length: float = np.nan
     width: float = np.nan
+    kind: str = ""
     origin: tuple[float, float] | None = None
 
     @classmethod
     def of_rows(
-        cls, name: str, stamps: Ints, states: Floats, rows: Ints, size: tuple[float, float], *, measured: bool = True
+        cls,
+        name: str,
+        stamps: Ints,
+        states: Floats,
+        rows: Ints,
+        size: tuple[float, float],
+        *,
+        kind: str = "",
+        measured: bool = True,
     ) -> "Observations":
         """Return the observations of a log each of whose rows is a fix and, if it was `measured`, a speed.
 
@@ -64,12 +73,12 @@ class Observations:
             states: (F, 4) position (two columns), heading and speed, as above.
             rows: (F,) rows of the log.
             size: length and width, metres or NaN.
+            kind: what the log calls its type of road user, "" if nothing.
             measured: whether the log has speeds.
         """
         n_speeds = len(rows) if measured else 0
-        return cls(
-            name, stamps, states[:, :2], rows, states[:, 2], stamps[:n_speeds], states[:n_speeds, 3], rows[:n_speeds], *size
-        )
+        fixes, speeds = (states[:, :2], rows, states[:, 2]), (stamps[:n_speeds], states[:n_speeds, 3], rows[:n_speeds])
+        return cls(name, stamps, *fixes, *speeds, *size, kind)
 
 
 @dataclass
@@ -136,12 +145,6 @@ class RawLog:
         """Name the file and line (or topic and message) of a row."""
         segment = self.segment(row)
         return f"{renamed(segment.label)}, {segment.unit} {segment.number + row - segment.first}"
-
-
-def left_out_note(counts: Mapping[str, int], kinds: str) -> tuple[str, ...]:
-    """Return the note on road users that were left out, none if `counts` by their class is empty; `kinds` names who is read."""
-    counted = ", ".join(f"{count} × {kind or 'unknown'}" for kind, count in sorted(counts.items()))
-    return (f"who is no {kinds} was left out: {counted}",) if counted else ()
 
 
 def natural(name: str) -> tuple[int, int, str]:

@@ -22,13 +22,15 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.base.stores import local, naming_objects, renamed, temporary
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.adapters.nocturne import is_nocturne
+from scenario_gen.logs.adapters.openscenario import is_openscenario
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import LogConfig, picked
-from scenario_gen.logs.encounters import driven_forwards, Piece, pieces_of
+from scenario_gen.logs.encounters import Piece, pieces_of, plausible
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
 from scenario_gen.logs.groups import distances, driven, find_groups, ticks
 from scenario_gen.logs.growing import Group, Meeting
+from scenario_gen.logs.kinds import typed
 from scenario_gen.logs.packed import unpacked, without_packing
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog, UnknownFormatError
@@ -99,13 +101,12 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     if log.encounters:
         return as_recorded(log, config)
     check_unit(log, config)
-    log, notes = retimed(log, config)
+    log, notes = retimed(typed(log, config), config)
     tracks, drops = clean(log, config)
     said_first = (*notes, *notes_on_drops(log, drops), *drops.notes)
     if len({track.id for track in tracks}) < 2:
         raise NoEncounterError(explain_few_vehicles(log, [track.id for track in tracks], drops))
-    tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
-    dt_ns = round(config.period * 1e9)
+    tracks, dt_ns = tuple(sorted(tracks, key=lambda track: natural(track.id))), round(config.period * 1e9)
     origin_ns = min(int(track.fix_ns[0]) for track in tracks) // dt_ns * dt_ns
     pieces: list[Piece] = []
     vehicles = []
@@ -115,11 +116,11 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         vehicles.append(quality)
     if not pieces and any(vehicle.lost for vehicle in vehicles):
         raise InputError(f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units")
-    pieces, backwards = driven_forwards(pieces, config)
+    pieces, doubts = plausible(pieces, config)
     groups, notes = find_groups(pieces, config)
     if not groups:
-        raise NoEncounterError("; ".join((*backwards, explain_no_encounter(log, pieces, config))))
-    notes += backwards
+        raise NoEncounterError("; ".join((*doubts, explain_no_encounter(log, pieces, config))))
+    notes += doubts
     notes += notes_on_origin(tracks, config)
     notes += notes_on_vehicles(
         vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.spans}, config
@@ -267,7 +268,7 @@ def cut_encounter(
     dt_ns = round(config.period * 1e9)
     encounter = Encounter(
         name=name,
-        vehicles=tuple(Vehicle(p.track.id, p.track.length, p.track.width) for p in members),
+        vehicles=tuple(Vehicle(p.track.id, p.track.length, p.track.width, p.track.kind) for p in members),
         start_ns=origin_ns + group.start * dt_ns,
         dt_ns=dt_ns,
         position=np.array(position),
@@ -281,7 +282,7 @@ def cut_encounter(
 
 def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
     """Return the error message on fewer than two vehicles."""
-    causes = "; ".join((*(note for note in log.notes if note.startswith("who is no")), *map(str, drops.of(log))))
+    causes = "; ".join((*(note for note in log.notes if note.startswith("left out: ")), *map(str, drops.of(log))))
     have = f"only vehicle {names[0]}" if names else "no vehicle"
     return (
         f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock. "
@@ -430,6 +431,7 @@ FORMATS = Registry[LogFormat](
         "osi": LogFormat(is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))),
         "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
         "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
+        "openscenario": LogFormat(is_openscenario, late("adapters.openscenario")),
         "bsm": LogFormat(is_bsm, late("adapters.bsm")),
         "fcd": LogFormat(is_fcd, late("adapters.fcd")),
         "nocturne": LogFormat(is_nocturne, late("adapters.nocturne")),
@@ -468,8 +470,8 @@ def _read_files(files: Sequence[Path], config: LogConfig) -> RawLog:
     if known is None:
         raise UnknownFormatError(
             f"{files[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and GPUDrive (.json), "
-            "rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
+            "CommonRoad and OpenSCENARIO scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and "
+            "GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
             "If its name misleads: --set log.format=table"
         )
     with reading(files[0]):

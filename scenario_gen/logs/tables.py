@@ -3,12 +3,10 @@
 
 """Tables: CSV or Parquet with named columns, and the headerless files of the Safety Pilot Model Deployment (SPMD)."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
-import re
 from typing import Any
 
 import numpy as np
@@ -19,7 +17,7 @@ from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.cleaning import LONGEST_M
 from scenario_gen.logs.columns import Column, find_columns, notes_on, SHOWN, UNITS
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
 from scenario_gen.logs.text import layout_of
 from scenario_gen.numerics import Floats, Ints
 
@@ -30,10 +28,6 @@ FEW_ROWS = 10  # of which each may be of a vehicle of its own
 STILL_M = 0.05  # that no vehicle of an encounter drives
 LONGEST_NUMBER = 300  # characters
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
-OTHERS = re.compile(  # a word in the kinds of road users that are no cars, vans, trucks or buses
-    r"(?<![a-z])(ped(estrian)?s?|persons?|people|human|walkers?|adult|child|wheelchair|stroller|skater|vru|(bi|motor)?cycles?|"
-    r"(bi|motor)?cyclists?|(motor)?bikes?|e?scooter|moped|rider|animal|dog|cone|no car)(?![a-z])"
-)
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
     *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
     *("Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"),
@@ -101,11 +95,11 @@ def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -
         texts = {columns[quantity].name: object for quantity in ("vehicle", "kind") if quantity in columns}
         frame = read_text(path, before, config, **form, dtype=texts)  # a number of 64 bits, or in hexadecimal, is no float64
         above = layout.above
-    if "kind" in columns and not columns["kind"].cars and len(kinds := reals(frame[columns["kind"].name]).dropna().unique()):
+    if "kind" in columns and not columns["kind"].types and len(kinds := reals(frame[columns["kind"].name]).dropna().unique()):
         name, some = columns.pop("kind").name, ", ".join(f"{kind:g}" for kind in sorted(kinds)[:SHOWN])
         notes.append(
-            f"column {name} has numbers ({some}), whose meaning is not known: all are read as cars; those that are, say 1 and 2, "
-            f"are named with --set log.columns=kind={name}:1+2"
+            f"column {name} has numbers ({some}), whose meaning is not known: all are read by their sizes; name it with, say, "
+            f"--set log.columns=kind={name}:car1+truck2"
         )
     notes += notes_on(columns, config.columns, header)
     numbers = to_numbers(frame, columns, path)
@@ -185,10 +179,8 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
         if quantity == "vehicle":
             out["vehicle"] = vehicle_names(values)
         elif quantity == "kind":
-            car = reals(values).isin(column.cars)
-            out["kind"] = (
-                values.astype(str).where(~car, "car").where(car | (not column.cars), "no car (" + values.astype(str) + ")")
-            )
+            words = values.astype(str)
+            out["kind"] = reals(values).map(dict(column.types)).fillna("unnamed " + words) if column.types else words
         elif pd.api.types.is_bool_dtype(values):
             raise InputError(f"{path}, column {column.name!r} ({quantity}): true or false is no {quantity}; name another column")
         elif quantity == "time":
@@ -302,21 +294,10 @@ def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segme
     position = ("lat", "lon") if geographic else ("x", "y")
     vehicles = []
     frame = frame.assign(row=rows)[usable]
-    frame, notes = without_others(frame)
     for name, group in frame.groupby("vehicle", sort=False):
         vehicles.append(observations(str(name), group, position))
     name = paths[0].stem if len(paths) == 1 else paths[0].parent.name
-    return RawLog(name, geographic, tuple(vehicles), len(rows), segments, notes, dropped)
-
-
-def without_others(frame: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Return the rows of cars, vans, trucks and buses, and of who is of no kind that is known; and a note on the others."""
-    if "kind" not in frame:
-        return frame, ()
-    counts = frame.groupby(["vehicle", "kind"]).size().sort_values(kind="stable").reset_index()
-    kinds = counts.drop_duplicates("vehicle", keep="last").set_index("vehicle")["kind"].str.lower()
-    others = kinds[kinds.map(lambda kind: OTHERS.search(kind) is not None).astype(bool)]
-    return frame[~frame["vehicle"].isin(others.index)], left_out_note(Counter(others), "car, van, truck or bus")
+    return RawLog(name, geographic, tuple(vehicles), len(rows), segments, (), dropped)
 
 
 def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> Observations:
@@ -335,7 +316,9 @@ def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> O
     states = np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")])
     stamps: Ints = group["time"].to_numpy(np.int64)
     rows: Ints = group["row"].to_numpy(np.int64)
-    return Observations.of_rows(name, stamps, states, rows, (median("length"), median("width")), measured="speed" in group)
+    size = median("length"), median("width")
+    kind = str(group["kind"].mode().iloc[0]) if "kind" in group else ""
+    return Observations.of_rows(name, stamps, states, rows, size, kind=kind, measured="speed" in group)
 
 
 def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:

@@ -50,9 +50,9 @@ class Chain:
         config = self.config
         fit = fit_template(
             self.encounter, self.segmentation, self.road, config.fitting,
-            request=self.request, max_speed=config.sampling.max_speed,
+            request=self.request, limits=config.limits,
         )  # fmt: skip
-        routes = plan_routes(self.road, fit, config.planning, self.seed)
+        routes = plan_routes(self.road, fit, config.planning, self.seed, config.limits)
         return GenerationResult(self.encounter, self.segmentation, self.road, fit, routes, seed=self.seed)
 
     def sample(self, planned: GenerationResult, callbacks: Callbacks = Callbacks()) -> GenerationResult:

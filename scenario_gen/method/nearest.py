@@ -202,7 +202,7 @@ class _Search:
             if answer is not None and answer[1] > 0.0:
                 state = _with_room(self.requested.road, vehicle, answer[0], pose) + state[3:]
             if len(state) == 4:
-                state = (*state[:3], min(state[3], self.requested.config.sampling.max_speed))
+                state = (*state[:3], min(state[3], self.requested.config.limits.of(vehicle.type).planned.max_speed))
             request = with_state(request, end, name, state)
         for end, name in elements(request):
             request = self._apart(request, end, name)

@@ -25,14 +25,16 @@ from scenario_gen.roads.ways import draw_ring_route, draw_route
 from scenario_gen.template import clean_tracks, reactions_of, sharpness_of, Track, turn_of
 from scenario_gen.types import Encounter, Road, YIELD
 
-_RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
+_RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane where none was recorded
+_LEAST_RING = 8.0  # metres, of one that was recorded
 _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
 _NEAR_RING = 4.0  # metres beyond the middle of its lane within which a vehicle's speed is one on the ring
 _EVERY = 1.0  # metres between the poses of a path by which a ring is found
 _WIDEST_RING = 60.0  # metres of its radius, in the template
-_LEAST_ARC = 15.0  # metres that are driven about it
+_LEAST_ARC = 12.0  # metres that are driven about it
 _OFF_RING = 2.5  # metres to its lane
 _FLARED = np.radians(15.0)  # by which those who come or go turn away from it
+_CIRCLED = np.radians(100.0)  # about it, from which on one who neither comes nor goes is on a ring
 _SAME_ARM = np.radians(30.0)  # directions that differ by less are those of one arm
 _MERGED = np.radians(45.0)  # and by so much if the road has too few arms otherwise
 _PART = np.radians(75.0)  # a vehicle that is still turning may go on by so much to an arm
@@ -146,22 +148,25 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     Raises:
         RefusedError: the template drives too fast for it, side by side, or by more than four arms.
     """
-    radius, fastest, length, wide = _RING[0], 0.0, 5.0, 2.0
+    radius, fastest, length, wide, notes = _RING[0], 0.0, 5.0, 2.0, list[str]()
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
     centre = np.zeros(2)
     if encounter is not None:
         tracks = clean_tracks(encounter)
         config = fitting_width(tracks, config)
-        centre, recorded = _ring_driven(tracks, config)
-        radius, fastest = _ring(tracks, centre, recorded)
+        driven_about = _ring_driven(tracks, config)
+        centre = junction_centre(tracks) if driven_about is None else driven_about[0]
+        radius, fastest = _ring(tracks, centre, None if driven_about is None else driven_about[1])
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
+        if driven_about is None:
+            notes.append(f"nobody in the template drives about a ring; one of {radius:.0f} m radius is drawn in its middle")
     if fastest > np.sqrt(_RING_FASTEST * radius):
         possible = float(np.sqrt(_RING_FASTEST * _RING[1]))
         raise RefusedError(
-            f"road roundabout: the template drives up to {fastest:.1f} m/s there, and the largest one ({_RING[1]:g} m) allows "
-            f"{possible:.1f} m/s; choose four_way or curve"
+            f"road roundabout: the template drives up to {fastest:.1f} m/s where the ring would be, and the largest one "
+            f"({_RING[1]:g} m) allows {possible:.1f} m/s"
         )
     turn = np.pi - directions[0].yaw
     arms = []
@@ -183,13 +188,14 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
     yielding = set(range(len(arms))) - {arm for (_, inward), (arm, _) in lane_of.items() if inward}
     yielding |= set() if encounter is None else _yielding_arms(encounter, lane_of, config)
-    return draw_plan(Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim), name, config)
+    plan = Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim, notes=tuple(notes))
+    return draw_plan(plan, name, config)
 
 
-def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float]:
-    """Centre (2,) and radius [m] of the circle about which those drive who bend to the other side before or after.
+def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float] | None:
+    """Centre (2,) and radius [m] of the circle about which those drive who bend to the other side before or after, or go far.
 
-    The junction's centre and the smallest radius, where nobody does.
+    None where nobody does.
     """
     sign, points = 1.0 if config.traffic_side == "right" else -1.0, np.zeros((0, 2))
     for track in tracks:
@@ -197,7 +203,7 @@ def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats,
         turned = sign * np.gradient(np.convolve(poses[:, 2], np.full(5, 0.2), "same")) if len(poses) > 9 else np.zeros(len(poses))
         turned[:3] = turned[-3:] = 0.0
         about = turned > _EVERY / _WIDEST_RING
-        if -turned[turned < 0.0].sum() > _FLARED:
+        if -turned[turned < 0.0].sum() > _FLARED or turned[about].sum() > _CIRCLED:
             points = np.concatenate((points, poses[about, :2]))
     for _ in range(3):
         if len(points) < _LEAST_ARC / _EVERY:
@@ -207,21 +213,26 @@ def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats,
         centre, radius = np.array([x, y]), float(np.sqrt(rest + x * x + y * y))
         near = np.abs(np.hypot(*(points - centre).T) - radius) < _OFF_RING
         if near.all() and radius < _WIDEST_RING:
-            return centre, radius
+            return centre, max(radius, _LEAST_RING)
         points = points[near]
-    return junction_centre(tracks), _RING[0]
+    return None
 
 
-def _ring(tracks: tuple[Track, ...], centre: Floats, least: float) -> tuple[float, float]:
-    """The radius [m] of a roundabout's lane that suits the template's speeds on it, not on its arms; the fastest [m/s] there."""
+def _ring(tracks: tuple[Track, ...], centre: Floats, recorded: float | None) -> tuple[float, float]:
+    """The radius [m] of a roundabout's lane that suits the template's speeds on it, not on its arms; the fastest [m/s] there.
+
+    One that was recorded is drawn as it was, if cars can drive it so fast.
+    """
     there = [slice(track.present[0], track.present[1] + 1) for track in tracks]
     speed = np.concatenate([track.speed[own] for track, own in zip(tracks, there, strict=True)])
     place = np.concatenate([track.poses[own, :2] for track, own in zip(tracks, there, strict=True)])
     away = np.hypot(*(place - centre).T)
-    lateral = _RING_FASTEST if least > _RING[0] else _RING_LATERAL  # a ring that was recorded is drawn as it was
-    for radius in np.append(np.arange(max(least, _RING[0]), _RING[1], 0.25), _RING[1]):
+    if recorded is not None:
+        fastest = float(speed[away < recorded + _OFF_RING].max(initial=0.0))
+        return min(max(recorded, fastest**2 / _RING_FASTEST), _RING[1]), fastest
+    for radius in np.append(np.arange(*_RING, 0.25), _RING[1]):
         fastest = float(speed[away < radius + _NEAR_RING].max(initial=0.0))
-        if np.square(fastest) <= lateral * radius:
+        if np.square(fastest) <= _RING_LATERAL * radius:
             break
     return float(radius), fastest
 
@@ -231,7 +242,7 @@ def _ends(i: int, track: Track, centre: Floats, ring: float) -> list[_End]:
     poses = track.curve.at(s) - np.array([*centre, 0.0])
     ends = []
     turn = turn_of(track)
-    goes_on = 0.0 if abs(turn) < _THROUGH else float(np.sign(turn))
+    goes_on = 0.0 if ring or abs(turn) < _THROUGH else float(np.sign(turn))
     for inward in (True, False):
         along = poses if inward else poses[::-1]
         turning = np.flatnonzero(np.abs(along[:, 2] - along[0, 2]) > _STEADY)

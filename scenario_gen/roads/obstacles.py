@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.types import read_numbers, Road, split_pieces
 
 _FORM = "x y yaw length width"
@@ -57,22 +58,17 @@ def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...]) -> Road:
         return road
     blocked = np.zeros(road.drivable.shape, dtype=np.bool_)
     height, width = road.drivable.shape
+    low, high = road.origin, road.origin + np.array([width, height]) * road.resolution
+    x, y = (first + (np.arange(n) + 0.5) * road.resolution for first, n in zip(low, (width, height), strict=True))
+    cells = np.stack((*np.broadcast_arrays(x, y[:, None]), np.zeros((height, width))), axis=-1)
+    half = 0.5 * road.resolution * (1.0 - 1e-9)  # touching is no overlap
     for obstacle in obstacles:
-        turn_cos, turn_sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
-        cos, sin = abs(turn_cos), abs(turn_sin)
-        reach_x = 0.5 * (obstacle.length * cos + obstacle.width * sin)
-        reach_y = 0.5 * (obstacle.length * sin + obstacle.width * cos)
-        cell = road.resolution
-        x, y = (np.arange(n) + 0.5 for n in (width, height))
-        dx = (road.origin[0] + x * cell - obstacle.x)[None, :]
-        dy = (road.origin[1] + y * cell - obstacle.y)[:, None]
-        half = 0.5 * cell * (1.0 - 1e-9)  # touching is no overlap
-        ahead, aside = np.abs(dx * turn_cos + dy * turn_sin), np.abs(dy * turn_cos - dx * turn_sin)
-        slack = half * (cos + sin)  # separating axes: the grid's two and the rectangle's two
-        over = (np.abs(dx) < reach_x + half) & (np.abs(dy) < reach_y + half)
-        over = over & (ahead < 0.5 * obstacle.length + slack) & (aside < 0.5 * obstacle.width + slack)
+        pose, size = np.array([obstacle.x, obstacle.y, obstacle.yaw]), (obstacle.length / 2.0, obstacle.width / 2.0)
+        near = np.hypot(*np.moveaxis(cells[..., :2] - pose[:2], -1, 0)) < np.hypot(*size) + road.resolution
+        over = np.zeros_like(blocked)
+        own = np.ascontiguousarray(cells[near])
+        over[near] = footprint_gaps((half, half), own, size, np.tile(pose, (len(own), 1)))[0] < 0.0
         if not (over & road.drivable).any():
-            low, high = road.origin, road.origin + np.array([width, height]) * cell
             raise InputError(
                 f"obstacle `{obstacle}` stands nowhere on what is drivable of road {road.name!r}, which lies between "
                 f"({low[0]:.1f}, {low[1]:.1f}) and ({high[0]:.1f}, {high[1]:.1f}) m"

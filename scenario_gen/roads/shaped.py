@@ -21,6 +21,7 @@ from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, reaction
 from scenario_gen.types import Encounter, Road, YIELD
 
 _RAMP_ANGLE = np.radians(12.0)
+_RAMP_LATERAL = 2.5  # m/s² across, at the most, for who joins as fast as in the template
 _BEND = np.radians(20.0)  # of a curve whose template does not bend
 _BESIDE = 0.4  # metres on each side of the widest vehicle in its lane
 
@@ -82,10 +83,12 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         lanes = max(int(others.max(initial=0)) + 1, int(frenet.lane[who, 1].max()) + 1, config.lanes)
         along = float(frenet.direction[who[0]])
         low, high = sorted(along * end for end in frenet.span(tracks))
-        join = float(np.median([along * frenet.station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
+        joining = [int(np.argmax(frenet.change[i] >= 0.5)) for i in who]
+        join = float(np.median([along * frenet.station[i][at] for i, at in zip(who, joining, strict=True)]))
         before, after = join - low, high - join
         approach = join - min(along * float(frenet.station[i][0]) - tracks[i].vehicle.length / 2.0 for i in who)
-        sharpness = max(sharpness_of(tracks[i]) for i in who)
+        fastest = max(float(tracks[i].speed[at]) for i, at in zip(who, joining, strict=True))
+        sharpness = min(max(sharpness_of(tracks[i]) for i in who), _RAMP_LATERAL / max(fastest, 1.0) ** 2)
         yields = any(edge.kind == YIELD and edge.who in who for edge in reactions_of(encounter).edges)
         joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
         joins[2] += 0.0 if along > 0.0 else np.pi
@@ -115,5 +118,5 @@ def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:
             return who
     raise RefusedError(
         "road merge: nobody in the template leaves the outermost lane of its direction for the next one, so nobody would use the "
-        "ramp; choose straight or curve"
+        "ramp"
     )

@@ -22,11 +22,11 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
-from scenario_gen.types import Encounter, mask, once_per_object, Vehicle
+from scenario_gen.types import Encounter, mask, ON_THE_SPOT, once_per_object, Vehicle
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
-_MAX_CURVATURE = 0.2  # 1/m, a car's tightest turn but for a little
-_MAX_LATERAL = 4.0  # m/s²
+_SHARE_OF_CURVATURE = 0.8  # of the sharpest curve of its type; of a car 0.2 1/m, its tightest turn but for a little
+_SHARE_OF_LATERAL = 2.0 / 3.0  # of its type's lateral acceleration; of a car 4 m/s²
 _MAX_DEVIATION = 0.6  # metres from the record
 _TURN = math.radians(45.0)
 _U_TURN = math.radians(140.0)
@@ -47,6 +47,7 @@ class Track:
         present: (2,) first and last sample at which it is there; before and after, progress and speed are those at these.
         recorded_turn: how far [rad, left positive] the recorded heading turns from start to end; NaN for one that stands.
         dt: seconds between samples.
+        lane: the middle of the lanes that it drives on a road, before and beyond its path too; None: they are not known.
     """
 
     vehicle: Vehicle
@@ -58,6 +59,7 @@ class Track:
     present: Ints
     recorded_turn: float
     dt: float
+    lane: Curve | None = None
 
     @cached_property
     def there(self) -> Bools:
@@ -112,7 +114,9 @@ def _clean(encounter: Encounter, i: int) -> Track:
     spread = float(np.hypot(*np.ptp(encounter.position[i, there], axis=0)))
     still = bool(claimed[-1] < _STILL or spread < _STILL)
     cleaned = _standing if still else _smoothed
-    curve, progress, deviation = cleaned(encounter.position[i, there], heading, speed, claimed)
+    dynamics = encounter.vehicles[i].kind.dynamics
+    limits = min(_SHARE_OF_CURVATURE * dynamics.sharpest, ON_THE_SPOT), _SHARE_OF_LATERAL * dynamics.max_lateral_acceleration
+    curve, progress, deviation = cleaned(encounter.position[i, there], heading, speed, claimed, limits)
     return Track(
         vehicle=encounter.vehicles[i],
         curve=curve,
@@ -126,7 +130,9 @@ def _clean(encounter: Encounter, i: int) -> Track:
     )
 
 
-def _standing(position: Floats, heading: Floats, speed: Floats, _claimed: Floats) -> tuple[Curve, Floats, float]:
+def _standing(
+    position: Floats, heading: Floats, speed: Floats, _claimed: Floats, _limits: tuple[float, float]
+) -> tuple[Curve, Floats, float]:
     """The path of a vehicle that stands, its progress, and how far its positions lie from it."""
     centre = position.mean(axis=0)
     yaw = float(np.arctan2(np.sin(heading).mean(), np.cos(heading).mean()))
@@ -134,8 +140,14 @@ def _standing(position: Floats, heading: Floats, speed: Floats, _claimed: Floats
     return curve, np.zeros(len(speed)), float(np.hypot(*(position - centre).T).max())
 
 
-def _smoothed(position: Floats, heading: Floats, speed: Floats, claimed: Floats) -> tuple[Curve, Floats, float]:
-    """The drivable path of positions (T, 2) at distances (T,) that the speed claims, the progress, and the largest deviation."""
+def _smoothed(
+    position: Floats, heading: Floats, speed: Floats, claimed: Floats, limits: tuple[float, float]
+) -> tuple[Curve, Floats, float]:
+    """The drivable path of positions (T, 2) at distances (T,) that the speed claims, the progress, and the largest deviation.
+
+    The limits are of curvature [1/m] and of lateral acceleration [m/s²].
+    """
+    max_curvature, max_lateral = limits
     best: tuple[float, Curve, Floats, float] | None = None
     for wavelength in _WAVELENGTHS:
         stop_if_cancelled()
@@ -145,7 +157,7 @@ def _smoothed(position: Floats, heading: Floats, speed: Floats, claimed: Floats)
         deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
         curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
         lateral = curvature * np.square(np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)))
-        excess = (float(lateral.max()) / _MAX_LATERAL, deviation / _MAX_DEVIATION)  # what is too sharp is eased below
+        excess = (float(lateral.max()) / max_lateral, deviation / _MAX_DEVIATION)  # what is too sharp is eased below
         badness = math.fsum(max(e - 1.0, 0.0) for e in excess)
         if best is None or badness < best[0]:
             best = (badness, curve, progress, deviation)
@@ -153,15 +165,15 @@ def _smoothed(position: Floats, heading: Floats, speed: Floats, claimed: Floats)
             break
     assert best is not None
     _, curve, progress, deviation = best
-    if (np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)).max() > _MAX_CURVATURE:
+    if (np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)).max() > max_curvature:
         share = progress / curve.length
-        curve = _eased(curve)
+        curve = _eased(curve, max_curvature)
         progress = share * curve.length
         deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
     return _aligned(curve, heading, speed, progress), progress, deviation
 
 
-def _eased(curve: Curve) -> Curve:
+def _eased(curve: Curve, max_curvature: float) -> Curve:
     """The curve with its sharpest bends spread out until no curvature is above the limit.
 
     What a bend has too much is handed on to its neighbours, so it turns as far as before, over a longer way; the path is
@@ -171,7 +183,7 @@ def _eased(curve: Curve) -> Curve:
     step = curve.length / count
     even = curve.at(np.linspace(0.0, curve.length, count + 1))
     bend = np.diff(even[:, 2])
-    most = 0.95 * _MAX_CURVATURE * step
+    most = 0.95 * max_curvature * step
     for _ in range(2000):
         excess = np.sign(bend) * np.maximum(np.abs(bend) - most, 0.0)
         if not excess.any():

@@ -3,11 +3,11 @@
 
 """What passes from stage to stage: frozen, no stage imported."""
 
-from scenario_gen.types.body import height, is_truck, rear_axle, shifted, WHEELBASE
+from scenario_gen.types.body import height, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
 from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.ego import join_ego, split_off, with_witness
-from scenario_gen.types.encounter import Encounter, Tracks, Vehicle
+from scenario_gen.types.encounter import Encounter, most_exposed, Tracks, Vehicle
 from scenario_gen.types.evaluation import as_markdown, CheckCounts, Evaluation, formatted, Interval, Metric, Row, SCHEMA, TEMPLATE
 from scenario_gen.types.fit import Fit, FittedVehicle, Loss
 from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
@@ -20,6 +20,18 @@ from scenario_gen.types.qos import Quality
 from scenario_gen.types.reaction import FOLLOW, lost_pairs, NOT_KEPT, Reaction, reaction_facts, ReactionGraph, YIELD, yielders_of
 from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
 from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
+from scenario_gen.types.road_users import (
+    CAR,
+    Dynamics,
+    OF_CARS,
+    ON_THE_SPOT,
+    OTHER,
+    TypeLimits,
+    usual_type,
+    VEHICLE_TYPES,
+    VehicleType,
+    words,
+)
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.sample import Sample
 from scenario_gen.types.scenario import (
@@ -37,14 +49,15 @@ from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 from scenario_gen.types.target import Pair, Reached, Target, UNITS
 
 __all__ = [
-    "ALWAYS", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LEVEL", "MIRRORED", "NARROW", "NOT_KEPT",
-    "ORACLE", "ORDERS", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates",
-    "Cause", "CheckCounts", "Coverage", "DrawnFor", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle",
-    "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures",
-    "Metric", "Pair", "Quality", "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind",
-    "Sample", "Scenario", "ScenarioSet", "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "Vehicle",
-    "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut", "formatted",
-    "height", "is_truck", "join_ego", "join_pieces", "lost_pairs", "mask", "once_per_object", "reaction_facts",
-    "read_numbers", "read_states", "rear_axle", "routes_in_words", "shifted", "split_off", "split_pieces", "together", "token",
-    "tokens", "vehicle_index", "with_witness", "yielders_of",
+    "ALWAYS", "CAR", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LEVEL", "MIRRORED", "NARROW",
+    "NOT_KEPT", "OF_CARS", "ON_THE_SPOT", "ORACLE", "ORDERS", "OTHER", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "VEHICLE_TYPES",
+    "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause", "CheckCounts", "Coverage", "DrawnFor", "Dynamics",
+    "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult", "Interval", "Lane", "LaneNetwork",
+    "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality", "Reached", "Reaction", "ReactionGraph",
+    "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario", "ScenarioSet", "Segmentation", "Spread", "State",
+    "Target", "Tracks", "TrafficRule", "TypeLimits", "Vehicle", "VehicleType", "Verdict", "Violation", "always", "as_markdown",
+    "at_ends", "canonical_presence", "causes_in_words", "cut", "formatted", "height", "join_ego", "join_pieces", "lost_pairs",
+    "mask", "most_exposed", "once_per_object", "reaction_facts", "read_numbers", "read_states", "rear_axle", "routes_in_words",
+    "shifted", "split_off", "split_pieces", "together", "token", "tokens", "usual_type", "vehicle_index", "with_witness",
+    "words", "yielders_of",
 ]  # fmt: skip

@@ -3,6 +3,7 @@
 
 """An encounter: N vehicles near each other on one clock (paper II-A, eqs 1-2)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TYPE_CHECKING
@@ -12,6 +13,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
+from scenario_gen.types.road_users import usual_type, VEHICLE_TYPES, VehicleType
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,16 +22,43 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A vehicle's identity and footprint; length and width in metres."""
+    """A road user's identity, footprint and type; length and width in metres.
+
+    Attributes:
+        type: a name in `VEHICLE_TYPES`; by default by its length, a car or a truck.
+
+    Raises:
+        InputError: there is no such type.
+    """
 
     id: str
     length: float = 4.8
     width: float = 1.9
+    type: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.type:
+            object.__setattr__(self, "type", usual_type(self.length))
+        elif self.type not in VEHICLE_TYPES:
+            raise InputError(
+                f"vehicle {self.id} is of type {self.type!r}; known are {', '.join(VEHICLE_TYPES.names())}: "
+                "install the package that has it"
+            )
+
+    @property
+    def kind(self) -> VehicleType:
+        """What is known of its type."""
+        return VEHICLE_TYPES[self.type]
 
     @property
     def half(self) -> tuple[float, float]:
         """Half its length and half its width [m]."""
         return 0.5 * self.length, 0.5 * self.width
+
+
+def most_exposed(vehicles: Iterable[Vehicle]) -> str:
+    """Return the type of the most exposed road user: of the smallest width that is usual of its type."""
+    return min((vehicle.type for vehicle in vehicles), key=lambda name: (VEHICLE_TYPES[name].width, name))
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ class FittedVehicle:
         moved: (K + 2,) metres that repair moved each anchor.
         stands: (K + 1,) True for the primitives during which the vehicle stands: a dwell, no path.
         scale: factor s of eq 9, template lengths -> road lengths.
-        manoeuvre: "straight", "left", "right", "wait" (or "own path" where the template's own path is kept).
+        manoeuvre: "straight", "left", "right", "U-turn", or "wait" of one that stands throughout.
         turned: how far [rad, left positive] the vehicle turns in the template and on the road; NaN where it is not known.
         path: (M, 3) x, y, yaw of the fitted path from start to end, at most 0.5 m apart; no row where it is not known (a bag).
     """

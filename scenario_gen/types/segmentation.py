@@ -61,8 +61,6 @@ class LiveChangepoints:
         heading: (N, K) rad: the course over ground.
         speed: (N, K) m/s.
         probability: (K,) that each is a changepoint rather than noise.
-        label: (K,) what the segment was that it ends: a class of segments of this stretch, numbered as they were first seen.
-        label_probability: (K,) of that class.
     """
 
     start_ns: int
@@ -72,5 +70,3 @@ class LiveChangepoints:
     heading: Floats
     speed: Floats
     probability: Floats
-    label: Ints
-    label_probability: Floats

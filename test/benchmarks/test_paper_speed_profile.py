@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from benchmarks._paper_speed_profile import SpeedProfile, SpeedProfileQP
-from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.speed_profile.knots import best_knot, speed_knots
+from scenario_gen.types import Dynamics
 
 TIME = np.arange(201) * 0.1
 CLOCK = np.array([0.0, 6.0, 9.0, 14.0, 20.0])
@@ -29,10 +29,10 @@ def driven(speed, clock=CLOCK):
 @settings(max_examples=20)
 @given(st.lists(st.floats(0.85, 1.15), min_size=4, max_size=4), st.floats(0.0, 9.0), st.floats(8.0, 11.0))
 def test_lengths_ends_and_limits_hold(factors, depth, first):
-    template, config = dip(depth), SamplingConfig()
+    template, limits = dip(depth), Dynamics().planned
     knots = speed_knots(CLOCK, NO_DWELL, [], TIME, template, (first, 10.0))
     lengths = driven(template) * np.array(factors)
-    speed, ok = SpeedProfileQP(knots, config).solve(knots.knot[None], lengths[None])
+    speed, ok = SpeedProfileQP(knots, limits).solve(knots.knot[None], lengths[None])
     if not ok[0]:
         return
     profile = SpeedProfile(knots.knot, speed[0])
@@ -40,15 +40,15 @@ def test_lengths_ends_and_limits_hold(factors, depth, first):
     assert (speed[0][[0, -1]] == [first, 10.0]).all()
     acceleration = np.diff(speed[0]) / np.diff(knots.knot)
     assert (speed[0] >= 0.0).all()
-    assert acceleration.max() <= config.max_acceleration + 1e-5
-    assert acceleration.min() >= -config.max_deceleration - 1e-5
+    assert acceleration.max() <= limits.max_acceleration + 1e-5
+    assert acceleration.min() >= -limits.max_deceleration - 1e-5
 
 
 def test_constant_acceleration_within_primitives_is_given_back():
     """Where the template keeps to its primitives, so does the profile: no interior knot bends."""
     template = np.interp(TIME, CLOCK, [8.0, 11.0, 4.0, 4.0, 9.0])
     knots = speed_knots(CLOCK, NO_DWELL, [], TIME, template, (8.0, 9.0))
-    speed, ok = SpeedProfileQP(knots, SamplingConfig()).solve(knots.knot[None], driven(template)[None])
+    speed, ok = SpeedProfileQP(knots, Dynamics().planned).solve(knots.knot[None], driven(template)[None])
     assert ok[0]
     assert speed[0] == pytest.approx(np.interp(knots.knot, TIME, template), abs=1e-5)
 
@@ -67,7 +67,7 @@ def test_chained_law_would_ring_and_this_does_not():
     for length, duration in zip(lengths, np.diff(CLOCK), strict=True):
         chained.append(2.0 * length / duration - chained[-1])
     knots = speed_knots(CLOCK, NO_DWELL, [], TIME, template, (10.0, 10.0))
-    speed, ok = SpeedProfileQP(knots, SamplingConfig()).solve(knots.knot[None], lengths[None])
+    speed, ok = SpeedProfileQP(knots, Dynamics().planned).solve(knots.knot[None], lengths[None])
     assert ok[0]
     assert np.abs(speed[0] - 10.0).max() < 0.5 < np.abs(np.array(chained) - 10.0).max() + 0.1
 
@@ -76,7 +76,7 @@ def test_wait_inside_a_primitive_stands_exactly():
     template = np.interp(TIME, [0.0, 5.0, 7.4, 15.3, 18.0, 20.0], [6.0, 6.0, 0.0, 0.0, 6.0, 6.0])
     knots = speed_knots(CLOCK, np.array([False, False, True, False]), [(7.4, 15.3)], TIME, template, (6.0, 6.0))
     lengths = np.array([[35.0, 3.0, 20.5]])
-    speed, ok = SpeedProfileQP(knots, SamplingConfig()).solve(knots.knot[None], lengths)
+    speed, ok = SpeedProfileQP(knots, Dynamics().planned).solve(knots.knot[None], lengths)
     assert ok[0]
     profile = SpeedProfile(knots.knot, speed[0])
     at, v, _ = profile.state(np.linspace(7.4, 15.3, 80))
@@ -87,7 +87,7 @@ def test_wait_inside_a_primitive_stands_exactly():
 
 def test_impossible_lengths_are_refused_and_slid():
     knots = speed_knots(CLOCK, NO_DWELL, [], TIME, dip(), (10.0, 10.0))
-    qp = SpeedProfileQP(knots, SamplingConfig())
+    qp = SpeedProfileQP(knots, Dynamics().planned)
     wrong = driven(dip()) + np.array([70.0, -20.0, -50.0, 0.0])
     assert not qp.solve(knots.knot[None], wrong[None])[1][0]
     speed, ok, slid = qp.slide(knots.knot[None], wrong[None])

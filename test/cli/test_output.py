@@ -11,9 +11,12 @@ import sys
 
 import pytest
 from rich.console import Console
+import typer
+from typer.testing import CliRunner
 
 from scenario_gen.base.terminal import Terminal
 from scenario_gen.cli import output
+from scenario_gen.cli.commands import app
 from scenario_gen.cli.corpus import shown
 
 
@@ -125,3 +128,11 @@ def test_a_page_is_opened_where_somebody_looks(monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "stdout", Console(force_terminal=True).file)
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     assert output.open_page(tmp_path / "page.html") and opened[0].startswith("file://")
+
+
+@pytest.mark.parametrize("name", sorted(typer.main.get_command(app).commands))
+def test_no_word_of_a_help_is_cut_at_80_columns(name, monkeypatch):
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 80)
+    shown = CliRunner().invoke(app, [name, "--help"]).output
+    helps = " ".join(option.help or "" for option in typer.main.get_command(app).commands[name].params).replace("\\[", "[")
+    assert "Usage" in shown and not [word for word in helps.split() if word not in shown]

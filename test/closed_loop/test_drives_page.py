@@ -35,7 +35,7 @@ def test_drives_are_sorted_chosen_and_played(browser, file):
     row = tab.page.locator(".drives tbody tr").last
     row.click()
     assert row.get_attribute("aria-current") == "true"
-    assert tab.page.locator("#figures dt").all_inner_texts()[1:3] == ["gap [m]", "least PET [s]"]
+    assert tab.page.locator("#figures dt").all_inner_texts()[1:3] == ["gap [m]", "minimum PET [s]"]
     assert tab.page.locator("#figures dd").nth(1).inner_text() == row.locator("td").nth(3).inner_text()
     tab.page.locator("h1").click()
     tab.page.keyboard.press("Space")

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The example package adds a road, a log format, a planner, a metric and an export format, to the command and to the library."""
+"""The example package adds a road, a log format, a planner, a metric, a type of road users and an export format.
+
+All serve the command and the library.
+"""
 
 import json
 import os
@@ -81,3 +84,20 @@ assert "| **Speed** |" in evaluation.to_markdown()
 @pytest.mark.long
 def test_the_library_takes_all_by_name(python):
     python("-c", USE)
+
+
+TYPES = """
+import pandas as pd
+from scenario_gen import read_log
+from scenario_gen.logs import bundled
+
+table = read_log(bundled("a")).encounters[0].to_dataframe()
+table["type"] = table["vehicle"].map(dict(zip(table["vehicle"].unique(), ("Standup-Scooter", "car"))))
+table["speed"], table["x"], table["y"] = 0.5 * table["speed"], 0.5 * table["x"], 0.5 * table["y"]
+scooter = read_log(table).encounters[0].vehicles[0]
+print(scooter.type, scooter.length, scooter.kind.dynamics.max_speed)
+"""
+
+
+def test_a_type_of_the_package_is_read(python):
+    assert python("-c", TYPES).strip() == "e_scooter 1.2 7.0"

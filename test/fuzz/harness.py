@@ -8,7 +8,7 @@ k alone, so a run can be stopped and go on, and a failure can be made again. Exe
 once and tells its parent which number it is at; so a crash of native code or a hang is seen and known by its input.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, field
 import faulthandler
@@ -16,7 +16,8 @@ from fnmatch import fnmatch
 import gc
 import importlib
 import json
-import mmap
+import multiprocessing
+from multiprocessing.sharedctypes import Synchronized
 import os
 from pathlib import Path
 import random
@@ -24,12 +25,12 @@ import re
 import resource
 import shutil
 import signal
-import struct
 import sys
 import tempfile
 import time
 import tomllib
 import traceback
+from typing import TextIO
 import warnings
 
 from scenario_gen.base.errors import LONGEST, ScenarioGenError, UnforeseenError
@@ -40,7 +41,7 @@ CRASHES = DATA.parent / "crashes"
 SECONDS = 5.0  # of CPU that one execution may take
 MEMORY = 1 << 30  # bytes that the process may hold at its peak
 HEADROOM = 3 << 30  # bytes of address space that an execution may ask for: more is refused, so that the machine lives on
-SILENT = 300.0  # s without progress after which the child hangs outside of Python
+SILENT = 300  # s that an execution may take: after that it hangs outside of Python
 BATCH = 5000  # executions of one child
 SAVED = 30.0  # s after which a child makes room for the next, and progress is kept: who is stopped loses no more
 
@@ -176,12 +177,9 @@ def over_time(_signal: int, _frame: object) -> None:
 
 
 def child(
-    target: Target, seeds: Sequence[bytes], first: int, last: int, until: float, parent: int, progress: mmap.mmap, pipe: int
+    target: Target, seeds: Sequence[bytes], last: int, until: float, parent: int, number: "Synchronized[int]", out: TextIO
 ) -> None:
-    """Execute inputs `first` to before `last`, or up to a time, or while the parent lives.
-
-    The number of each is written before it runs, and of the one to go on at; failures go to the pipe.
-    """
+    """Execute inputs from `number` on to before `last`, or up to a time, or while the parent lives; failures go to a file."""
     warnings.simplefilter("ignore")
     os.fsync = lambda _: None  # slow, and nothing here outlives the machine
     gc.freeze()  # to look for garbage in what the parent has loaded would copy all of it
@@ -194,69 +192,33 @@ def child(
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, 1)
     os.dup2(quiet, 2)
-    with tempfile.TemporaryDirectory() as scratch, os.fdopen(pipe, "w") as out:
-        for number in range(first, last):
-            progress[:8] = struct.pack("<q", number)
-            found = execute(target, damaged(target, seeds, number), Path(scratch) / "input", most)
+    with tempfile.TemporaryDirectory() as scratch:
+        while number.value < last and time.monotonic() < until and os.getppid() == parent:
+            signal.alarm(SILENT)  # ends the process: it hangs outside of Python
+            found = execute(target, damaged(target, seeds, number.value), Path(scratch) / "input", most)
             if found:
-                out.write(json.dumps([number, *found]) + "\n")
-                out.flush()
-                if peak() > most:  # it stays: a new child has its own
-                    return
-            progress[:8] = struct.pack("<q", number + 1)
-            if time.monotonic() > until or os.getppid() != parent:
+                print(json.dumps([number.value, *found]), file=out, flush=True)
+            number.value += 1
+            if peak() > most:  # it stays: a new child has its own
                 return
 
 
-def batch(target: Target, seeds: Sequence[bytes], first: int, last: int, until: float) -> Iterator[tuple[int, str, str] | int]:
-    """Fork a child for some executions.
-
-    Yields:
-        Its failures as (number, signature, message), and at last the number to go on at.
-    """
-    progress = mmap.mmap(-1, 8)
-    progress[:8] = struct.pack("<q", first)
-    reading, writing = os.pipe()
-    parent, pid = os.getpid(), os.fork()
-    if pid == 0:
-        code = 1
-        try:
-            os.close(reading)
-            child(target, seeds, first, last, until, parent, progress, writing)
-            code = 0
-        finally:
-            os._exit(code)
-    os.close(writing)
-    status, died = watch(pid, progress)
-    number = int(struct.unpack("<q", progress[:8])[0])
-    with os.fdopen(reading) as lines:
-        found = [json.loads(line) for line in lines if line.endswith("\n")]
-    yield from (tuple(entry) for entry in found)
-    if died:
-        yield number, died, ""
-        number += 1
-    elif found and found[-1][0] == number:  # it stopped by itself after this one
-        number += 1
-    elif status and number < last and not os.WIFSIGNALED(status):
-        yield number, f"exit code {os.waitstatus_to_exitcode(status)}", ""
-        number += 1
-    yield number
-
-
-def watch(pid: int, progress: mmap.mmap) -> tuple[int, str]:
-    """Wait for a child; return its status, and what killed it, if that was its input."""
-    seen, since = progress[:8], time.monotonic()
-    while True:
-        done, status = os.waitpid(pid, os.WNOHANG)
-        if done:
-            return status, f"signal {os.WTERMSIG(status)}" if os.WIFSIGNALED(status) else ""
-        if progress[:8] != seen:
-            seen, since = progress[:8], time.monotonic()
-        elif time.monotonic() - since > SILENT:
-            os.kill(pid, signal.SIGKILL)
-            os.waitpid(pid, 0)
-            return status, "hangs in native code"
-        time.sleep(0.01)
+def batch(
+    target: Target, seeds: Sequence[bytes], first: int, last: int, until: float
+) -> tuple[int, Sequence[tuple[int, str, str]]]:
+    """Fork a child for some executions; return the number to go on at, and its failures as (number, signature, message)."""
+    context = multiprocessing.get_context("fork")
+    number = context.Value("q", first, lock=False)
+    with tempfile.TemporaryFile("w+") as out:
+        process = context.Process(target=child, args=(target, seeds, last, until, os.getpid(), number, out))
+        process.start()
+        process.join()
+        out.seek(0)
+        found = [tuple(json.loads(line)) for line in out]
+    if process.exitcode:
+        found.append((number.value, f"exit code {process.exitcode}", "a signal, if it is negative"))
+        number.value += 1
+    return number.value, found
 
 
 def fuzz(target: Target, state: Path, executions: int, seconds: float, seeds: Sequence[bytes] | None = None) -> Record:
@@ -278,11 +240,9 @@ def fuzz(target: Target, state: Path, executions: int, seconds: float, seeds: Se
     while record.executions < executions and record.seconds < seconds:
         started = time.monotonic()
         last = min(record.executions + BATCH, executions)
-        for found in batch(target, seeds, record.executions, last, started + min(seconds - record.seconds, SAVED)):
-            if isinstance(found, int):
-                record.executions = found
-                continue
-            number, kind, message = found
+        until = started + min(seconds - record.seconds, SAVED)
+        record.executions, found = batch(target, seeds, record.executions, last, until)
+        for number, kind, message in found:
             known = record.failures.get(kind)
             if known:
                 known.count += 1

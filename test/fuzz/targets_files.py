@@ -27,7 +27,6 @@ from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.exchange.commonroad import write_commonroad
-from scenario_gen.output.exchange.importing import import_file
 from scenario_gen.output.exchange.openscenario import write_openscenario
 
 FILE = re.compile(rb"\n\x00FILE ([\w./=-]+)\x00\n")  # begins a file of an input of several
@@ -102,10 +101,9 @@ def scenario_file(suffix: str) -> Callable[[Path], object]:
 
 
 def import_all(folder: Path) -> None:
-    """Import every file as a table, and read that."""
+    """Read every file as a log."""
     for path in sorted(folder.iterdir()):
-        import_file(path, folder / f"{path.stem}.csv")
-        read_log(folder / f"{path.stem}.csv", SHORT)
+        read_log(path, SHORT)
 
 
 def corpus_tables(folder: Path) -> None:

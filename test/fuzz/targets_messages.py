@@ -14,7 +14,7 @@ from mutators import BYTES, fields
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
-from msg_conventions import diagnostics, ego, frames, odometry, paths, pictures, roads, streams, tracks, trajectory
+from msg_conventions import diagnostics, ego, frames, odometry, paths, roads, streams, tracks, trajectory
 from msg_conventions.changepoints import (
     decode_changepoints,
     decode_posterior,
@@ -118,11 +118,5 @@ TARGETS = (
         frames.decode_frames,
     ),
     decoder("message_speed", TWIST_TYPE, lambda: [streams.encode_speed(8.5, 5, "vehicle_1")], streams.decode_speed),
-    decoder(
-        "message_footprint",
-        pictures.FOOTPRINT_TYPE,
-        lambda: [pictures.encode_footprint(TEMPLATE.vehicles[0], 5, "vehicle_1")],
-        lambda data: np.isfinite(pictures.decode_footprint(data)),
-    ),
     *template_targets(),
 )

@@ -19,9 +19,11 @@ T = np.arange(0.0, 8.0, 0.1)
 
 
 def motion(vehicle, t):
-    """Two that meet: x, y, vx, vy, heading; the first drives east at 8 m/s, the second north-west at 5 m/s."""
+    """Three that meet: x, y, vx, vy, heading; they drive east at 8 m/s and north-west at 5 m/s, and walk north at 1.5 m/s."""
     if vehicle == "7":
         return -30.0 + 8.0 * t, 0.0 * t, 8.0, 0.0, 0.0
+    if vehicle == "9":
+        return 5.0 + 0.0 * t, -20.0 + 1.5 * t, 0.0, 1.5, 0.5 * math.pi
     c = 5.0 / math.sqrt(2.0)
     return 20.0 - c * t, -10.0 + c * t, -c, c, 0.75 * math.pi
 
@@ -37,7 +39,7 @@ def argoverse2(folder):
     names += " start_timestamp end_timestamp num_timestamps focal_track_id city"
     path = folder / "scenario_s1.parquet"
     pd.DataFrame(rows, columns=names.split()).to_parquet(path)
-    return path, {"pedestrian", "static"}
+    return path, ("car", "bus", "pedestrian")
 
 
 def interaction(folder):
@@ -47,9 +49,10 @@ def interaction(folder):
         rows += [(track, k + 1, 100 * (k + 1), "car", x[k], y[k], vx, vy, heading, *size) for k in range(len(T))]
     names = "track_id frame_id timestamp_ms agent_type x y vx vy psi_rad length width"
     pd.DataFrame(rows, columns=names.split()).to_csv(folder / "vehicle_tracks_000.csv", index=False)
-    walker = [("P1", k, 100 * k, "pedestrian/bicycle", 0.0, 0.0, 0.0, 1.0) for k in range(5)]
+    x, y, vx, vy, _ = motion("9", T)
+    walker = [("9", k, 100 * (k + 1), "pedestrian/bicycle", x[k], y[k], vx, vy) for k in range(len(T))]
     pd.DataFrame(walker, columns=names.split()[:8]).to_csv(folder / "pedestrian_tracks_000.csv", index=False)
-    return folder, {"pedestrian/bicycle"}
+    return folder, ("car", "car", "pedestrian")
 
 
 def levelx(folder, tracks, classes):
@@ -69,7 +72,7 @@ def ind(folder):
     names += " xAcceleration yAcceleration"
     classes = pd.DataFrame({"recordingId": 0, "trackId": [7, 8, 9], "class": ["car", "truck_bus", "bicycle"]})
     levelx(folder, pd.DataFrame(rows, columns=names.split()), classes)
-    return folder / "00_tracks.csv", {"bicycle"}
+    return folder / "00_tracks.csv", ("car", "truck", "bicycle")
 
 
 def highd(folder):
@@ -83,7 +86,7 @@ def highd(folder):
     names = "frame id x y width height xVelocity yVelocity xAcceleration yAcceleration laneId"
     classes = pd.DataFrame({"id": [7, 8], "class": ["Car", "Truck"]})
     levelx(folder, pd.DataFrame(rows, columns=names.split()), classes)
-    return folder, set()
+    return folder, ("car", "truck")
 
 
 def commonroad(folder):
@@ -107,7 +110,7 @@ def commonroad(folder):
         )
     path = folder / "scenario.xml"
     path.write_text(f'<?xml version="1.0"?><commonRoad commonRoadVersion="2020a" timeStepSize="0.1">{text}</commonRoad>')
-    return path, {"pedestrian"}
+    return path, ("car", "bus", "pedestrian")
 
 
 def nocturne(folder, unit=math.degrees):
@@ -131,7 +134,7 @@ def nocturne(folder, unit=math.degrees):
         )
     path = folder / "scene.json"
     path.write_text(json.dumps({"name": "scene.json", "objects": objects, "roads": []}))
-    return path, {"pedestrian"}
+    return path, ("car", "truck", "pedestrian")
 
 
 def omega_prime(folder):
@@ -145,7 +148,7 @@ def omega_prime(folder):
     names = "total_nanos idx x y z vel_x vel_y yaw length width type subtype role"
     path = folder / "omega.csv"
     pd.DataFrame(rows, columns=names.split()).to_csv(path, index=False)
-    return path, {"pedestrian"}
+    return path, ("car", "bus", "pedestrian")
 
 
 def osi(folder):
@@ -174,7 +177,7 @@ def osi(folder):
             nanos = round(t * 1e9)
             stamp = betterosi.Timestamp(seconds=nanos // 10**9, nanos=nanos % 10**9)
             writer.add(betterosi.GroundTruth(timestamp=stamp, moving_object=things), topic="ground_truth", log_time=nanos)
-    return path, {"pedestrian"}
+    return path, ("car", "bus", "pedestrian")
 
 
 ABSENT = {"x": -10000.0, "y": -10000.0}
@@ -241,7 +244,7 @@ def tracked(folder):
             stamp = make("builtin_interfaces/msg/Time", sec=int(t), nanosec=round((t % 1.0) * 1e9))
             message = make(TRACKED, header=make("std_msgs/msg/Header", stamp=stamp, frame_id="map"), objects=objects)
             bag.write(connection, round(t * 1e9), type_store().serialize_cdr(message, TRACKED))
-    return path, {"pedestrian"}
+    return path, ("car", "bus", "pedestrian")
 
 
 MADE = {f.__name__: f for f in (argoverse2, interaction, ind, highd, commonroad, nocturne, omega_prime, osi, tracked)}
@@ -249,17 +252,17 @@ MADE = {f.__name__: f for f in (argoverse2, interaction, ind, highd, commonroad,
 
 @pytest.mark.parametrize("name", MADE)
 def test_what_was_written_is_read(tmp_path, name):
-    path, left_out = MADE[name](tmp_path)
-    result = read_log(path)
-    (encounter,) = result.encounters
-    ids = [bytes([int(track)] * 16).hex() if name == "tracked" else track for track in SIZES]
-    assert [vehicle.id for vehicle in encounter.vehicles] == ids
-    for said in left_out:
-        assert any(f"1 × {said}" in note for note in result.quality.notes), result.quality.notes
+    path, types = MADE[name](tmp_path)
+    (encounter,) = read_log(path).encounters
+    ids = [bytes([int(track)] * 16).hex() if name == "tracked" else track for track in (*SIZES, "9")]
+    assert [(vehicle.id, vehicle.type) for vehicle in encounter.vehicles] == list(zip(ids, types, strict=False))
+    if "pedestrian" in types:
+        assert (encounter.vehicles[2].length, encounter.vehicles[2].width) == (0.5, 0.5)
     for n, track in enumerate(SIZES):
         vehicle = encounter.vehicles[n]
-        if name != "argoverse2":  # which says no sizes
-            assert (vehicle.length, vehicle.width) == SIZES[track]
+        says_sizes = name != "argoverse2" or track != "7"
+        if says_sizes:  # otherwise those of its type
+            assert (vehicle.length, vehicle.width) == pytest.approx(SIZES[track], abs=0.06)
         if name == "highd":
             sign = 1.0 if track == "7" else -1.0
             assert np.allclose(encounter.heading[n] % (2 * math.pi), 0.0 if sign > 0 else math.pi, atol=0.01)
@@ -292,13 +295,26 @@ def test_a_repeated_column_is_named(tmp_path, column):
         read_log(path)
 
 
-def test_pedestrians_of_no_known_kind_are_counted_too(tmp_path):
+def test_who_is_of_no_known_type_is_counted_and_some_can_be_left_out(tmp_path):
     folder, _ = interaction(tmp_path)
-    walkers, tracks_file = folder / "pedestrian_tracks_000.csv", folder / "vehicle_tracks_000.csv"
-    walkers.write_text(walkers.read_text().replace("pedestrian/bicycle", "1.5"))
-    tracks_file.write_text(tracks_file.read_text() + "99,1,100,tram,0,0,0,1,0,30,2.5\n")
-    (note,) = [note for note in read_log(folder).quality.notes if "left out" in note]
-    assert note.endswith("1 × 1.5, 1 × tram")
+    tracks_file = folder / "vehicle_tracks_000.csv"
+    tracks_file.write_text(tracks_file.read_text() + "98,1,100,tram,0,0,0,1,0,30,2.5\n99,1,100,hovercraft,0,0,0,1,0,30,2.5\n")
+    notes = read_log(folder).quality.notes
+    assert "left out: 1 × tram" in notes and "types that are not known, told from the size: 1 × hovercraft" in notes
+    cars = read_log(folder, LogConfig(types="car"))
+    assert [vehicle.type for vehicle in cars.encounters[0].vehicles] == ["car", "car"]
+    assert "left out: 1 × hovercraft, 1 × pedestrian/bicycle, 1 × tram" in cars.quality.notes
+    with pytest.raises(InputError, match=r"log\.types: there is no type 'cars'; choose of car, van"):
+        read_log(folder, LogConfig(types="cars"))
+
+
+def test_a_type_that_contradicts_its_motion_is_said(tmp_path):
+    folder, _ = interaction(tmp_path)
+    tracks_file = folder / "vehicle_tracks_000.csv"
+    tracks_file.write_text(tracks_file.read_text().replace("car", "pedestrian"))
+    result = read_log(folder)
+    assert [vehicle.type for vehicle in result.encounters[0].vehicles] == ["other", "pedestrian", "pedestrian"]
+    assert any("vehicle 7 is a pedestrian by the log and as fast as 8" in note for note in result.quality.notes)
 
 
 def test_two_recordings_are_refused(tmp_path):
@@ -342,7 +358,7 @@ def test_the_unit_of_headings_of_a_scene_is_told_from_its_velocities(tmp_path):
         (lambda scene: scene["objects"][0].pop("valid"), "object 1 has no 'valid'"),
         (lambda scene: scene["objects"][1]["heading"].pop(), "object 2: position, velocity, heading and valid have"),
         (lambda scene: scene["objects"][1]["position"].__setitem__(0, {"x": "a", "y": 0}), "object 2: .*no list of numbers"),
-        (lambda scene: scene.update(objects=scene["objects"][2:]), "no object of type vehicle"),
+        (lambda scene: scene.update(objects=[1] * 20), "`objects` is no list of objects"),
     ],
     ids=["key", "length", "numbers", "vehicles"],
 )

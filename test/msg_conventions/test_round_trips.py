@@ -28,6 +28,8 @@ from msg_conventions import (
     tracks,
     trajectory,
 )
+from msg_conventions.cdr import decode
+from msg_conventions.layouts import POLYGON
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle
 from scenario_gen.types.ego import with_witness
@@ -294,8 +296,8 @@ def test_asked_states_are_in_the_order_of_the_scenario():
 
 
 def test_footprint():
-    corners = pictures.decode_footprint(pictures.encode_footprint(Vehicle("a", 5.0, 2.0), 0, "vehicle_a"))
-    assert corners.tolist() == [[2.5, 1.0], [-2.5, 1.0], [-2.5, -1.0], [2.5, -1.0]]
+    data = pictures.encode_footprint(Vehicle("a", 5.0, 2.0), 0, "vehicle_a")
+    assert decode(POLYGON, data, "footprint").points[:, :2].tolist() == [[2.5, 1.0], [-2.5, 1.0], [-2.5, -1.0], [2.5, -1.0]]
 
 
 def test_ids_become_ros_tokens_and_collisions_are_refused():

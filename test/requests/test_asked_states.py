@@ -13,8 +13,10 @@ import pytest
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.nearest import ImpossibleError
+from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.arrays import wrap_angle
 from scenario_gen.types.request import Request
+from scenario_gen.types.road_users import Dynamics
 
 COUNT = 5 if LONG else 1
 pytestmark = pytest.mark.spread
@@ -111,7 +113,11 @@ def test_a_goal_too_far_for_the_scale(chain, plain):
 
 
 def test_a_goal_too_far_for_the_time(chain, plain):
-    slow = replace(chain, sampling=replace(chain.sampling, max_acceleration=0.6 if LONG else 0.8, max_stretch=0.0))
+    slow = replace(
+        chain,
+        sampling=replace(chain.sampling, max_stretch=0.0),
+        limits=Limits(car=Dynamics(max_acceleration=0.7 if LONG else 0.9)),
+    )
     texts = {"starts": state(plain, "start", 0, speed=0.0), "goals": state(plain, "end", 0, ahead=10.0)}
     error = refused(slow, **texts)
     assert "cannot drive" in str(error)
@@ -121,7 +127,7 @@ def test_a_goal_too_far_for_the_time(chain, plain):
 
 @pytest.mark.long
 def test_a_start_too_fast_to_stop(chain, plain):
-    weak = replace(chain, sampling=replace(chain.sampling, max_deceleration=4.0))
+    weak = replace(chain, limits=Limits(car=Dynamics(max_deceleration=4.5)))
     texts = {"starts": state(plain, "start", 0, speed=38.0), "goals": state(plain, "end", 0, speed=0.0)}
     error = refused(weak, **texts)
     assert "cannot drive" in str(error)
@@ -132,7 +138,7 @@ def test_a_start_too_fast_to_stop(chain, plain):
 @pytest.mark.long
 def test_a_speed_above_the_limit(chain, plain):
     error = refused(chain, starts=state(plain, "start", 1, speed=60.0))
-    assert "sampling.max_speed is 40" in str(error)
+    assert "at most 40 m/s is planned, 8/9 of limits.car.max_speed" in str(error)
     assert 20.0 < error.suggestions[0].request.states("starts")["2"][3] <= 40.0
 
 

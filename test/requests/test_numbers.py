@@ -18,6 +18,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.roads import build_road
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.request import Request
+from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import Cause
 
 
@@ -59,7 +60,7 @@ def tight(made_data):
 
 
 def limited(chain, lateral, **sampling):
-    limits = Limits(max_lateral_acceleration=lateral, acceleration_tolerance=0.1)
+    limits = Limits(car=Dynamics(max_lateral_acceleration=lateral), acceleration_tolerance=0.1)
     return replace(chain, limits=limits, sampling=replace(chain.sampling, **sampling))
 
 

@@ -106,6 +106,8 @@ def test_a_merge_is_used_by_who_changes_lanes_and_refused_where_nobody_does():
     away = [abs(np.degrees(f.path[0, 2]) % 360.0) for f in fit.fitted]
     assert away[0] == pytest.approx(0.0, abs=0.5) and 8.0 < away[1] < 20.0  # the second comes up the ramp
     assert len(road.entries) == len(road.exits) + 1
+    _, fit = fitted(made(motion(line(0.0), 10.0, 28.0), motion(joining, 10.0)), "curve")
+    assert fit.lost == ()  # who ends beyond another one's path in a bend is in its lane
     with pytest.raises(RefusedError, match="nobody would use the ramp"):
         build_road("merge", made(motion(line(0.0), 8.0, 20.0), motion(line(0.0), 8.0)))
 
@@ -122,22 +124,27 @@ def test_a_roundabout_is_sized_to_the_speed_and_gone_about():
         build_road("roundabout", made(motion(line(0.0), 18.0, 20.0), motion(line(0.0), 18.0)))
 
 
-def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_driven_fast():
+@pytest.mark.parametrize(("radius", "circles"), [(16.0, False), (10.0, False), (16.0, True)])
+def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_driven_fast(radius, circles):
     poses, speeds = [], []
     for come, leave in ((np.pi, 0.0), (-np.pi / 2.0, np.pi / 2.0)):
         out = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in (come, leave)]
         beside = [1.75 * np.array([-y, x]) for x, y in out]
         start, goal = np.array([*(90.0 * out[0] + beside[0]), come + np.pi]), np.array([*(90.0 * out[1] - beside[1]), leave])
-        way = draw_ring_route(start, goal, np.zeros(2), 16.0)
-        away = np.maximum(np.hypot(*way.points[:, :2].T) - 19.0, 0.0)
+        way = draw_ring_route(start, goal, np.zeros(2), radius)
+        away = np.maximum(np.hypot(*way.points[:, :2].T) - radius - 3.0, 0.0)
         speed = np.minimum(np.sqrt(36.0 + 4.0 * away), 14.0)
         time = np.concatenate(([0.0], np.cumsum(2.0 * np.diff(way.station) / (speed[1:] + speed[:-1]))))
         station = np.interp(0.1 * np.arange(T), time, way.station)
         poses.append(way.at(station))
         speeds.append(np.interp(station, way.station, speed))
+    if circles:  # by 287°, neither coming nor going
+        angle = np.linspace(1.0, 6.0, T)
+        poses[1] = np.column_stack((radius * np.cos(angle), radius * np.sin(angle), angle + np.pi / 2.0))
+        speeds[1] = np.full(T, 50.0 * radius / T)
     road, fit = fitted(made(*zip(poses, speeds, strict=True)), "roundabout")
-    assert ring_of(road)[1] == pytest.approx(16.0, abs=0.3)
-    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and fit.lost == ()
+    assert ring_of(road)[1] == pytest.approx(radius, abs=0.3)
+    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and {loss.kind for loss in fit.lost} <= {"arm"}
 
 
 def test_roads_without_a_template_are_of_their_kind():

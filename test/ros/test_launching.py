@@ -117,7 +117,7 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
 
     file = tmp_path / "my.yaml"
     everywhere = {"count": 3, "seed": 5, "road_name": "straight", "ego": "7", "log_path": LOG}
-    sections = {"/**": everywhere, "/**/gp_sampler": {"count": 4, "ego": "8", "limits": {"max_speed": 30}}}
+    sections = {"/**": everywhere, "/**/gp_sampler": {"count": 4, "ego": "8", "limits": {"car": {"max_speed": 30}}}}
     file.write_text(yaml.safe_dump({key: {"ros__parameters": body} for key, body in sections.items()}, sort_keys=False))
     space = f"/launched_{composed}"
     nodes = launched(params=str(file), ego="21202", namespace=space, autostart="false", composed=composed)
@@ -131,7 +131,7 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
             answer = client.call(GetParameters, f"{space}/{node}/get_parameters", GetParameters.Request(names=list(names)))
             return [parameter_value_to_python(value) for value in answer.values]
 
-        assert values("gp_sampler", "count", "seed", "ego", "pair_map", "limits.max_speed") == [4, 5, "21202", True, 30.0]
+        assert values("gp_sampler", "count", "seed", "ego", "pair_map", "limits.car.max_speed") == [4, 5, "21202", True, 30.0]
         assert values("road_server", "road_name", "wait_for_tracks", "autostart") == ["straight", True, False]
         state = client.call(GetState, f"{space}/gp_sampler/get_state", GetState.Request())
         assert state.current_state.label == "unconfigured"

@@ -79,7 +79,6 @@ def test_maps_are_served_and_bad_ones_refused(suite, client):
 
 def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
     from nav_msgs.srv import GetPlan
-    from std_srvs.srv import Trigger
 
     client.hear("/diagnostics", "/fit")
     asked = decode_fit(client.wait("/fit")[0])[2]
@@ -92,7 +91,6 @@ def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
     assert plan.header.stamp.sec == 123
     assert plan.poses[0].pose.position.x == request.start.pose.position.x
     assert plan.poses[-1].pose.position.y == request.goal.pose.position.y
-    assert client.call(Trigger, "/planner/explain", Trigger.Request()).message.startswith("123.000000000: a path was found")
     for stamp, (field, value, reason) in enumerate(
         (
             ("tolerance", -1.0, "tolerance"),
@@ -114,9 +112,6 @@ def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
             lambda reason=reason: any(s.name.startswith("/planner") and reason in s.message for s in client.statuses()),
             f"{reason} on /diagnostics",
         )
-        told = client.call(Trigger, "/planner/explain", Trigger.Request())
-        (own, *_) = [line for line in told.message.splitlines() if line.startswith(f"{stamp}.000000000: ")]
-        assert reason in own and not told.success
 
 
 def test_ctrl_c_ends_everything_cleanly_and_the_bag_is_whole(suite):

@@ -6,6 +6,7 @@
 from pathlib import Path
 import threading
 
+from default_yaml import default_yaml
 import pytest
 from rclpy.parameter import Parameter
 import yaml
@@ -17,7 +18,6 @@ from msg_conventions.layouts import HEADER
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.worker import Worker
-from scenario_gen.cli.default_yaml import default_yaml
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.ros.nodes.road_server import road_of_url
 from scenario_gen.ros.plumbing.ros_parameters import descriptor, with_values
@@ -151,4 +151,4 @@ def test_default_yaml_holds_the_defaults():
     nested = yaml.safe_load(text)["/**"]["ros__parameters"]
     flat = {f"{head}.{name}": value for head, body in nested.items() for name, value in body.items()}
     assert flat == {name: value for name, (_, value) in flatten(PipelineConfig()).items()}
-    assert text == default_yaml(), "run: python -m scenario_gen.cli.default_yaml > config/default.yaml"
+    assert text == default_yaml(), "run: python test/packaging/default_yaml.py > config/default.yaml"

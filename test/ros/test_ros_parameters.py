@@ -33,7 +33,8 @@ def test_a_real_number_is_taken_as_any_tool_writes_it(number):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("ego", True), ("limits.max_speed", "fast"), ("limits.max_speed", True), ("count", "5"), ("count", 5.0)]
+    ("name", "value"),
+    [("ego", True), ("limits.car.max_speed", "fast"), ("limits.car.max_speed", True), ("count", "5"), ("count", 5.0)],
 )
 def test_what_can_only_be_a_mistake_is_refused(name, value):
     with pytest.raises(InputError, match=name.rpartition(".")[2]):
@@ -65,7 +66,7 @@ def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
         "ego": "21202",
         "log.vehicles": "21202",
         "starts": "'21202: 10.5 -1.75 0.0 8.0; 2: 3 4 1.5'",
-        "limits.max_speed": "40",
+        "limits.car.max_speed": "40",
         "limits.time_resolution": "1.0e-06",
         "log.origin": "48.1,11.5",
         "autostart": "false",
@@ -89,12 +90,14 @@ def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
             }
             if name == "gp_sampler":
                 assert before["ego"] == "21202" and before["starts"] == "21202:10.5 -1.75 0.0 8.0; 2:3 4 1.5"
-                assert type(before["limits.max_speed"]) is float and before["limits.time_resolution"] == 1e-6
-                file.write_text(yaml.dump({node: {"ros__parameters": {RESERVED: False, "ego": 7, "limits": {"max_speed": 30}}}}))
+                assert type(before["limits.car.max_speed"]) is float and before["limits.time_resolution"] == 1e-6
+                file.write_text(
+                    yaml.dump({node: {"ros__parameters": {RESERVED: False, "ego": 7, "limits": {"car": {"max_speed": 30}}}}})
+                )
                 assert set(loaded(client, node, file)) == {RESERVED}, "what is read-only is not changed"
                 changed = dumped(client, node)
-                assert (changed["ego"], changed["limits.max_speed"], changed[RESERVED]) == ("7", 30.0, True)
-                assert type(changed["limits.max_speed"]) is float
+                assert (changed["ego"], changed["limits.car.max_speed"], changed[RESERVED]) == ("7", 30.0, True)
+                assert type(changed["limits.car.max_speed"]) is float
             if name == "log_player":
                 assert before["log.vehicles"] == "21202"
     finally:

@@ -335,9 +335,9 @@ def result_in(recording: Recording, namespace: str = "") -> GenerationResult:
         InputError: the namespace is not among its `results`, or a scenario of the request is missing.
     """
     if namespace not in recording.results:
-        names = ", ".join(map(repr, recording.results))
-        remedy = f"choose one of {names}" if names else "no namespace has any; is it a log?"
-        raise InputError(f"{recording.path}: namespace {namespace!r} holds no template with scenarios; {remedy}")
+        names = " or ".join(map(repr, recording.results))
+        remedy = f"choose one: namespace={names}" if names else "no namespace has any; is it a log?"
+        raise InputError(f"{recording.path}: namespace {namespace!r} holds no recording with scenarios; {remedy}")
     found = recording.namespaces[namespace]
     with within(recording.path):
         fit, routes = found.fit

@@ -188,7 +188,8 @@ def search_failures(
         raise InputError(f"--budget {request.budget}: at least one drive is needed")
     config, ego = request.drive_config(), request.ego_id()
     identity = request.identity()
-    plan = plan_of(request.planned, request.sampling, replace(request.request, target="", choose="natural"))
+    plain = replace(request.request, target="", choose="natural")
+    plan = plan_of(request.planned, request.sampling, request.limits, plain)
     check = checker_of(plan, request.sampling, request.limits, request.request).check
     measures = measures_in(request.sampling.variety, plan.encounter)
     natural = NaturalScenarios.of(plan, check, request.sampling, request.planned.seed, measures)

@@ -19,26 +19,23 @@ Source: CommonRoad's documentation of the XML format, 2018b and 2020a. An interv
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 import math
 from pathlib import Path
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, read_xml
+from scenario_gen.base.markup import Element, has_root, read_xml
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
 
-KINDS = ("car", "truck", "bus", "taxi", "priorityvehicle")
 _SKIPPED = frozenset(("lanelet", "trafficSign", "trafficLight", "intersection", "planningProblem", "staticObstacle"))
 
 
 def is_commonroad(path: Path) -> bool:
     """Return whether a file is CommonRoad by its name and beginning."""
-    if path.suffix.lower() != ".xml":
-        return False
-    with path.open("rb") as file:
-        return b"<commonRoad" in file.read(4096)
+    return has_root(path, "commonRoad", ".xml")
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -64,26 +61,29 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     check_vehicles(str(path), len(obstacles), config)
     for obstacle in obstacles:
         kind = obstacle.first("type")
-        name = kind.text.strip() if kind is not None else "unknown"
+        name = kind.text.strip() if kind is not None else ""
         trajectory = obstacle.first("trajectory")
-        if name.lower() not in KINDS or trajectory is None:
-            left_out[name if name.lower() not in KINDS else f"{name} without a trajectory"] += 1
+        if trajectory is None:
+            left_out[name or "unknown"] += 1
             continue
         states = [*obstacle.all("initialState"), *trajectory.all("state")]
         check_size(str(path), 0, row + len(states), config)
-        vehicles.append(_observations(obstacle, states, step, row))
+        vehicles.append(replace(_observations(obstacle, states, step, row), kind=name))
         row += len(states)
     if not vehicles:
-        raise InputError(f"{path}: no car, truck or bus with a trajectory in it")
-    notes = ("read as CommonRoad", *left_out_note(left_out, "car, truck or bus that drives"))
+        raise InputError(f"{path}: no road user with a trajectory in it")
+    counted = ", ".join(f"{count} × {name}" for name, count in sorted(left_out.items()))
+    notes = ("read as CommonRoad", *((f"left out, without a trajectory: {counted}",) if counted else ()))
     return RawLog(path.stem, False, tuple(vehicles), row, (Segment(0, str(path), "state", 1),), notes)
 
 
 def _observations(obstacle: Element, states: list[Element], step: float, row: int) -> Observations:
     values = np.array([_state(state) for state in states]).reshape(-1, 5)
     stamps = np.round(values[:, 0] * (step * 1e9)).astype(np.int64)
-    box = obstacle.first("shape", "rectangle")
+    box, disc = obstacle.first("shape", "rectangle"), obstacle.first("shape", "circle")
     length, width = (box.one(name).value() if box is not None else math.nan for name in ("length", "width"))
+    if disc is not None:
+        length = width = 2.0 * disc.one("radius").value()
     return Observations.of_rows(obstacle.get("id"), stamps, values[:, 1:], np.arange(row, row + len(states)), (length, width))
 
 

@@ -11,7 +11,7 @@
 | heading | angle | degrees clockwise from north |
 | speed | speed | m/s |
 
-Source: SUMO's user documentation, FCDOutput. Sizes are not in it: those of the parameters `length` and `width` are taken.
+Source: SUMO's user documentation, FCDOutput. Sizes are not in it: a car has those of the parameters `length` and `width`.
 """
 
 from collections.abc import Sequence
@@ -25,6 +25,7 @@ import pandas as pd
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import read_xml
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.kinds import type_called, usual_size
 from scenario_gen.logs.raw import check_size, RawLog, Segment
 from scenario_gen.logs.tables import from_frame, LONGEST
 
@@ -46,7 +47,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     for step in read_xml(path, str(path)).all("timestep"):
         time = step.number("time")
         for one in step.children:
-            kind = "person" if one.tag == "person" else one.attributes.get("type", "")
+            kind = "pedestrian" if one.tag == "person" else one.attributes.get("type", "")
             values = one.number("x"), one.number("y"), one.number("speed", math.nan), one.number("angle", math.nan)
             rows.append((time, one.get("id"), *values, kind))
         check_size(str(path), 0, len(rows), config)
@@ -61,7 +62,8 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     if (driven[moves] < TINY * frame["speed"][moves]).sum() > 0.5 * driven[moves].notna().sum():
         frame = frame.rename(columns={"x": "lon", "y": "lat"})
     else:
-        frame["x"] -= config.length / 2.0 * np.cos(frame["heading"].fillna(0.0))
-        frame["y"] -= config.length / 2.0 * np.sin(frame["heading"].fillna(0.0))
+        half = frame["kind"].map(lambda kind: usual_size(type_called(kind) or "", config)[0] / 2.0)
+        frame["x"] -= half * np.cos(frame["heading"].fillna(0.0))
+        frame["y"] -= half * np.sin(frame["heading"].fillna(0.0))
     log = from_frame(frame, paths, (Segment(0, str(path), "vehicle", 1),), config)
     return replace(log, notes=("read as SUMO's floating-car data: x, y are of the front bumper", *log.notes))

@@ -4,7 +4,7 @@
 """Which columns of public data sets hold which quantity, in which unit, by their definitions.
 
 Positions are those of the middle of the bounding box, except in highD, which gives its upper left corner; headings are
-counter-clockwise from +x. Road users that are neither car, van, truck nor bus are counted and left out.
+counter-clockwise from +x.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,6 @@ class Format:
         source: of the definition.
         columns: quantity -> column, with its factor to s, m, m/s or rad: vehicle, time, x, y, vx, vy, heading, length, width,
             kind, and subkind, which says more of those that are of kind "vehicle".
-        kinds: which of `kind` are read, in small letters.
         names: of the numbers in `kind` and in `subkind`, where these are no texts.
         optional: quantities that a file need not have.
         companions: endings of the files of tracks, of classes and of frames per second, where these are three files.
@@ -34,7 +33,6 @@ class Format:
     title: str
     source: str
     columns: dict[str, Column]
-    kinds: tuple[str, ...]
     companions: tuple[str, str, str] | None = None
     image: bool = False
     signs: tuple[str, ...] = ()
@@ -76,7 +74,6 @@ FORMATS = {
             "vehicle=track_id x=position_x y=position_y vx=velocity_x vy=velocity_y heading=heading kind=object_type",
             time=("timestep", 0.1),
         ),
-        kinds=("vehicle", "bus"),
         signs=("scenario_id",),
     ),
     "interaction": Format(
@@ -86,7 +83,6 @@ FORMATS = {
             "vehicle=track_id x=x y=y vx=vx vy=vy heading=psi_rad length=length width=width kind=agent_type",
             time=("timestamp_ms", 1e-3),
         ),
-        kinds=("car", "truck", "bus", "van"),
         signs=("frame_id",),
     ),
     "ind": Format(
@@ -96,14 +92,12 @@ FORMATS = {
             "vehicle=trackId time=frame x=xCenter y=yCenter vx=xVelocity vy=yVelocity length=length width=width",
             heading=("heading", math.pi / 180.0),
         ),
-        kinds=("car", "truck", "van", "bus", "truck_bus", "trailer"),
         companions=_LEVELX,
     ),
     "highd": Format(
         title="highD",
         source="highD: format page (Krajewski et al. 2018): x, y the upper left corner, y down, width along the road",
         columns=_columns("vehicle=id time=frame x=x y=y vx=xVelocity vy=yVelocity length=width width=height"),
-        kinds=("car", "truck"),
         companions=_LEVELX,
         image=True,
         signs=("laneId",),
@@ -114,10 +108,6 @@ FORMATS = {
         columns=_columns(
             "vehicle=idx x=x y=y vx=vel_x vy=vel_y heading=yaw length=length width=width kind=type subkind=subtype",
             time=("total_nanos", 1e-9),
-        ),
-        kinds=(
-            *("vehicle", "small car", "compact car", "car", "luxury car", "delivery van", "heavy truck", "semitractor"),
-            *("bus", "land vehicle"),
         ),
         names={
             "kind": {str(number): name for number, name in OSI_TYPES.items()},

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenarios of the Waymo Open Motion Dataset as Nocturne and GPUDrive take them (JSON): the objects of type vehicle.
+"""Scenarios of the Waymo Open Motion Dataset as Nocturne and GPUDrive take them (JSON).
 
 | quantity | key of an object | unit |
 |---|---|---|
 | vehicle | id; without it the object's place in the list | |
-| class | type: vehicle | |
+| class | type: vehicle, pedestrian, cyclist | |
 | length, width | length, width | m |
 | time | place in the lists, times 0.1 s | |
 | there | valid | |
@@ -17,7 +17,6 @@
 Source: the documentation of Nocturne's and of GPUDrive's scenes. Which unit headings have is told from the velocities.
 """
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 import json
 from pathlib import Path
@@ -27,7 +26,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
 from scenario_gen.numerics import Floats
 
 STEP_NS = 100_000_000
@@ -61,10 +60,9 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     if not isinstance(objects, list) or not all(isinstance(one, dict) for one in objects):
         raise InputError(f"{path}: `objects` is no list of objects")
     check_vehicles(str(path), len(objects), config)
-    left_out = Counter(str(one.get("type")) for one in objects if one.get("type") != "vehicle")
-    found = [(k, one) for k, one in enumerate(objects) if one.get("type") == "vehicle"]
+    found = list(enumerate(objects))
     if not found:
-        raise InputError(f"{path}: no object of type vehicle in it")
+        raise InputError(f"{path}: no object in it")
     names = [str(one.get("id", k)) for k, one in found]
     if len(set(names)) < len(names):
         names = [str(k) for k, _ in found]
@@ -80,10 +78,12 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         heading = np.radians(own[:, 2]) if degrees else own[:, 2]
         values = np.column_stack([own[:, :2], heading, np.hypot(own[:, 3], own[:, 4])])[there]
         size = (_number(one, "length"), _number(one, "width"))
-        vehicles.append(Observations.of_rows(name, there.astype(np.int64) * STEP_NS, values, there + row, size))
+        vehicles.append(
+            Observations.of_rows(name, there.astype(np.int64) * STEP_NS, values, there + row, size, kind=str(one.get("type", "")))
+        )
         row += len(own)
     unit = "degrees" if degrees else "rad"
-    notes = (f"read as a scene of Nocturne or GPUDrive, headings in {unit}", *left_out_note(left_out, "vehicle"))
+    notes = (f"read as a scene of Nocturne or GPUDrive, headings in {unit}",)
     return RawLog(path.stem, False, tuple(vehicles), rows, (Segment(0, str(path), "state", 1),), notes)
 
 

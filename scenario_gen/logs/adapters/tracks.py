@@ -3,7 +3,6 @@
 
 """Tables of public data sets (`formats`) to observations."""
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 import math
@@ -16,7 +15,7 @@ import pandas as pd
 from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.adapters.formats import Format, FORMATS
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, left_out_note, RawLog
+from scenario_gen.logs.raw import check_size, RawLog
 from scenario_gen.logs.tables import from_frame, read_text, reals, segment_of, to_numbers, vehicle_name
 
 Load = Callable[[Path, Format, int, LogConfig], pd.DataFrame]
@@ -36,6 +35,7 @@ def read(paths: Sequence[Path], config: LogConfig, *, name: str, load: Load | No
     """
     known = FORMATS[name]
     tracks = [path for path in paths if not _companion_ending(path, known)]
+    tracks.sort(key=lambda path: _is_of_pedestrians(path, name))
     main = [path for path in tracks if not _is_of_pedestrians(path, name)]
     if len(main) != 1:
         names = ", ".join(path.name for path in main) or "none"
@@ -43,20 +43,14 @@ def read(paths: Sequence[Path], config: LogConfig, *, name: str, load: Load | No
             f"{paths[0]}: one recording of {known.title} has one file of tracks, here are {names}; give one at a time"
         )
     frames, segments, row = [], [], 0
-    left_out: Counter[str] = Counter()
     for path in tracks:
         table = (load or _read_table)(path, known, row, config)
-        kinds = _kinds(path, known, table)
-        keep = kinds.isin(known.kinds).to_numpy() & (path in main)
-        vehicles = table.loc[~keep, known.columns["vehicle"].name]
-        left_out.update({str(kind): int(count) for kind, count in vehicles.groupby(kinds[~keep]).nunique().items()})
-        if path in main:
-            frames.append(_convert(table, path, known).assign(row=np.arange(row, row + len(table)))[keep])
-            segments.append(segment_of(path, row))
-            row += len(table)
+        frames.append(_convert(table, path, known).assign(kind=_kinds(path, known, table), row=range(row, row + len(table))))
+        segments.append(segment_of(path, row))
+        row += len(table)
     frame = pd.concat(frames, ignore_index=True)
     without = () if "speed" in frame else ("there are no speeds: they are derived from the positions",)
-    notes = (f"read as {known.title}", *without, *left_out_note(left_out, "car, van, truck or bus"))
+    notes = (f"read as {known.title}", *without)
     return replace(from_frame(frame, main, tuple(segments), config), rows=row, notes=notes)
 
 
@@ -160,7 +154,7 @@ def _convert(table: pd.DataFrame, path: Path, known: Format) -> pd.DataFrame:
     columns = {
         quantity: column
         for quantity, column in known.columns.items()
-        if quantity not in ("kind", "subkind") and (quantity not in known.optional or column.name in table)
+        if quantity not in ("kind", "subkind") and column.name in table
     }
     if known.companions:
         rate = float(reals(_read_companion(path, known, 2, ("frameRate",))["frameRate"]).iloc[0])

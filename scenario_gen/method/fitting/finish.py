@@ -13,7 +13,7 @@ from scenario_gen.method.fitting.kept import find_losses
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
 from scenario_gen.roads import nearest_pose_with_room
-from scenario_gen.template import clean_tracks, Track, turn_of
+from scenario_gen.template import clean_tracks, manoeuvre_of, Track, turn_of
 from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Road, Segmentation
 
 _STAND_LENGTH = 0.5  # metres
@@ -59,7 +59,8 @@ def finish(
             )
         turned = turn_of(tracks[i]), turn_of(track)
         scale = float(placement.scale[i])
-        fitted.append(FittedVehicle(anchors, moved, stands, scale, placement.manoeuvre[i], turned, _path(track)))
+        manoeuvre = "wait" if track.still else manoeuvre_of(turned[1])
+        fitted.append(FittedVehicle(anchors, moved, stands, scale, manoeuvre, turned, _path(track)))
         ends = encounter.speed[i, [0, last]] * placement.scale[i]
         ends = np.where(ends < STAND_SPEED, 0.0, ends)
         if given is not None:

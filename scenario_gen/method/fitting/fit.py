@@ -4,7 +4,6 @@
 """One door to the fitting: which way of placing a template is tried on which road."""
 
 from functools import lru_cache
-import math
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from scenario_gen.method.fitting.requested import refuse_impossible, refuse_misf
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.numerics import Floats
 from scenario_gen.template import clean_tracks, refuse_reversing
-from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation
+from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation, TypeLimits
 
 _AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
 _NEAR_HOME = 0.5  # the same for a map without lanes to go by: recorded cars leave recorded maps here and there
@@ -34,7 +33,7 @@ def fit_template(
     starts: Floats | None = None,
     goals: Floats | None = None,
     request: Request = Request(),
-    max_speed: float = math.inf,
+    limits: TypeLimits = TypeLimits(),
 ) -> Fit:
     """Place a template on a road (paper III-A, eqs 7-9 put right).
 
@@ -46,7 +45,7 @@ def fit_template(
         starts: (N, 3) or (N, 4) given start poses x [m], y [m], yaw [rad], and speeds [m/s] of all vehicles; with `goals`.
         goals: likewise the end.
         request: the start and end states that are requested, of some vehicles; the others are the road's own placement.
-        max_speed: [m/s] that no asked state may exceed.
+        limits: of motion; no requested state may exceed a speed that is planned.
 
     Raises:
         LostEncounterError: the best place on the road loses something of the encounter that `config.allow` does not name.
@@ -56,7 +55,7 @@ def fit_template(
     refuse_reversing(encounter)
     request.ego_of(encounter)  # no such vehicle: refused before anything is placed
     if request.moves:
-        return _fit_request(encounter, segmentation, road, config, request, max_speed)
+        return _fit_request(encounter, segmentation, road, config, request, limits)
     if starts is not None or goals is not None:
         placement, given = place_given(encounter, road, config, starts, goals)
         return finish(encounter, segmentation, road, placement, config, given)
@@ -68,10 +67,10 @@ def fit_template(
 
 
 def _fit_request(
-    encounter: Encounter, segmentation: Segmentation, road: Road, config: FittingConfig, request: Request, max_speed: float
+    encounter: Encounter, segmentation: Segmentation, road: Road, config: FittingConfig, request: Request, limits: TypeLimits
 ) -> Fit:
     starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))
-    refuse_impossible(encounter, road, starts, goals, max_speed)
+    refuse_impossible(encounter, road, starts, goals, limits)
     base = _place(encounter, road.cleared, config) if np.isnan(starts).any() or np.isnan(goals).any() else None
     placement, given = place_given(encounter, road, config, starts, goals, base)
     fit = finish(encounter, segmentation, road, placement, config, given)

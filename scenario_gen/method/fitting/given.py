@@ -11,9 +11,10 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.finish import STAND_SPEED
-from scenario_gen.method.fitting.placement import check_scale, has_room, max_repair, Placement, rotated, share_with_room
+from scenario_gen.method.fitting.placement import check_scale, has_room, max_repair, Placement, share_with_room
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import place
 from scenario_gen.roads import draw_route
 from scenario_gen.template import clean_tracks, own_paths, Track
 from scenario_gen.types import Encounter, Road
@@ -28,7 +29,7 @@ def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) 
     separation = own_paths(encounter)
     max_repair([track for track in separation.tracks if share_with_room(road, track) < 1.0], road, config.max_move)
     notes = (f"placed on road {road.name} in the template's own frame", *separation.notes)
-    return replace(Placement.of(separation.tracks, 1.0, notes, "own path"), moved=separation.moved, at_home=True)
+    return replace(Placement.of(separation.tracks, 1.0, notes), moved=separation.moved, at_home=True)
 
 
 def share_at_home(encounter: Encounter, road: Road) -> float:
@@ -74,15 +75,15 @@ def place_given(
     rows, notes = [], []
     for n, track in enumerate(tracks):
         if base is not None and not has_state[n].any():
-            rows.append((base.tracks[n], base.scale[n], base.manoeuvre[n], base.moved[n]))
+            rows.append((base.tracks[n], base.scale[n], base.moved[n]))
             continue
         placed, scale, how = _place(track, ends[n], joint, road, config)
-        rows.append((placed, scale, "wait" if track.still else _name(placed), 0.0))
+        rows.append((placed, scale, 0.0))
         which = "start and goal" if has_state[n].all() else "start" if has_state[n, 0] else "goal"
         notes.append(f"vehicle {track.vehicle.id}: {which} as given, {how}")
-    on_road, scales, manoeuvres, moves = zip(*rows, strict=True)
+    on_road, scales, moves = zip(*rows, strict=True)
     sentences = (*(() if base is None else base.notes), *notes)
-    return Placement(on_road, frozen(scales), manoeuvres, frozen(moves), sentences), given
+    return Placement(on_road, frozen(scales), frozen(moves), sentences), given
 
 
 def _ends_of(base: Placement, encounter: Encounter) -> Floats:
@@ -151,16 +152,9 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
         scale, how = float(np.hypot(*v) / np.hypot(*u)), "similarity"
     check_scale(scale, f"vehicle {vehicle.id} (template chord {np.hypot(*u):.1f} m, asked {np.hypot(*v):.1f} m)", config)
     points = track.curve.points.copy()
-    points[:, :2] = rotated(scale * (points[:, :2] - points[0, :2]), turn) + start[:2]  # eqs 8b, 9
+    points[:, :2] = place(np.array([*start[:2], turn]), *(scale * (points[:, :2] - points[0, :2]).T))  # eqs 8b, 9
     share = track.curve.station / track.curve.length
     points[:, :2] += share[:, None] * (goal[:2] - points[-1, :2])  # zero but for short chords
     curve = Curve.through(points[:, :2])
     progress = np.interp(track.progress / track.curve.length, share, curve.station)
     return replace(track, curve=curve, progress=frozen(progress)), scale, f"{how} (s = {scale:.2f}, {np.degrees(turn):.0f}°)"
-
-
-def _name(track: Track) -> str:
-    turn = float(track.curve.points[-1, 2] - track.curve.points[0, 2])
-    if abs(turn) < np.radians(35.0):
-        return "straight"
-    return "left" if turn > 0.0 else "right"

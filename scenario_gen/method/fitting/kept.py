@@ -34,7 +34,10 @@ _SAME_WAY = np.radians(30.0)
 _ENOUGH = 0.5  # share of that time in which they are beside each other on the road, on the same side
 _IN_LANE, _OFF_LANE = 1.4, 2.3  # metres sideways up to which a vehicle is in another one's lane, and from which on beside it
 _STILL_IN_LANE = 2.0  # metres, likewise on the road
-_BEYOND, _DRIFT = 30.0, 1.0  # metres beyond a path's ends, straight on, for which it says where its lane lies, to so many
+_BEYOND, _DRIFT = (
+    30.0,
+    1.0,
+)  # metres beyond a path's, or its lanes', ends, straight on, for which it says where its lane lies, to so many
 _PASSED = 2.0  # metres by which one that passes another is behind it first, and then before it
 
 
@@ -109,6 +112,8 @@ def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Ite
         a, b = (tracks[k].vehicle.id for k in pair)
         if pair not in after:
             following = before[pair].following
+            if following and _in_two_lanes(*(tracks[k] for k in pair)):
+                continue
             what = "follow each other" if following else "have crossing or merging paths"
             kind = "following" if following else "conflict"
             yield Loss(kind, (a, b), f"vehicles {a} and {b} {what} in the template, and do not meet on this road")
@@ -117,6 +122,12 @@ def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Ite
         elif before[pair].first != after[pair].first and not before[pair].following:
             first, late = tracks[before[pair].first].vehicle.id, abs(after[pair].arrival_gap)
             yield Loss("order", (a, b), f"vehicle {first} goes first in the template, {late:.1f} s after the other on this road")
+
+
+def _in_two_lanes(track: Track, other: Track) -> bool:
+    """Whether two vehicles drive beside each other at both ends, however near: a record may have them overlap."""
+    aside = np.abs([_aside(one, another, end) for one, another in ((track, other), (other, track)) for end in (0, 1)])
+    return bool((aside > _IN_LANE).any() and not (aside <= _IN_LANE).any())
 
 
 def _lost_lanes(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
@@ -149,10 +160,10 @@ def _differs(own: float, there: float, farthest: float) -> bool:
 
 def _aside(track: Track, other: Track, end: int) -> float:
     """How far [m, left positive] beside a path another vehicle starts (`end` 0) or ends (1); NaN if it does not lead there."""
-    pose = other.curve.at(other.progress[other.present[end]])
-    station, offset = track.curve.project(pose[None, :2])
-    beyond = max(-float(station[0]), float(station[0]) - track.travelled)
-    turned = abs(float(wrap_angle(track.curve.at(station)[0, 2] - pose[2])))
+    pose, lane = other.curve.at(other.progress[other.present[end]]), track.lane or track.curve
+    station, offset = lane.project(pose[None, :2])
+    beyond = max(-float(station[0]), float(station[0]) - (lane.length if track.lane else track.travelled))
+    turned = abs(float(wrap_angle(lane.at(station)[0, 2] - pose[2])))
     leads = turned < _SAME_WAY if beyond <= 0.0 else beyond < _BEYOND and turned * beyond < _DRIFT
     return float(offset[0]) if leads and not (track.still or other.still) else np.nan
 

@@ -46,7 +46,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         notes = [*network.notes, *(_note(c, t, network) for c, t in zip(match.courses, tracks, strict=True))]
         if scale * shortened != 1.0:
             notes.append(f"scaled by {scale * shortened:.3g} to fit the lanes")
-        placement = Placement.of(tracks_on(match, laid), scale * shortened, notes, map(_manoeuvre, match.courses))
+        placement = Placement.of(tracks_on(match, laid), scale * shortened, notes)
         try:
             placement = separated(placement, config, sideways=0.0, own=own)
             astray = max_repair(placement.tracks, road, config.max_move) > _ASTRAY
@@ -109,12 +109,6 @@ def _lanes_of(road: Road) -> LaneNetwork:
     if road.lanes is None:
         raise RefusedError(f"road {road.name} has no lanes; choose another way of placing (fitting.placement)")
     return road.lanes
-
-
-def _manoeuvre(course: Course) -> str:
-    yaw = course.curve.at(np.array([course.start, course.end]))[:, 2]
-    turn = float(yaw[1] - yaw[0])
-    return "straight" if abs(turn) < math.radians(20.0) else "left" if turn > 0.0 else "right"
 
 
 def _note(course: Course, track: Track, network: LaneNetwork) -> str:

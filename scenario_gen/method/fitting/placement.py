@@ -28,7 +28,6 @@ class Placement:
     Attributes:
         tracks: paths on the road, and the progress along them at each of the template's samples.
         scale: (N,) s of eq 9.
-        manoeuvre: what each vehicle does on the road.
         moved: (N,) metres by which whole paths were shifted to keep vehicles apart.
         notes: what was decided, in sentences.
         unused: arms of the road that nobody uses.
@@ -37,25 +36,15 @@ class Placement:
 
     tracks: tuple[Track, ...]
     scale: Floats
-    manoeuvre: tuple[str, ...]
     moved: Floats
     notes: tuple[str, ...]
     unused: tuple[Loss, ...] = ()
     at_home: bool = False
 
     @classmethod
-    def of(cls, tracks: tuple[Track, ...], scale: float, notes: Iterable[str], manoeuvres: Iterable[str] | str) -> "Placement":
-        """Return the placement of tracks that all have one scale, none of them shifted; one that stands throughout waits.
-
-        Args:
-            tracks: on the road.
-            scale: s of eq 9.
-            notes: what was decided, in sentences.
-            manoeuvres: what each vehicle does if it does not wait, or what all do.
-        """
-        names = [manoeuvres] * len(tracks) if isinstance(manoeuvres, str) else manoeuvres
-        waits = tuple("wait" if track.still else name for track, name in zip(tracks, names, strict=True))
-        return cls(tracks, frozen(np.full(len(tracks), scale)), waits, frozen(np.zeros(len(tracks))), tuple(notes))
+    def of(cls, tracks: tuple[Track, ...], scale: float, notes: Iterable[str]) -> "Placement":
+        """Return the placement of tracks on the road that all have one scale s of eq 9, none of them shifted."""
+        return cls(tracks, frozen(np.full(len(tracks), scale)), frozen(np.zeros(len(tracks))), tuple(notes))
 
 
 def check_scale(scale: float, what: str, config: FittingConfig) -> None:
@@ -97,12 +86,6 @@ def separated(placement: Placement, config: FittingConfig, *, sideways: float, o
         moved=placement.moved + separation.moved,
         notes=(*placement.notes, *separation.notes),
     )
-
-
-def rotated(points: Floats, yaw: float) -> Floats:
-    """Turn points (M, 2) [m] about the origin by `yaw` [rad]."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]))
 
 
 def has_room(road: Road, vehicle: Vehicle, poses: Floats) -> bool:

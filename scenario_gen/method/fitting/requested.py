@@ -11,25 +11,28 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.roads import footprint_fits
-from scenario_gen.types import Encounter, Fit, Road
+from scenario_gen.types import Encounter, Fit, Road, TypeLimits
 
 STAND = 0.05  # m/s, a speed below this is met by standing
 NAMES = {"starts": "start", "goals": "goal"}
 
 
-def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: Floats, max_speed: float) -> None:
+def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: Floats, limits: TypeLimits) -> None:
     """Refuse states, (N, 4) each with NaN where none is requested, that no motion can have.
 
     Raises:
-        RefusedError: one is faster than `max_speed` [m/s], or off the road; with figures.
+        RefusedError: one is faster than is planned for its type, or off the road; with figures.
     """
     for name, rows in (("starts", starts), ("goals", goals)):
         for vehicle, state in zip(encounter.vehicles, rows, strict=True):
             if np.isnan(state[0]):
                 continue
             what = f"the {NAMES[name]} asked of vehicle {vehicle.id} (x {state[0]:.2f}, y {state[1]:.2f})"
+            max_speed = limits.of(vehicle.type).planned.max_speed
             if state[3] > max_speed:
-                raise RefusedError(f"{what} has {state[3]:g} m/s; sampling.max_speed is {max_speed:g} m/s")
+                raise RefusedError(
+                    f"{what} has {state[3]:g} m/s; at most {max_speed:g} m/s is planned, 8/9 of limits.{vehicle.type}.max_speed"
+                )
             if not footprint_fits(road, state[None, :3], vehicle.length, vehicle.width)[0]:
                 raise RefusedError(
                     f"{what} is off the road: a footprint of {vehicle.length:g} m by {vehicle.width:g} m has no room there"

@@ -16,9 +16,11 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.placement import max_repair, Placement, rotated, SCALES, separated, share_with_room
+from scenario_gen.method.fitting.placement import max_repair, Placement, SCALES, separated, share_with_room
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.pattern_search import pattern_search
+from scenario_gen.numerics.plane import place
 from scenario_gen.roads import clearance_field
 from scenario_gen.template import Track
 from scenario_gen.types import Road
@@ -84,7 +86,7 @@ def _tried(
         f"placed on road {road.name} as one piece: turned by {np.degrees(motion.yaw) % 360.0:.0f}°, scale "
         f"{motion.scale:g}, its centre at x {motion.at[0]:.1f}, y {motion.at[1]:.1f}"
     )
-    as_laid = Placement.of(_moved(tracks, centre, motion), motion.scale, [note], "own path")
+    as_laid = Placement.of(_moved(tracks, centre, motion), motion.scale, [note])
     placement = separated(as_laid, config, sideways=1.0)
     share = float(min(share_with_room(road, track) for track in placement.tracks))
     return placement, share, max_repair(placement.tracks, road, config.max_move)
@@ -119,7 +121,7 @@ def _coarse(discs: Floats, road: Road, required: float, scale: float) -> list[_M
     whole = np.fft.rfft2(np.round(field * _WHOLE))
     best = []
     for yaw in np.arange(_TURNS) * 2.0 * np.pi / _TURNS:
-        points = scale * rotated(discs, float(yaw))
+        points = place(np.array([0.0, 0.0, yaw]), *(scale * discs).T)
         index = np.floor(points / cell + 0.5).astype(np.int64)
         low, size = index.min(axis=0), np.ptp(index, axis=0) + 1
         if size[0] > field.shape[1] or size[1] > field.shape[0]:
@@ -137,29 +139,14 @@ def _coarse(discs: Floats, road: Road, required: float, scale: float) -> list[_M
     return best
 
 
-def _fine_cost(discs: Floats, road: Road, required: float, scale: float, state: Floats) -> float:
-    points = scale * rotated(discs, float(state[2])) + state[:2]
-    row, column, inside = road.cells(points)
-    return float(_penalty(np.where(inside, clearance_field(road)[row, column], 0.0), required).mean())
-
-
 def _refined(discs: Floats, road: Road, required: float, motion: _Motion) -> _Motion:
-    """Pattern search over place and rotation (Hooke & Jeeves 1961)."""
-    state = np.array([*motion.at, motion.yaw])
-    cost = _fine_cost(discs, road, required, motion.scale, state)
-    step = np.array([1.0, 1.0, np.radians(3.0)])
-    while step[0] > 0.05:
-        improved = False
-        for k in range(3):
-            for sign in (1.0, -1.0):
-                trial = state.copy()
-                trial[k] += sign * step[k]
-                tried = _fine_cost(discs, road, required, motion.scale, trial)
-                if tried < cost - 1e-12:
-                    state, cost, improved = trial, tried, True
-                    break
-        if not improved:
-            step /= 2.0
+    """The best similarity near one, of the same scale."""
+
+    def costs(states: Floats) -> Floats:
+        row, column, inside = road.cells(place(states[:, None], *(motion.scale * discs).T))
+        return np.asarray(_penalty(np.where(inside, clearance_field(road)[row, column], 0.0), required).mean(axis=1))
+
+    state, cost = pattern_search(costs, np.array([*motion.at, motion.yaw]), np.array([1.0, 1.0, np.radians(3.0)]), 0.05)
     return _Motion(cost, motion.scale, float(state[2]), (float(state[0]), float(state[1])))
 
 
@@ -167,7 +154,7 @@ def _moved(tracks: tuple[Track, ...], centre: Floats, motion: _Motion) -> tuple[
     moved = []
     for track in tracks:
         points = track.curve.points.copy()
-        points[:, :2] = motion.scale * rotated(points[:, :2] - centre, motion.yaw) + motion.at
+        points[:, :2] = place(np.array([*motion.at, motion.yaw]), *(motion.scale * (points[:, :2] - centre)).T)
         points[:, 2] += motion.yaw
         moved.append(replace(track, curve=Curve(points), progress=frozen(motion.scale * track.progress)))
     return tuple(moved)

@@ -13,6 +13,7 @@ from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPla
 from scenario_gen.method.routing.search.planner import Planner
 from scenario_gen.method.routing.search.pose_planner import PoseRrtStarConnect, PoseSearchConfig
 from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.types import OF_CARS
 
 
 class MakePlanner(Protocol):
@@ -47,12 +48,12 @@ PLANNERS = Registry[MakePlanner](
 class PlanningConfig(Parameters):
     """How routes are planned."""
 
+    replaced = OF_CARS
+
     planner: str = parameter("rrt_star_connect", "geometric planner", choices=tuple(PLANNERS.built_in), group=PLANNERS.group)
     iterations: int = parameter(1000, "iterations of the planner between two anchors", low=1, high=10_000_000)
     margin: float = parameter(0.3, "room to keep beside the footprint where the road has it", unit="m", low=0.0, high=5.0)
     drivable: bool = parameter(True, "smooth routes that can be driven; false: the planner's bare polylines")
-    # A car's turning circle of 10.5 to 11 m between kerbs is one of 4.4 m radius for its centre; the checker allows 0.25.
-    max_curvature: float = parameter(0.225, "largest curvature of a route", unit="1/m", low=0.01, high=2.0)
     spacing: float = parameter(0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5)
     keep_side: float = parameter(
         0.05,

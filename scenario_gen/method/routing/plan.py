@@ -31,7 +31,7 @@ from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
 from scenario_gen.roads import clearance_field, footprint_fits, nearest_pose_with_room, own_ground
-from scenario_gen.types import Fit, FittedVehicle, Road, Route, Vehicle
+from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits, Vehicle
 
 STANDS = 0.05  # [m] a vehicle whose start and end are nearer than this has no path
 CLOSE = 0.3  # [m] anchors nearer to each other than this are one waypoint
@@ -65,6 +65,7 @@ class _Task:
     config: PlanningConfig
     planner: Planner
     seed: int
+    max_curvature: float
     tightest: float = TIGHTEST[0]
 
     @property
@@ -80,7 +81,13 @@ class _Task:
         return f"the {which} of vehicle {self.vehicle.id} (anchor {k}, at {x:.2f}, {y:.2f} m)"
 
 
-def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(), seed: int = 0) -> tuple[Route, ...]:
+def plan_routes(
+    road: Road,
+    fit: Fit,
+    config: PlanningConfig = PlanningConfig(),
+    seed: int = 0,
+    limits: TypeLimits = TypeLimits(),
+) -> tuple[Route, ...]:
     """Plan one route per vehicle through its anchors.
 
     Source: paper III-B, between consecutive changepoints.
@@ -93,6 +100,7 @@ def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(),
         fit: where every vehicle's anchors stand on it.
         config: see `PlanningConfig`.
         seed: same seed, same routes.
+        limits: each type's, for the curvature.
 
     Returns:
         N routes, geometry only.
@@ -103,7 +111,7 @@ def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(),
     """
     planner = make_planner(config)
     tasks = (
-        _Task(road, vehicle, fitted, config, planner, seed + 7919 * n)
+        _Task(road, vehicle, fitted, config, planner, seed + 7919 * n, limits.of(vehicle.type).planned.max_curvature)
         for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
     )
     return tuple(_on_own_lanes(task) for task in tasks)
@@ -154,7 +162,7 @@ def _route(task: _Task) -> Route:
             )
     if task.fitted.stands.all() or np.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
         return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1), joined=0, searched=0)
-    waypoints = _waypoints(anchors, task.fitted.stands, task.config.max_curvature)
+    waypoints = _waypoints(anchors, task.fitted.stands, task.max_curvature)
     if not task.config.drivable:
         return _polyline(task, waypoints)
     failed: RefusedError | None = None
@@ -191,8 +199,8 @@ def _smoothed(task: _Task, waypoints: list[int]) -> Route | _Rough:
     for firmness, rounds in FIRMNESS:
         stop_if_cancelled()
         held = Guess(guess.points, guess.hold * firmness)
-        curve = smooth(task.road, task.vehicle, anchors[0], anchors[-1], targets, held, task.config, rounds)
-        if curve.curvature <= task.config.max_curvature and not len(curve.off_road):
+        curve = smooth(task.road, task.vehicle, (anchors[0], anchors[-1]), targets, held, task.config, task.max_curvature, rounds)
+        if curve.curvature <= task.max_curvature and not len(curve.off_road):
             route = _sampled(task, curve.poses, curve.length)
             far = farthest(route.points, task.fitted.path)
             return replace(route, joined=len(legs) - searched, searched=searched, left_out=left_out, farthest=far)
@@ -293,11 +301,11 @@ def _weights(anchors: Floats, waypoints: list[int]) -> Floats:
 
 def _leg(task: _Task, a: int, b: int, poses: Floats, *, last: bool) -> _Leg:
     """The way from anchor a to anchor b, at `poses` (A, 3): a direct curve, else one that is searched for; `last`: patiently."""
-    start, end, config = poses[a], poses[b], task.config
+    start, end = poses[a], poses[b]
     own = _fitted_piece(task, start, end)
     if own is not None:
         return _Leg(Guess(own[:, :2], np.full(len(own), OWN_HOLD)), searched=False)
-    curve = direct(task.road, task.vehicle, start, end, config.max_curvature)
+    curve = direct(task.road, task.vehicle, start, end, task.max_curvature)
     if curve is not None:
         return _Leg(Guess(curve[:, :2], np.full(len(curve), DIRECT_HOLD)), searched=False)
     if isinstance(task.planner, PlansPoses):
@@ -320,7 +328,7 @@ def _fitted_piece(task: _Task, start: Floats, end: Floats) -> Floats | None:
         return None
     step = edge_lengths(poses[:, :2])
     bend = np.abs(wrap_angle(np.diff(path[first : last + 1, 2]))) / edge_lengths(path[first : last + 1, :2])
-    if bend.max() > task.config.max_curvature or step.min() < 1e-6:
+    if bend.max() > task.max_curvature or step.min() < 1e-6:
         return None
     free = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
     return poses if free.all() else None
@@ -334,7 +342,7 @@ def _searched_poses(
     First with more room than the footprint, which the smoothing can use; then with the footprint alone.
     """
     (a, b), (start, end), config, vehicle = anchors, ends, task.config, task.vehicle
-    guide = next(candidates(start, end, config.max_curvature))[::GUIDE_STRIDE]
+    guide = next(candidates(start, end, task.max_curvature))[::GUIDE_STRIDE]
     free = Wishes(config.margin, LACK, guide, *_sides(config, config.keep_side * AGAINST, config.keep_side))
     most_left, most_right = _sides(config, HALF_LANE, np.inf)
     own = replace(free, about=_own_side(guide, config), most_left=most_left, most_right=most_right)
@@ -343,7 +351,7 @@ def _searched_poses(
     if config.keep_side > 0.0:
         attempts.insert(0, (own, ROOMY, own_iterations))
     where = f"between {task.name(a)} and {task.name(b)}"
-    limit = task.tightest * config.max_curvature
+    limit = task.tightest * task.max_curvature
     error: RefusedError | None = None
     for wishes, extra, iterations in attempts:
         query = PoseQuery(start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit)
@@ -479,10 +487,10 @@ def _reason(task: _Task, curve: Curve) -> str:
     """Why a curve cannot be driven, and next to which anchor."""
     reasons = []
     where = curve.sharpest
-    if curve.curvature > task.config.max_curvature:
+    if curve.curvature > task.max_curvature:
         reasons.append(
             f"its curvature reaches {curve.curvature:.3f} 1/m at ({where[0]:.2f}, {where[1]:.2f}) m, "
-            f"the limit is {task.config.max_curvature:.3f}"
+            f"the limit is {task.max_curvature:.3f}"
         )
     if len(curve.off_road):
         where = curve.off_road[len(curve.off_road) // 2, :2]

@@ -80,20 +80,23 @@ class Curve:
 def smooth(
     road: Road,
     vehicle: Vehicle,
-    start: Floats,
-    end: Floats,
+    ends: tuple[Floats, Floats],
     targets: Targets,
     guess: Guess,
     config: PlanningConfig,
+    max_curvature: float,
     rounds: int = ROUNDS,
 ) -> Curve:
-    """Draw a curve from `start` to `end` (poses (3,)) near the interior `targets` and near a guess that is free.
+    """Draw a curve between `ends` (poses (3,)), near the interior `targets` and near a guess that is free.
+
+    It is no sharper than `max_curvature` [1/m].
 
     Source: elastic bands (Quinlan & Khatib 1993).
 
     Returns:
         The first curve within the limits; if there is none, the last one, with what is wrong about it.
     """
+    start, end = ends
     disc = (np.arange(DISCS) - 0.5 * (DISCS - 1)) * vehicle.length / DISCS
     cover = float(np.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS))
     headings = np.stack([unit(start[2]), unit(end[2])])
@@ -111,14 +114,14 @@ def smooth(
         before, points = points, np.ascontiguousarray(points - road.origin)
         band = Band(
             field, road.resolution, guess.points - road.origin, guess.hold, anchor - road.origin, pull, headings, disc,
-            required, wish, spacing, BEND, config.max_curvature,
+            required, wish, spacing, BEND, max_curvature,
         )  # fmt: skip
         relax(STEPS, band, stiff, push, points)
         points = points + road.origin
         still = np.abs(points - before).max() < 0.02
         if still or round_ % 4 == 3:
             curve = verified(road, vehicle, points, start, end)
-            if curve.curvature <= config.max_curvature and not len(curve.off_road):
+            if curve.curvature <= max_curvature and not len(curve.off_road):
                 return curve
         count = max(int(np.ceil(path_length(points) / config.spacing)) + 1, 8)
         old, new = np.linspace(0.0, 1.0, len(points)), np.linspace(0.0, 1.0, count)

@@ -12,7 +12,7 @@ from scenario_gen.method.sampling.prepare import kept_reactions
 from scenario_gen.method.sampling.sample import draw_scenarios
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.template import reactions_of, Wait, waits_to_keep
-from scenario_gen.types import GenerationResult, Measures, MIRRORED, Request
+from scenario_gen.types import GenerationResult, Measures, MIRRORED, Request, TypeLimits
 
 
 def sample_scenarios(
@@ -31,7 +31,7 @@ def sample_scenarios(
     Args:
         planned: with road, fit, routes and seed.
         sampling: the sampler's parameters.
-        limits: the checker's.
+        limits: of motion, and the checker's.
         request: what is requested.
         count: valid scenarios wanted.
         waits: that are kept; the template's unless given.
@@ -42,7 +42,7 @@ def sample_scenarios(
         InputError: road or fit are not known.
         RefusedError: as `draw_scenarios`.
     """
-    plan = plan_of(planned, sampling, request, waits)
+    plan = plan_of(planned, sampling, limits, request, waits)
     check = checker_of(plan, sampling, limits, request).check
     drawn = draw_scenarios(
         plan, check, sampling, count=count, seed=planned.seed, request=request, callbacks=callbacks, measures=measures
@@ -53,7 +53,13 @@ def sample_scenarios(
     return replace(planned, fit=replace(fit, requested=plan.requested), generated=drawn)
 
 
-def plan_of(planned: GenerationResult, sampling: SamplingConfig, request: Request, waits: tuple[Wait, ...] | None = None) -> Plan:
+def plan_of(
+    planned: GenerationResult,
+    sampling: SamplingConfig,
+    limits: TypeLimits,
+    request: Request,
+    waits: tuple[Wait, ...] | None = None,
+) -> Plan:
     """Return what the scenarios of a request are drawn from: with preset `wide` the states leave the template's where they may.
 
     Raises:
@@ -62,7 +68,7 @@ def plan_of(planned: GenerationResult, sampling: SamplingConfig, request: Reques
     encounter, segmentation, (road, fit) = planned.encounter, planned.segmentation, planned.placed()
     states = relaxed_states(fit.requested, encounter, sampling, request)
     waits = waits_to_keep(encounter, segmentation) if waits is None else waits
-    return Plan(encounter, segmentation, road, planned.routes, states, waits)
+    return Plan(encounter, segmentation, road, planned.routes, states, waits, limits)
 
 
 def checker_of(plan: Plan, sampling: SamplingConfig, limits: Limits, request: Request) -> Checker:

@@ -6,6 +6,7 @@
 from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.types import OF_CARS
 
 ARRIVAL_S, PACE, WAIT_S, END_SPEED_MPS = 2.0, 0.2, 2.0, 1.5
 """Standard deviations of `population`, at least: as wide as encounters differ; which scenarios remain, the population decides."""
@@ -13,10 +14,12 @@ ARRIVAL_S, PACE, WAIT_S, END_SPEED_MPS = 2.0, 0.2, 2.0, 1.5
 
 @dataclass(frozen=True)
 class SamplingConfig(Parameters):
-    """What varies from scenario to scenario, by how much, and within which limits of motion.
+    """What varies from scenario to scenario, and by how much; the limits of motion are `TypeLimits`.
 
     Source: σ_f and l of eq 14, σ_ω of eq 13; the others are ours.
     """
+
+    replaced = OF_CARS
 
     variety: str = parameter(
         "wide",
@@ -59,10 +62,6 @@ class SamplingConfig(Parameters):
     )
     duration_tolerance: float = parameter(0.1, "share by which a sample may be longer or shorter", low=0.0, high=0.5)
     fixed_duration: bool = parameter(False, "keep the template's duration")
-    max_speed: float = parameter(40.0, "highest speed", unit="m/s", low=0.1)
-    max_acceleration: float = parameter(4.5, "strongest speeding up", unit="m/s²", low=0.1)
-    max_deceleration: float = parameter(8.0, "strongest braking", unit="m/s²", low=0.1)
-    max_lateral_acceleration: float = parameter(5.0, "largest speed² times curvature", unit="m/s²", low=0.1)
     max_jerk: float = parameter(
         0.0, "largest jerk along the route; 0: 1.2 times the template's, 1.0 m/s³ at least", unit="m/s³", low=0.0, high=100.0
     )

@@ -19,7 +19,7 @@ from scipy import special
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.time_warp import Clock, LONGEST_SHARE, SHORTEST_SHARE
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.types import BoundaryStates, Encounter, Request, Vehicle
+from scenario_gen.types import BoundaryStates, CAR, Encounter, Request, Vehicle
 
 CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
 """Length and width [m] of cars, each as likely: our choice of typical ones, from a city car to a large saloon."""
@@ -293,7 +293,8 @@ def freedom_of(
             place = place * _smooth_step(since / max(min(_TAPER, _RAMP_SHARE * float(arc[-1])), 1e-9))[0]
     still = len(arc) == 1 or relaxed[:, 0].min() == 0.0
     sizes = np.array([size for size in CATALOGUE if size[0] - vehicle.length <= max(_GROWS * gap, 0.0)]).reshape(-1, 2)
-    other_size = config.sizes == "catalogue" and _CARS[0] <= vehicle.length <= _CARS[1] and not still
+    is_car = vehicle.type == CAR
+    other_size = config.sizes == "catalogue" and is_car and _CARS[0] <= vehicle.length <= _CARS[1] and not still
     return Freedom(
         clock,
         place if len(arc) > 1 else np.zeros(1),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from scenario_gen.template import Wait
-from scenario_gen.types import BoundaryStates, EgoSlot, Encounter, Road, Route, Scenario, Segmentation
+from scenario_gen.types import BoundaryStates, EgoSlot, Encounter, Road, Route, Scenario, Segmentation, TypeLimits
 
 Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
 Cancelled = Callable[[], bool]
@@ -25,6 +25,7 @@ class Plan:
         routes: one per vehicle, with an anchor at start, changepoints and end.
         requested: start and end states; their speeds are met exactly.
         waits: when a vehicle stands, on the template's clock.
+        limits: of each type's motion, within which speeds are planned.
     """
 
     encounter: Encounter
@@ -33,6 +34,7 @@ class Plan:
     routes: Sequence[Route]
     requested: BoundaryStates
     waits: Sequence[Wait]
+    limits: TypeLimits = TypeLimits()
 
 
 @dataclass(frozen=True)

@@ -66,20 +66,16 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
     waits = [standing_part(encounter, wait) for wait in plan.waits]
-    routed_vehicles = [
-        routed_vehicle(n, encounter, times, routes[n], requested, waits, config) for n in range(len(encounter.vehicles))
-    ]
+    routed_vehicles = [routed_vehicle(n, plan, times, waits, config) for n in range(len(encounter.vehicles))]
     clock, sentences = _slowed(routed_vehicles, template_grid(encounter), config)
     left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
     best: tuple[float, float, list[MeanSpeed]] | None = None
-    reasons = ""
+    failed: list[tuple[RoutedVehicle, str]] = []
     for stretch in np.linspace(1.0, max(left, 1.0), _STRETCHES if left > 1.0 else 1).tolist():
-        means = [routed.mean(clock_of(clock.grid, stretch * clock.rate), config) for routed in routed_vehicles]
+        means = [routed.mean(clock_of(clock.grid, stretch * clock.rate)) for routed in routed_vehicles]
         feasible = [mean for mean in means if not isinstance(mean, str)]
         if len(feasible) < len(means):
-            reasons = "; ".join(
-                f"vehicle {routed.vehicle.id} {m}" for routed, m in zip(routed_vehicles, means, strict=True) if isinstance(m, str)
-            )
+            failed = [(routed, m) for routed, m in zip(routed_vehicles, means, strict=True) if isinstance(m, str)]
             continue
         shift = max(routed.largest_shift(mean[0]) for routed, mean in zip(routed_vehicles, feasible, strict=True))
         if best is None or shift < best[0] - _FREE_SHIFT:
@@ -87,7 +83,8 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
         if shift <= _FREE_SHIFT:
             break
     if best is None:
-        return Prepared(None, (), reasons)
+        reasons = (f"vehicle {routed.vehicle.id} {reason}{routed.blamed(clock)}" for routed, reason in failed)
+        return Prepared(None, (), "; ".join(reasons))
     _, stretch, feasible = best
     if stretch > 1.0:
         share = 100.0 * (stretch - 1.0)
@@ -127,7 +124,7 @@ def _freedom(
     config: SamplingConfig,
 ) -> Freedom:
     """What preset `wide` relaxes for a vehicle that came so near [m] to others in the template, and `answers` one or not."""
-    fastest = routed.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * config.max_acceleration * FADES
+    fastest = routed.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * routed.limits.max_acceleration * FADES
     ahead = road_ahead(routed.path, routed.vehicle, road, MOST_ONWARD * fastest)
     clock = OwnClock.of(nominal, routed.rests, (bool(tied[0]), bool(tied[1])), config)
     if answers:  # what the other one does comes on top of its own
@@ -141,7 +138,7 @@ def _slowed(routed_vehicles: Sequence[RoutedVehicle], grid: Floats, config: Samp
     plain = clock_of(grid, np.ones(len(grid)))
     slowdowns = []
     for routed in routed_vehicles:
-        mean = routed.mean(plain, _without_bends(config))
+        mean = routed.without_bends.mean(plain)
         slowdowns.append(np.ones(len(grid)) if isinstance(mean, str) else routed.slowdown(mean[0], grid))
     clock = slowed_clock(grid, slowdowns, 1.0 + config.max_stretch)
     if clock.rate.max() < 1.0 + _REPORTED_PACE:
@@ -151,11 +148,6 @@ def _slowed(routed_vehicles: Sequence[RoutedVehicle], grid: Floats, config: Samp
         f"the pace is lowered by up to {100.0 * (1.0 - 1.0 / clock.rate.max()):.0f} % ahead of bends, most for vehicle "
         f"{routed_vehicles[worst].vehicle.id} at {grid[k]:.1f} s; in all the clock is {clock.time[-1] - grid[-1]:.1f} s longer"
     ]
-
-
-def _without_bends(config: SamplingConfig) -> SamplingConfig:
-    """The parameters of a vehicle that takes bends at any speed, which is enough to know where the vehicle is when."""
-    return replace(config, max_lateral_acceleration=1e6)
 
 
 def _model(

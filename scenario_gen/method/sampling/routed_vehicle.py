@@ -4,7 +4,7 @@
 """One vehicle on its route: what its speed must keep to, and the mean speed on a clock."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy import ndimage
@@ -12,6 +12,7 @@ from scipy import ndimage
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.deviations import Steering
 from scenario_gen.method.sampling.path import BasePath, MIN_NODES, NODE_SPACING
+from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
 from scenario_gen.method.sampling.speed_profile.mean import Bounds, mean_speed, Motion, rounded_lines, Target
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
@@ -19,7 +20,7 @@ from scenario_gen.method.sampling.speed_profile.stops import lengthened, SHORTES
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Floats
 from scenario_gen.template import clean_tracks, Track, Wait, WAIT_SPEED
-from scenario_gen.types import BoundaryStates, Encounter, Route, Vehicle
+from scenario_gen.types import Dynamics, Encounter, Vehicle
 
 _MOST_SCALE = 4.0  # largest factor on the template's speeds; a longer route only has the mean speed raised
 _SLOW_WAIT = 0.9 * WAIT_SPEED  # m/s, fastest while a wait is kept by moving slowly
@@ -74,6 +75,7 @@ class RoutedVehicle:
     sideways: Floats
     steering: Steering
     rests: list[tuple[float, float]]
+    limits: Dynamics
 
     def target(self, clock: Clock) -> Target:
         """The speeds and places that its mean should be near, on this clock."""
@@ -87,28 +89,41 @@ class RoutedVehicle:
         inner = 1 + np.flatnonzero(np.diff(self.anchor[:-1]) != 0.0)
         return Target(grid, np.maximum(line, 0.0), self.times[inner], self.anchor[inner], ends, self.path.length)
 
-    def mean(self, clock: Clock, config: SamplingConfig) -> MeanSpeed | str:
+    @property
+    def without_bends(self) -> "RoutedVehicle":
+        """The vehicle as one that takes bends at any speed, which is enough to know where it is when."""
+        return replace(self, limits=replace(self.limits, max_lateral_acceleration=1e6))
+
+    def mean(self, clock: Clock) -> MeanSpeed | str:
         """The mean's coefficients on this clock, with motion and bounds; or why there are none."""
         spline, rate = self.spline, clock.at(self.spline.stations)[1:]
         motion, target = Motion.of(spline, *rate), self.target(clock)
         at, pace = spline.middle, clock.at(spline.middle)[1]
-        top = config.max_speed * pace
+        top = self.limits.max_speed * pace
         for a, b in self.knots.stretches(self.knots.creeping):
             margin = float(spline.breaks[1] - spline.breaks[0])
             top = np.where((at > a - margin) & (at < b + margin), np.minimum(top, _SLOW_WAIT * pace), top)
         most, limit = top, ""
         for _ in range(_BOUND_ROUNDS):
-            bounds = Bounds(most, config.max_acceleration, config.max_deceleration, self.jerk)
+            bounds = Bounds(most, self.limits.max_acceleration, self.limits.max_deceleration, self.jerk)
             mean = mean_speed(spline, target, motion, bounds)
             if mean is None:
                 longest = f"{clock.time[-1]:.1f} s"
                 return f"cannot drive {self.path.length:.1f} m{limit} in {longest} within the limits"
-            sideways = np.clip(self._own_sideways(at) / config.max_lateral_acceleration, _CURVE_MARGIN, _OWN_MARGIN)
-            allowed = self._bend_speed(spline.driven(at) @ mean, sideways * config.max_lateral_acceleration)
+            sideways = np.clip(self._own_sideways(at) / self.limits.max_lateral_acceleration, _CURVE_MARGIN, _OWN_MARGIN)
+            allowed = self._bend_speed(spline.driven(at) @ mean, sideways * self.limits.max_lateral_acceleration)
             if (mean <= allowed * pace * 1.01 + 1e-6)[1:-1].all():
                 return mean, motion, bounds
             most, limit = np.minimum(most, allowed * pace), " through its curves"
-        return f"cannot drive its curves within {config.max_lateral_acceleration:g} m/s² sideways in {clock.time[-1]:.1f} s"
+        most_aside = self.limits.max_lateral_acceleration
+        return f"cannot drive its curves within {most_aside:g} m/s² sideways in {clock.time[-1]:.1f} s"
+
+    def blamed(self, clock: Clock) -> str:
+        """Return which of its limits, were it alone not there, would leave it a mean speed on this clock; "" if none would."""
+        names = (entry.name for entry in fields(self.limits))
+        freed = ((name, replace(self, limits=replace(self.limits, **{name: 1e6}))) for name in names)
+        found = [f"limits.{self.vehicle.type}.{name}" for name, routed in freed if not isinstance(routed.mean(clock), str)]
+        return f" (more of {' or of '.join(found)} would do)" if found else ""
 
     def largest_shift(self, mean: Floats) -> float:
         """Return the largest distance [m] of the mean (d,) from a changepoint's place when it is due."""
@@ -137,16 +152,11 @@ class RoutedVehicle:
         return np.asarray(np.sqrt(limit / np.maximum(np.interp(s, self.path.arc, _bends(self.path)), 1e-6)))
 
 
-def routed_vehicle(
-    n: int,
-    encounter: Encounter,
-    times: Floats,
-    route: Route,
-    requested: BoundaryStates,
-    waits: Sequence[Wait],
-    config: SamplingConfig,
-) -> RoutedVehicle:
+def routed_vehicle(n: int, plan: Plan, times: Floats, waits: Sequence[Wait], config: SamplingConfig) -> RoutedVehicle:
     """Return vehicle n on its route, with changepoints at times (K,) [s]; one without length stands, whatever is requested."""
+    encounter, route, requested = plan.encounter, plan.routes[n], plan.requested
+    vehicle = encounter.vehicles[n]
+    limits = plan.limits.of(vehicle.type).planned
     first, last = encounter.present[n].tolist()
     here = slice(first, last + 1)
     time, speed = encounter.time[here], encounter.speed[n, here]
@@ -171,7 +181,7 @@ def routed_vehicle(
     jerk, sideways = _largest_jerk(scale * speed, encounter.dt), _largest_sideways(encounter, n)
     track = clean_tracks(encounter)[n]
     return RoutedVehicle(
-        encounter.vehicles[n],
+        vehicle,
         path,
         replace(knots, lines=lines),
         spline,
@@ -183,11 +193,12 @@ def routed_vehicle(
         (recorded[0], recorded[1]),
         config.max_jerk or max(_JERK_SHARE * jerk, _LEAST_JERK),
         min(
-            config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * config.max_lateral_acceleration
+            config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * limits.max_lateral_acceleration
         ),
         _sideways(track, encounter.speed[n])[here],
         Steering.of(time, np.unwrap(encounter.heading[n, here]), encounter.speed[n, here], path.length),
         rests,
+        limits,
     )
 
 

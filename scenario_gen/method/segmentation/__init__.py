@@ -9,12 +9,11 @@ from scenario_gen.method.segmentation.library import assign, Assignment, build_l
 from scenario_gen.method.segmentation.live import LiveSegmenter
 from scenario_gen.method.segmentation.online import OnlineConfig, OnlineSegmenter
 from scenario_gen.method.segmentation.posterior import Posterior
-from scenario_gen.method.segmentation.segment_classes import FinishedSegment
 from scenario_gen.method.segmentation.segmenter import DEFAULT, segment, segment_track, SegmentationConfig
 from scenario_gen.method.segmentation.series import segment_series
 
 __all__ = [
-    "DEFAULT", "USUAL_R_HAT", "Assignment", "FinishedSegment", "LiveSegmenter",
+    "DEFAULT", "USUAL_R_HAT", "Assignment", "LiveSegmenter",
     "OnlineConfig", "OnlineSegmenter", "Posterior", "PrimitiveLibrary", "SamplerConfig", "SegmentationConfig",
     "SegmentationWarning", "StickyHDPHMM", "assign", "build_library", "segment", "segment_series", "segment_track",
 ]  # fmt: skip

@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import linalg
 
 from scenario_gen.base.documents import check_shape, COUNT, NUMBER, read_json
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.method.segmentation.descriptions import describe_accelerations, describe_segments
+from scenario_gen.method.segmentation.estimates import whitened
 from scenario_gen.method.segmentation.features import driving_features
+from scenario_gen.method.segmentation.hdp_hmm.smoother import log_densities, smooth
 from scenario_gen.method.segmentation.posterior import in_order
 from scenario_gen.method.segmentation.segmenter import cut, DEFAULT, on_trends, relabel, SegmentationConfig
 from scenario_gen.method.segmentation.series import segment_series
@@ -238,8 +239,8 @@ def assign(encounter: Encounter, library: PrimitiveLibrary, config: Segmentation
         InputError: the encounter has another number of vehicles than the library.
     """
     x = library.features(encounter)
-    smooth, changed = _smooth(library, x)
-    labels = smooth.argmax(axis=1).astype(np.int64)
+    smoothed, changed = _smooth(library, x)
+    labels = smoothed.argmax(axis=1).astype(np.int64)
     points = np.flatnonzero(np.diff(labels)) + 1
     gap = max(2, round(config.min_segment / encounter.dt))
     while len(points) and np.diff([0, *points, len(x)]).min() < gap:
@@ -252,28 +253,11 @@ def assign(encounter: Encounter, library: PrimitiveLibrary, config: Segmentation
 
 
 def _smooth(library: PrimitiveLibrary, x: Floats) -> tuple[Floats, Floats]:
-    """(T, K) probability of each primitive and (T,) of a change, at each sample of x (T, D)."""
-    log_likelihood = np.empty((len(x), len(library.means)))
-    for k, (mean, covariance) in enumerate(zip(library.means, library.covariances, strict=True)):
-        factor = np.linalg.cholesky(covariance)
-        rest = linalg.solve_triangular(factor, (x - mean).T, lower=True)
-        log_likelihood[:, k] = -0.5 * np.square(rest).sum(axis=0) - np.log(np.diag(factor)).sum()
-    log_likelihood *= library.weight
-    likelihood = np.exp(log_likelihood - log_likelihood.max(axis=1, keepdims=True)) + 1e-300
-    forward = np.empty_like(likelihood)
-    backward = np.ones_like(likelihood)
-    forward[0] = library.initial * likelihood[0]
-    forward[0] /= forward[0].sum()
-    for t in range(1, len(x)):
-        forward[t] = (forward[t - 1] @ library.transition) * likelihood[t]
-        forward[t] /= forward[t].sum()
-    for t in range(len(x) - 2, -1, -1):
-        backward[t] = library.transition @ (likelihood[t + 1] * backward[t + 1])
-        backward[t] /= backward[t].sum()
-    smooth = forward * backward
-    smooth /= smooth.sum(axis=1, keepdims=True)
-    changed = np.zeros(len(x))
-    same = forward[:-1] * np.diag(library.transition) * likelihood[1:] * backward[1:]
-    every = ((forward[:-1] @ library.transition) * likelihood[1:] * backward[1:]).sum(axis=1)
-    changed[1:] = np.clip(1.0 - same.sum(axis=1) / every, 0.0, 1.0)
-    return smooth, changed
+    """(T, K) probability of each primitive and (T,) of a change, at each sample of x (T, D); NaN: not measured."""
+    density, smoothed, changed = np.empty((len(x), len(library.means))), np.empty((len(x), len(library.means))), np.empty(len(x))
+    states = zip(library.means, library.covariances, strict=True)
+    coef = np.stack([whitened(mean[:, None], covariance) for mean, covariance in states])
+    rows = np.column_stack([np.ones(len(x)), np.nan_to_num(x)])
+    log_densities(rows, np.isnan(x), coef, library.weight, 0.0, density)
+    smooth(density, library.transition, library.initial, np.array([len(x)]), smoothed, changed)
+    return smoothed, changed

@@ -45,7 +45,6 @@ class LiveSegmenter:
         speed = np.stack([sample.speed for sample in self._past], axis=1)
         heading = np.array([course(xy, v, self._dt_ns * 1e-9)[0] for xy, v in zip(position, speed, strict=True)])
         vehicles = self._past[-1].vehicles
-        ended = [changepoint.ended for changepoint in changepoints]
         return LiveChangepoints(
             self._start_ns,
             vehicles,
@@ -54,6 +53,4 @@ class LiveSegmenter:
             heading[:, at],
             speed[:, at],
             probability=np.array([changepoint.probability for changepoint in changepoints]),
-            label=np.array([segment.label for segment in ended], dtype=np.int64),
-            label_probability=np.array([segment.probability[segment.labels == segment.label][0] for segment in ended]),
         )

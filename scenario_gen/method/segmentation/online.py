@@ -5,8 +5,7 @@
 
 A batch sampler looks at the whole past at once. Online, the same description of speeds and courses by lines with knots
 is kept over a short window: a knot that gains more than noise could is a changepoint, once enough samples after it
-confirm it; confirmed changepoints never move again. Single samples far off their neighbours are left out. What a finished
-segment is `segment_classes` says.
+confirm it; confirmed changepoints never move again. Single samples far off their neighbours are left out.
 """
 
 from collections import deque
@@ -16,9 +15,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.segmentation.features import POSITION_FLOOR, SPEED_FLOOR, STAND_SPEED, without_spikes
-from scenario_gen.method.segmentation.library import PrimitiveLibrary
-from scenario_gen.method.segmentation.segment_classes import FinishedSegment, SegmentClasses
+from scenario_gen.method.segmentation.features import POSITION_FLOOR, SPEED_FLOOR, without_spikes
 from scenario_gen.method.segmentation.trends import Trends
 from scenario_gen.numerics import Floats
 
@@ -47,30 +44,18 @@ class Changepoint:
         sample: its index, counted from the first sample pushed.
         confirmed: index of the sample that confirmed it.
         probability: that there is one rather than noise; see `chance_of_knot`.
-        ended: the segment that it ends, and what that was.
     """
 
     sample: int
     confirmed: int
     probability: float
-    ended: FinishedSegment
 
 
 class OnlineSegmenter:
     """Extends a segmentation sample by sample; memory and time per sample do not grow with the samples seen."""
 
-    def __init__(
-        self, vehicles: int, dt: float, config: OnlineConfig = OnlineConfig(), library: PrimitiveLibrary | None = None
-    ) -> None:
-        """Start with no samples of `vehicles` vehicles, `dt` seconds apart; finished segments are named by `library`, if given.
-
-        Raises:
-            InputError: the library is for another number of vehicles.
-        """
-        if library is not None and library.vehicles != vehicles:
-            raise InputError(f"the primitive library is for {library.vehicles} vehicles; the stream has {vehicles}")
-        self._classes = SegmentClasses(vehicles, library)
-        self._begun = 0
+    def __init__(self, vehicles: int, dt: float, config: OnlineConfig = OnlineConfig()) -> None:
+        """Start with no samples of `vehicles` vehicles, `dt` seconds apart."""
         self._config = config
         self._dt = dt
         self._vehicles = vehicles
@@ -118,10 +103,7 @@ class OnlineSegmenter:
         changepoints = []
         for i, c in enumerate(points):
             if start <= c <= ripe and (gain := trends.gain(points, i)) > least:
-                a = max(self._begun - first, 0)
-                ended = self._classes.add(self._begun, first + c, *segment_features(trends, speed, a, c, self._dt))
-                changepoints.append(Changepoint(first + c, self._count - 1, chance_of_knot(gain, trends, points, i), ended))
-                self._begun = first + c
+                changepoints.append(Changepoint(first + c, self._count - 1, chance_of_knot(gain, trends, points, i)))
         self._confirmed.extend(c.sample for c in changepoints)
         while len(self._confirmed) == 2 and len(self._samples) > 1 and first < self._confirmed[0] - gap:
             self._samples.popleft()
@@ -145,26 +127,3 @@ def chance_of_knot(gain: float, trends: Trends, points: list[int], i: int) -> fl
     n = edges[i + 2] - edges[i]
     odds = 0.5 * (gain - len(trends.signals) * np.log(float(n))) - np.log(float(n))
     return float(1.0 / (1.0 + np.exp(-min(max(odds, -50.0), 50.0))))
-
-
-def segment_features(trends: Trends, speed: Floats, a: int, b: int, dt: float) -> tuple[Floats, Floats]:
-    """(3N,) features of samples a .. b - 1, see `FinishedSegment`, and (3N,) the variances of their errors.
-
-    Args:
-        trends: of N vehicles.
-        speed: (N, T) m/s.
-        a: first sample.
-        b: one past the last.
-        dt: s.
-    """
-    t = np.arange(b - a) * dt
-    weight = np.square(trends.weights[:, a:b])
-    total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
-    rest = t - (weight * t).sum(axis=1, keepdims=True) / total
-    power = np.maximum((weight * np.square(rest)).sum(axis=1), 1e-9)
-    slope = (weight * rest * trends.signals[:, a:b]).sum(axis=1) / power
-    pace = speed[:, a:b].mean(axis=1)
-    moving = np.clip(pace / STAND_SPEED - 0.5, 0.0, 1.0)
-    features = np.column_stack([slope[::2], slope[1::2] * pace * moving, moving])
-    variance = np.column_stack([1.0 / power[::2], np.square(pace * moving) / power[1::2], np.zeros(len(pace))])
-    return features.ravel(), variance.ravel()

@@ -5,7 +5,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, groupby
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class Checker:
     def __post_init__(self) -> None:
         self._first = tuple(conflict.first for conflict in self.conflicts or ()) if self.first is None else tuple(self.first)
         self._limits = self.limits or Limits()
-        self._dynamics_limits = np.array([getattr(self._limits, name) for name in dynamics.LIMITS])
+        self._dynamics_limits: dict[str, Floats] = {}
         if self.road is not None:
             self._ground = inside.Ground.of(self.road)
         lanes = self.road.lanes if self.road is not None else None
@@ -236,11 +236,20 @@ class Checker:
         names = ("position", "heading", "speed", "acceleration")
         for rows, at in spans(scenario):
             position, heading, speed, acceleration = (np.ascontiguousarray(getattr(scenario, name)[rows, at]) for name in names)
-            dynamics.worst_excess(scenario.time[at], position, heading, speed, acceleration, self._dynamics_limits, out[rows])
+            limits = self._limits_of(scenario.vehicles[rows.start].type)
+            dynamics.worst_excess(scenario.time[at], position, heading, speed, acceleration, limits, out[rows])
         for i, row in zip(*(index.tolist() for index in np.nonzero(~(out[..., 0] <= 0.0))), strict=True):  # NaN, too
             _, value, limit, time = out[i, row].tolist()
             cause, sentence = dynamics.MESSAGES[dynamics.Check(row)]
-            yield Violation(cause, time, (i,), f"vehicle {i}: {sentence.format(value=value, limit=limit)}")
+            named = dynamics.parameter_of(dynamics.Check(row), scenario.vehicles[i].type)
+            yield Violation(cause, time, (i,), f"vehicle {i}: {sentence.format(value=value, limit=limit)}{named}")
+
+    def _limits_of(self, name: str) -> Floats:
+        """Return the limits of a type as `worst_excess` takes them."""
+        if name not in self._dynamics_limits:
+            own = [getattr(self._limits.of(name), each) for each in dynamics.OF_TYPE]
+            self._dynamics_limits[name] = np.array([*own, *(getattr(self._limits, each) for each in dynamics.OF_ALL)])
+        return self._dynamics_limits[name]
 
     def _contacts(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         n, limits = len(half), self._limits
@@ -396,11 +405,14 @@ class Checker:
         return bool(np.hypot(off[0], off[1]) <= self._limits.position_tolerance)
 
 
-def spans(scenario: Scenario) -> list[tuple[slice, slice]]:
-    """Return rows of vehicles and the instants at which they are there: all at once where everybody is there throughout."""
-    if scenario.all_present:
-        return [(slice(None), slice(0, len(scenario.time)))]
-    return [(slice(i, i + 1), slice(first, last + 1)) for i, (first, last) in enumerate(scenario.present.tolist())]
+def spans(scenario: Scenario) -> Iterator[tuple[slice, slice]]:
+    """Yield rows of neighbouring vehicles of one type that come and go together, and the instants at which they are there."""
+    alike = zip(scenario.present.tolist(), (vehicle.type for vehicle in scenario.vehicles), strict=True)
+    row = 0
+    for ((first, last), _), group in groupby(alike):
+        count = len(list(group))
+        yield slice(row, row + count), slice(first, last + 1)
+        row += count
 
 
 def _not_finite(scenario: Scenario) -> Violation | None:

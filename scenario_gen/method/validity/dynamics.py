@@ -73,11 +73,9 @@ def stretch(b: Floats, u0: float, u1: float, out: Floats) -> None:
 TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show in a step without having moved
 TURN_DRIFT = 1e-3  # rad/s, and as a rate: many short steps would make a turn of it
 SLACK = 1e-6  # rounding of a value that keeps exactly to its limit
-LIMITS = (
-    *("max_speed", "max_acceleration", "max_deceleration", "max_lateral_acceleration", "max_curvature"),
-    *("slip", "slip_share", "acceleration_tolerance"),
-)
-"""Of `Limits`, those that `worst_excess` takes."""
+OF_TYPE = ("max_speed", "max_acceleration", "max_deceleration", "max_lateral_acceleration", "sharpest")
+OF_ALL = ("slip", "slip_share", "acceleration_tolerance")
+"""Of a type's `Dynamics`, and of `Limits`, those that `worst_excess` takes."""
 
 
 class Check(IntEnum):
@@ -116,6 +114,18 @@ MESSAGES: dict[Check, tuple[Cause, str]] = {
     Check.PATH_LONGITUDINAL: (_ALONG, "positions speed up or brake at {value:.3f} m/s²; {limit:.3f} m/s² are allowed"),
     Check.PATH_LATERAL: (_ASIDE, "positions accelerate sideways at {value:.3f} m/s²; {limit:.3f} m/s² are allowed"),
 }
+_PARAMETERS = {
+    Check.MAX_SPEED: "max_speed",
+    Check.ACCELERATION: "max_acceleration",
+    Check.DECELERATION: "max_deceleration",
+    Check.LATERAL: "max_lateral_acceleration",
+    Check.CURVATURE: "max_curvature",
+}
+
+
+def parameter_of(check: Check, name: str) -> str:
+    """Return which parameter is the limit of a check for a type, to be put behind a message; "" if it is none of a type."""
+    return f" (limits.{name}.{_PARAMETERS[check]})" if check in _PARAMETERS else ""
 
 
 @kernel(inline=True)
@@ -156,7 +166,7 @@ def worst_excess(
         heading: (N, T) rad.
         speed: (N, T) m/s.
         acceleration: (N, T) m/s².
-        limits: those that LIMITS names, in its order.
+        limits: those that OF_TYPE and OF_ALL name, in that order.
         out: one row per `Check`.
     """
     top, speeding, braking, lateral, curvature = limits[0], limits[1], limits[2], limits[3], limits[4]

@@ -5,22 +5,20 @@
 
 from dataclasses import dataclass, replace
 
-from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.base.parameters import parameter
 from scenario_gen.template import least_gap
-from scenario_gen.types import Encounter
+from scenario_gen.types import Encounter, TypeLimits
 
 _SHARE_OF_GAP, _MOST_CLEARANCE = 0.5, 0.5  # of the template's least gap; m
 
 
 @dataclass(frozen=True)
-class Limits(Parameters):
-    """Limits of the checker. Speed and heading are linear between samples, position is the cubic of `Scenario`."""
+class Limits(TypeLimits):
+    """Limits of the checker; those of motion are of each type.
 
-    max_speed: float = parameter(45.0, "highest speed", unit="m/s", low=0.0)
-    max_acceleration: float = parameter(5.0, "strongest speeding up", unit="m/s²", low=0.0)
-    max_deceleration: float = parameter(9.0, "strongest braking", unit="m/s²", low=0.0)
-    max_lateral_acceleration: float = parameter(6.0, "largest product of speed and yaw rate", unit="m/s²", low=0.0)
-    max_curvature: float = parameter(0.25, "largest change of heading per metre driven", unit="1/m", low=0.0)
+    Speed and heading are linear between samples, position is the cubic of `Scenario`.
+    """
+
     position_tolerance: float = parameter(0.1, "start and end positions are this near to what was asked", unit="m", low=0.0)
     speed_tolerance: float = parameter(0.1, "start and end speeds are this near to what was asked", unit="m/s", low=0.0)
     stand_speed: float = parameter(0.1, "a vehicle that stands in the template is slower than this", unit="m/s", low=0.0)

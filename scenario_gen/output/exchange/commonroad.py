@@ -10,7 +10,6 @@ placeholder problem, for the format's schema demands one; a comment in the file 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, UTC
 import re
 
 import numpy as np
@@ -22,8 +21,8 @@ from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
-from scenario_gen.output.exchange.xml import add, comment, Element, number, serialized
-from scenario_gen.types import is_truck, Lane, LaneNetwork, Scenario
+from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
+from scenario_gen.types import Lane, LaneNetwork, Scenario
 
 OBSTACLES, PROBLEM, INTERSECTION, SIGNS = 100_000, 200_000, 300_000, 400_000  # ids from here on; lanelets count from 1
 MAX_SPEED = "274"
@@ -61,7 +60,7 @@ def write_commonroad(case: Case, exported: Exported, export: ExportConfig = Expo
         {
             "commonRoadVersion": "2020a",
             "benchmarkID": benchmark_id(case, exported),
-            "date": datetime.fromtimestamp(case.start_ns // 10**9, UTC).date().isoformat(),
+            "date": date_of(case.start_ns).partition("T")[0],
             "author": AUTHOR,
             "affiliation": AUTHOR,
             "source": f"scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}",
@@ -107,9 +106,13 @@ def _even(scenario: Scenario, export: ExportConfig) -> tuple[Scenario, tuple[str
 def _points(parent: Element, tag: str, points: Floats) -> None:
     bound = add(parent, tag)
     for x, y in points.tolist():
-        point = add(bound, "point")
-        add(point, "x", x)
-        add(point, "y", y)
+        _point(bound, x, y)
+
+
+def _point(parent: Element, x: float, y: float, tag: str = "point") -> None:
+    point = add(parent, tag)
+    add(point, "x", x)
+    add(point, "y", y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +170,7 @@ def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -
     if at_line:
         stop = add(lanelet, "stopLine")
         for x, y in at_line[0].line[[0, -1]].tolist():
-            point = add(stop, "point")
-            add(point, "x", x)
-            add(point, "y", y)
+            _point(stop, x, y)
         add(stop, "lineMarking", "solid")
     add(lanelet, "laneletType", "unknown" if lane_map.is_derived(k) else "urban")
     if lane_map.turn(k):
@@ -209,9 +210,7 @@ def _interval(parent: Element, tag: str, low: float, high: float) -> None:
 def _state(parent: Element, tag: str, scenario: Scenario, n: int, k: int) -> Element:
     """Append position, orientation, time, velocity and acceleration of vehicle `n` at instant `k`."""
     state = add(parent, tag)
-    point = add(add(state, "position"), "point")
-    add(point, "x", float(scenario.position[n, k, 0]))
-    add(point, "y", float(scenario.position[n, k, 1]))
+    _point(add(state, "position"), *scenario.position[n, k].tolist())
     _exact(state, "orientation", float(scenario.heading[n, k]))
     add(add(state, "time"), "exact", k)
     _exact(state, "velocity", float(scenario.speed[n, k]))
@@ -222,7 +221,7 @@ def _state(parent: Element, tag: str, scenario: Scenario, n: int, k: int) -> Ele
 def _obstacle(root: Element, scenario: Scenario, n: int) -> None:
     vehicle = scenario.vehicles[n]
     obstacle = add(root, "dynamicObstacle", id=OBSTACLES + n + 1)
-    add(obstacle, "type", "truck" if is_truck(vehicle) else "car")
+    add(obstacle, "type", vehicle.kind.commonroad)
     rectangle = add(add(obstacle, "shape"), "rectangle")
     add(rectangle, "length", vehicle.length)
     add(rectangle, "width", vehicle.width)
@@ -257,9 +256,7 @@ def _goal(problem: Element, pose: tuple[float, float, float], size: tuple[float,
     add(rectangle, "length", size[0])
     add(rectangle, "width", size[1])
     add(rectangle, "orientation", yaw)
-    center = add(rectangle, "center")
-    add(center, "x", x)
-    add(center, "y", y)
+    _point(rectangle, x, y, "center")
     _interval(goal, "orientation", yaw - GOAL_TURN, yaw + GOAL_TURN)
 
 
@@ -271,9 +268,7 @@ def _placeholder(root: Element, lane: Lane, steps: int) -> None:
     x, y = middle[at].tolist()
     problem = add(root, "planningProblem", id=PROBLEM)
     state = add(problem, "initialState")
-    point = add(add(state, "position"), "point")
-    add(point, "x", x)
-    add(point, "y", y)
+    _point(add(state, "position"), x, y)
     for tag, value in (("velocity", 0.0), ("orientation", yaw), ("yawRate", 0.0), ("slipAngle", 0.0)):
         _exact(state, tag, value)
     add(add(state, "time"), "exact", 0)

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from shapely import contains_xy, covers, make_valid, Polygon, polygons, prepare, union_all
+from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.boxes import corners
@@ -73,26 +74,30 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
     return LaneMap(LaneNetwork("derived", tuple(derived)), len(derived), origin)
 
 
+def area_of(network: LaneNetwork) -> BaseGeometry:
+    """Return all that lies in lanes."""
+    return union_all(make_valid([Polygon(lane.outline) for lane in network.lanes]))
+
+
 def _not_kept(network: LaneNetwork, scenarios: Sequence[Scenario]) -> dict[str, Curve]:
     """Return the paths, by id, of vehicles that leave the lanes or drive across them."""
-    shapes = [Polygon(lane.outline) for lane in network.lanes]
-    area = union_all(make_valid(shapes)).buffer(SEAM_M, join_style="mitre").buffer(-SEAM_M, join_style="mitre")
+    area = area_of(network).buffer(SEAM_M, join_style="mitre").buffer(-SEAM_M, join_style="mitre")
     prepare(area)
     missing: dict[str, Curve] = {}
     for scenario in scenarios:
         for n, vehicle in enumerate(scenario.vehicles):
             if vehicle.id not in missing:
                 path = driven_path(scenario, n)
-                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, network, shapes) > CUT:
+                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, network) > CUT:
                     missing[vehicle.id] = path
     return missing
 
 
-def _unled(path: Curve, network: LaneNetwork, shapes: Sequence[Polygon]) -> float:
-    """Return the metres of a path on which no lane, of these shapes, has nearly its direction."""
+def _unled(path: Curve, network: LaneNetwork) -> float:
+    """Return the metres of a path on which no lane has nearly its direction."""
     led = np.zeros(len(path.points), dtype=np.bool_)
-    for lane, shape in zip(network.lanes, shapes, strict=True):
-        inside = np.flatnonzero(~led & contains_xy(shape, path.points[:, :2]))
+    for lane in network.lanes:
+        inside = np.flatnonzero(~led & contains_xy(Polygon(lane.outline), path.points[:, :2]))
         if len(inside):
             middle = Curve.through(lane.centre)
             yaw = middle.at(middle.project(path.points[inside, :2])[0])[:, 2]

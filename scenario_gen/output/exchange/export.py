@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shapely import contains_xy, make_valid, Polygon, prepare, union_all
+from shapely import contains_xy, prepare
 
 from scenario_gen.bags.recordings.autoware import add_autoware
 from scenario_gen.bags.storage.config import BagConfig
@@ -22,6 +22,7 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.derived_lanes import area_of
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.output.exchange.osi import write_osi
@@ -52,14 +53,6 @@ class Written:
     content: Any = None
 
 
-def _nothing_shared(_: Case, __: ExportConfig) -> Mapping[str, bytes]:
-    return {}
-
-
-def _nothing_at_the_end(_: Sequence[tuple[str, Any]]) -> Mapping[str, bytes]:
-    return {}
-
-
 @dataclass(frozen=True)
 class ExportFormat:
     """A format of other software. The same case must give the same bytes.
@@ -74,11 +67,11 @@ class ExportFormat:
     """
 
     write: Callable[[Path, Case, Exported, ExportConfig], Written]
-    shared: Callable[[Case, ExportConfig], Mapping[str, bytes]] = _nothing_shared
+    shared: Callable[[Case, ExportConfig], Mapping[str, bytes]] = lambda *_: {}
     projected_from: Callable[[Case, ExportConfig], tuple[float, ...]] = lambda *_: ()
     takes_map: bool = False
     maps: tuple[str, ...] = MAPS
-    closing: Callable[[Sequence[tuple[str, Any]]], Mapping[str, bytes]] = _nothing_at_the_end
+    closing: Callable[[Sequence[tuple[str, Any]]], Mapping[str, bytes]] = lambda _: {}
 
 
 def export_bag(
@@ -234,7 +227,7 @@ def refuse_other_map(case: Case, path: Path) -> None:
     Raises:
         InputError: it cannot be read, or more than a tenth of the positions lie on none of its lanes.
     """
-    lanes = union_all([make_valid(Polygon(lane.outline)) for lane in read_network(path).lanes])
+    lanes = area_of(read_network(path))
     prepare(lanes)
     places = np.concatenate([one.others.position[one.others.there] for one in case.scenarios])
     share = float(contains_xy(lanes, places).mean())

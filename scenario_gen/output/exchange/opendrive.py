@@ -13,7 +13,6 @@ are linear between points. The date is that of the template's stamp.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, UTC
 from itertools import groupby, pairwise
 import math
 from typing import NamedTuple
@@ -26,7 +25,7 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths, unit_left
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
-from scenario_gen.output.exchange.xml import add, comment, Element, serialized
+from scenario_gen.output.exchange.xml import add, comment, date_of, Element, serialized
 from scenario_gen.types import Lane, LaneNetwork
 
 ROADS, JUNCTION = 1, 1000  # ids: of the first road, and of the first junction
@@ -197,8 +196,7 @@ def write_opendrive(lane_map: LaneMap, name: str, start_ns: int) -> bytes:
     """
     root = Element("OpenDRIVE")
     (west, south), (east, north) = lane_map.network.box.tolist()
-    date = datetime.fromtimestamp(start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S")
-    about = {"revMajor": "1", "revMinor": "7", "name": name, "version": "1.00", "date": date}
+    about = {"revMajor": "1", "revMinor": "7", "name": name, "version": "1.00", "date": date_of(start_ns)}
     add(root, "header", **about, north=north, south=south, east=east, west=west, vendor="scenario_gen")
     comment(root, f"lanes: {lane_map.origin}")
     network = _Network(lane_map)

@@ -10,18 +10,17 @@ A vehicle that arrives late is added to the simulation then, and one that leaves
 has its speed, and is left to the controller under test; its goal is a routing action.
 """
 
-from datetime import datetime, UTC
-
+from scenario_gen.logs import OPENSCENARIO_SPEEDS
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.xml import add, Element, number, serialized
-from scenario_gen.types import height, is_truck, rear_axle, Scenario, shifted, token, Vehicle, WHEELBASE
+from scenario_gen.output.exchange.xml import add, date_of, Element, number, serialized
+from scenario_gen.types import height, rear_axle, Scenario, shifted, token, Vehicle, WHEELBASE
 
 EGO = "Ego"
-SPEEDS = "speed_mps"  # name of the property that holds a vehicle's speed at each vertex, for `scenario-gen import`
 WHEEL = 0.65  # metres of diameter
 LIMITS = {"maxSpeed": 70.0, "maxAcceleration": 10.0, "maxDeceleration": 10.0}  # beyond what any published scenario does
 STEERING = 0.7  # rad
+MASS_KG = 75.0  # of who walks
 
 
 def write_openscenario(case: Case, exported: Exported, road_file: str, export: ExportConfig = ExportConfig()) -> bytes:
@@ -37,7 +36,7 @@ def write_openscenario(case: Case, exported: Exported, road_file: str, export: E
         "FileHeader",
         revMajor="1",
         revMinor="2",
-        date=datetime.fromtimestamp(case.start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S"),
+        date=date_of(case.start_ns),
         description=f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}",
         author="scenario_gen",
     )
@@ -76,20 +75,24 @@ def _speeds(scenario: Scenario, n: int) -> str:
 
 
 def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None:
-    kind = "truck" if is_truck(vehicle) else "car"
-    element = add(add(entities, "ScenarioObject", name=name), "Vehicle", name=kind, vehicleCategory=kind)
+    kind, entity = vehicle.kind.openscenario, add(entities, "ScenarioObject", name=name)
+    if vehicle.kind.walks:
+        element = add(entity, "Pedestrian", name=vehicle.type, mass=MASS_KG, model=vehicle.type, pedestrianCategory=kind)
+    else:
+        element = add(entity, "Vehicle", name=vehicle.type, vehicleCategory=kind)
     add(element, "ParameterDeclarations")
     box = add(element, "BoundingBox")
     add(box, "Center", x=rear_axle(vehicle), y=0.0, z=height(vehicle) / 2.0)
     add(box, "Dimensions", length=vehicle.length, width=vehicle.width, height=height(vehicle))
-    add(element, "Performance", **LIMITS)
-    axles = add(element, "Axles")
-    track = 0.85 * vehicle.width
-    for tag, x, steering in (("FrontAxle", WHEELBASE * vehicle.length, STEERING), ("RearAxle", 0.0, 0.0)):
-        add(axles, tag, maxSteering=steering, wheelDiameter=WHEEL, trackWidth=track, positionX=x, positionZ=WHEEL / 2.0)
+    if not vehicle.kind.walks:
+        add(element, "Performance", **LIMITS)
+        axles = add(element, "Axles")
+        track = 0.85 * vehicle.width
+        for tag, x, steering in (("FrontAxle", WHEELBASE * vehicle.length, STEERING), ("RearAxle", 0.0, 0.0)):
+            add(axles, tag, maxSteering=steering, wheelDiameter=WHEEL, trackWidth=track, positionX=x, positionZ=WHEEL / 2.0)
     properties = add(element, "Properties")
     if speeds:
-        add(properties, "Property", name=SPEEDS, value=speeds)
+        add(properties, "Property", name=OPENSCENARIO_SPEEDS, value=speeds)
 
 
 def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:

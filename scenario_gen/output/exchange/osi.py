@@ -10,7 +10,6 @@ accelerations are vectors, with the part across the heading. Times begin at 0. A
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import datetime, UTC
 from functools import cache
 import math
 from pathlib import Path
@@ -23,7 +22,8 @@ from scenario_gen.base.markup import read_xml
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.motion import at_times, EVEN
-from scenario_gen.types import height, is_truck, rear_axle, Scenario, Vehicle, WHEELBASE
+from scenario_gen.output.exchange.xml import date_of
+from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE
 
 OBJECTS, MAP = "ground_truth", "ground_truth_map"  # omega-prime's topics
 WHEEL_RADIUS = 0.325  # metres, as in OpenSCENARIO files
@@ -69,9 +69,8 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
     time, parts = _parts(exported, numbers)
     host = numbers[-1] if exported.ego is not None else numbers[0]
     text, frame = _text(road), _frame(road)
-    date = datetime.fromtimestamp(case.start_ns // NS, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     about = f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}"
-    metadata = {"creation_time": date, "description": about, "authors": "scenario_gen"}
+    metadata = {"creation_time": f"{date_of(case.start_ns)}Z", "description": about, "authors": "scenario_gen"}
     with betterosi.Writer(path, metadata=metadata, library="scenario_gen", descriptor_set=_definitions()) as trace:
         drawn = betterosi.MapAsamOpenDrive(map_reference=road.name, open_drive_xml_content=text)
         trace.add(drawn, topic=MAP, log_time=0)
@@ -129,12 +128,13 @@ def _ground_truth(parts: tuple[_Part, ...], k: int, stamp: int, host: int, road_
 
     objects = [one for part in parts for one in _objects(part, k)]
     there = any(one.id.value == host for one in objects)
+    major, minor, patch = map(int, osi.DEFAULT_VERSION.split("."))
     offset = None
     if frame.offset is not None:
         x, y, z, yaw = frame.offset
         offset = osi.GroundTruth.ProjFrameOffset(position=osi.Vector3d(x=x, y=y, z=z), yaw=yaw)
     return osi.GroundTruth(
-        version=osi.InterfaceVersion(**dict(zip(("version_major", "version_minor", "version_patch"), _version(), strict=True))),
+        version=osi.InterfaceVersion(version_major=major, version_minor=minor, version_patch=patch),
         timestamp=osi.Timestamp(seconds=stamp // NS, nanos=stamp % NS),
         host_vehicle_id=osi.Identifier(value=host) if there else None,
         moving_object=objects,
@@ -142,14 +142,6 @@ def _ground_truth(parts: tuple[_Part, ...], k: int, stamp: int, host: int, road_
         proj_string=frame.projection or None,
         proj_frame_offset=offset,
     )
-
-
-def _version() -> tuple[int, int, int]:
-    """Return the version of OSI that the messages are of."""
-    import betterosi
-
-    major, minor, patch = map(int, betterosi.DEFAULT_VERSION.split("."))
-    return major, minor, patch
 
 
 def _objects(part: _Part, k: int) -> Iterator[Any]:
@@ -173,13 +165,15 @@ def _objects(part: _Part, k: int) -> Iterator[Any]:
             acceleration=osi.Vector3d(x=along * cos - across * sin, y=along * sin + across * cos, z=0.0),
             orientation_rate=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=rate),
         )
-        kinds, roles = osi.MovingObject.VehicleClassification.Type, osi.MovingObject.VehicleClassification.Role
-        kind = kinds.HEAVY_TRUCK if is_truck(vehicle) else kinds.CAR
+        number, classes = osi.Identifier(value=part.numbers[n]), osi.MovingObject.VehicleClassification
+        if vehicle.kind.walks:
+            yield osi.MovingObject(id=number, type=osi.MovingObject.Type.PEDESTRIAN, base=base)
+            continue
         yield osi.MovingObject(
-            id=osi.Identifier(value=part.numbers[n]),
+            id=number,
             type=osi.MovingObject.Type.VEHICLE,
             base=base,
-            vehicle_classification=osi.MovingObject.VehicleClassification(type=kind, role=roles.CIVIL),
+            vehicle_classification=classes(type=classes.Type[vehicle.kind.osi], role=classes.Role.CIVIL),
             vehicle_attributes=_attributes(vehicle),
         )
 

@@ -9,6 +9,7 @@ Pickles are written, never read: a pickle runs what it holds. They hold nothing 
 written so that every version of NumPy reads them and the same scenario has the same bytes.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import io
@@ -87,8 +88,9 @@ def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
         "height": masked(np.full(steps, height(vehicle))),
         "valid": there.copy(),
     }
-    metadata = {"type": "VEHICLE", "object_id": vehicle.id, "track_length": steps, "dataset": DATASET}
-    return {"type": "VEHICLE", "state": state, "metadata": metadata}
+    kind = vehicle.kind.scenarionet
+    metadata = {"type": kind, "object_id": vehicle.id, "track_length": steps, "dataset": DATASET}
+    return {"type": kind, "state": state, "metadata": metadata}
 
 
 def _summary(track: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -97,7 +99,7 @@ def _summary(track: Mapping[str, Any], name: str) -> dict[str, Any]:
     driven = position[valid]
     moved = float(edge_lengths(driven).sum())
     return {
-        "type": "VEHICLE",
+        "type": track["type"],
         "object_id": name,
         "track_length": len(valid),
         "moving_distance": round(moved, 3),
@@ -108,13 +110,14 @@ def _summary(track: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def _numbers(tracks: Mapping[str, Any]) -> dict[str, Any]:
-    moving = [name for name, track in tracks.items() if _summary(track, name)["moving_distance"] > MOVES]
+    moving = Counter(track["type"] for name, track in tracks.items() if _summary(track, name)["moving_distance"] > MOVES)
+    each = Counter(track["type"] for track in tracks.values())
     return {
-        "num_moving_objects": len(moving),
-        "num_moving_objects_each_type": {"VEHICLE": len(moving)},
+        "num_moving_objects": moving.total(),
+        "num_moving_objects_each_type": {kind: moving[kind] for kind in sorted(each)},
         "num_objects": len(tracks),
-        "object_types": ["VEHICLE"],
-        "num_objects_each_type": {"VEHICLE": len(tracks)},
+        "object_types": sorted(each),
+        "num_objects_each_type": dict(sorted(each.items())),
         "num_traffic_lights": 0,
         "num_traffic_light_types": [],
         "num_traffic_lights_each_step": {},

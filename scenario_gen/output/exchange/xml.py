@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""XML written the same each time."""
+"""XML, and what it holds, written the same each time."""
 
+from datetime import datetime, UTC
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -42,6 +43,11 @@ def _text(value: str | float) -> str:
 def comment(parent: Element, text: str) -> None:
     """Append a comment."""
     parent.append(ET.Comment(f" {_text(text).replace('--', '- -')} "))
+
+
+def date_of(start_ns: int) -> str:
+    """Return the instant of a stamp, so that the same bag gives the same file."""
+    return datetime.fromtimestamp(start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S")
 
 
 def serialized(root: Element) -> bytes:

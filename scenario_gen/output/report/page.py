@@ -151,7 +151,7 @@ def _criticality(case: GenerationResult) -> str:
     for name, words in (("ttc", "time to collision"), ("pet", "PET")):
         least = min(filter(math.isfinite, case.coverage.spreads[name].values), default=math.nan)
         if least < (math.inf if name == "pet" or cap is None else cap):
-            said.append(f"least {words} {least:.1f} s")
+            said.append(f"minimum {words} {least:.1f} s")
         elif name == "ttc" and cap is not None:
             said.append(f"{words}: none below {cap:g} s")
     return ", ".join(said)
@@ -160,7 +160,7 @@ def _criticality(case: GenerationResult) -> str:
 def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
     """E of the delivered set, and what stands below it: each with its words and whether it is the best of what is compared."""
     best = case.best(metric)
-    words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", ORACLE: "replayed"}
+    words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", ORACLE: "replay"}
     errors = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
     return {
         "own": formatted(Interval(case.evaluation.value(case.row, metric)), ""),

@@ -26,12 +26,12 @@ from scenario_gen.types import (
     WITHOUT,
 )
 
-SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", ORACLE: "replayed"}
+SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", ORACLE: "replay"}
 COMPARED = (
     "; after | of sets drawn likewise, without changepoints and with K evenly spaced; in brackets, not compared: preset "
-    "narrow, the template replayed"
+    "narrow, replay of the recording"
 )
-UNCOMPARED = "; in brackets, not compared: the template replayed. --compare draws sets to compare with"
+UNCOMPARED = "; in brackets, not compared: replay of the recording. --compare draws sets to compare with"
 VARIED = ("pet", "gap", "speed")  # figures whose range is said: PET, or where nobody crosses the least gap, and the speed
 FAILED = "yellow"
 
@@ -46,7 +46,7 @@ def summary(cases: Sequence[GenerationResult], *, verbose: bool = False) -> Rend
     lines = [line for case in cases for line in _case(case, verbose)]
     if verbose:
         beside = COMPARED if any(case.references for case in cases) else UNCOMPARED
-        explained = f"K: changepoints. E: distance of the delivered set to the template, lower is nearer{beside}."
+        explained = f"K: changepoints. E: distance of the delivered set to the recording, lower is nearer{beside}."
         lines.append(Text(explained, style="dim"))
     return Group(*lines)
 

@@ -17,11 +17,11 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
-from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.method.validity import Limits
 from scenario_gen.output.results import EVALUATED, write_evaluation
-from scenario_gen.output.review.validation import kept_reactions, Reference
+from scenario_gen.output.review.validation import Checkers, kept_reactions
 from scenario_gen.template import reactions_of
-from scenario_gen.types import CheckCounts, EgoSlot, GenerationResult, join_ego, Scenario, ScenarioSet, Verdict, WITHOUT
+from scenario_gen.types import CheckCounts, EgoSlot, GenerationResult, join_ego, ScenarioSet, Verdict, WITHOUT
 
 
 def bag_results(
@@ -71,11 +71,17 @@ def _result(
     encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
     fit, routes = namespace.fit
     graph = reactions_of(encounter)
-    scenarios = tuple(namespace.scenario(k)[1] for k in range(len(namespace.hashes)))
-    counts = CheckCounts.of_verdicts(_verdicts(namespace, scenarios, limits, tick))
+    checkers, scenarios, verdicts = Checkers(namespace, limits), [], list[Verdict]()
+    for k in range(len(namespace.hashes)):
+        stamp, scenario = namespace.scenario(k)
+        whole = join_ego(scenario)
+        verdicts += checkers.of(k, stamp, whole, None).check([whole])
+        scenarios.append(scenario)
+        tick()
+    counts = CheckCounts.of_verdicts(verdicts)
     evaluation = evaluate_scenarios(
         encounter,
-        {SCENARIOS: scenarios},
+        {SCENARIOS: tuple(scenarios)},
         changepoints=len(segmentation.changepoints),
         checks={SCENARIOS: counts},
         road=road.name if road else "",
@@ -95,7 +101,7 @@ def _result(
         ego = EgoSlot(witness.vehicles[0], first, last)
     held = [kept_reactions(encounter, namespace.entry(k)) for k in range(len(scenarios))]
     generated = ScenarioSet(
-        len(scenarios), scenarios, counts.candidates, Counter(counts.refused), _left_out(namespace), ego,
+        len(scenarios), tuple(scenarios), counts.candidates, Counter(counts.refused), _left_out(namespace), ego,
         reactions=tuple(edge for edge in graph.edges if all(edge in kept for kept in held)), graph=graph,
     )  # fmt: skip
     return GenerationResult(
@@ -113,33 +119,11 @@ def _result(
     )
 
 
-def _verdicts(
-    namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Limits | None, tick: Callable[[], None]
-) -> list[Verdict]:
-    """Check every scenario; an ego may have been left out of one, and its map be another than the newest."""
-    encounter = namespace.encounter
-    checkers: dict[tuple[object, ...], Checker] = {}
-    verdicts: list[Verdict] = []
-    for k, recorded in enumerate(scenarios):
-        entry, scenario = namespace.entry(k), join_ego(recorded)
-        map_hash, order = (entry.map_hash, entry.order) if entry else (None, "keep")
-        ids = tuple(vehicle.id for vehicle in scenario.vehicles)
-        key = (map_hash or "", order, kept_reactions(encounter, entry), ids)
-        if key not in checkers:
-            road = namespace.road
-            if namespace.roads_differ:
-                road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
-            checkers[key] = Reference.of(encounter, namespace.segmentation, road, entry).checker(scenario, limits, None)
-        verdicts += checkers[key].check([scenario])
-        tick()
-    return verdicts
-
-
 def _left_out(namespace: Namespace) -> tuple[str, ...]:
     """Say what the bag has not, and what follows from it; and what its requests say they came to."""
-    messages = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not asked"]
+    messages = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not checked"]
     if "map" not in namespace.messages:
         messages.append("the bag has no map: whether vehicles leave the road was not checked")
     if "changepoints" not in namespace.messages:
-        messages.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
+        messages.append("the bag has no changepoints: the recording counts as one primitive, and its waits were not checked")
     return (*messages, *(summary.sentence() for summary in namespace.summaries))

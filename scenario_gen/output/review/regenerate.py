@@ -96,7 +96,7 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
     values, seed, index = found.summary.values, found.entry.seed, found.entry.index
     known = _replan(found, what, log)
     encounter, requested, sampling = known.planned.encounter, known.request, known.sampling
-    plan = plan_of(known.planned, sampling, requested)
+    plan = plan_of(known.planned, sampling, known.limits, requested)
     check = None
     if requested.target or requested.order == "swap":  # a proposal is found again with them
         check = checker_of(plan, sampling, known.limits, requested).check

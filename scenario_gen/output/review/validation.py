@@ -40,7 +40,7 @@ from scenario_gen.types import (
 )
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
-NO_WITNESS = f"the ego: its witness is not on {WITNESS}"
+NO_WITNESS = f"the ego: its reference drive is not on {WITNESS}"
 ALTERED = "altered_message"  # not the bytes that scenarios/info has an entry for
 
 
@@ -166,12 +166,38 @@ def validate_bag(
         return tuple(_validate(namespace, limits, lambda: progress(next(done), total)) for namespace in checked)
 
 
+class Checkers:
+    """The checkers of the scenarios of a namespace; those that are held against the same share one."""
+
+    def __init__(self, namespace: Namespace, limits: Limits | None) -> None:
+        self._namespace, self._limits = namespace, limits
+        self._references: dict[tuple[object, ...], Reference] = {}
+        self._checkers: dict[tuple[object, ...], Checker] = {}
+
+    def of(self, k: int, stamp: int, scenario: Scenario, states: BoundaryStates | None) -> Checker:
+        """Return the checker of scenario `k`, its ego among its vehicles, which must meet the `states`, if they are known.
+
+        Raises:
+            InputError: a message of what it is held against is damaged.
+        """
+        entry = self._namespace.entry(k) or self._namespace.unknown.get(k)
+        is_lost = k in self._namespace.unknown and entry is None
+        kept = () if entry is None else tuple(text for key, text in entry.facts.items() if key.startswith("reactions"))
+        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order, kept)
+        of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
+        key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
+        if key not in self._checkers:
+            if place not in self._references:
+                self._references[place] = _reference(self._namespace, stamp, entry, is_lost)
+            self._checkers[key] = self._references[place].checker(scenario, self._limits, states)
+        return self._checkers[key]
+
+
 def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], None]) -> Validation:
     namespace.check_infos()
     result = Validation(namespace.name, missing=namespace.missing)
     message = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
-    references: dict[tuple[object, ...], Reference] = {}
-    checkers: dict[tuple[object, ...], Checker] = {}
+    checkers = Checkers(namespace, limits)
     for k, sha256 in enumerate(namespace.hashes):
         tick()
         wrong, entry = [], namespace.unknown.get(k)
@@ -183,7 +209,7 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
         silent = message
         if entry is not None and namespace.without_witness(entry):
             if namespace.strange_witnesses:
-                wrong.append((ALTERED, f"the ego's witness is not what was published for index {entry.index}"))
+                wrong.append((ALTERED, f"the ego's reference drive is not what was published for index {entry.index}"))
             silent = (*message, NO_WITNESS)
         try:
             stamp, scenario = namespace.scenario(k)
@@ -194,25 +220,17 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
         if entry is not None:
             states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
         scenario = join_ego(scenario)
-        is_lost = k in namespace.unknown and entry is None
-        kept = () if entry is None else tuple(text for key, text in entry.facts.items() if key.startswith("reactions"))
-        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order, kept)
-        if place not in references:
-            references[place] = _reference(namespace, stamp, entry, is_lost)
-        of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
-        key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
+        checker = checkers.of(k, stamp, scenario, states)
         try:
-            if key not in checkers:
-                checkers[key] = references[place].checker(scenario, limits, states)
-            (verdict,) = checkers[key].check([scenario])
+            (verdict,) = checker.check([scenario])
         except InputError as error:
             result.add(k, [*wrong, (UNUSABLE, str(error))], ())
             continue
         wrong += [(violation.cause.value, violation.message) for violation in verdict.violations]
-        result.add(k, wrong, (*silent, *checkers[key].not_applicable))
+        result.add(k, wrong, (*silent, *checker.not_applicable))
         broken = {violation.vehicles for violation in verdict.violations if violation.cause == Cause.REACTION}
         ids = tokens(vehicle.id for vehicle in scenario.vehicles)
-        for edge in checkers[key].reactions:
+        for edge in checker.reactions:
             result.proven[edge.words(ids)] += (edge.who, edge.whom) not in broken
     return result
 

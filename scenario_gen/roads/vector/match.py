@@ -91,6 +91,12 @@ class Course:
         """Arc length [m] on the curve at which the template ends."""
         return self.start + float(self.progress[-1])
 
+    @property
+    def turn(self) -> float:
+        """How far [rad, left positive] it turns."""
+        start, end = self.curve.at(np.array([self.start, self.end]))[:, 2]
+        return float(end - start)
+
 
 @dataclass(frozen=True, eq=False)
 class Match:
@@ -190,7 +196,7 @@ def match(
     for track, (first, last) in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
         course = _course(chains, track, _placed(track, spot), scale, first, last)
         if course is None:
-            yield Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
+            yield Match((), math.inf, f"no lanes lead along the way of vehicle {track.vehicle.id}, from its start to its end")
             return
         courses.append(course)
     yield judged(chains, _tied(chains.network, courses, tracks, scale, [None] * len(courses)), tracks, spot)
@@ -337,7 +343,7 @@ def _starts_to_stop(network: LaneNetwork, course: Course, track: Track, scale: f
 def _start_to_turn(course: Course, track: Track) -> float | None:
     """The begin [m] nearest to a course's own from which it turns as the vehicle does; None if it does anyway, or from none."""
     turn, driven = float(np.mean(turns_to_keep(track))), float(course.progress[-1])
-    if track.still or abs(turned_more(course, track) + turn_of(track) - turn) < _OTHERWISE:
+    if track.still or abs(course.turn - turn) < _OTHERWISE:
         return None
     starts = np.arange(0.0, max(course.curve.length - driven, 0.0), _STEP)
     more = course.curve.at(starts + driven)[:, 2] - course.curve.at(starts)[:, 2] - turn
@@ -354,26 +360,17 @@ def _follows(track: Track, leader: Track) -> float | None:
     return float(station[0]) if on else None
 
 
-def turned_more(course: Course, track: Track) -> float:
-    """By how much [rad, signed] a course turns more than the vehicle does in the template."""
-    if track.still:
-        return 0.0
-    ends, own = course.curve.at(np.array([course.start, course.end])), track.curve.at(np.array([0.0, track.travelled]))
-    return float((ends[1, 2] - ends[0, 2]) - (own[1, 2] - own[0, 2]))
-
-
 def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], spot: Spot) -> Match:
     """Say how well courses resemble the template, and what is lost."""
     cost, reason = 0.0, ""
     for course, track in zip(courses, tracks, strict=True):
         half = track.vehicle.length / 2.0 + _ROOM
         short = max(half - course.start, course.end + half - course.curve.length)
-        turn = turned_more(course, track)
         if short > 0.0:
             reason = reason or f"the lanes of vehicle {track.vehicle.id} end {short:.1f} m too soon"
-        if abs(turn) > _TURN:
-            there = turn_of(track) + turn
-            reason = reason or f"vehicle {track.vehicle.id} {in_words(turn_of(track))} in the template, {in_words(there)} there"
+        if abs(course.turn - turn_of(track)) > _TURN:
+            there = in_words(course.turn)
+            reason = reason or f"vehicle {track.vehicle.id} {in_words(turn_of(track))} in the template, {there} there"
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
         miss = np.minimum(np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED)

@@ -89,9 +89,9 @@ def placements(
             found = True
             yield placed
     if not found:
-        what = "road" if network.drawn else "map"
+        what, why = ("road", network.notes) if network.drawn else ("map", ())
         *_, reason = min(search.failures, default=("it has no lanes of its directions",))
-        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {recorded}{reason}")
+        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {'; '.join((recorded + reason, *why))}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +216,7 @@ def tracks_on(placement: Match, tracks: Sequence[Track]) -> tuple[Track, ...]:
         driven = float(course.progress[-1])
         curve = course.curve.cut(course.start, course.start + max(driven, 1.0), 0.25)
         progress = course.progress * (curve.length / driven if driven > 1.0 else 1.0)
-        placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length))))
+        placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length)), lane=course.curve))
     return tuple(placed)
 
 

@@ -4,7 +4,7 @@
 """The best place for a template in a whole map: where its paths lie along lanes, in their directions, as one piece.
 
 Every placement that lays one of a few instants of the template onto a lane is tried: the cost of a placement is the mean
-squared distance of the template's samples from the nearest lane of their direction. The best are refined (Hooke & Jeeves 1961).
+squared distance of the template's samples from the nearest lane of their direction. The best are refined.
 """
 
 from collections.abc import Sequence
@@ -18,6 +18,8 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
+from scenario_gen.numerics.pattern_search import pattern_search
+from scenario_gen.numerics.plane import place
 from scenario_gen.roads.vector.network import crossing_lanes
 from scenario_gen.template import pair_crossings, Track
 from scenario_gen.types import LaneNetwork, once_per_object
@@ -43,22 +45,16 @@ _TOGETHER = 2_000_000  # samples looked up at once
 
 @dataclass(frozen=True)
 class Spot:
-    """A placement of the template as one piece: turned by `yaw` about its own origin, then moved by x, y; its cost [m²]."""
+    """A placement of the template as one piece: its cost [m²]; where on the map the template's own frame lies [m, m, rad]."""
 
     cost: float
-    yaw: float
     x: float
     y: float
+    yaw: float
 
     def moved(self, points: Floats) -> Floats:
         """Points (P, 2) [m] of the template on the map."""
-        return np.asarray(_turned(points, self.yaw) + np.array([self.x, self.y]))
-
-
-def _turned(points: Floats, yaw: Floats | float) -> Floats:
-    """Points (..., 2) turned by angles (...) about the origin."""
-    x, y, cos, sin = points[..., 0], points[..., 1], np.cos(yaw), np.sin(yaw)
-    return np.stack((x * cos - y * sin, x * sin + y * cos), axis=-1)
+        return place(np.array([self.x, self.y, self.yaw]), *points.T)
 
 
 @once_per_object
@@ -137,13 +133,12 @@ def find_spots(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[
     spots: list[Spot] = []
     step = max(_TOGETHER // len(poses), 1)
     for anchor in _anchors(tracks):
-        turn = yaws - anchor[2]
-        placements = np.column_stack((points - _turned(anchor[:2], turn), turn))
-        parts = [placements[k : k + step] for k in range(0, len(turn), step)]
+        placements = _laid_onto(anchor[:2], points, yaws - anchor[2])
+        parts = [placements[k : k + step] for k in range(0, len(placements), step)]
         cost = np.concatenate([_costs(field, poses, weight, part) for part in parts])
         stop_if_cancelled()
         best = np.argsort(cost, kind="stable")[: 4 * _REFINED]
-        spots += [Spot(*row) for row in np.column_stack((cost, placements[:, [2, 0, 1]]))[best].tolist()]
+        spots += [Spot(*row) for row in np.column_stack((cost, placements))[best].tolist()]
     centre = poses[:, :2].mean(axis=0)
     chosen = _distinct(spots, centre, _REFINED)
     return _distinct([_refined(field, poses, weight, spot) for spot in chosen], centre, _REFINED)
@@ -161,14 +156,13 @@ def crossing_spots(network: LaneNetwork, tracks: tuple[Track, ...]) -> list[Spot
         turn = wrap_angle(yaw - np.array([own[2], other[2]]))  # of each of both
         apart = wrap_angle(turn[:, 1] - turn[:, 0])
         alike = np.abs(apart) <= _ANGLE
-        turned = turn[alike, 0] + apart[alike] / 2.0
-        placements.append(np.column_stack((point[alike] - _turned(own[:2], turned), turned)))
+        placements.append(_laid_onto(own[:2], point[alike], turn[alike, 0] + apart[alike] / 2.0))
     moved = np.concatenate([np.zeros((0, 3)), *placements])
     if not len(moved):
         return []
     poses, weight = _samples(tracks)
     cost = _costs(_field(network), poses, weight, moved)
-    spots = [Spot(*row) for row in np.column_stack((cost, moved[:, [2, 0, 1]])).tolist()]
+    spots = [Spot(*row) for row in np.column_stack((cost, moved)).tolist()]
     return _distinct(spots, poses[:, :2].mean(axis=0), _REFINED)
 
 
@@ -189,7 +183,12 @@ def spot_at(network: LaneNetwork, tracks: tuple[Track, ...], frame: Floats) -> S
     """The template where its frame (3,) x, y [m], yaw [rad] lies; the cost says whether lanes of its directions are there."""
     poses, weight = _samples(tracks)
     cost = float(_costs(_field(network), poses, weight, frame[None])[0])
-    return Spot(cost, float(frame[2]), float(frame[0]), float(frame[1]))
+    return Spot(cost, *frame.tolist())
+
+
+def _laid_onto(point: Floats, places: Floats, turn: Floats) -> Floats:
+    """Placements (M, 3) turned by so much (M,) [rad] that lay a point (2,) [m] of the template onto places (M, 2) [m]."""
+    return np.column_stack((place(np.column_stack((places, turn)), -point[0], -point[1]), turn))
 
 
 def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
@@ -214,27 +213,17 @@ def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
 
 def _costs(field: _Field, poses: Floats, weight: Floats, placements: Floats) -> Floats:
     """Costs (M,) [m²] of placements (M, 3): where the origin lies and how far all is turned."""
-    turn = placements[:, 2, None]
-    points = _turned(poses[:, :2], turn) + placements[:, None, :2]
-    return np.asarray((field.squared(points, poses[:, 2] + turn) * weight).sum(axis=1))
+    points = place(placements[:, None], *poses[:, :2].T)
+    return np.asarray((field.squared(points, poses[:, 2] + placements[:, 2, None]) * weight).sum(axis=1))
 
 
 def _refined(field: _Field, poses: Floats, weight: Floats, spot: Spot) -> Spot:
-    """Pattern search over place and rotation about the template's middle."""
+    """The best placement near one, by moves and turns about the template's middle."""
     centre = poses[:, :2].mean(axis=0)
-    state = np.array([*spot.moved(centre), spot.yaw])
     local = poses - np.array([*centre, 0.0])
-    cost, step = spot.cost, np.array([2.0, 2.0, math.radians(4.0)])
-    signs = np.concatenate((np.eye(3), -np.eye(3)))
-    while step[0] > 0.2:
-        trials = state + signs * step
-        costs = _costs(field, local, weight, trials)
-        best = int(np.argmin(costs))
-        if costs[best] < cost - 1e-9:
-            state, cost = trials[best], float(costs[best])
-        else:
-            step /= 2.0
-    return Spot(cost, float(state[2]), *(state[:2] - _turned(centre, float(state[2]))).tolist())
+    begin, step = np.array([*spot.moved(centre), spot.yaw]), np.array([2.0, 2.0, math.radians(4.0)])
+    state, cost = pattern_search(lambda trials: _costs(field, local, weight, trials), begin, step, 0.2)
+    return Spot(cost, *_laid_onto(centre, state[None, :2], state[2:])[0].tolist())
 
 
 def _distinct(spots: list[Spot], centre: Floats, most: int) -> list[Spot]:
@@ -242,12 +231,12 @@ def _distinct(spots: list[Spot], centre: Floats, most: int) -> list[Spot]:
     kept: list[Spot] = []
     places = np.empty((0, 3))
     for spot in sorted(spots, key=lambda spot: (round(spot.cost, 6), spot.yaw, spot.x, spot.y)):
-        place = np.array([*spot.moved(centre), spot.yaw])
-        off = np.abs(places - place)
-        turned = np.abs(wrap_angle(places[:, 2] - place[2]))
+        own = np.array([*spot.moved(centre), spot.yaw])
+        off = np.abs(places - own)
+        turned = np.abs(wrap_angle(places[:, 2] - own[2]))
         if not ((off[:, 0] < _ELSEWHERE) & (off[:, 1] < _ELSEWHERE) & (turned < _TURNED)).any():
             kept.append(spot)
-            places = np.vstack((places, place))
+            places = np.vstack((places, own))
             if len(kept) == most:
                 break
     return kept

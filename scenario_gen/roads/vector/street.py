@@ -18,8 +18,8 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads.vector.match import bending, Chains, changed_curve, Course, Match, pressed_aside, speeding, turned_more
-from scenario_gen.template import FrenetTracks, to_frenet, Track
+from scenario_gen.roads.vector.match import bending, Chains, changed_curve, Course, Match, pressed_aside, speeding
+from scenario_gen.template import FrenetTracks, to_frenet, Track, turn_of
 from scenario_gen.types import LEVEL
 
 _ROOM = 1.0  # metres between a footprint and the end of the road
@@ -167,7 +167,9 @@ def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: 
             progress = np.zeros(len(station)) if track.still else (station - station[0]) * sign
             courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
         half = track.vehicle.length / 2.0 + _ROOM / 2.0
-        if courses[-1].start < half or courses[-1].end + half > curve.length or _bends_more(courses[-1], track):
+        if courses[-1].start < half or courses[-1].end + half > curve.length:
+            return None
+        if abs(courses[-1].turn) > abs(turn_of(track)) + _TURN:
             return None
     offsets = [
         [sides[int(k)].offset for k in frenet.lane[frenet.direction == sign].ravel()]
@@ -188,13 +190,6 @@ def _swerving(used: tuple[int, ...], lane: Curve, places: Floats, swerve: Floats
     curve = Curve.through(lane.beside(s, np.interp(s, at[moves], swerve[moves]))[:, :2])
     driven = np.interp(at, s, curve.station)
     return Course(used, curve, float(driven[0]), driven - driven[0])
-
-
-def _bends_more(course: Course, track: Track) -> bool:
-    """Whether a road turns a vehicle much more than the road of the template did."""
-    more = turned_more(course, track)
-    own = 0.0 if track.still else float(np.subtract(*track.curve.at(np.array([track.travelled, 0.0]))[:, 2]))
-    return abs(own + more) > abs(own) + _TURN
 
 
 def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:

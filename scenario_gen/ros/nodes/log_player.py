@@ -12,7 +12,6 @@ from pathlib import Path
 import time
 
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.driving import encode_clock
@@ -23,6 +22,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import latitude_longitude, LogConfig, read_log
 from scenario_gen.ros.plumbing.node_parameters import LogPlayerParameters
+from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.types import Encounter, tokens
 
@@ -43,7 +43,7 @@ class LogPlayer(StageNode):
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("log_player", Config(), namespace)
-        self.serve(Trigger, "~/play", self._play_again)
+        offer_trigger(self, "~/play", self._play_again)
 
     def started(self) -> None:
         """Read the log, if one is named."""
@@ -95,8 +95,8 @@ class LogPlayer(StageNode):
             self.status(Level.OK, f"{encounter.name}: streamed", "stream", encounter.start_ns)
         self.destroy_publisher(clock)
 
-    def _play_again(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self.active and bool(self.config.log_path)
-        response.message = "started" if response.success else "parameter log_path is empty, or the node is not active"
+    def _play_again(self) -> str:
+        if not (self.active and self.config.log_path):
+            raise InputError("parameter log_path is empty, or the node is not active")
         self.started()
-        return response
+        return "started"

@@ -3,10 +3,9 @@
 
 """planner: `map`, `tracks` and `changepoints` of one template in; `fit`, a `vehicle_<id>/route` each, and `fit/info` out.
 
-`~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and `~/explain` says why.
+`~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and /diagnostics says why.
 """
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
@@ -17,7 +16,6 @@ from nav_msgs.srv import GetPlan
 import numpy as np
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
-from std_srvs.srv import Trigger
 
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import decimal_stamp, Level
@@ -35,11 +33,12 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import make_planner, plan_with_retry, PlanningConfig, Query
+from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
-from scenario_gen.ros.plumbing.stage_node import Inputs, REQUESTS, StageNode
+from scenario_gen.ros.plumbing.services import REQUESTS
+from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
 from scenario_gen.types import Road, tokens
 
-EXPLAINED = 20  # newest plans whose lack is explained
 ROAD = ("map", "road/entries", "road/exits")
 
 
@@ -49,6 +48,7 @@ class Config(Parameters):
 
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
+    limits: Limits = field(default_factory=Limits)
     seed: int = parameter(0, "seed of the planner", low=0)
     radius: float = parameter(1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0)
     pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
@@ -64,8 +64,6 @@ class Planner(StageNode):
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("planner", Config(), namespace)
         self.create_service(GetPlan, "~/get_plan", self._get_plan, qos_profile=REQUESTS)
-        self.serve(Trigger, "~/explain", self._explain)
-        self._reasons: deque[tuple[int, str]] = deque(maxlen=EXPLAINED)  # stamp of a request, and why there is no path
         paired = self.config.pair_map
         self._requests = 0
         self.inputs = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",), (LANES,))
@@ -87,7 +85,7 @@ class Planner(StageNode):
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
         _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
-        stages = PipelineConfig(fitting=config.fitting, planning=config.planning)
+        stages = PipelineConfig(fitting=config.fitting, planning=config.planning, limits=config.limits)
         planned = Chain(encounter, segmentation, road, stages, seed=config.seed).plan()
         (_, fit), routes = planned.placed(), planned.routes
         stop_if_cancelled()
@@ -111,36 +109,24 @@ class Planner(StageNode):
         self._requests += 1
         name = f"get_plan {self._requests}"
 
-        def job(cancelled: Callable[[], bool]) -> tuple[bytes, str]:
+        def job(cancelled: Callable[[], bool]) -> bytes:
             try:
                 if grid is None or cancelled():
                     raise RefusedError("there is no map yet" if grid is None else "cancelled")
                 _, road = decode_map(grid)
                 query = query_of(request, road.frame_id, self.config.radius)
                 poses = plan_poses(road, query, self.config.planning, self.config.seed)
-                return encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp), ""
+                return encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp)
             except ScenarioGenError as error:
                 kind = type(error).__name__
                 self.status(Level.ERROR, str(error), "get_plan", error=kind, job=name, request_stamp=decimal_stamp(stamp))
-                return b"", str(error)
+                return b""
 
         response.plan.header.stamp = request.start.header.stamp
-        plan, reason = b"", "the node is not active; activate it first"
-        if self.active:
-            plan, reason = await self.result_of(name, job, lambda error: (b"", f"{type(error).__name__}: {error}"))
-        self._reasons.appendleft((stamp, reason))
-        if plan:
+        if not self.active:
+            self.get_logger().warning("no plan: the node is not active; activate it first")
+        elif plan := await self.result_of(name, job, lambda _: b""):
             response.plan = deserialize_message(plan, Path)
-        return response
-
-    def _explain(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Say whether the newest plan is a path, and a line for each, newest first: its request's stamp and the reason.
-
-        nav_msgs/GetPlan has no place for it.
-        """
-        lines = [f"{decimal_stamp(stamp)}: {reason or 'a path was found'}" for stamp, reason in self._reasons]
-        response.success = bool(lines) and not self._reasons[0][1]
-        response.message = "\n".join(lines) or "no plan has been asked for"
         return response
 
 

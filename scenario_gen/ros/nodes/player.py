@@ -5,8 +5,7 @@
 
 Each topic is offered with the quality of service it was recorded with, or as `qos_overrides./topic.publisher.reliability` and the
 like say. With an offset, what latched topics had said before it is published first. With `clock`, the bag's time is published on
-/clock, so that nodes with `use_sim_time` follow it, in place of the bag's own /clock. A motion of the bag, its tracks or one of
-its scenarios, is published sample by sample as the frames of its vehicles (`Frames`). When all is played and acknowledged the
+/clock, so that nodes with `use_sim_time` follow it, in place of the bag's own /clock. When all is played and acknowledged the
 player ends, unless it is to `loop`, or to `stay` for who comes late to latched topics.
 """
 
@@ -15,115 +14,28 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from heapq import merge
-from operator import attrgetter
 from pathlib import Path
 import re
 import threading
 from time import monotonic
 from typing import Any
 
-import numpy as np
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.driving import encode_clock
-from msg_conventions.frames import decode_frames, encode_frames
-from msg_conventions.pictures import encode_footprint
-from msg_conventions.topics import vehicle_topic
-from msg_conventions.tracks import FRAME
-from scenario_gen.bags.recordings.motion import find_motion, Motion
 from scenario_gen.bags.storage.bag import bag_topics, BagMessage, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
-from scenario_gen.ros.plumbing.topics import (
-    create_publisher,
-    create_subscription,
-    message_class,
-    OVERRIDABLE,
-    Pace,
-    publish,
-    qos,
-    unacknowledged,
-)
-from scenario_gen.types import tokens
-
-MAP = "map"
-OWN = 100  # transforms of ours that may be underway
-
-
-@dataclass(frozen=True)
-class Instant:
-    """Sample `k` of a motion, at a time of the bag: what is to be published there depends on the clock then."""
-
-    k: int
-    stamp_ns: int
-
-
-class Frames:
-    """Publishes one motion, unless another publisher publishes the same frames: then who has published less of them gives in."""
-
-    def __init__(self, node: Node, motion: Motion) -> None:
-        self._node, self._motion = node, motion
-        names = tokens(vehicle.id for vehicle in motion.trajectory.vehicles)
-        self._children = tuple(f"vehicle_{name}" for name in names)
-        space = motion.topic.rpartition("/tracks")[0] or motion.topic.rpartition("/scenarios")[0]
-        self._tf, tie, *self._footprints = (
-            create_publisher(node, topic)
-            for topic in ("/tf", "/tf_static", *(f"{space}/{vehicle_topic(n, 'footprint')}" for n in names))
-        )
-        self.publishers = (self._tf, tie, *self._footprints)
-        self._own: deque[bytes] = deque(maxlen=OWN)
-        self._published = 0
-        self._given_in = False
-        create_subscription(node, "/tf", self._yield_to_others)
-        # The suite's maps and tracks have no place on the earth in common but where a map is the template's own.
-        publish(node, tie, encode_frames(np.zeros((1, 3)), [FRAME], MAP, 0))
-
-    def instants(self) -> Iterator[Instant]:
-        """Yield the samples, each at its time of the bag."""
-        for k, time_ns in enumerate(self._motion.trajectory.time_ns.tolist()):
-            yield Instant(k, self._motion.begin_ns + time_ns)
-
-    def publish(self, instant: Instant, stamp_ns: int) -> None:
-        """Publish one sample's frames, and the footprints in them."""
-        if self._given_in:
-            return
-        motion = self._motion.trajectory
-        here = np.ones(len(self._children), dtype=bool) if motion.there is None else motion.there[:, instant.k]
-        poses = np.column_stack((motion.position[:, instant.k], motion.heading[:, instant.k]))[here]
-        children = [child for child, there in zip(self._children, here, strict=True) if there]
-        data = encode_frames(poses, children, motion.frame_id, stamp_ns)
-        self._own.append(data)
-        self._published += 1
-        publish(self._node, self._tf, data)
-        for publisher, vehicle, frame, there in zip(self._footprints, motion.vehicles, self._children, here, strict=True):
-            if there:
-                publish(self._node, publisher, encode_footprint(vehicle, stamp_ns, frame))
-
-    def _yield_to_others(self, data: bytes, info: dict[str, Any]) -> None:
-        """Give in to whoever publishes one of these frames and has published more on /tf."""
-        if self._given_in or data in self._own:
-            return
-        try:
-            others = {child for _, _, child, _ in decode_frames(data)} & set(self._children)
-        except InputError:
-            return
-        if others and info["publication_sequence_number"] >= self._published:
-            self._given_in = True
-            self._node.get_logger().error(
-                f"another publisher of /tf publishes {', '.join(sorted(others))}: this player publishes no frames any more; "
-                "play one motion at a time in a ROS domain, or set the parameter frames to ''"
-            )
-
+from scenario_gen.ros.plumbing.services import offer_trigger
+from scenario_gen.ros.plumbing.topics import message_class, OVERRIDABLE, Pace, publish, qos, unacknowledged
 
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
 PATIENCE = 5.0  # seconds in which listeners have to take the last messages
@@ -142,10 +54,6 @@ class Config(Parameters):
     stay: bool = parameter(False, "stay when all is played, so that latched topics reach who comes later, too")
     paused: bool = parameter(False, "wait for ~/resume before the first message")
     clock: bool = parameter(False, "publish /clock")
-    frames: str = parameter(
-        "tracks", "topic whose motion is published on /tf, as vehicle_<id>: `tracks`, `scenarios`, or its full name; empty: none"
-    )
-    scenario: int = parameter(0, "which message of that topic, from 0", low=0)
     patience: float = parameter(
         60.0, "wait so long for subscribers that acknowledge nothing, then go on and warn; 0: for ever", unit="s", low=0.0
     )
@@ -165,11 +73,10 @@ class Player(Node):  # type: ignore[misc]
         self._ended = threading.Event()
         self._player: threading.Thread | None = None
         self._offered: dict[str, tuple[Any, bool, int]] = {}
-        self._frames: Frames | None = None
         self._paces: dict[str, Pace] = {}
         self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
-        self.create_service(Trigger, "~/pause", lambda _, response: self._set_running(response, running=False))
-        self.create_service(Trigger, "~/resume", lambda _, response: self._set_running(response, running=True))
+        offer_trigger(self, "~/pause", partial(self._set_running, running=False))
+        offer_trigger(self, "~/resume", partial(self._set_running, running=True))
 
     def autostart(self) -> None:
         """Offer the bag's topics and begin.
@@ -195,30 +102,10 @@ class Player(Node):  # type: ignore[misc]
                 self.diagnostics.status(Level.ERROR, f"{name} is not played: {error}", "topics", {"error": "InputError"})
         if not self._offered:
             raise InputError(f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics")
-        self._frames = self._frames_of(config)
         if not config.paused:
             self._running.set()
         self._player = threading.Thread(target=self._play, args=(config,), daemon=True)
         self._player.start()
-
-    def _frames_of(self, config: Config) -> Frames | None:
-        """What is published on /tf: nothing if the bag has a /tf of its own, or /tf is not among the topics to play.
-
-        Raises:
-            InputError: one topic was chosen, and it has no such motion.
-        """
-        if not config.frames or not re.fullmatch(config.topics, "/tf") or {"/tf", "tf"} & set(self._offered):
-            return None
-        try:
-            motion = find_motion(Path(config.bag), config.frames, config.scenario, STREAMED)
-            if motion is None and config.frames != Config.frames:
-                raise InputError(f"{config.bag} has no motion on {config.frames}; see the parameter frames")
-            return Frames(self, motion) if motion else None
-        except InputError as error:
-            if config.frames != Config.frames:
-                raise
-            self.get_logger().warning(f"no frames are published on /tf: {error}")
-            return None
 
     def _play(self, config: Config) -> None:
         self._at = config.start_offset
@@ -244,7 +131,7 @@ class Player(Node):  # type: ignore[misc]
             pace.end()
         deadline = monotonic() + PATIENCE
         with suppress(InvalidHandle):  # the node is being ended already
-            for publisher in (*(one for one, _, _ in self._offered.values()), *(self._frames.publishers if self._frames else ())):
+            for publisher, _, _ in self._offered.values():
                 while not publisher.wait_for_all_acked(Duration()) and monotonic() < deadline and not self._ended.wait(TICK):
                     pass
         self.executor.create_task(self._finish)  # to wake the executor alone would not make it look
@@ -261,10 +148,7 @@ class Player(Node):  # type: ignore[misc]
             elapsed = self._wait_until((message.stamp_ns - first) * 1e-9 + config.start_offset, elapsed, config, first)
             if self._ended.is_set():
                 return
-            if isinstance(message, BagMessage):
-                self._publish(message.topic, message.data)
-            elif self._frames is not None:
-                self._frames.publish(message, message.stamp_ns if config.clock else self.get_clock().now().nanoseconds)
+            self._publish(message.topic, message.data)
 
     def _publish(self, topic: str, data: bytes) -> None:
         """Publish, once it overwrites nothing that is on its way; a replay may take longer than the recording for that."""
@@ -274,16 +158,14 @@ class Player(Node):  # type: ignore[misc]
     def _report_pace(self, topic: str, count: int) -> None:
         self.diagnostics.status(Level.WARN, unacknowledged(self, topic, count), f"pace of {topic}", {"count": str(count)})
 
-    def _from_offset(self, config: Config) -> Iterator[BagMessage | Instant]:
+    def _from_offset(self, config: Config) -> Iterator[BagMessage]:
         """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
         latched: dict[str, deque[bytes]] = {}
         begin: int | None = None
-        recorded = read_messages(Path(config.bag), lambda topic: topic in self._offered, STREAMED)
-        moved: Iterator[BagMessage | Instant] = self._frames.instants() if self._frames is not None else iter(())
-        for message in merge(recorded, moved, key=attrgetter("stamp_ns")):
+        for message in read_messages(Path(config.bag), lambda topic: topic in self._offered, STREAMED):
             begin = message.stamp_ns if begin is None else begin
             if message.stamp_ns - begin < config.start_offset * 1e9:
-                if isinstance(message, BagMessage) and self._offered[message.topic][1]:
+                if self._offered[message.topic][1]:
                     depth = self._offered[message.topic][2]
                     latched.setdefault(message.topic, deque(maxlen=depth)).append(message.data)
                 continue
@@ -315,11 +197,11 @@ class Player(Node):  # type: ignore[misc]
         if self._clock_publisher is not None:
             publish(self, self._clock_publisher, encode_clock(stamp_ns))
 
-    def _set_running(self, response: Trigger.Response, *, running: bool) -> Trigger.Response:
-        response.success = running != self._running.is_set()
-        response.message = ("playing" if running else "paused") if response.success else "it is so already"
+    def _set_running(self, *, running: bool) -> str:
+        if running == self._running.is_set():
+            raise InputError("it is so already")
         (self._running.set if running else self._running.clear)()
-        return response
+        return "playing" if running else "paused"
 
     def destroy_node(self) -> None:
         """End playing, then the node."""

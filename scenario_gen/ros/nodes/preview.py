@@ -59,7 +59,7 @@ class Preview(StageNode):
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("preview", Config(), namespace)
-        self._tf = create_frames_publisher(self, "/tf")
+        self._tf = create_frames_publisher(self)
         self._arriving = ArrivingScenarios()
         self._newest: tuple[Scenario, ScenarioEntry] | None = None
         self._shown: Shown | None = None

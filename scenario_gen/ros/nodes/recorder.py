@@ -22,7 +22,6 @@ from typing import Any
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.time import Time
-from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
 from scenario_gen.bags.recordings.losses import Losses, remedy
@@ -32,6 +31,7 @@ from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.node_parameters import RecorderParameters
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
+from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.topics import adapted_quality, message_class, qos
 
 REST = 30.0  # seconds that are taken at most, at the end, for what has arrived
@@ -82,8 +82,8 @@ class Recorder(Node):  # type: ignore[misc]
         self._bag: BagWriter | None = None
         self._listening: dict[str, Any] = {}
         self._refused: set[str] = set()
-        self.create_service(Trigger, "~/start", self._start_service)
-        self.create_service(Trigger, "~/stop", self._stop_service)
+        offer_trigger(self, "~/start", self._start_now)
+        offer_trigger(self, "~/stop", self._stop_now)
         self.create_timer(0.1, self._look_around)
         self.create_timer(HELD, self._let_go)
         self._losses = Losses(self.count_publishers)
@@ -242,22 +242,14 @@ class Recorder(Node):  # type: ignore[misc]
         self.stop(rest=False)  # nothing more is written to such a bag
         self._report(Level.ERROR, str(error), error="InputError")
 
-    def _start_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        now = self.get_clock().now().nanoseconds
-        folder = Path(self.parameters.config.bag or f"bag_{now // 1_000_000}")
-        try:
-            if self._bag is not None:
-                raise InputError(f"{self._bag.folder} is being recorded; call ~/stop first")
-            self._start(folder)
-            response.success, response.message = True, str(folder)
-        except InputError as error:
-            response.success, response.message = False, str(error)
-        return response
+    def _start_now(self) -> str:
+        if self._bag is not None:
+            raise InputError(f"{self._bag.folder} is being recorded; call ~/stop first")
+        folder = Path(self.parameters.config.bag or f"bag_{self.get_clock().now().nanoseconds // 1_000_000}")
+        self._start(folder)
+        return str(folder)
 
-    def _stop_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            folder = self.stop()
-            response.success, response.message = bool(folder), folder or "nothing is being recorded"
-        except InputError as error:
-            response.success, response.message = False, str(error)
-        return response
+    def _stop_now(self) -> str:
+        if folder := self.stop():
+            return folder
+        raise InputError("nothing is being recorded")

@@ -30,7 +30,8 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.roads import build_road, FAULTY, RoadConfig
 from scenario_gen.ros.plumbing.node_parameters import RoadServerParameters
-from scenario_gen.ros.plumbing.stage_node import REQUESTS, StageNode
+from scenario_gen.ros.plumbing.services import REQUESTS
+from scenario_gen.ros.plumbing.stage_node import StageNode
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class RoadServer(StageNode):
         self._name = self.config.road_name
         self._grid: bytes | None = None
         self._with_lanes = False  # whether the last road had lanes: an empty message then replaces them
-        self.serve(GetMap, "~/get_map", self._get_map)
+        self.create_service(GetMap, "~/get_map", self._get_map, qos_profile=REQUESTS)
         self._requests = 0
         self.create_service(LoadMap, "~/load_map", self._load_map, qos_profile=REQUESTS)
 

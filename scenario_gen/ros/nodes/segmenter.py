@@ -11,8 +11,6 @@ this node as for all others.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from std_srvs.srv import Trigger
-
 from msg_conventions.changepoints import (
     encode_changepoints,
     encode_live_changepoints,
@@ -22,10 +20,12 @@ from msg_conventions.changepoints import (
 from msg_conventions.diagnostics import Level
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
+from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import encounters_of, LogConfig, RawLog
 from scenario_gen.method.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
 from scenario_gen.ros.plumbing.live import LiveConfig, LiveStreams
+from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.types import Sample
 
@@ -53,7 +53,7 @@ class Segmenter(StageNode):
         self._tracks: bytes | None = None
         self._live: LiveStreams | None = None
         self._encounters = 0
-        self.serve(Trigger, "~/segment", self._segment_again)
+        offer_trigger(self, "~/segment", self._segment_again)
 
     def started(self) -> None:
         """Look for streams."""
@@ -105,12 +105,10 @@ class Segmenter(StageNode):
 
         self.work(f"encounter {self._encounters}", job)
 
-    def _segment_again(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _segment_again(self) -> str:
         if self._live is not None and self._live.end():
-            response.success, response.message = True, "started with what the streams have brought so far"
-        elif self.active and self._tracks is not None:
-            self.received("tracks", self._tracks)
-            response.success, response.message = True, "started"
-        else:
-            response.message = "no tracks yet, or the node is not active"
-        return response
+            return "started with what the streams have brought so far"
+        if self._tracks is None or not self.active:
+            raise InputError("no tracks yet, or the node is not active")
+        self.received("tracks", self._tracks)
+        return "started"

@@ -12,7 +12,6 @@ later, so that an answer to the last state of a drive is not taken for one to th
 Topics, frames and units: msg_conventions/driving.py. What is wrong with the ego stands on /diagnostics and in the verdict.
 """
 
-from collections.abc import Callable
 from functools import partial
 import json
 import math
@@ -49,6 +48,7 @@ from scenario_gen.ros.plumbing.driving import (
 )
 from scenario_gen.ros.plumbing.node_parameters import TrafficParameters as Config
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
+from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.topics import create_frames_publisher, create_publisher, create_subscription, publish
 from scenario_gen.types import tokens
 
@@ -83,13 +83,13 @@ class Traffic(Node):  # type: ignore[misc]
         self._arriving = ArrivingTrials()
         self._verdict = ""
         self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
-        self._out["/tf"] = create_frames_publisher(self, "/tf")
+        self._out["/tf"] = create_frames_publisher(self)
         self._autoware: tuple[str, ...] = ()
         for topic in INPUTS:
             create_subscription(self, topic, lambda data, topic=topic: self._receive_command(topic, data))
         pause, resume = partial(self._pause, paused=True), partial(self._pause, paused=False)
         for name, action in (("next", self._next), ("reset", self._reset), ("pause", pause), ("resume", resume)):
-            self.create_service(Trigger, f"~/{name}", lambda _, response, action=action: self._answer(action, response))
+            offer_trigger(self, f"~/{name}", action)
         self.create_service(Trigger, "~/step", self._serve_step)
 
     @property
@@ -293,14 +293,6 @@ class Traffic(Node):  # type: ignore[misc]
         return f"scenario {self._trials[self._at].name} is over: {self._verdict}; {after}"
 
     # --- services ---------------------------------------------------------------------------------------------
-
-    def _answer(self, action: Callable[[], str], response: Trigger.Response) -> Trigger.Response:
-        try:
-            response.message = action()
-            response.success = True
-        except ScenarioGenError as error:
-            response.message = str(error)
-        return response
 
     def _next(self) -> str:
         if self._at + 1 >= len(self._trials):

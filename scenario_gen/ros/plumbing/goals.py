@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 
 from msg_conventions.scenario_info import REFUSED
 from scenario_gen.ros.plumbing.sampling_requests import Code, OpenRequest, OpenRequests, Outcome
-from scenario_gen.ros.plumbing.stage_node import REQUESTS
+from scenario_gen.ros.plumbing.services import REQUESTS
 
 NAME = "~/generate_scenarios"
 PERIOD = 0.1  # seconds between two feedbacks

@@ -39,7 +39,7 @@ from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.ros.plumbing.node_parameters import SamplerParameters
 from scenario_gen.ros.plumbing.ros_parameters import values_of_call
-from scenario_gen.ros.plumbing.stage_node import REQUESTS
+from scenario_gen.ros.plumbing.services import offer_trigger, REQUESTS
 from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Request, Scenario
 
 SHOWN = 20  # waiting requests that are named
@@ -127,8 +127,8 @@ class OpenRequests:
         self._timer = node.create_timer(LOOK, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         node.create_service(SetParametersAtomically, "~/generate", self._generate, qos_profile=REQUESTS)
         node.create_service(Trigger, "~/wait_until_ready", self._wait_until_ready, qos_profile=REQUESTS)
-        node.serve(SetParametersAtomically, "~/cancel_request", self._cancel_request)
-        node.serve(Trigger, "~/cancel", self._cancel_all)
+        node.create_service(SetParametersAtomically, "~/cancel_request", self._cancel_request, qos_profile=REQUESTS)
+        offer_trigger(node, "~/cancel", self._cancel_all)
 
     def add(self, given: str = "", job: str = "", n_requested: int = 0) -> OpenRequest:
         """Open a request; without a name of its own, or a job's, it has the next number.
@@ -319,10 +319,10 @@ class OpenRequests:
             response.result.reason = str(error)
         return response
 
-    def _cancel_all(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        names = self._node.cancel()
-        response.success, response.message = bool(names), f"cancelled: {', '.join(names)}" if names else "nothing is running"
-        return response
+    def _cancel_all(self) -> str:
+        if names := self._node.cancel():
+            return f"cancelled: {', '.join(names)}"
+        raise InputError("nothing is running")
 
 
 def _named(parameters: Sequence[Any]) -> tuple[list[Any], str]:

@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
 from msg_conventions import trajectory
@@ -166,7 +165,6 @@ class Inputs:
         }
 
 
-REQUESTS = QoSProfile(depth=1000)  # ROS's own 10 would drop the oldest of many requests that come at once
 Result = TypeVar("Result")
 
 
@@ -237,19 +235,6 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self.destroy_subscription(self._listening.pop(topic))
             self._latched.pop(topic, None)
             self.diagnostics.resolve(topic)
-
-    def serve(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
-        """Offer a service; whatever goes wrong in it, the caller gets an answer and the node lives on."""
-
-        def guarded(request: Any, response: Any) -> Any:
-            try:
-                return callback(request, response)
-            except Exception as error:
-                self.diagnostics.failed(name, error)
-                self.diagnostics.resolve(name)
-                return response
-
-        self.create_service(kind, name, guarded, qos_profile=REQUESTS)
 
     def work(self, name: str, job: Job) -> None:
         """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""

@@ -29,7 +29,7 @@ from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.types import Quality
 
 OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
-OWN_QUALITY = ("/diagnostics", "/tf", "/tf_static")  # as others expect them
+OWN_QUALITY = ("/diagnostics", "/tf")  # as others expect them
 SHARED = ("/diagnostics", "/rosout", "/parameter_events", "/tf", "/tf_static", "/clock", "/footprint", "/transition_event")
 """How the names of topics end that many nodes publish."""
 DEPTH = 1000  # messages that a subscription holds at least
@@ -88,12 +88,12 @@ def create_publisher(node: Node, topic: str, name: str = "") -> Any:
     return node.create_publisher(message_class(kind), name or topic, qos(quality), qos_overriding_options=options)
 
 
-def create_frames_publisher(node: Node, topic: str) -> Any:
-    """Return a publisher of /tf or /tf_static; None, which is said once, where tf2_msgs is not installed."""
+def create_frames_publisher(node: Node) -> Any:
+    """Return a publisher of /tf; None, which is said once, where tf2_msgs is not installed."""
     try:
-        return create_publisher(node, topic)
+        return create_publisher(node, "/tf")
     except InputError as error:
-        node.get_logger().warning(f"no frames are published on {topic}: {error}", once=True)
+        node.get_logger().warning(f"no frames are published on /tf: {error}", once=True)
         return None
 
 

@@ -282,7 +282,7 @@ def test_a_saved_result_is_loaded_with_the_same_scenarios(run, tmp_path):
 def test_what_holds_no_result_cannot_be_loaded(run, tmp_path):
     folder = write_recording(tmp_path / "bag", {"/case_1": run, "/case_2": run})
     assert len(load(str(folder), "/case_2")) == 5
-    with pytest.raises(InputError, match="choose one of '/case_1', '/case_2'"):
+    with pytest.raises(InputError, match="choose one: namespace='/case_1' or '/case_2'"):
         load(folder)
     with pytest.raises(InputError, match="no namespace has any"):
         load(bundled("a"))

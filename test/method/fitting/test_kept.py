@@ -33,7 +33,7 @@ def apart(encounter, metres):
     """The template in its own frame, its second vehicle moved east by so much."""
     first, second = clean_tracks(encounter)
     moved = replace(second, curve=Curve(second.curve.points + np.array([metres, 0.0, 0.0])))
-    return Placement((first, moved), np.ones(2), ("own path", "own path"), np.zeros(2), ())
+    return Placement((first, moved), np.ones(2), np.zeros(2), ())
 
 
 @pytest.fixture
@@ -121,7 +121,7 @@ def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
     encounter = lane_encounter(speed, speed)
     first, second = clean_tracks(encounter)
     beside = replace(second, curve=Curve(second.curve.points + np.array([0.0, 8.0, 0.0])))
-    place(Placement((first, beside), np.ones(2), ("own path", "own path"), np.zeros(2), ()))
+    place(Placement((first, beside), np.ones(2), np.zeros(2), ()))
     with pytest.raises(LostEncounterError, match=r"drive in one lane .* fitting\.allow=lost_following takes it"):
         fit_template(encounter, segment(encounter), OPEN)
     taken = fit_template(encounter, segment(encounter), OPEN, FittingConfig(allow="lost_following, lost_merge"))

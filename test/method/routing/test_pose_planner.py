@@ -9,13 +9,12 @@ import numpy as np
 from oracle import drivable_area, footprints
 import pytest
 import shapely
-from shapely.geometry import LineString, Point
 
 from benchmarks._planning_maps import road_of
 from benchmarks._planning_obstructed import obstructed
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing import plan, plan_routes, PlanningConfig
-from scenario_gen.method.routing.distance import distances_to_line, farthest
+from scenario_gen.method.routing.distance import farthest
 from scenario_gen.method.routing.search.dubins import Pose, shortest_curve
 from scenario_gen.method.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError
 from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, PoseSearchConfig, Wishes
@@ -23,13 +22,12 @@ from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import BoundaryStates
 
 CAR = (4.8, 1.9)
 LIMIT = 0.225
-metre = st.floats(-50, 50).map(lambda value: round(value, 9))  # squares of less than 1e-162 are 0: shapely has such a line at inf
-point = st.tuples(metre, metre)
 pose = st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-7, 7))
 
 
@@ -176,17 +174,10 @@ def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
     case = obstructed(113)
     ends = (case.query.start, case.query.goal)
     route = route_on(case.road, *ends)
-    assert np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max() <= PlanningConfig().max_curvature
+    assert np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max() <= Dynamics().planned.max_curvature
     monkeypatch.setattr(plan, "TIGHTEST", plan.TIGHTEST[:1])
     with pytest.raises(RefusedError, match="its curvature reaches"):
         route_on(case.road, *ends)
-
-
-@given(st.lists(point, min_size=1, max_size=6), st.lists(point, min_size=2, max_size=6))
-def test_distances_to_a_line_are_those_of_shapely(points, line):
-    found = distances_to_line(np.array(points), np.array(line))
-    assert found == pytest.approx([LineString(line).distance(Point(each)) for each in points], abs=1e-6)
-    assert distances_to_line(np.zeros((1, 2)), np.array([(0.0, 0.0), (0.0, 5.9e-246)])) == 0.0
 
 
 def test_what_is_far_from_the_fit_is_said():

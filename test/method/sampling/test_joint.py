@@ -131,7 +131,7 @@ def test_who_gives_way_is_slow_when_the_other_one_passes():
 def test_a_scenario_comes_again_by_its_index(case):
     _, _, made, _ = case
     for scenario in made.generated.scenarios[3:6]:
-        plan = plan_of(made, CONFIG.sampling, Request())
+        plan = plan_of(made, CONFIG.sampling, CONFIG.limits, Request())
         again = regenerate(plan, CONFIG.sampling, seed=1, index=scenario.index)
         np.testing.assert_allclose(again.position, scenario.position, atol=1e-9)
         np.testing.assert_allclose(again.speed, scenario.speed, atol=1e-9)

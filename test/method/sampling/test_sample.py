@@ -19,6 +19,7 @@ from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import wrap_angle
 from scenario_gen.template.interaction import find_waits, Wait
 from scenario_gen.types.road import Road
+from scenario_gen.types.road_users import Dynamics, TypeLimits
 from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation
 
 PLAIN = SamplingConfig(variety="narrow", bend_acceleration=5.0)
@@ -265,14 +266,14 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
 
 def test_stretched_clock_is_said():
     encounter, segmentation, road, routes, asked, waits = scene()
-    slow = SamplingConfig(variety="narrow", max_speed=6.0)
-    done = prepare(Plan(encounter, segmentation, road, routes, asked, waits), slow)
+    plan = Plan(encounter, segmentation, road, routes, asked, waits, TypeLimits(car=Dynamics(max_speed=6.75)))
+    done = prepare(plan, PLAIN)
     assert done.model is not None
     assert any("stretched" in sentence for sentence in done.adaptations)
-    slowest = SamplingConfig(variety="narrow", max_speed=3.0)
-    impossible = draw_scenarios(Plan(encounter, segmentation, road, routes, asked, waits), all_valid, slowest, count=5)
+    slowest = replace(plan, limits=TypeLimits(car=Dynamics(max_speed=3.375)))
+    impossible = draw_scenarios(slowest, all_valid, PLAIN, count=5)
     assert impossible.refused[Cause.SPEED_PROFILE] == 1
-    assert "cannot drive" in impossible.adaptations[0]
+    assert "cannot drive" in impossible.adaptations[0] and "more of limits.car.max_speed would do" in impossible.adaptations[0]
 
 
 def test_routes_that_do_not_suit():

@@ -8,17 +8,11 @@ import numpy as np
 from scenario_gen.method.validity import Limits
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
+from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import Scenario
 
-FREE = Limits(
-    max_acceleration=1e6,
-    max_deceleration=1e6,
-    max_lateral_acceleration=1e6,
-    max_curvature=1e6,
-    slip=1e6,
-    acceleration_tolerance=1e6,
-    max_speed=1e6,
-)
+_UNLIMITED = Dynamics(1e6, 1e6, 1e6, 1e6, 1e6)
+FREE = Limits(car=_UNLIMITED, truck=_UNLIMITED, slip=1e6, acceleration_tolerance=1e6)
 
 
 def road_of(drivable, resolution=0.2, origin=(0.0, 0.0)):

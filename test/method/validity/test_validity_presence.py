@@ -5,14 +5,13 @@
 
 from dataclasses import replace
 from itertools import combinations
-import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lengths import LONG
 from motions import FREE, open_road, scenario_of, straight, wander
 import numpy as np
-from oracle import boxes_beyond, oracle_violations
+from oracle import boxes_beyond, overlapping
 import pytest
 import shapely
 
@@ -20,6 +19,7 @@ from scenario_gen.method.validity import Checker, checker
 from scenario_gen.template.interaction import Wait
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.lanes import Lane, LaneNetwork
+from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario
 
 TIME = np.arange(101) * 0.1
@@ -106,18 +106,13 @@ def compare(seed, group=0):
     scenario, limits = random_case(seed, group)
     _, verdict = causes(scenario, road=None, limits=limits)
     refused = {violation.vehicles: violation for violation in verdict.violations if violation.cause is Cause.OVERLAP}
-    pairs = {tuple(map(int, re.findall(r"\d+", found.split(" at ")[0]))) for found in overlaps(scenario, limits)}
-    assert pairs <= set(refused), "what the oracle finds is refused"
+    assert overlapping(scenario, limits, 0.02) <= set(refused), "what the oracle finds is refused"
     for pair, violation in refused.items():  # and what is refused is so, at the instant that is named
         boxes = [boxes_beyond(scenario, i, np.array([violation.time]))[0] for i in pair]
         assert shapely.distance(*boxes) < 0.02, violation
     first, last = scenario.present.T
     spans = {int(np.clip(min(last[[i, j]]) - max(first[[i, j]]) + 1, 0, 3)) for i, j in combinations(range(len(first)), 2)}
     return not refused, spans
-
-
-def overlaps(scenario, limits):
-    return [found for found in oracle_violations(scenario, None, None, None, None, limits, 0.02) if found.startswith("overlap")]
 
 
 def test_checker_and_oracle_agree_on_who_comes_and_goes():
@@ -137,13 +132,13 @@ def test_each_vehicle_is_checked_as_if_cut_out(seed):
     present = np.sort(np.array([rng.choice(101, 2, replace=False) for _ in range(3)]), axis=1)
     whole = scenario_of(tracks, TIME)
     road = open_road(60.0)
-    found, _ = causes(replace(whole, present=present), road=road, limits=replace(FREE, max_speed=12.0))
+    found, _ = causes(replace(whole, present=present), road=road, limits=replace(FREE, car=Dynamics(12.0, 1e6, 1e6, 1e6, 1e6)))
     expected = []
     for row, (first, last) in enumerate(present):
         own = slice(first, last + 1)
         values = (getattr(whole, name)[[row], own] for name in ("position", "heading", "speed", "acceleration"))
         part = Scenario((whole.vehicles[row],), TIME[own] - TIME[first], *values)
-        expected += causes(part, road=road, limits=replace(FREE, max_speed=12.0))[0]
+        expected += causes(part, road=road, limits=replace(FREE, car=Dynamics(12.0, 1e6, 1e6, 1e6, 1e6)))[0]
     assert sorted(cause for cause in found if cause != Cause.OVERLAP) == sorted(expected)
 
 

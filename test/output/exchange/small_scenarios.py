@@ -5,6 +5,7 @@
 
 import numpy as np
 
+from scenario_gen.logs import LogConfig, read_raw
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import Scenario
 
@@ -24,6 +25,11 @@ def moving(rows, *, vehicles=None, step=0.1, count=61, present=None, index=0):
     names = vehicles or [Vehicle(str(n + 1), 4.8 - 0.3 * n, 1.9 - 0.05 * n) for n in range(len(rows))]
     more = {} if present is None else {"present": np.array(present)}
     return Scenario(tuple(names), t, place, heading, speed, np.repeat(rows[:, 4:5], count, axis=1), index=index, **more)
+
+
+def observed(path):
+    """What is read of a file of others: the raw log."""
+    return read_raw([path], LogConfig())
 
 
 def crossing(present=None, index=0):

@@ -8,14 +8,13 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from small_scenarios import crossing, moving, one_vehicle
+from small_scenarios import crossing, moving, observed, one_vehicle
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import derived_lanes
-from scenario_gen.output.exchange.importing import read_scenario_file
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.motion import at_times
 from scenario_gen.roads import read_network
@@ -99,9 +98,9 @@ def test_uneven_steps_are_resampled_and_that_is_said(tmp_path):
     uneven = at_times(fine, np.concatenate([np.linspace(0.0, 3.0, 31), np.linspace(3.08, 5.96, 37)]))
     path, _, notes = written(tmp_path, uneven)
     assert "resampled at 0.1 s" in notes[0] and "0.060 s are left out" in notes[0]
-    tracks = read_scenario_file(path).tracks
+    tracks = observed(path).vehicles
     for n, track in enumerate(tracks):
-        assert np.abs(track.rows[:, 1:3] - fine.position[n, : len(track.rows)]).max() < 1e-3
+        assert np.abs(track.fix - fine.position[n, : len(track.fix)]).max() < 1e-3
 
 
 def test_who_arrives_late_is_refused_by_name(tmp_path):
@@ -113,9 +112,9 @@ def test_who_arrives_late_is_written_where_that_is_asked_for(tmp_path):
     scenario = crossing(present=[[0, 60], [8, 51]])
     path, _, notes = written(tmp_path, scenario, export=ExportConfig(late="written"))
     assert "vehicle 2 arrives late" in notes[0]
-    track = read_scenario_file(path).tracks[1]
-    assert np.allclose(track.rows[:, 0], scenario.time[8:52], atol=1e-9)
-    assert np.abs(track.rows[:, 1:3] - scenario.position[1, 8:52]).max() < 1e-6
+    track = observed(path).vehicles[1]
+    assert np.allclose(track.fix_ns * 1e-9, scenario.time[8:52], atol=1e-9)
+    assert np.abs(track.fix - scenario.position[1, 8:52]).max() < 1e-6
 
 
 @pytest.mark.parametrize("late", ["refused", "written"])

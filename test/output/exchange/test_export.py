@@ -11,6 +11,7 @@ import numpy as np
 import pyproj
 import pytest
 from rosbags.rosbag2 import Reader
+from small_scenarios import observed
 from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.read import read_recording
@@ -22,7 +23,6 @@ from scenario_gen.logs.geodesy import geodetic
 from scenario_gen.output.exchange.cases import read_cases
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.export import export_bag, EXPORTS, MANIFEST
-from scenario_gen.output.exchange.importing import import_file
 from scenario_gen.pipeline import generate
 
 
@@ -79,14 +79,14 @@ def test_round_trips_close(small_bag, tmp_path):
         out = tmp_path / target
         export_bag(small_bag, out, target)
         manifest = json.loads((out / MANIFEST).read_text())
-        for k, entry in enumerate(manifest["scenarios"]):
-            table = tmp_path / f"{target}{k}.csv"
-            tracks = import_file(out / entry["files"][0], table).tracks
+        for entry in manifest["scenarios"]:
+            path = out / entry["files"][0]
+            tracks = observed(path).vehicles
             scenario = scenarios[entry["namespace"], entry["index"]].others
             for n, track in enumerate(tracks):
-                assert np.abs(track.rows[:, 1:3] - scenario.position[n]).max() < 1e-3
-                assert np.abs(track.rows[:, 3] - scenario.speed[n]).max() < 1e-2
-        (encounter,) = read_log(table).encounters  # a log like any other
+                assert np.abs(track.fix - scenario.position[n]).max() < 1e-3
+                assert np.abs(track.speed - scenario.speed[n]).max() < 1e-2
+        (encounter,) = read_log(path).encounters  # a log like any other
         assert len(encounter.vehicles) == 2
 
 
@@ -159,7 +159,7 @@ def test_a_map_in_degrees_is_driven_in_the_frame_in_which_others_load_it(geograp
     made = export_bag(bag, tmp_path / "out", "openscenario", config)
     assert ("positions in " in made.notes[0]) == (projection != "local" or bool(origin))
     (one, *_), (entry, *_) = read_cases(bag)[0].scenarios, json.loads((tmp_path / "out" / MANIFEST).read_text())["scenarios"]
-    tracks = import_file(tmp_path / "out" / entry["files"][0], tmp_path / "log.csv").tracks
+    tracks = observed(tmp_path / "out" / entry["files"][0]).vehicles
     utm = pyproj.Transformer.from_crs(4326, 32632)
     near = pyproj.Transformer.from_crs(4326, f"+proj=aeqd +lat_0={origin[:2]} +lon_0={origin[3:]}" if origin else 32632)
     for n, track in enumerate(tracks):
@@ -169,9 +169,9 @@ def test_a_map_in_degrees_is_driven_in_the_frame_in_which_others_load_it(geograp
             zero = utm.transform(60.0, 5.0) if projection == "utm" else (0.0, 0.0)
         if projection == "local" and not origin:
             wanted = one.others.position[n]
-        assert np.abs(track.rows[:, 1:3] - (wanted - zero)).max() < 1e-3
+        assert np.abs(track.fix - (wanted - zero)).max() < 1e-3
         step = np.gradient(wanted, axis=0)
-        assert np.abs(np.sin(track.rows[:, 4] - np.arctan2(step[:, 1], step[:, 0])))[1:-1].max() < 5e-3
+        assert np.abs(np.sin(track.heading - np.arctan2(step[:, 1], step[:, 0])))[1:-1].max() < 5e-3
 
 
 def test_autoware_gets_the_frame_of_the_map_without_being_given_it(geographic_town, tmp_path):

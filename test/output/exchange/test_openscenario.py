@@ -8,12 +8,11 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from small_scenarios import crossing, one_vehicle
+from small_scenarios import crossing, observed, one_vehicle
 from test_commonroad import case_of
 
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import lane_map_of
-from scenario_gen.output.exchange.importing import read_scenario_file
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
@@ -88,19 +87,19 @@ def test_the_ego_is_placed_and_has_a_goal_but_no_trajectory():
     assert np.allclose([float(goal["x"]), float(goal["y"])], end, atol=1e-8)
 
 
-def test_what_was_written_is_read_back_and_others_speeds_are_derived(tmp_path):
+def test_what_was_written_is_read_back_and_others_have_no_speeds(tmp_path):
     scenario = crossing(present=[[0, 60], [9, 44]])
     data, _ = written(scenario, one_vehicle())
-    for remove, most in ((b"", 1e-6), (b"speed_mps", 1e-2)):
-        path = tmp_path / f"one{len(remove)}.xosc"
-        path.write_bytes(data.replace(remove, b"theirs") if remove else data)
-        made = read_scenario_file(path)
+    for ours in (True, False):
+        path = tmp_path / f"one{ours}.xosc"
+        path.write_bytes(data if ours else data.replace(b"speed_mps", b"theirs"))
+        made = observed(path)
         assert "Ego left out: it follows no trajectory" in made.notes
-        for n, track in enumerate(made.tracks):
+        for n, track in enumerate(made.vehicles):
             there = slice(int(scenario.present[n, 0]), int(scenario.present[n, 1]) + 1)
-            assert np.allclose(track.rows[:, 0], scenario.time[there], atol=1e-9)
-            assert np.abs(track.rows[:, 1:3] - scenario.position[n, there]).max() < 1e-6
-            assert np.abs(track.rows[:, 3] - scenario.speed[n, there])[1:].max() < most
+            assert np.allclose(track.fix_ns * 1e-9, scenario.time[there], atol=1e-9)
+            assert np.abs(track.fix - scenario.position[n, there]).max() < 1e-6
+            assert np.allclose(track.speed, scenario.speed[n, there] if ours else [], atol=1e-6)
 
 
 THEIRS = {  # what others write in place of what we write, and by how many seconds it is later
@@ -123,11 +122,11 @@ def test_what_others_write_is_read_as_it_is_meant(tmp_path, kind):
     data = data.replace(b"<ParameterDeclarations", b"<ParameterDeclarations>" + names + b"</ParameterDeclarations><Gone", 1)
     path = tmp_path / "one.xosc"
     path.write_bytes(data.replace(ours, theirs).replace(b"speed_mps", b"theirs").replace(b"AbsoluteTargetSpeed", b"Gone"))
-    made = read_scenario_file(path)
-    for n, track in enumerate(made.tracks):
-        assert np.allclose(track.rows[:, 0], scenario.time + later, atol=1e-9)
-        assert np.abs(track.rows[:, 1:3] - scenario.position[n]).max() < (0.2 if kind == "no heading" else 1e-6)
-    assert len(made.tracks) == 2 and (kind == "no time reference") == any(
+    made = observed(path)
+    for n, track in enumerate(made.vehicles):
+        assert np.allclose(track.fix_ns * 1e-9, scenario.time + later, atol=1e-9)
+        assert np.abs(track.fix - scenario.position[n]).max() < (0.2 if kind == "no heading" else 1e-6)
+    assert len(made.vehicles) == 2 and (kind == "no time reference") == any(
         "without a time reference" in note for note in made.notes
     )
 
@@ -136,8 +135,9 @@ def test_without_times_a_first_speed_is_kept(tmp_path):
     data, _ = written(crossing())
     path = tmp_path / "one.xosc"
     path.write_bytes(re.sub(rb' time="[^"]*"', b"", data.replace(b"<Timing", b"<None").replace(b"speed_mps", b"theirs")))
-    for track, speed in zip(read_scenario_file(path).tracks, (9.0, 6.0), strict=True):
-        assert np.allclose(track.rows[:, 3], speed, rtol=0.02)
+    for track, speed in zip(observed(path).vehicles, (9.0, 6.0), strict=True):
+        driven = np.hypot(*np.diff(track.fix, axis=0).T)
+        assert np.allclose(driven / np.diff(track.fix_ns * 1e-9), speed, rtol=0.02)
 
 
 def test_vehicles_may_stand_in_a_catalog(tmp_path):
@@ -156,11 +156,11 @@ def test_vehicles_may_stand_in_a_catalog(tmp_path):
     folder = b'<CatalogLocations><VehicleCatalog><Directory path="catalogs"/></VehicleCatalog></CatalogLocations><Gone'
     text = (data[: first[0]] + reference + data[first[1] :]).replace(b"<CatalogLocations", folder, 1)
     (tmp_path / "one.xosc").write_bytes(text)
-    assert [track.length for track in read_scenario_file(tmp_path / "one.xosc").tracks] == [5.2, 4.5]
+    assert [track.length for track in observed(tmp_path / "one.xosc").vehicles] == [5.2, 4.5]
     text = text.replace(b'vehicleCategory="car"', b'vehicleCategory="bicycle"')
     (tmp_path / "one.xosc").write_bytes(text)
-    made = read_scenario_file(tmp_path / "one.xosc")
-    assert len(made.tracks) == 1 and "vehicle_2 left out: it is a bicycle" in made.notes
+    made = observed(tmp_path / "one.xosc")
+    assert sorted(seen.kind for seen in made.vehicles) == ["bicycle", "car"]
 
 
 def along(geometry, s):

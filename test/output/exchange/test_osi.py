@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_scenarios import observed
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.output.exchange.cases import read_cases
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.export import export_bag
-from scenario_gen.output.exchange.importing import import_file, read_scenario_file
 
 betterosi = pytest.importorskip("betterosi")
 
@@ -68,17 +68,14 @@ def test_the_host_is_the_ego_or_else_the_first_vehicle(small_bag, exported, tmp_
         assert {message.host_vehicle_id.value for message in messages(path)} == {2}
 
 
-def test_what_is_exported_is_read_back_and_as_a_log(small_bag, exported, tmp_path):
+def test_what_is_exported_is_read_back(small_bag, exported):
     for name, scenario in scenarios(small_bag):
-        found = {track.vehicle: track for track in read_scenario_file(exported / name).tracks}
+        found = {track.id: track for track in observed(exported / name).vehicles}
         assert set(found) == {vehicle.id for vehicle in scenario.vehicles}
         for n, vehicle in enumerate(scenario.vehicles):
-            rows = found[vehicle.id].rows
-            assert np.allclose(rows[:, 1:3], scenario.position[n, scenario.there[n]], atol=1e-6)
-            assert np.allclose(rows[:, 3], scenario.speed[n, scenario.there[n]], atol=1e-6)
-    name, _ = next(scenarios(small_bag))
-    import_file(exported / name, tmp_path / "log.csv")
-    assert (tmp_path / "log.csv").read_text().startswith("vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m\n1,0,")
+            track = found[vehicle.id]
+            assert np.allclose(track.fix, scenario.position[n, scenario.there[n]], atol=1e-6)
+            assert np.allclose(track.speed, scenario.speed[n, scenario.there[n]], atol=1e-6)
 
 
 def test_ids_that_are_no_numbers_are_counted_and_that_is_said(small_bag, tmp_path):
@@ -96,4 +93,4 @@ def test_a_trace_that_is_cut_off_is_refused_by_name(exported, tmp_path, cut):
     whole = next(exported.glob("*.mcap")).read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[:cut])
     with pytest.raises(InputError, match=r"cut\.mcap"):
-        read_scenario_file(tmp_path / "cut.mcap")
+        observed(tmp_path / "cut.mcap")

@@ -34,6 +34,7 @@ from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.review.evaluation import bag_results
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
+from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import Cause, ScenarioSet
 
 QUICK = EvaluationConfig(resamples=50)
@@ -94,10 +95,10 @@ def only(bag, folder, topics):
 
 def test_a_bag_becomes_a_page_with_all_its_scenarios_valid_or_not(tmp_path):
     bag = write_recording(tmp_path / "run", report_case(5))
-    (case,) = bag_results(bag, QUICK, Limits(max_speed=9.0))
+    (case,) = bag_results(bag, QUICK, Limits(car=Dynamics(max_speed=9.0)))
     assert case.valid == 0 and case.published == 0 and len(case.generated.scenarios) == 5
     page = render(ReportInput([case]))
-    assert "<b>0</b> of 5 scenarios asked for" in page and ">0 / 5</td>" in page
+    assert "<b>0</b> of 5 scenarios requested" in page and ">0 / 5</td>" in page
     assert "the bag holds one set of scenarios" in page and "<h3>Without changepoints</h3>" not in page
     assert "<h3>Scenarios</h3>" in page
 

@@ -71,8 +71,8 @@ def relative_likelihood(log_density: Floats, out: Floats) -> float:
     return best
 
 
-@kernel(F2, F2, F1, I1, OUT2)
-def smooth(log_density: Floats, transition: Floats, initial: Floats, ends: Ints, out: Floats) -> float:
+@kernel(F2, F2, F1, I1, OUT2, OUT1)
+def smooth(log_density: Floats, transition: Floats, initial: Floats, ends: Ints, out: Floats, changed: Floats) -> float:
     """Fill out (T, K) with the posterior probability of each state; returns log p(samples) (Rabiner 1989, III-A and V-A, scaled).
 
     Args:
@@ -81,6 +81,7 @@ def smooth(log_density: Floats, transition: Floats, initial: Floats, ends: Ints,
         initial: (K,) of the first state of every sequence.
         ends: index one past the last sample of each sequence.
         out: output, rows sum to 1.
+        changed: (T,) output, probability that the state differs from that of the sample before; 0 where a sequence begins.
     """
     samples, states = log_density.shape
     likelihood, ahead, message = np.empty(states), np.empty(states), np.ones(states)
@@ -109,10 +110,16 @@ def smooth(log_density: Floats, transition: Floats, initial: Floats, ends: Ints,
             out[t, k] *= message[k]
             likelihood[k] *= message[k]
         scaled(out[t])
+        stays, whole = 0.0, 0.0
         for j in range(states):
             message[j] = 0.0
             for k in range(states):
                 message[j] += transition[j, k] * likelihood[k]
+            if t > 0:
+                stays += out[t - 1, j] * transition[j, j] * likelihood[j]
+                whole += out[t - 1, j] * message[j]
+        begins = t == 0 or (sequence > 0 and t == ends[sequence - 1])
+        changed[t] = 0.0 if begins else 1.0 - stays / whole
         scaled(message)
     return total
 

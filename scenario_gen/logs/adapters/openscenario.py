@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""OpenSCENARIO XML, 1.0 to 1.3: the vehicles that follow polylines of world positions.
+
+| quantity | element | unit |
+|---|---|---|
+| vehicle | Entities/ScenarioObject: attribute name | |
+| class | Vehicle: vehicleCategory; Pedestrian: pedestrianCategory; in our own files the name | |
+| length, width | BoundingBox/Dimensions | m |
+| time | Polyline/Vertex: time, by Timing: scale, offset; relative ones from when the event's trigger fires | s |
+| position | Vertex/Position/WorldPosition: x, y of the rear axle, from which BoundingBox/Center says where the middle is | m |
+| heading | WorldPosition: h, counter-clockwise from +x; that of the path where it is missing | rad |
+| speed | our own files' property `speed_mps` | m/s |
+
+Without a time reference the first speed of the vehicle, else the vertices' times, count.
+
+Source: ASAM OpenSCENARIO XML 1.2.
+"""
+
+from collections.abc import Iterator, Sequence
+import math
+from pathlib import Path
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.markup import Element, has_root, read_xml
+from scenario_gen.logs.adapters.openscenario_values import resolved
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.plane import edge_lengths, place
+from scenario_gen.types import VEHICLE_TYPES
+
+OPENSCENARIO_SPEEDS = "speed_mps"
+"""Name of a vehicle's property that holds its speed at each vertex, for which the format has no place."""
+_FOLLOWS = "PrivateAction/RoutingAction/FollowTrajectoryAction"
+
+
+def is_openscenario(path: Path) -> bool:
+    """Return whether a file is OpenSCENARIO by its name and beginning."""
+    return has_root(path, "OpenSCENARIO", ".xosc", ".xml")
+
+
+def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read the trajectories of one scenario.
+
+    Raises:
+        InputError: it is broken, or no vehicle follows a trajectory that can be read; names file and line.
+    """
+    if len(paths) != 1:
+        raise InputError(f"{paths[0]} and {len(paths) - 1} more: scenarios have clocks of their own; give one at a time")
+    path = paths[0]
+    check_size(str(path), path.stat().st_size, 0, config)
+    root = read_xml(path, str(path))
+    if root.tag != "OpenSCENARIO":
+        raise InputError(f"{root.place}: the root of an OpenSCENARIO file is <OpenSCENARIO>")
+    root = resolved(root, path)
+    notes = ["read as OpenSCENARIO"]
+    vehicles = _vehicles(root, notes)
+    check_vehicles(str(path), len(vehicles), config)
+    speeds = {
+        private.get("entityRef"): target.number("value")
+        for private in root.all("Storyboard/Init/Actions/Private")
+        for target in private.all("PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed")
+    }
+    seen: dict[str, Observations] = {}
+    rows = 0
+    for name, follow, start in _followers(root):
+        if name not in vehicles or name in seen:
+            continue
+        try:
+            seen[name] = _observations(follow, name, vehicles[name], start, (speeds.get(name, 0.0), rows))
+        except InputError as error:
+            notes.append(f"{name} left out: {error}")
+            del vehicles[name]
+            continue
+        rows += len(seen[name].fix)
+        check_size(str(path), 0, rows, config)
+        if follow.first("TimeReference", "Timing") is None:
+            notes.append(f"{name} follows its trajectory without a time reference: its first speed, or its vertices' times count")
+    notes += [f"{name} left out: it follows no trajectory" for name in vehicles if name not in seen]
+    if not seen:
+        raise InputError(f"{path}: no vehicle with a trajectory in it; {'; '.join(notes[1:])}")
+    return RawLog(path.stem, False, tuple(seen.values()), rows, (Segment(0, str(path), "vertex", 1),), tuple(notes))
+
+
+def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
+    """Return the vehicles by name; who is none that is read is noted."""
+    vehicles: dict[str, Element] = {}
+    for entity in root.all("Entities/ScenarioObject"):
+        name, vehicle = entity.get("name"), entity.first("Vehicle") or entity.first("Pedestrian")
+        if vehicle is None or vehicle.first("BoundingBox") is None:
+            notes.append(f"{name} left out: it is no road user with a bounding box in this file or its catalogs")
+        else:
+            vehicles[name] = vehicle
+    return vehicles
+
+
+def _category(entity: Element) -> str:
+    """Return what a file calls the type of a road user: its name where that is a type of the category, as in our own files."""
+    named = entity.attributes.get("name", "")
+    key = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory"}[entity.tag]
+    category = entity.attributes.get(key, entity.tag)
+    return named if named in VEHICLE_TYPES and VEHICLE_TYPES[named].openscenario == category else category
+
+
+def _followers(root: Element) -> Iterator[tuple[str, Element, float]]:
+    """Yield who follows a trajectory, the action, and the second at which it begins; 0 where that is no matter of time."""
+    for private in root.all("Storyboard/Init/Actions/Private"):
+        yield from ((private.get("entityRef"), follow, 0.0) for follow in private.all(_FOLLOWS))
+    for group in root.all("Storyboard/Story/Act/ManeuverGroup"):
+        for event in group.all("Maneuver/Event"):
+            conditions = event.all("StartTrigger/ConditionGroup/Condition/ByValueCondition/SimulationTimeCondition")
+            start = conditions[0].number("value") if conditions else 0.0
+            for follow in event.all(f"Action/{_FOLLOWS}"):
+                yield from ((actor.get("entityRef"), follow, start) for actor in group.all("Actors/EntityRef"))
+
+
+def _observations(follow: Element, name: str, vehicle: Element, start: float, given: tuple[float, int]) -> Observations:
+    """Return where a vehicle is that follows a trajectory.
+
+    Args:
+        follow: the action.
+        name: of the vehicle.
+        vehicle: with its bounding box.
+        start: seconds at which the action begins.
+        given: its first speed [m/s], 0 if it has none; the row of its first vertex.
+    """
+    trajectory = follow.first("TrajectoryRef", "Trajectory") or follow.one("Trajectory")  # before, in 1.0
+    rows = []
+    for vertex in trajectory.one("Shape/Polyline").all("Vertex"):
+        world = vertex.one("Position/WorldPosition")
+        rows.append((vertex.number("time", math.nan), world.number("x"), world.number("y"), world.number("h", math.nan)))
+    if len(rows) < 2:
+        raise InputError(f"{follow.place}: its polyline has {len(rows)} vertices; at least 2 are needed")
+    (time, x, y, heading), (speed, first) = np.array(rows).T, given
+    xy, timing = np.column_stack((x, y)), follow.first("TimeReference", "Timing")
+    if timing is not None:
+        from_start = start if timing.get("domainAbsoluteRelative") == "relative" else 0.0
+        time = time * timing.number("scale") + timing.number("offset") + from_start
+    elif speed > 0.0:
+        time = start + np.concatenate(([0.0], np.cumsum(edge_lengths(xy)))) / speed
+    if not np.isfinite(time).all():
+        raise InputError(f"{follow.place}: its vertices have no times, and the vehicle has no first speed")
+    step = np.gradient(xy, axis=0)
+    heading = np.where(np.isnan(heading), np.arctan2(step[:, 1], step[:, 0]), heading)
+    center, size = vehicle.one("BoundingBox/Center"), vehicle.one("BoundingBox/Dimensions")
+    middle = place(np.column_stack((xy, heading)), center.number("x"), center.number("y"))
+    speeds = _own_speeds(vehicle, len(rows))
+    states = np.column_stack((middle, heading, speeds if speeds is not None else np.zeros(len(rows))))
+    return Observations.of_rows(
+        name, np.round(time * 1e9).astype(np.int64), states, np.arange(first, first + len(rows)),
+        (size.number("length"), size.number("width")), kind=_category(vehicle), measured=speeds is not None,
+    )  # fmt: skip
+
+
+def _own_speeds(vehicle: Element, count: int) -> Floats | None:
+    """Return the speeds (K,) [m/s] that a file of ours has as a property; None if it has none, damaged ones or not so many."""
+    for own in vehicle.all("Properties/Property"):
+        if own.attributes.get("name") == OPENSCENARIO_SPEEDS:
+            try:
+                speeds = np.array(own.get("value").split(), dtype=np.float64)
+            except ValueError:
+                return None
+            return speeds if len(speeds) == count and np.isfinite(speeds).all() else None
+    return None
