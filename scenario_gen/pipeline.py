@@ -23,7 +23,7 @@ __all__ = ["PipelineConfig", "generate"]
 
 
 def generate(
-    encounter: Encounter,
+    encounter: Encounter | Sequence[Encounter],
     road: Road | str,
     config: PipelineConfig = PipelineConfig(),
     *,
@@ -31,13 +31,13 @@ def generate(
     seed: int = 0,
     request: Request = Request(),
     progress: Progress = lambda *_: None,
-    population: Sequence[Encounter] = (),
     select: Callable[[GenerationResult], GenerationResult] = lambda sampled: sampled,
 ) -> GenerationResult:
     """Segment, fit, plan, sample (every candidate is checked) and evaluate.
 
     Args:
-        encounter: the template.
+        encounter: the template. In a list others follow it, which say how encounters differ: `sampling.variety=population` keeps
+            what is usual among them.
         road: the target, of `build_road`, the name or path that this takes, or "auto": the first built-in road that suits. A
             template of right-hand traffic is mirrored on a map of left-hand traffic, and the other way round.
         config: the parameters of every stage; with `evaluation.compare` further sets are drawn to compare with.
@@ -45,7 +45,6 @@ def generate(
         seed: of all randomness.
         request: a vehicle to be left out for a planner under test, start and end states, a target, a choice, an order.
         progress: called with scenarios so far, scenarios wanted, candidates so far.
-        population: recorded encounters that say, with `sampling.variety=population`, how encounters differ; the template is one.
         select: leaves out some of the `count` valid scenarios before the set is evaluated.
 
     Raises:
@@ -53,18 +52,10 @@ def generate(
         RefusedError: the encounter is too large, the template does not fit the road, there is no way, what the request asks
             cannot be had, or no candidate is valid; the message says why.
     """
+    encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter
     if road == AUTO:
-        again = partial(
-            generate,
-            config=config,
-            count=count,
-            seed=seed,
-            request=request,
-            progress=progress,
-            population=population,
-            select=select,
-        )
-        return on_first_suitable_road(partial(again, encounter), encounter, config, seed)
+        again = partial(generate, config=config, count=count, seed=seed, request=request, progress=progress, select=select)
+        return on_first_suitable_road(partial(again, [encounter, *population]), encounter, config, seed)
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
     chain = Chain(encounter, segmentation, road, config, request, count, seed, population=population)
@@ -75,7 +66,7 @@ def generate(
         raise RefusedError(f"none of {sampled.generated.candidates} candidates is valid: {causes or 'none was drawn'}")
     result = select(sampled)
     if config.evaluation.compare:
-        result = with_references(result, config, request)
+        result = with_references(result, config, request, population)
     result = replace(result, oracle=replay(encounter, result.placed()[1], road.frame_id))
     coverage = coverage_of(encounter, result.generated.scenarios)
     return replace(result, evaluation=evaluate(result, config.evaluation), coverage=coverage)

@@ -199,9 +199,8 @@ def generate_all(
         try:
             if request.ego == EGO_AUTO:
                 own = with_ego_that_reacts(encounter, road, config, seed, request)
-            case = generate(
-                encounter, road, config, count=drawn, seed=seed, request=own, progress=report, population=population, **further
-            )
+            template = [encounter, *population]
+            case = generate(template, road, config, count=drawn, seed=seed, request=own, progress=report, **further)
         except RefusedError as error:
             if own.ego == EGO_AUTO:
                 refusals.append(f"{encounter.name} on {road}: {error}")

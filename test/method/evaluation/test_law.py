@@ -36,10 +36,7 @@ def encounters():
 @pytest.fixture(scope="module")
 def sets(encounters):
     """Of the first encounter: as recorded ones differ, and as by default."""
-    return [
-        generate(encounters[0], "corridor", config, count=40, seed=5, population=encounters)
-        for config in (POPULATION, PipelineConfig())
-    ]
+    return [generate(encounters, "corridor", config, count=40, seed=5) for config in (POPULATION, PipelineConfig())]
 
 
 def test_the_shipped_law_is_one_of_these_features_names_its_source_and_has_no_rows():
@@ -102,20 +99,20 @@ def test_scenarios_say_their_rarity_and_the_others_are_counted(sets):
 
 def test_the_same_seed_gives_the_same_and_an_index_one_alone(sets, encounters):
     made = sets[0]
-    again = generate(encounters[0], "corridor", POPULATION, count=5, seed=5, population=encounters)
+    again = generate(encounters, "corridor", POPULATION, count=5, seed=5)
     assert [one.index for one in again] == [one.index for one in made][:5]
-    alone = regenerate(plan_of(again, POPULATION.sampling, Request()), POPULATION.sampling, seed=5, index=again[4].index)
+    alone = regenerate(plan_of(again, POPULATION.sampling, POPULATION.limits, Request()), POPULATION.sampling, seed=5, index=again[4].index)
     np.testing.assert_allclose(alone.position, made[4].position, atol=1e-9)
 
 
 def test_an_unusual_template_keeps_its_least_rare_quarter_and_says_so(encounters):
     others = [replace(other, name=f"{n}", speed=0.1 * other.speed) for n, other in enumerate(4 * encounters)]
-    made = generate(encounters[0], "corridor", POPULATION, count=10, seed=5, population=others)
+    made = generate([encounters[0], *others], "corridor", POPULATION, count=10, seed=5)
     assert len(made) == 10 and any("unusual among recorded encounters" in note for note in made.generated.adaptations)
 
 
 def test_natural_scenarios_of_a_population_are_usual_too(sets, encounters):
-    plan, sampling = plan_of(sets[0], POPULATION.sampling, Request()), POPULATION.sampling
+    plan, sampling = plan_of(sets[0], POPULATION.sampling, POPULATION.limits, Request()), POPULATION.sampling
     measures = measures_in("population", encounters[0], encounters)
     check = checker_of(plan, sampling, POPULATION.limits, Request()).check
     natural, any_of_them = (NaturalScenarios.of(plan, check, sampling, 5, given) for given in (measures, None))
