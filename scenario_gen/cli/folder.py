@@ -168,6 +168,7 @@ def generate_all(
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
     config, count, seed, request = requested.config, requested.count, requested.seed, requested.request
+    population = [encounter for encounter, _ in pairs]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:
@@ -189,7 +190,8 @@ def generate_all(
             if requested.for_testing:
                 case = testing(own).run(count, report)
             else:
-                case = generate(encounter, road, config, count=count, seed=seed, request=own, progress=report)
+                template = [encounter, *population]
+                case = generate(template, road, config, count=count, seed=seed, request=own, progress=report)
         except RefusedError as error:
             named = replace(own, ego="") if own.ego == EGO_AUTO else own
             answer = answer_refusal(error, encounter, road, config, named, count, seed)
