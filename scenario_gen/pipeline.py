@@ -3,7 +3,7 @@
 
 """The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -23,7 +23,7 @@ __all__ = ["PipelineConfig", "generate"]
 
 
 def generate(
-    encounter: Encounter,
+    encounter: Encounter | Sequence[Encounter],
     road: Road | str,
     config: PipelineConfig = PipelineConfig(),
     *,
@@ -36,7 +36,8 @@ def generate(
     """Segment, fit, plan, sample (every candidate is checked) and evaluate.
 
     Args:
-        encounter: the template.
+        encounter: the template. In a list others follow it, which say how encounters differ: `sampling.variety=population` keeps
+            what is usual among them.
         road: the target, of `build_road`, the name or path that this takes, or "auto": the first built-in road that suits. A
             template of right-hand traffic is mirrored on a map of left-hand traffic, and the other way round.
         config: the parameters of every stage; with `evaluation.compare` further sets are drawn to compare with.
@@ -51,19 +52,20 @@ def generate(
         RefusedError: the encounter is too large, the template does not fit the road, there is no way, what the request asks
             cannot be had, or no candidate is valid; the message says why.
     """
+    encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter
     if road == AUTO:
         again = partial(generate, config=config, count=count, seed=seed, request=request, progress=progress, accepts=accepts)
-        return on_first_suitable_road(partial(again, encounter), encounter, config, seed)
+        return on_first_suitable_road(partial(again, [encounter, *population]), encounter, config, seed)
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
-    chain = Chain(encounter, segmentation, road, config, request, count, seed)
+    chain = Chain(encounter, segmentation, road, config, request, count, seed, population=population)
     planned = replace(chain.plan(), provenance=what_makes_it_again(config, request))
     result = chain.sample(planned, Callbacks(progress, accepts=partial(accepts, road)))
     if not result.generated.scenarios:
         causes = ", ".join(f"{count} × {cause}" for cause, count in causes_in_words(result.generated.refused))
         raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {causes or 'none was drawn'}")
     if config.evaluation.compare:
-        result = with_references(result, config, request)
+        result = with_references(result, config, request, population)
     result = replace(result, oracle=replay(encounter, result.placed()[1], road.frame_id))
     coverage = coverage_of(encounter, result.generated.scenarios)
     return replace(result, evaluation=evaluate(result, config.evaluation), coverage=coverage)

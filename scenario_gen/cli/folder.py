@@ -102,15 +102,7 @@ def generate_folder(
             for road in roads
         ]
         with progress() as advance:
-            cases, refusals = generate_all(
-                pairs,
-                requested.config,
-                count=requested.count,
-                seed=requested.seed,
-                request=requested.request,
-                advance=advance,
-                for_testing=requested.for_testing,
-            )
+            cases, refusals = generate_all(pairs, requested, advance)
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         unlooking: list[str] = []
@@ -172,16 +164,11 @@ def notes_of(readings: Sequence[LogResult]) -> list[str]:
 
 
 def generate_all(
-    pairs: Sequence[tuple[Encounter, str]],
-    config: PipelineConfig,
-    *,
-    count: int,
-    seed: int,
-    request: Request = Request(),
-    advance: Advance = lambda *_: None,
-    for_testing: bool = False,
+    pairs: Sequence[tuple[Encounter, str]], requested: FolderRequest, advance: Advance = lambda *_: None
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
+    config, count, seed, request = requested.config, requested.count, requested.seed, requested.request
+    population = [encounter for encounter, _ in pairs]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:
@@ -191,19 +178,20 @@ def generate_all(
         def report(done: int, total: int, _candidates: int, name: str = name) -> None:
             advance(name, done, total)
 
-        def testing(requested: Request, encounter: Encounter = encounter, road: str = road) -> "Testing":
+        def testing(wanted: Request, encounter: Encounter = encounter, road: str = road) -> "Testing":
             from scenario_gen.closed_loop.reacting import Testing
 
-            return Testing(encounter, road, config, requested, seed)
+            return Testing(encounter, road, config, wanted, seed)
 
         own = request
         try:
             if request.ego == EGO_AUTO:
                 own = replace(request, ego=testing(request).who_reacts_most())
-            if for_testing:
+            if requested.for_testing:
                 case = testing(own).run(count, report)
             else:
-                case = generate(encounter, road, config, count=count, seed=seed, request=own, progress=report)
+                template = [encounter, *population]
+                case = generate(template, road, config, count=count, seed=seed, request=own, progress=report)
         except RefusedError as error:
             named = replace(own, ego="") if own.ego == EGO_AUTO else own
             answer = answer_refusal(error, encounter, road, config, named, count, seed)
@@ -213,7 +201,7 @@ def generate_all(
         n_scenarios, refused = len(case.generated.scenarios), case.generated.refused
         if n_scenarios < count:
             causes = ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
-            causes = case.generated.adaptations[-1] if for_testing else causes
+            causes = case.generated.adaptations[-1] if requested.for_testing else causes
             refusals.append(f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}")
     return cases, refusals
 

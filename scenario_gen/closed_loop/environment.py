@@ -172,7 +172,8 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         others[: len(nearest)] = np.column_stack(facts)[nearest]
         own = np.array((ego.speed, ego.curvature, offset, angle, left))
         seen = np.concatenate([own, ahead.ravel(), others.ravel()]).astype(np.float32)
-        return np.minimum(np.maximum(seen, self.observation_space.low), self.observation_space.high)
+        within: Seen = np.minimum(np.maximum(seen, self.observation_space.low), self.observation_space.high)
+        return within
 
 
 def observation_space(config: ClosedLoopConfig) -> Box:

@@ -11,6 +11,7 @@ from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.dtw import dtw_distance, feature_matrix, mean_feature
 from scenario_gen.method.evaluation.evaluate import evaluate, evaluate_scenarios, MEASURED
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
+from scenario_gen.method.evaluation.law import measures_in
 from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.metrics import MetricGroup
 from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, Motion
@@ -26,7 +27,7 @@ __all__ = [
     "EvaluationConfig", "MetricGroup", "Motion", "Samples",
     "Template", "at_common", "at_count", "at_period", "clustered_wilson", "compare", "comparison_table", "coverage_of",
     "criticality", "dtw_distance", "evaluate", "evaluate_scenarios", "feature_matrix", "footprint_distance", "free_acceleration",
-    "mean_correlation", "mean_error", "mean_feature", "pair_similarities", "paired_difference",
+    "mean_correlation", "mean_error", "mean_feature", "measures_in", "pair_similarities", "paired_difference",
     "read_evaluations", "replay", "time_apart", "time_to_collision", "uniform_changepoints", "wanted_speeds", "wilson",
     "without_changepoints",
 ]  # fmt: skip

@@ -49,6 +49,7 @@ def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: Samp
 
     A vehicle that starts a seconds later or earlier, starts as far along its lane as it drives in that time.
     """
+    config = config.drawn
     if config.variety != "wide":
         return replace(requested, relaxed=np.zeros_like(requested.relaxed)) if requested.relaxed.any() else requested
     ego = request.ego_of(encounter)
