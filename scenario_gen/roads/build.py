@@ -157,11 +157,13 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     return draw(name, layout_for(name, tracks, config), config, tracks)
 
 
+CORRIDOR = "corridor"
+"""The road that is drawn around what was recorded."""
 BUILT_IN: dict[str, DrawRoad] = {
     **dict.fromkeys(("straight", "curve", "t_intersection", "four_way"), draw_main_road),
     "merge": draw_merge,
     "roundabout": draw_roundabout,
 }
 """The built-in roads that need no template, by name."""
-ROADS = Registry[DrawRoad]("scenario_gen.roads", {**BUILT_IN, "corridor": draw_corridor})
+ROADS = Registry[DrawRoad]("scenario_gen.roads", {**BUILT_IN, CORRIDOR: draw_corridor})
 """All roads that are drawn, by name."""
