@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.kept import find_losses, find_unused, refused_losses
+from scenario_gen.method.fitting.kept import find_losses, find_unused, find_walkers_on_lanes, refused_losses
 from scenario_gen.method.fitting.placement import check_scale, max_repair, Placement, SCALES, separated
 from scenario_gen.numerics import frozen
 from scenario_gen.numerics.curve import Curve
@@ -57,7 +57,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         lacks = len(refused_losses(lost, config.allow)), astray
         if best is None or lacks < best[0]:
             unused = find_unused(road, (k for course in match.courses for k in course.lanes))
-            best = lacks, replace(placement, unused=unused)
+            best = lacks, replace(placement, unused=(*unused, *find_walkers_on_lanes(road, tracks)))
         if not any(lacks):
             break
     if best is None:

@@ -37,6 +37,11 @@ class SamplingConfig(Parameters):
     sizes: str = parameter(
         "catalogue", "wide: sizes of cars, from the catalogue of eight or as recorded", choices=("catalogue", "recorded")
     )
+    ego: str = parameter(
+        "keep",
+        "wide: start and end states of the vehicle that is left out; `keep`: its template's, `free`: free as those of the others",
+        choices=("keep", "free"),
+    )
     reactions: str = parameter(
         "keep",
         "wide: `keep` lets followers and yielders of the template answer to those they react to, `none` lets nobody",

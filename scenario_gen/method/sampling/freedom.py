@@ -55,7 +55,7 @@ def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: Samp
     ego = request.ego_of(encounter)
     relaxed = np.zeros((len(encounter.vehicles), 2, 2))
     own = [np.asarray(np.isfinite(request.rows(end, encounter)).any(axis=1)) for end in ("starts", "goals")]
-    if ego is not None:
+    if ego is not None and config.ego == "keep":
         for rows in own:
             rows[ego] = True
     tied = [rows.any() for rows in own]

@@ -162,6 +162,7 @@ class _Loop:
         remaining = self.count
         if diverse:
             self.count, self.keep, self.publish = remaining * POOL_SHARE, 0, False
+        attempts *= self.usual.valid_each
         if self.aim is None:
             self.run(attempts * max(self.count, LEAST_COUNT if self.sampler.free else 1))
         else:
@@ -192,6 +193,11 @@ class _Loop:
         plain = replace(self.sampler, ego=None, label=lambda _: {}, weighted=False)
         for _, together in itertools.groupby(index, lambda number: number // BLOCK):
             yield from plain.redraw(list(together))
+
+    def _take(self, number: int, scenario: Scenario) -> None:
+        """Keep a valid candidate of all vehicles if it is accepted."""
+        if self.callbacks.accepts(scenario):
+            self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
 
     def _keep(self, number: int, scenario: Scenario) -> None:
         self.index.append(number)
@@ -249,7 +255,7 @@ class _Loop:
             elif not self.usual(scenario):
                 self.refused[Cause.UNUSUAL] += 1
             else:
-                self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+                self._take(number, scenario)
 
     def run(self, budget: int) -> None:
         """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
@@ -295,7 +301,7 @@ class _Loop:
                     good += 1
                     cause = None if self.usual(scenario) else Cause.UNUSUAL
                 if scenario is not None and cause is None:
-                    self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+                    self._take(number, scenario)
                 else:
                     self.refused[cause or Cause.SPEED_PROFILE] += 1
                     if scenario is not None and cause is not None and self.refused[cause] <= EXAMPLES:

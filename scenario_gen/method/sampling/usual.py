@@ -34,6 +34,11 @@ class Usual:
         """Whether it is."""
         return self.measures.rarity is None or self.measures.rarity(scenario) <= self.most
 
+    @property
+    def valid_each(self) -> int:
+        """Valid candidates of which one is kept, in the worst case."""
+        return 1 if self.measures.rarity is None else round(1.0 / LEAST_RARE)
+
     def notes(self) -> tuple[str, ...]:
         """Return what is to be said of the bound: nothing where what is kept is usual."""
         if self.measures.rarity is None or self.most <= 1.0:
