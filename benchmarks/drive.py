@@ -156,17 +156,20 @@ def dense(outcomes: list[Outcome]) -> tuple[int, int, int]:
 
 
 def seen_at(drive: Drive, looked_at: Sequence[int] | None = None, every: float = 1e-3) -> float | None:
-    """First instant [s], in some steps or in all, at which the ego's box overlaps another's, by plain numpy on the motion."""
+    """First instant [s] at which the ego's box overlaps another's, by plain numpy on the motion, in some steps or in all.
+
+    A jump is no motion: nobody is met on its way.
+    """
     motion, ego = drive.motion, drive.ego
     first = None
     for i in range(len(motion.vehicles)):
-        steps = np.flatnonzero(drive.here[i][:-1] & drive.here[i][1:])
+        steps = np.setdiff1d(np.flatnonzero(drive.here[i][:-1] & drive.here[i][1:]), np.subtract(drive.jumps, 1))
         if looked_at is not None:
             steps = np.intersect1d(steps, looked_at)
         if i == ego or not len(steps):
             continue
         near = np.hypot(*(motion.position[i] - motion.position[ego]).T)
-        moved = np.linalg.norm(np.diff(motion.position[[i, ego]], axis=1), axis=2).sum(axis=0)  # an ego may jump
+        moved = np.linalg.norm(np.diff(motion.position[[i, ego]], axis=1), axis=2).sum(axis=0)
         reach = 15.0 + moved + motion.speed[[i, ego]].max(axis=1).sum() * (motion.time[1] - motion.time[0])
         steps = steps[near[steps] < reach[steps]]
         if not len(steps):
