@@ -21,7 +21,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between
-from scenario_gen.roads import draw_route, footprint_fits, nearest_pose_with_room, road_and_template
+from scenario_gen.roads import CORRIDOR, draw_route, footprint_fits, nearest_pose_with_room, road_and_template
 from scenario_gen.types import Encounter, ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
 
 BISECTIONS = 7
@@ -125,7 +125,7 @@ def answer_refusal(
 
 def roads_that_keep(requested: Chain) -> list[str]:
     """Names of the built-in roads that the template fits with all its conflicts, two at most; else `corridor`, its own road."""
-    return list(islice(suitable_roads(requested.encounter, requested.segmentation, requested.config), _NAMED)) or ["corridor"]
+    return list(islice(suitable_roads(requested.encounter, requested.segmentation, requested.config), _NAMED)) or [CORRIDOR]
 
 
 class _Search:

@@ -7,22 +7,31 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 import logging
 import os
+from pathlib import Path
 import subprocess
 import sys
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from filelock import FileLock, Timeout
 
 from scenario_gen.numerics.kernel_cache import folder, is_lasting
 
-if TYPE_CHECKING:
-    from scenario_gen.numerics.kernels import Kernel
-
 WORKERS = max(1, min(4, os.cpu_count() or 1))
 POLL_S = 0.5
 ONLY = "--only"
 Progress = Callable[[int, int, float], None]  # kernels that are there, kernels that are needed, seconds
+
+
+class Compilable(Protocol):
+    """A kernel: what tells it from all others, the file that says that it is in the cache, and how long it takes, about."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def mark(self) -> Path: ...  # noqa: D102
+    @property
+    def size(self) -> int: ...  # noqa: D102
 
 
 _workers: list["subprocess.Popen[bytes]"] = []
@@ -42,7 +51,7 @@ def _log(done: int, needed: int, seconds: float) -> None:
         logging.getLogger("scenario_gen").warning("%s; this takes a minute or two", words(done, needed, seconds))
 
 
-def make_ready(needed: "Sequence[Kernel]", report: Progress = _log) -> int:
+def make_ready(needed: Sequence[Compilable], report: Progress = _log) -> int:
     """Compile what is not in the cache of the kernels that are needed; return their number.
 
     Of several processes one has them compiled; the others wait.
@@ -64,12 +73,12 @@ def make_ready(needed: "Sequence[Kernel]", report: Progress = _log) -> int:
     return len(needed)
 
 
-def _missing(kernels: "Sequence[Kernel]") -> "list[Kernel]":
+def _missing(kernels: Sequence[Compilable]) -> list[Compilable]:
     """Those that are not in the cache."""
     return [each for each in kernels if not each.mark.exists()]
 
 
-def _compile(absent: "Sequence[Kernel]", show: Callable[[], None]) -> None:
+def _compile(absent: Sequence[Compilable], show: Callable[[], None]) -> None:
     """Have kernels compiled by processes, each its share of them."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder().parent)}
     names = [each.name for each in sorted(absent, key=lambda each: each.size, reverse=True)]

@@ -4,7 +4,7 @@
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
 from scenario_gen.roads.along import lane_along, sharing_lanes
-from scenario_gen.roads.build import build_road, BUILT_IN, DrawRoad, road_and_template, ROADS
+from scenario_gen.roads.build import build_road, BUILT_IN, CORRIDOR, DrawRoad, road_and_template, ROADS
 from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.roads.clearance import (
     blocked_before,
@@ -34,7 +34,7 @@ from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.ways import draw_route
 
 __all__ = [
-    "BUILT_IN", "CONTACT", "FAULTY", "ROADS", "Arm", "Course", "DrawRoad", "Driven", "NoPlaceError", "Place", "Plan",
+    "BUILT_IN", "CONTACT", "CORRIDOR", "FAULTY", "ROADS", "Arm", "Course", "DrawRoad", "Driven", "NoPlaceError", "Place", "Plan",
     "RoadConfig", "RuleCheck", "along_lanes", "blocked_before", "build_road", "clearance_field", "clearance_in_cells",
     "common_component", "component_cells", "distance_transform", "draw", "draw_plan", "draw_route", "drivable_beside",
     "drives_against", "footprint_fits", "free_length", "is_vector_map", "lane_along", "layout_for", "nearest_pose_with_room",

@@ -20,7 +20,7 @@ from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, PLAIN_LINE
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
-from scenario_gen.template import clean_tracks, main_line, mirrored, refuse_too_large, to_frenet, traffic_side
+from scenario_gen.template import clean_tracks, main_line, mirrored, refuse_reversing, refuse_too_large, to_frenet, traffic_side
 from scenario_gen.types import Encounter, LaneNetwork, MIRRORED, Road
 
 
@@ -59,9 +59,10 @@ def road_and_template(
 
     Raises:
         InputError: as `build_road`.
-        RefusedError: likewise, or the encounter is too large.
+        RefusedError: likewise, or the encounter is too large, or somebody drives backwards.
     """
     refuse_too_large(encounter)
+    refuse_reversing(encounter)
     if isinstance(name_or_path, Road):
         return name_or_path, encounter
     refusal: RefusedError | None = None
@@ -156,11 +157,13 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     return draw(name, layout_for(name, tracks, config), config, tracks)
 
 
+CORRIDOR = "corridor"
+"""The road that is drawn around what was recorded."""
 BUILT_IN: dict[str, DrawRoad] = {
     **dict.fromkeys(("straight", "curve", "t_intersection", "four_way"), draw_main_road),
     "merge": draw_merge,
     "roundabout": draw_roundabout,
 }
 """The built-in roads that need no template, by name."""
-ROADS = Registry[DrawRoad]("scenario_gen.roads", {**BUILT_IN, "corridor": draw_corridor})
+ROADS = Registry[DrawRoad]("scenario_gen.roads", {**BUILT_IN, CORRIDOR: draw_corridor})
 """All roads that are drawn, by name."""

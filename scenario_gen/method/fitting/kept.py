@@ -11,6 +11,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.roads import CORRIDOR
 from scenario_gen.template import in_words, keeps, Track, turn_of, turns_to_keep
 from scenario_gen.template.answers import meetings
 from scenario_gen.types import Loss, Road
@@ -24,6 +25,7 @@ LOSABLE = {
     "overtaking": "a vehicle does not pass another one",
     "stand": "a vehicle does not pass one that stands, on its side",
     "turn": "a vehicle turns otherwise",
+    "footway": "who walks does so on a lane of vehicles",
 }
 """What a fit may lose only where `fitting.allow` names it, as lost_KIND; other losses are only reported."""
 
@@ -91,6 +93,16 @@ def find_unused(road: Road, used: Iterable[int]) -> tuple[Loss, ...]:
     return (Loss("arm", (), f"{unused} of the {len(arms)} arms of road {road.name} {used_by_nobody}"),)
 
 
+def find_walkers_on_lanes(road: Road, tracks: Iterable[Track]) -> tuple[Loss, ...]:
+    """That who walks is on lanes of vehicles, as on every road with lanes but one that is drawn around what was recorded."""
+    if road.lanes is None or road.lanes.name == CORRIDOR:
+        return ()
+    walkers = (track.vehicle.id for track in tracks if track.vehicle.kind.walks)
+    return tuple(
+        Loss("footway", (name,), f"road {road.name} has no footway or crossing for {name}, who walks") for name in walkers
+    )
+
+
 def find_losses(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> tuple[Loss, ...]:
     """Return what of the template's interaction its placement on a road has not, or has otherwise; both are cleaned tracks."""
     found = (_lost_turns, _lost_passings, _lost_lanes, _lost_conflicts, _lost_neighbours)
@@ -113,6 +125,8 @@ def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Ite
         if pair not in after:
             following = before[pair].following
             if following and _in_two_lanes(*(tracks[k] for k in pair)):
+                how = "drive side by side less than a lane apart in the template, in two lanes on this road"
+                yield Loss("beside", (a, b), f"vehicles {a} and {b} {how}")
                 continue
             what = "follow each other" if following else "have crossing or merging paths"
             kind = "following" if following else "conflict"
