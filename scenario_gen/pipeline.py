@@ -61,7 +61,8 @@ def generate(
     sampled = chain.sample(planned, Callbacks(progress))
     if not sampled.generated.scenarios:
         causes = ", ".join(f"{count} × {cause}" for cause, count in causes_in_words(sampled.generated.refused))
-        raise RefusedError(f"none of {sampled.generated.candidates} candidates is valid: {causes or 'none was drawn'}")
+        why = "; ".join((causes or "none was drawn", *sampled.generated.adaptations))
+        raise RefusedError(f"none of {sampled.generated.candidates} candidates is valid: {why}")
     result = select(sampled)
     if config.evaluation.compare:
         result = with_references(result, config, request)
