@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.closed_loop.search.estimate import Response
-from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import footprint_distance, Motion
+from scenario_gen.method.evaluation.nearness import time_apart
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics import Floats

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import special
 
 from benchmarks._late_witness import LateWitness
-from scenario_gen.closed_loop.search.nearness import APART
+from scenario_gen.method.evaluation.nearness import APART
 
 ROOT = Path(__file__).resolve().parents[1]
 PYTHON = ROOT / ".venv-judges-verifai" / "bin" / "python"

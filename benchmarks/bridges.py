@@ -22,7 +22,7 @@ from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.cli.demo import ROADS
-from scenario_gen.cli.folder import generate_all
+from scenario_gen.cli.folder import FolderRequest, generate_all
 from scenario_gen.logs import LogConfig, read_log, read_raw
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
@@ -110,7 +110,7 @@ def _turns(folder: Path, encounters: Sequence[Encounter], count: int) -> Iterato
 
 def _bag(folder: Path, encounters: Sequence[Encounter], road: str, count: int) -> Iterator[Path]:
     pairs = [(encounter, road) for encounter in encounters]
-    made, _ = generate_all(pairs, PipelineConfig(), count=count, seed=7)
+    made, _ = generate_all(pairs, FolderRequest([], PipelineConfig(), count, 7))
     for case in made:
         if case.generated.scenarios:
             yield write_recording(folder / f"bag_{len(list(folder.glob('bag_*')))}", case)

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks._drive_judges import contacts, reactive_planner
 from benchmarks._drive_others import braking_jerks, rear_ends
-from benchmarks._drive_peers import highway_env
+from benchmarks._drive_peers import highway_env, sumo
 from benchmarks._drive_testing import discriminating
 from benchmarks._driving_worlds import Anything, draw_scenario, Witness
 from benchmarks._sampling_cases import cases, Prepared
@@ -300,7 +300,7 @@ def speed() -> list[Row]:
                 steps += drive.here.size
             best = max(best, steps / (process_time() - began))
         rows.append(Row(f"in process, reactive, {vehicles} vehicles", best, "vehicle-steps/s", "higher", 40_000.0))
-        rows += highway_env(vehicles)
+        rows += [*highway_env(vehicles), *sumo(vehicles)]
     return rows
 
 

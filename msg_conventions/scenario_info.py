@@ -31,6 +31,7 @@ REACTION, CUT = "reaction.", "reaction.cut."  # who reacts to whom in the templa
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
 SIZES = "sizes"  # length and width of its vehicles [m], where they are not those of the template
 FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the requested states
+EGO_FREED = "ego_freed"  # likewise of the vehicle that was left out
 EGO_WITNESS = "ego_witness"  # of one with an ego slot
 Values = Mapping[str, str]
 
@@ -101,16 +102,19 @@ class ScenarioEntry:
         if witness:
             own = (_states(f"[{values[key]}]", where) for _, key in keys)
             start, end = (np.concatenate(rows) for rows in zip((start, end), own, strict=True))
-        return BoundaryStates(start, end, self._relaxed(len(start), where))
+        return BoundaryStates(start, end, self._relaxed(len(start), where, witness=witness))
 
-    def _relaxed(self, count: int, where: str) -> Floats:
+    def _relaxed(self, count: int, where: str, *, witness: bool) -> Floats:
         """Return by how much each of `count` vehicles may miss its states (count, 2, 2) [m, m/s]; 0 where it is not there."""
         relaxed = np.zeros((count, 2, 2))
         with guarded(where):
-            own = np.array(json.loads(self.status.values.get(FREED, "[]")), dtype=np.float64).reshape(-1, 2, 2)
-        if len(own) > count or not np.isfinite(own).all() or (own < 0.0).any():
-            raise InputError(f"{where}: {FREED} is not metres and m/s of at most {count} vehicles")
+            texts = (self.status.values.get(key, "[]") for key in (FREED, EGO_FREED))
+            own, ego = (np.array(json.loads(text), dtype=np.float64).reshape(-1, 2, 2) for text in texts)
+        for key, freed, most in ((FREED, own, count - witness), (EGO_FREED, ego, 1)):
+            if len(freed) > most or not np.isfinite(freed).all() or (freed < 0.0).any():
+                raise InputError(f"{where}: {key} is not metres and m/s of at most {most} vehicles")
         relaxed[: len(own)] = own
+        relaxed[count - witness :] = ego if witness and len(ego) else 0.0
         return relaxed
 
 
@@ -258,6 +262,7 @@ def scenario_entry(
     """
     ids = [vehicle.id for vehicle in template]
     rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
+    own = asked.relaxed[[ids.index(ego.vehicle.id)] if ego is not None else []]
     several = messages_of(data) if not scenario.all_present else ()
     sizes = [[vehicle.length, vehicle.width] for vehicle in scenario.vehicles]
     spans = [[float(scenario.time[first]), float(scenario.time[last])] for first, last in scenario.present.tolist()]
@@ -277,7 +282,7 @@ def scenario_entry(
         **({} if scenario.witness is None else {EGO_WITNESS: digest(encode_scenario(scenario.witness, stamp_of(data, INFO)))}),
         "asked_start": json.dumps(asked.start[rows].tolist()),
         "asked_end": json.dumps(asked.end[rows].tolist()),
-        **({FREED: json.dumps(asked.relaxed[rows].tolist())} if asked.relaxed[rows].any() else {}),
+        **{key: json.dumps(freed.tolist()) for key, freed in ((FREED, asked.relaxed[rows]), (EGO_FREED, own)) if freed.any()},
     }
     status = Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
     return _entry(status, INFO)

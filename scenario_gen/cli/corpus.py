@@ -37,13 +37,14 @@ def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
         yield Workers(count, scheduler, partial(advance, "tasks"))
 
 
-def conclude(failed: Sequence[str], out: Place) -> None:
-    """Give the failed tasks.
+def conclude(summary: list[str], failed: Sequence[str], out: Place, **files: Place) -> None:
+    """Give and print the summary of tasks, and the files.
 
     Raises:
         RefusedError: a task failed.
     """
-    give(out=out, failed=failed)
+    give(summary=summary, **files, out=out, failed=failed)
+    say(*summary, *(f"{name}: {path}" for name, path in files.items()), sep="\n")
     if failed:
         raise RefusedError(f"{len(failed)} tasks failed, see above; the rest is in {out}; the same command tries them again")
 
@@ -69,9 +70,7 @@ def mine(
     config, corpus = assigned_all(CorpusConfig(), assignments), place(out, to_write=True)
     with workers_of(workers, scheduler) as who:
         result = mined([place(one) for one in archive], corpus, config, workers=who)
-    give(summary=result.lines(), page=corpus / PAGE)
-    say(*result.lines(), f"page: {corpus / PAGE}", sep="\n")
-    conclude(result.failed, corpus)
+    conclude(result.lines(), result.failed, corpus, page=corpus / PAGE)
 
 
 @dataclass(frozen=True)
@@ -106,9 +105,7 @@ def batch(options: Batch) -> None:
             place(options.corpus), names, out, BatchRequest(config, options.count, options.seed),
             templates=options.templates, workers=who,
         )  # fmt: skip
-    give(summary=result.lines())
-    say(*result.lines(), sep="\n")
-    conclude(result.failed, out)
+    conclude(result.lines(), result.failed, out)
 
 
 def shown(value: object) -> str:
@@ -120,7 +117,7 @@ def shown(value: object) -> str:
 
 @commands.command(urls=("batch",))
 def find(
-    batch: Annotated[Path, typer.Argument(help="A batch, finished or not; or s3://….")],
+    batch: Annotated[Path, typer.Argument(help="A batch, finished or not, or a corpus that `mine` wrote; or s3://….")],
     condition: Annotated[str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")] = "true",
     limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list here. 0: all.")] = 20,
     bag: Annotated[
@@ -131,7 +128,7 @@ def find(
         bool, typer.Option("--again", help="Generate each scenario found again and check that it is byte-identical.")
     ] = False,
 ) -> None:
-    """Find scenarios of a batch by kind, road, PET, time to collision, …."""
+    """Find scenarios of a batch, or recorded encounters of a corpus, by kind, road, PET, time to collision, …."""
     from scenario_gen.corpus import find as finding
     from scenario_gen.output.review.evaluation import write_page
 
@@ -144,7 +141,7 @@ def find(
     titles = [f"{name} [{finding.UNITS[name]}]" if name in finding.UNITS else name for name in finding.COLUMNS]
     say_rows(titles, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3)
     rest = f", the first {len(listed)} are listed; --limit 0 lists all" if len(listed) < len(found.rows) else ""
-    say(f"{len(found.rows)} scenarios found{rest}; a ttc above evaluation.ttc_horizon (10 s) counts as this")
+    say(f"{len(found.rows)} found{rest}; a ttc above evaluation.ttc_horizon (10 s) counts as this")
     say(*finding.coverage_lines(found, source), sep="\n")
     if again:
         for row in found.rows:
@@ -179,9 +176,7 @@ def library(
     config, source = assigned_all(SHARED, assignments), place(corpus, to_write=True)
     with workers_of(workers, scheduler) as who:
         built = build(source, config, most=most, seed=seed, workers=who)
-    give(summary=built.lines())
-    say(*built.lines(), sep="\n")
-    conclude(built.failed, source / "library")
+    conclude(built.lines(), built.failed, source / "library")
 
 
 @commands.command()

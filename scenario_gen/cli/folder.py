@@ -6,8 +6,8 @@
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scenario_gen.base.errors import did_you_mean, InputError, RefusedError
 from scenario_gen.base.folders import replaced_folder
@@ -18,7 +18,9 @@ from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import FAULTY
 from scenario_gen.types import Encounter, GenerationResult, Request
 
-Select = Callable[[GenerationResult], GenerationResult]
+if TYPE_CHECKING:
+    from scenario_gen.closed_loop.reacting import Testing
+
 Advance = Callable[[str, int, int], None]
 """Called with the progress of a case: its name, scenarios so far, scenarios requested."""
 EGO_AUTO = "auto"  # the vehicle that has to react, by --ego
@@ -42,7 +44,7 @@ class FolderRequest:
         title: heading of the report; the logs' names by default.
         encounters: names of those to take; all by default.
         request: a vehicle to be left out, and start and end states.
-        for_testing: keep only scenarios in which an ego that looks at nobody collides.
+        for_testing: scenarios in which the ego has to react.
         also_read: what else is read, so that the folder may not hold it: maps, a parameter file.
     """
 
@@ -100,15 +102,7 @@ def generate_folder(
             for road in roads
         ]
         with progress() as advance:
-            cases, refusals = generate_all(
-                pairs,
-                requested.config,
-                count=requested.count,
-                seed=requested.seed,
-                request=requested.request,
-                advance=advance,
-                for_testing=requested.for_testing,
-            )
+            cases, refusals = generate_all(pairs, requested, advance)
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         unlooking: list[str] = []
@@ -170,21 +164,11 @@ def notes_of(readings: Sequence[LogResult]) -> list[str]:
 
 
 def generate_all(
-    pairs: Sequence[tuple[Encounter, str]],
-    config: PipelineConfig,
-    *,
-    count: int,
-    seed: int,
-    request: Request = Request(),
-    advance: Advance = lambda *_: None,
-    for_testing: bool = False,
+    pairs: Sequence[tuple[Encounter, str]], requested: FolderRequest, advance: Advance = lambda *_: None
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
-    drawn, further = count, dict[str, Select]()
-    if for_testing:
-        from scenario_gen.closed_loop.reacting import reacting, TRIED
-
-        drawn, further = count * TRIED, {"select": partial(reacting, count=count)}
+    config, count, seed, request = requested.config, requested.count, requested.seed, requested.request
+    population = [encounter for encounter, _ in pairs]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:
@@ -194,40 +178,32 @@ def generate_all(
         def report(done: int, total: int, _candidates: int, name: str = name) -> None:
             advance(name, done, total)
 
+        def testing(wanted: Request, encounter: Encounter = encounter, road: str = road) -> "Testing":
+            from scenario_gen.closed_loop.reacting import Testing
+
+            return Testing(encounter, road, config, wanted, seed)
+
         own = request
         try:
             if request.ego == EGO_AUTO:
-                own = with_ego_that_reacts(encounter, road, config, seed, request)
-            case = generate(encounter, road, config, count=drawn, seed=seed, request=own, progress=report, **further)
+                own = replace(request, ego=testing(request).who_reacts_most())
+            if requested.for_testing:
+                case = testing(own).run(count, report)
+            else:
+                template = [encounter, *population]
+                case = generate(template, road, config, count=count, seed=seed, request=own, progress=report)
         except RefusedError as error:
-            if own.ego == EGO_AUTO:
-                refusals.append(f"{encounter.name} on {road}: {error}")
-                continue
-            answer = answer_refusal(error, encounter, road, config, own, drawn, seed)
+            named = replace(own, ego="") if own.ego == EGO_AUTO else own
+            answer = answer_refusal(error, encounter, road, config, named, count, seed)
             refusals.append(f"{encounter.name} on {road}: {as_options(str(answer))}")
-            continue
-        if for_testing and not case.generated.scenarios:
-            refusals.append(f"{encounter.name} on {road}: none kept: {case.generated.adaptations[-1]}")
             continue
         cases.append(case)
         n_scenarios, refused = len(case.generated.scenarios), case.generated.refused
         if n_scenarios < count:
             causes = ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
-            causes = case.generated.adaptations[-1] if for_testing else causes
+            causes = case.generated.adaptations[-1] if requested.for_testing else causes
             refusals.append(f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}")
     return cases, refusals
-
-
-def with_ego_that_reacts(encounter: Encounter, road: str, config: PipelineConfig, seed: int, request: Request) -> Request:
-    """Return a request with the vehicle as ego that has to react in most of some scenarios.
-
-    Raises:
-        RefusedError: none has to, or there are no scenarios.
-    """
-    from scenario_gen.closed_loop.reacting import PROBED, who_reacts
-
-    case = generate(encounter, road, config, count=PROBED, seed=seed, request=replace(request, ego=""))
-    return replace(request, ego=who_reacts(case))
 
 
 def chosen(encounters: Sequence[Encounter], names: Sequence[str]) -> list[Encounter]:

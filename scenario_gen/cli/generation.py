@@ -54,7 +54,8 @@ class Generate:
     target: Annotated[
         list[str] | None,
         typer.Option(
-            help=r"Range of pet, ttc, gap, arrival_gap or closing_speed, e.g. 'pet=0.5..1.5' or 'ttc\[1,2]=1..2'. Repeatable."
+            help=r"Range of pet, ttc, gap, arrival_gap, closing_speed or unlooking, e.g. 'pet=0.5..1.5', 'ttc\[1,2]=1..2'. "
+            "Repeatable."
         ),
     ] = None
     choose: Annotated[str, typer.Option(help="natural: as sampled. diverse: the valid candidates that differ most.")] = "natural"
@@ -62,8 +63,8 @@ class Generate:
         bool,
         typer.Option(
             "--for-testing",
-            help="Keep only scenarios in which the --ego has to react: a baseline that ignores the others collides, and a simple "
-            "reactive planner passes.",
+            help="Search for scenarios in which the --ego has to react: a baseline that ignores the others collides, and a "
+            "simple reactive planner passes.",
         ),
     ] = False
     compare: Annotated[

@@ -111,6 +111,8 @@ def advance(
     vehicles[ego] = body[:4]
     for i in range(len(motion)):
         pose_at(time, motion[i], before[i, CLOCK], pose)
+        if i != ego and not world.leaves[i] and after[i, CLOCK] >= time[-1]:
+            vehicles[i, 3] = 0.0  # it stays where its motion ended
         speed, was, clock = vehicles[i, 3], before[i, ACCELERATION], after[i, CLOCK]
         gained = (speed - before[i, RATE] * pose[3]) / h
         if after[i, HELD] > 0.0:

@@ -44,7 +44,7 @@ class ClosedLoopConfig(Parameters):
         9.8, "by which they change their acceleration at most, unless the order forces them", unit="m/s³", low=1.0, high=1e6
     )
     patience: float = parameter(
-        5.0, "after which who waits for an ego that stands goes first where its way is free", unit="s", low=0.0, high=1e6
+        5.0, "after which who waits for an ego that hardly moves goes first where its way is free", unit="s", low=0.0, high=1e6
     )
     ego_acceleration: float = parameter(4.0, "the ego's strongest speeding up", unit="m/s²", low=0.1, high=20.0)
     ego_braking: float = parameter(9.0, "the ego's strongest braking", unit="m/s²", low=0.1, high=20.0)

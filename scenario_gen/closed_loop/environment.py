@@ -153,15 +153,16 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
 
         def local(xy: Floats) -> Floats:
             """Positions (..., 2) in the ego's frame."""
-            return np.stack(ahead_and_left(xy - ego[:2], ego.yaw), axis=-1)
+            return np.array(ahead_and_left(xy - ego[:2], ego.yaw)).T
 
         ahead, offset, angle, left = np.zeros((len(AHEAD), 2)), 0.0, 0.0, 0.0
         _, self._station = self._follower.steer(ego)
         if (route := self._follower.route) is not None:
-            pose, *coming = route.at(self._station + LOOKED_AT)
+            poses = route.at(self._station + LOOKED_AT)
+            pose, coming = poses[0], poses[1:]
             offset = float(ahead_and_left(ego[:2] - pose[:2], pose[2])[1])
             angle, left = angle_between(ego.yaw, pose[2]), route.length - self._station
-            ahead = local(np.array(coming)[:, :2])
+            ahead = local(coming[:, :2])
         found = self._loop.observe(state)
         place = local(found.others[:, :2])
         away = np.hypot(place[:, 0], place[:, 1])
@@ -171,7 +172,8 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         others[: len(nearest)] = np.column_stack(facts)[nearest]
         own = np.array((ego.speed, ego.curvature, offset, angle, left))
         seen = np.concatenate([own, ahead.ravel(), others.ravel()]).astype(np.float32)
-        return np.clip(seen, self.observation_space.low, self.observation_space.high)
+        within: Seen = np.minimum(np.maximum(seen, self.observation_space.low), self.observation_space.high)
+        return within
 
 
 def observation_space(config: ClosedLoopConfig) -> Box:

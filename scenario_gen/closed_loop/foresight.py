@@ -29,12 +29,14 @@ class Foreseen(NamedTuple):
         clock: of the ego on its witness' path at the end of this step [s].
         rate: of that clock; negative if the ego is not on that path.
         coming: (N, M) clocks of the others at the step's begin and at the end of each [s].
+        aside: metres that it leaves beside the ego if nothing makes it brake.
     """
 
     ego: Floats
     clock: float
     rate: float
     coming: Floats
+    aside: float
 
 
 @kernel(inline=True)
@@ -109,9 +111,8 @@ def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: For
     h, time, motion, cell, order = world.step, world.time, world.motion[me.i], world.cell, world.order[me.i]
     pose, mine, ego, half = np.empty(5), np.empty(7), np.empty(7), world.half
     t, r, was = me.clock, me.rate, me.was
-    length, width = half[me.i, 0], half[me.i, 1]
-    if braking > FREE:
-        length, width = length + SPARE, width + SPARE
+    spare = max(foreseen.aside, SPARE) if braking > FREE else foreseen.aside
+    length, width = half[me.i, 0] + spare, half[me.i, 1] + spare
     reach = np.sqrt(length**2 + width**2) + np.sqrt(half[world.ego, 0] ** 2 + half[world.ego, 1] ** 2)
     pose_at(time, motion, t, pose)
     for m in range(foreseen.ego.shape[0] - 1):
@@ -121,6 +122,8 @@ def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: For
         r = after
         pose_at(time, motion, t, pose)
         was = (r * pose[3] - u) / h
+        if world.leaves[me.i] and t >= world.spans[me.i, 1]:
+            return True
         there = foreseen.ego[m]
         dx, dy = there[0] - pose[0], there[1] - pose[1]
         if dx * dx + dy * dy < reach * reach:

@@ -45,7 +45,8 @@ from scenario_gen.numerics.kernels import kernel
 CREEP = 0.5  # m/s; the foresight lets everyone creep, so that nobody waits for one who waits for it; who is slower waits
 BEHIND = 1.0  # seconds that the order must leave to one so that it does not wait for another
 APPROACH = 1.0  # seconds in which a creeping driver would drive what the order leaves it
-STILL = 0.1  # m/s below which the ego is seen to stand
+CREEPS = 1.5  # m/s below which the ego is seen to hold up who waits for it
+ASIDE = 0.5  # metres that a driver leaves beside an ego that is not on its way
 ENTRY = 3.0  # metres ahead of and behind its place that the ego must leave free for one who comes onto the scene
 
 
@@ -144,25 +145,29 @@ def _expected(world: World, now: Now, i: int, spent: float) -> Foreseen:
     ago = min(now.delay[i], now.seen.shape[0] - 1)
     ego = now.seen[ago]
     rate = ego[EGO_RATE] if ego[ON_PATH] > 0.0 and spent < np.inf else -1.0
-    return Foreseen(now.ahead[i], ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step, rate, now.coming)
+    aside = ASIDE if ego[ON_PATH] == 0.0 and spent < np.inf else 0.0
+    return Foreseen(now.ahead[i], ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step, rate, now.coming, aside)
 
 
 @kernel(inline=True)
 def _spent(world: World, manner: Manner, now: Now, i: int) -> float:
-    """Patience [s] that driver i has spent waiting for an ego that stands; infinity once it goes before the ego.
+    """Patience [s] that driver i has spent waiting for an ego that hardly moves; infinity once it goes before the ego.
 
-    That it does when its patience is over and its path is free of the ego, whom it sees where it expects it to be now.
+    That it does when its patience is over and its path is free of the ego, where it expects it to be now and as far as it looks.
     """
     spent: float = now.drivers[i, WAITED]
     u, box = now.drivers[i, RATE] * now.pose[i, 3], np.empty(7)
     if spent == np.inf:
         return spent
-    if u > CREEP or now.drivers[i, RATE] >= 1.0 or now.pose[i, 3] < STAND or now.ahead[i, 0, 3] > STILL:
+    if u > CREEP or now.drivers[i, RATE] >= 1.0 or now.pose[i, 3] < STAND or now.ahead[i, 0, 3] > CREEPS:
         return 0.0
     spent += world.step
-    _fill_ego(world, now.ahead[i, 0], box)
-    _, at = gap_ahead(world, i, now.drivers[i, CLOCK], box, now.pose[i])
-    return np.inf if spent >= manner.patience and at < 0 else spent
+    for m in (0, now.ahead.shape[1] - 1):
+        _fill_ego(world, now.ahead[i, m], box)
+        _, at = gap_ahead(world, i, now.drivers[i, CLOCK], box, now.pose[i])
+        if spent < manner.patience or at >= 0:
+            return spent
+    return float(np.inf)
 
 
 @kernel(inline=True)

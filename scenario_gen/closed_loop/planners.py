@@ -10,6 +10,7 @@ import numpy as np
 
 from scenario_gen.closed_loop.ego import Command, EgoState, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Task
+from scenario_gen.method.evaluation import BRAKING, free_acceleration, PULLS_AWAY, STANDS, wanted_speeds
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 
@@ -62,8 +63,6 @@ class IdmFollower(RouteFollower):
     headway: float = 1.5  # s
     standstill: float = 3.0  # m
     acceleration: float = 1.5  # m/s²
-    braking: float = 2.5  # m/s²
-    lateral: float = 2.5  # m/s², in bends
     foresight: float = 4.0  # s, for which others are expected to go straight on
     room: float = 0.5  # m beside the ego that it keeps free
 
@@ -71,19 +70,15 @@ class IdmFollower(RouteFollower):
         """Steer, and brake for the nearest."""
         ego = observation.ego
         curvature, station = self.steer(ego)
-        wanted = self.speed if self.route is not None else 0.0  # without a way it is where it is to be
+        wanted = 0.0  # without a way it is where it is to be
         if self.route is not None:
-            bend = np.diff(self.route.at(station + np.arange(0.0, 21.0, 4.0))[:, 2]) / 4.0
-            sharpest = float(np.abs(bend).max())
-            wanted = min(wanted, math.sqrt(self.lateral / max(sharpest, 1e-6)))
-            if self.task.goal[3] < 0.5:  # the witness stands at its goal
-                wanted = min(wanted, math.sqrt(2.0 * self.braking * max(self.route.length - station, 0.0)) + 0.3)
-        over = ego.speed / max(wanted, 0.1)
-        free = max(1.0 - over * over, -self.braking / self.acceleration)  # to be too fast alone is no reason to brake hard
+            stops = bool(self.task.goal[3] < STANDS)  # the witness stands at its goal
+            wanted = float(wanted_speeds(self.route, np.array([station]), self.speed, stops=stops)[0])
         gap, ahead = self._nearest(observation, station)
-        closing = ego.speed * (ego.speed - ahead) / (2.0 * math.sqrt(self.acceleration * self.braking))
+        closing = ego.speed * (ego.speed - ahead) / (2.0 * math.sqrt(self.acceleration * BRAKING))
         share = (self.standstill + max(0.0, ego.speed * self.headway + closing)) / max(gap, 0.1)
-        return Command(max(self.acceleration * (free - share * share), -self.task.config.ego_braking), curvature)
+        acceleration = free_acceleration(ego.speed, wanted, self.acceleration) - self.acceleration * share * share
+        return Command(max(acceleration, -self.task.config.ego_braking), curvature)
 
     def _nearest(self, seen: Observation, station: float) -> tuple[float, float]:
         """Return gap [m] and speed along the route [m/s] of who is, or comes, next on the route; infinity and 0 if nobody does.
@@ -116,7 +111,7 @@ class Unlooking(IdmFollower):
     def reset(self, task: Task) -> None:
         """Take route and speed in."""
         super().reset(task)
-        self.speed = task.speed
+        self.speed, self.acceleration = task.speed, PULLS_AWAY
 
     def act(self, observation: Observation) -> Command:
         """Drive as if nobody else were there."""

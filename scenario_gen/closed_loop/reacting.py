@@ -3,20 +3,28 @@
 
 """The scenarios that test a planner: one that looks at nobody collides in them, and a simple one that looks passes."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import islice
 
 from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.parameters import updated
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.planners import IdmFollower, Unlooking, WitnessFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.types import GenerationResult, join_ego, Scenario
+from scenario_gen.method.sampling import Progress, TargetError
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.suitable_roads import suitable_roads
+from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.types import Encounter, GenerationResult, join_ego, join_pieces, Request, Road, Scenario
 
-TRIED = 20  # valid scenarios that are tried at most for each one that is wanted
 UNLOOKING = 50  # scenarios of a set that are driven to say how many need no reaction
 PROBED = 12  # scenarios by which it is told who has to react
+ROADS_TRIED = 2  # that are tried where nobody has to react
 EASY = 0.9  # share of a set that the baseline passes, from which on the set hardly tests
+FREER = {"arrival_sigma": 3.0, "wait_sigma": 2.0, "pace_sigma": 0.12, "end_speed_sigma": 2.0, "longitudinal_sigma": 6.0}
+"""Parameters of sampling where those given leave no scenario that tests."""
 
 
 def needs_reaction(loop: ClosedLoop) -> bool:
@@ -27,28 +35,118 @@ def needs_reaction(loop: ClosedLoop) -> bool:
     return all(judge(loop, loop.drive(reference)).passed for reference in references)
 
 
-def reactions(case: GenerationResult, scenarios: Sequence[Scenario], config: ClosedLoopConfig) -> dict[str, int]:
-    """Return for each vehicle of a case, by id, in how many scenarios it has to react if it is the ego; the most first."""
-    whole = [join_ego(scenario) for scenario in scenarios]
-    ids = [vehicle.id for vehicle in case.encounter.vehicles]
-    loops = {one: [ClosedLoop(scenario, one, case.road, config) for scenario in whole] for one in ids}
-    return dict(sorted({one: sum(map(needs_reaction, loops[one])) for one in ids}.items(), key=lambda item: -item[1]))
+@dataclass(frozen=True, eq=False)
+class Testing:
+    """A request for scenarios of an encounter on a road in which the ego has to react; arguments as of `pipeline.generate`."""
 
+    encounter: Encounter
+    road: Road | str
+    config: PipelineConfig
+    request: Request
+    seed: int
 
-def who_reacts(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
-    """Return the id of the vehicle that has to react in most scenarios of a case.
+    def run(self, count: int, progress: Progress = lambda *_: None) -> GenerationResult:
+        """Return `count` scenarios, drawn with more freedom where the parameters give too few, or as many as there are.
 
-    Raises:
-        RefusedError: none has to in any.
-    """
-    found = reactions(case, case.generated.scenarios, config)
-    ego = next(iter(found))
-    if not found[ego]:
-        raise RefusedError(
-            f"--ego auto: in none of {len(case.generated.scenarios)} scenarios has a vehicle to react; name one by --ego, or "
-            "take another road, or an encounter in which somebody yields or follows"
+        Raises:
+            InputError: no vehicle is named as ego.
+            TargetError: there is none; the message names vehicles and roads that have some.
+            RefusedError: as `pipeline.generate`.
+        """
+        if not self.request.ego:
+            ids = ", ".join(vehicle.id for vehicle in self.encounter.vehicles)
+            raise InputError(
+                f"--for-testing: name the vehicle in whose place the planner drives by --ego, or auto; there are {ids}"
+            )
+        most: GenerationResult | None = None
+        for tried in (self, self.freer()):
+            with suppress(TargetError):
+                case = tried.generate(count, progress)
+                if tried is not self:
+                    case = _noted(
+                        case, "drawn with more freedom: " + ", ".join(f"sampling.{name}={FREER[name]:g}" for name in FREER)
+                    )
+                if most is None or len(case.generated) > len(most.generated):
+                    most = case
+                if len(case.generated) == count:
+                    return case
+        ego, kept = self.request.ego, 0 if most is None else len(most.generated)
+        others = ", ".join(f"{other} in {found} of {PROBED}" for other, found in self.who_reacts().items() if other != ego)
+        advice = f"has to react as ego: {others}" if others else self.elsewhere()
+        said = f"for testing ego {ego}: {kept} of {count} scenarios found in which it has to react; {advice}"
+        if most is None:
+            raise TargetError(said)
+        return _noted(most, said)
+
+    def generate(self, count: int, progress: Progress = lambda *_: None) -> GenerationResult:
+        """Return `count` scenarios, or as many as the parameters give.
+
+        The ego's motion varies as the others' does; sampling is directed to where it meets one of them if it looks at nobody.
+
+        Raises:
+            InputError, RefusedError: as `pipeline.generate`; a TargetError if there is none.
+        """
+        ego = self.request.ego
+        targets = join_pieces(filter(None, [f"unlooking[{ego}]=..0", self.request.target]))
+
+        def accepts(road: Road, whole: Scenario) -> bool:
+            return needs_reaction(ClosedLoop(whole, ego, road))
+
+        return generate(
+            self.encounter, self.road, updated(self.config, {"sampling.ego": "free"}), count=count, seed=self.seed,
+            request=replace(self.request, target=targets), progress=progress, accepts=accepts,
+        )  # fmt: skip
+
+    def freer(self) -> "Testing":
+        """Return the request with the freedom of FREER, where it had less."""
+        sampling = self.config.sampling
+        most = {name: max(value, getattr(sampling, name)) for name, value in FREER.items()}
+        return replace(self, config=replace(self.config, sampling=replace(sampling, **most)))
+
+    def who_reacts(self) -> dict[str, int]:
+        """Return in how many of PROBED scenarios each vehicle has to react if it is the ego; who does in most comes first."""
+        found: dict[str, tuple[int, float]] = {}
+        for vehicle in self.encounter.vehicles:
+            with suppress(TargetError):
+                drawn = replace(self, request=replace(self.request, ego=vehicle.id)).generate(PROBED).generated
+                found[vehicle.id] = len(drawn), drawn.reached.share if drawn.reached is not None else 0.0
+        return {ego: found[ego][0] for ego in sorted(found, key=lambda ego: found[ego], reverse=True)}
+
+    def who_reacts_most(self) -> str:
+        """Return the vehicle that has to react in most scenarios if it is the ego.
+
+        Raises:
+            TargetError: nobody has to, with more freedom neither; the message names roads where somebody has.
+            RefusedError: as `pipeline.generate`.
+        """
+        for tried in (self, self.freer()):
+            for ego in tried.who_reacts():
+                return ego
+        raise TargetError(f"--ego auto: nobody has to react in any scenario that was found; {self.elsewhere()}")
+
+    def elsewhere(self) -> str:
+        """Say on which other roads somebody has to react."""
+        segmentation = segment(self.encounter, self.config.segmentation, self.seed)
+        names = (name for name in suitable_roads(self.encounter, segmentation, self.config) if name != self.road)
+        found: list[str] = []
+        for name in islice(names, ROADS_TRIED):
+            with suppress(RefusedError):
+                found += [f"--road {name} --ego {ego}" for ego in islice(replace(self, road=name).who_reacts(), 1)]
+        return (
+            f"possible: {' or '.join(found)}" if found else "take an encounter in which somebody yields, or follows more closely"
         )
-    return ego
+
+
+def _noted(case: GenerationResult, note: str) -> GenerationResult:
+    """Return a result with one more note on how it was drawn."""
+    return replace(case, generated=replace(case.generated, adaptations=(*case.generated.adaptations, note)))
+
+
+def hardly_tests(passed: int, driven: int) -> str:
+    """Say that a set hardly tests a planner, by how many of its scenarios the baseline passes; "" if it does test one."""
+    if passed <= EASY * driven:
+        return ""
+    return f"these scenarios hardly test a planner: one that looks at nobody passes {passed} of {driven}"
 
 
 def unlooking_pass(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
@@ -59,49 +157,5 @@ def unlooking_pass(case: GenerationResult, config: ClosedLoopConfig = ClosedLoop
     ego = drawn.ego.vehicle.id
     loops = [ClosedLoop(join_ego(scenario), ego, case.road, config) for scenario in drawn.scenarios[:UNLOOKING]]
     passed = sum(judge(loop, loop.drive(Unlooking())).passed for loop in loops)
-    road = case.road.name if case.road is not None else "its road"
-    said = f"{case.encounter.name} on {road}: a planner that looks at nobody, in place of {ego}, passes {passed} of {len(loops)}"
-    return f"{said}: they hardly test one" if passed > EASY * len(loops) else said
-
-
-def reacting(sampled: GenerationResult, count: int, config: ClosedLoopConfig = ClosedLoopConfig()) -> GenerationResult:
-    """Return a result with the first `count` of its scenarios that need a reaction, and an account of those left out.
-
-    Args:
-        sampled: with as many scenarios as may be tried.
-        count: how many are wanted.
-        config: how the others react.
-
-    Raises:
-        InputError: no vehicle was left out for a planner.
-    """
-    drawn = sampled.generated
-    if drawn.ego is None:
-        ids = ", ".join(vehicle.id for vehicle in sampled.encounter.vehicles)
-        raise InputError(f"--for-testing: name the vehicle in whose place the planner drives by --ego, or auto; there are {ids}")
-    ego = drawn.ego.vehicle.id
-    kept: list[Scenario] = []
-    tried = 0
-    for scenario in drawn.scenarios:
-        if len(kept) >= count:
-            break
-        tried += 1
-        if needs_reaction(ClosedLoop(join_ego(scenario), ego, sampled.road, config)):
-            kept.append(scenario)
-    note = (
-        f"for testing ego {ego}: {len(kept)} of {tried} valid scenarios are kept; in the other {tried - len(kept)} a planner "
-        "that looks at nobody does not collide, or a simple one that looks fails"
-    )
-    if len(kept) < count:
-        probed = drawn.scenarios[:PROBED]
-        others = {one: found for one, found in reactions(sampled, probed, config).items() if found and one != ego}
-        better = ", ".join(f"{one} in {found} of {len(probed)}" for one, found in others.items())
-        note += (
-            f"; has to react as ego: {better}"
-            if better
-            else "; nor has another vehicle: take another road or encounter, or `search`, where the ego's own motion varies, too"
-        )
-    chosen = replace(
-        drawn, requested=count, scenarios=tuple(kept), adaptations=(*drawn.adaptations, note), chosen=tried
-    )  # fmt: skip
-    return replace(sampled, generated=chosen)
+    said = f"a planner that looks at nobody, in place of {ego}, passes {passed} of {len(loops)}"
+    return f"{case.title}: {hardly_tests(passed, len(loops)) or said}"

@@ -20,7 +20,7 @@ from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.reacting import EASY
+from scenario_gen.closed_loop.reacting import hardly_tests
 from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
 from scenario_gen.output.report.html import render_page
@@ -63,10 +63,7 @@ class Drives:
     @property
     def easy(self) -> str:
         """A sentence if a planner that looks at nobody passes most scenarios, else ""."""
-        passed = sum(one.verdict.passed for one in self.unlooking)
-        if passed <= EASY * len(self.unlooking):
-            return ""
-        return f"these scenarios hardly test a planner: one that looks at nobody passes {passed} of {len(self.unlooking)}"
+        return hardly_tests(sum(one.verdict.passed for one in self.unlooking), len(self.unlooking))
 
     def scores(self) -> dict[str, float]:
         """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""

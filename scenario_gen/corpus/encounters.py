@@ -35,6 +35,7 @@ from scenario_gen.logs import (
     UnknownFormatError,
 )
 from scenario_gen.logs.tables import EPOCH_NS
+from scenario_gen.method.evaluation import at_period, criticality, EvaluationConfig
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Encounter
 
@@ -48,7 +49,7 @@ COLUMNS = {  # of a table
     **dict.fromkeys(("name", "source", "kind", "kinds", "reactions"), "string"),
     "vehicles": "string[]",
     **dict.fromkeys(("count", "start_ns"), "int64"),
-    **dict.fromkeys(("seconds", "gap", "distance", "travel", "lat", "lon"), "double"),
+    **dict.fromkeys(("seconds", "gap", "distance", "travel", "lat", "lon", "closest", "ttc", "pet", "speed"), "double"),
     "tracks": "binary",
 }
 MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
@@ -157,6 +158,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         gap, _, _ = space_time_gap(a.position, b.position, encounter.dt)
         pairs.append((gap, i, j, kind_of(a, b, encounter.dt), float(apart.min())))
     pairs.sort()
+    measures = criticality(at_period(encounter, encounter.dt), EvaluationConfig().ttc_horizon)
     latitude, longitude = encounter.origin or (None, None)
     return {
         "name": encounter.name,
@@ -173,6 +175,10 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "travel": float((encounter.speed * encounter.there).sum(axis=1).max() * encounter.dt),
         "lat": latitude,
         "lon": longitude,
+        "closest": measures.min_distance,
+        "ttc": measures.min_ttc,
+        "pet": measures.pet,
+        "speed": float((encounter.speed * encounter.there).max()),
         "tracks": tracks_bytes(encounter),
     }
 

@@ -90,9 +90,9 @@ class Mined:
         """Return the summary for people."""
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))
         lines = [f"{self.encounters} encounters: {kinds or 'none'}"]
-        lines += [f"{count} × {cause}" for cause, count in sorted(self.account.items())]
+        lines += [f"{count} {cause}" for cause, count in sorted(self.account.items())]
         for file, causes in list(self.files.items())[:MOST_SHOWN]:
-            lines.append(f"{file}: " + ", ".join(f"{n} × {cause}" for cause, n in causes.items()))
+            lines.append(f"{file}: " + ", ".join(f"{n} {cause}" for cause, n in causes.items()))
         lines += [f"encounter {one['name']} is left out: {one['why']}" for one in self.refused[:MOST_SHOWN]]
         for what, ones in (("files", self.files), ("encounters left out", self.refused)):
             if len(ones) > MOST_SHOWN:

@@ -3,10 +3,11 @@
 
 """Fit, plan and sample: the one chain of the stages between the segmentation and the evaluation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import MEASURES
+from scenario_gen.method.evaluation import measures_in
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, sample_scenarios
@@ -27,6 +28,7 @@ class Chain:
         count: valid scenarios wanted.
         seed: of all randomness.
         waits: that scenarios keep; the template's if None.
+        population: recorded encounters that say, with `sampling.variety=population`, how encounters differ.
     """
 
     encounter: Encounter
@@ -37,6 +39,7 @@ class Chain:
     count: int = 50
     seed: int = 0
     waits: tuple[Wait, ...] | None = None
+    population: Sequence[Encounter] = ()
 
     def plan(self) -> GenerationResult:
         """Fit and plan: the template on its road, with no scenarios yet.
@@ -60,7 +63,8 @@ class Chain:
         """
         return sample_scenarios(
             planned, self.config.sampling, self.config.limits, self.request,
-            count=self.count, waits=self.waits, callbacks=callbacks, measures=MEASURES,
+            count=self.count, waits=self.waits, callbacks=callbacks,
+            measures=measures_in(self.config.sampling.variety, self.encounter, self.population),
         )  # fmt: skip
 
     def run(self, callbacks: Callbacks = Callbacks()) -> GenerationResult:

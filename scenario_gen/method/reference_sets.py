@@ -3,19 +3,22 @@
 
 """The sets that a result is compared with, drawn by the same chain; `evaluation.compare` requests them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import MEASURED, uniform_changepoints, without_changepoints
-from scenario_gen.types import GenerationResult, NARROW, Request, UNIFORM, WITHOUT
+from scenario_gen.types import Encounter, GenerationResult, NARROW, Request, UNIFORM, WITHOUT
 
 
-def with_references(result: GenerationResult, config: PipelineConfig, request: Request = Request()) -> GenerationResult:
+def with_references(
+    result: GenerationResult, config: PipelineConfig, request: Request = Request(), population: Sequence[Encounter] = ()
+) -> GenerationResult:
     """Add what a result is measured against: sets without changepoints and with uniform ones.
 
-    They are drawn as the result is, with the same parameters and seed; beside preset `wide` there is a set of `narrow`, too.
+    They are drawn as the result is, with the same parameters and seed; beside any preset but `narrow` there is a set of that.
     A reference keeps no waits of the template: the ends of a wait would be two more changepoints. It has no target, choice or
     order either, and a result that has one is not compared. A reference has only as many scenarios as are measured.
 
@@ -24,11 +27,11 @@ def with_references(result: GenerationResult, config: PipelineConfig, request: R
     """
     road, _ = result.placed()
     count = min(result.generated.requested, MEASURED)
-    plain = Chain(result.encounter, result.segmentation, road, config, request.plain, count, result.seed)
+    plain = Chain(result.encounter, result.segmentation, road, config, request.plain, count, result.seed, population=population)
     chains = {WITHOUT: replace(plain, segmentation=without_changepoints(result.segmentation), waits=())}
     if result.segmentation.changepoints.size:
         chains[UNIFORM] = replace(plain, segmentation=uniform_changepoints(result.segmentation), waits=())
-    if config.sampling.variety == "wide":
+    if config.sampling.variety != "narrow":
         narrow = replace(config, sampling=replace(config.sampling, variety="narrow"))
         chains[NARROW] = replace(plain, config=narrow)
     references, refusals = {}, {}

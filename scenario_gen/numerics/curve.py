@@ -48,7 +48,9 @@ class Curve:
     def at(self, station: Floats | float) -> Floats:
         """Poses (..., 3) at arc lengths (...); beyond the ends straight on."""
         s = np.asarray(station, dtype=np.float64)
-        pose = np.stack([np.interp(s, self.station, self.points[:, k]) for k in range(3)], axis=-1)
+        pose = np.empty((*s.shape, 3))
+        for k in range(3):
+            pose[..., k] = np.interp(s, self.station, self.points[:, k])
         beyond = np.minimum(s, 0.0) + np.maximum(s - self.length, 0.0)
         pose[..., 0] += beyond * np.cos(pose[..., 2])
         pose[..., 1] += beyond * np.sin(pose[..., 2])

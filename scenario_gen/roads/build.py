@@ -20,7 +20,16 @@ from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, PLAIN_LINE
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
-from scenario_gen.template import clean_tracks, drivers_of, main_line, mirrored, refuse_too_large, to_frenet, traffic_side
+from scenario_gen.template import (
+    clean_tracks,
+    drivers_of,
+    main_line,
+    mirrored,
+    refuse_reversing,
+    refuse_too_large,
+    to_frenet,
+    traffic_side,
+)
 from scenario_gen.types import Encounter, LaneNetwork, MIRRORED, Road
 
 
@@ -59,9 +68,10 @@ def road_and_template(
 
     Raises:
         InputError: as `build_road`.
-        RefusedError: likewise, or the encounter is too large.
+        RefusedError: likewise, or the encounter is too large, or somebody drives backwards.
     """
     refuse_too_large(encounter)
+    refuse_reversing(encounter)
     if isinstance(name_or_path, Road):
         return name_or_path, encounter
     refusal: RefusedError | None = None

@@ -99,6 +99,7 @@ class Plan:
         ring: radius [m] of the lane of a roundabout about the origin; 0: it is none.
         yielding: the arms that give way, if priorities are shown.
         drawn_for: where the template that it is drawn for lies, about the same origin.
+        notes: what was decided, in sentences.
     """
 
     arms: Sequence[Arm]
@@ -107,6 +108,7 @@ class Plan:
     ring: float = 0.0
     yielding: Collection[int] = ()
     drawn_for: DrawnFor | None = None
+    notes: tuple[str, ...] = ()
 
 
 def lane_id(arm: int, lane: int, *, inward: bool) -> str:
@@ -149,6 +151,7 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
     network = LaneNetwork(
         name,
         lanes,
+        plan.notes,
         rules=tuple(drawing.rules(lanes)),
         rules_kept=config.traffic_rules == "kept",
         drawn=True,

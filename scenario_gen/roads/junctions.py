@@ -31,9 +31,10 @@ _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as i
 _NEAR_RING = 4.0  # metres beyond the middle of its lane within which a vehicle's speed is one on the ring
 _EVERY = 1.0  # metres between the poses of a path by which a ring is found
 _WIDEST_RING = 60.0  # metres of its radius, in the template
-_LEAST_ARC, _LONG_ARC = 12.0, 30.0  # metres that are driven about it, by all; by one who neither comes nor goes
+_LEAST_ARC = 12.0  # metres that are driven about it
 _OFF_RING = 2.5  # metres to its lane
 _FLARED = np.radians(15.0)  # by which those who come or go turn away from it
+_CIRCLED = np.radians(100.0)  # about it, from which on one who neither comes nor goes is on a ring
 _SAME_ARM = np.radians(30.0)  # directions that differ by less are those of one arm
 _MERGED = np.radians(45.0)  # and by so much if the road has too few arms otherwise
 _PART = np.radians(75.0)  # a vehicle that is still turning may go on by so much to an arm
@@ -147,7 +148,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     Raises:
         RefusedError: the template drives too fast for it, side by side, or by more than four arms.
     """
-    radius, fastest, length, wide = _RING[0], 0.0, 5.0, 2.0
+    radius, fastest, length, wide, notes = _RING[0], 0.0, 5.0, 2.0, list[str]()
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
     centre = np.zeros(2)
@@ -159,11 +160,13 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         radius, fastest = _ring(tracks, centre, None if driven_about is None else driven_about[1])
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
+        if driven_about is None:
+            notes.append(f"nobody in the template drives about a ring; one of {radius:.0f} m radius is drawn in its middle")
     if fastest > np.sqrt(_RING_FASTEST * radius):
         possible = float(np.sqrt(_RING_FASTEST * _RING[1]))
         raise RefusedError(
-            f"road roundabout: the template drives up to {fastest:.1f} m/s there, and the largest one ({_RING[1]:g} m) allows "
-            f"{possible:.1f} m/s; choose four_way or curve"
+            f"road roundabout: the template drives up to {fastest:.1f} m/s where the ring would be, and the largest one "
+            f"({_RING[1]:g} m) allows {possible:.1f} m/s"
         )
     turn = np.pi - directions[0].yaw
     arms = []
@@ -185,7 +188,8 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
     yielding = set(range(len(arms))) - {arm for (_, inward), (arm, _) in lane_of.items() if inward}
     yielding |= set() if encounter is None else _yielding_arms(encounter, lane_of, config)
-    return draw_plan(Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim), name, config)
+    plan = Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim, notes=tuple(notes))
+    return draw_plan(plan, name, config)
 
 
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float] | None:
@@ -199,7 +203,7 @@ def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats,
         turned = sign * np.gradient(np.convolve(poses[:, 2], np.full(5, 0.2), "same")) if len(poses) > 9 else np.zeros(len(poses))
         turned[:3] = turned[-3:] = 0.0
         about = turned > _EVERY / _WIDEST_RING
-        if -turned[turned < 0.0].sum() > _FLARED or about.sum() * _EVERY > _LONG_ARC:
+        if -turned[turned < 0.0].sum() > _FLARED or turned[about].sum() > _CIRCLED:
             points = np.concatenate((points, poses[about, :2]))
     for _ in range(3):
         if len(points) < _LEAST_ARC / _EVERY:

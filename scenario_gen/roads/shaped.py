@@ -118,5 +118,5 @@ def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:
             return who
     raise RefusedError(
         "road merge: nobody in the template leaves the outermost lane of its direction for the next one, so nobody would use the "
-        "ramp; choose straight or curve"
+        "ramp"
     )

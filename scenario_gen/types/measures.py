@@ -20,12 +20,16 @@ class Measures:
     Attributes:
         figure: returns one figure by its name, of a pair or of the most critical one.
         features: returns where a scenario lies in the space that a choice covers, in bins of width 1.
+        rarity: returns how unusual a scenario is among recorded encounters of its kind, up to 1 it is usual; None: nobody asks.
     """
 
     figure: Measure
     features: Callable[[Scenario], tuple[float, ...]]
+    rarity: Callable[[Scenario], float] | None = None
 
     def nearness(self, scenario: Scenario) -> dict[str, str]:
-        """Return the facts that say how near vehicles come; none of a figure that the scenario does not have."""
+        """Return the facts that say how near vehicles come, and how rare that is; none of a figure that the scenario lacks."""
         figures = {key: self.figure(scenario, name, None) for key, name in NEARNESS.items()}
-        return {key: f"{value:.3f}" for key, value in figures.items() if not math.isnan(value)}
+        if self.rarity is not None:
+            figures["rarity"] = self.rarity(scenario)
+        return {key: f"{value:.3f}" for key, value in figures.items() if math.isfinite(value)}

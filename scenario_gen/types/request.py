@@ -32,7 +32,8 @@ class Request(Parameters):
     )
     goals: str = parameter("", f"end states, likewise `{_FORM}`", unit="m, rad, m/s")
     target: str = parameter(
-        "", "ranges of pet, ttc, gap, arrival_gap, closing_speed, e.g. `pet=0.5..1.5; ttc[1,2]=1..2`: sampling is directed there"
+        "",
+        "ranges that sampling aims at, of pet, ttc, gap, arrival_gap, closing_speed, unlooking: `pet=0.5..1.5; ttc[1,2]=1..2`",
     )
     choose: str = parameter(
         "natural", "natural: as sampled; diverse: of many valid candidates those that cover best", choices=("natural", "diverse")

@@ -151,6 +151,7 @@ class Cause(StrEnum):
     CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the requested range; it was not checked
+    UNUSUAL = "unusual"  # valid, but rarer among encounters of its kind than the template
 
 
 def causes_in_words(refused: Mapping[Cause, int]) -> list[tuple[str, int]]:

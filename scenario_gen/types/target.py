@@ -11,10 +11,10 @@ from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
 from scenario_gen.types.pieces import join_pieces, split_pieces
 
-UNITS = {"pet": "s", "ttc": "s", "gap": "m", "arrival_gap": "s", "closing_speed": "m/s"}
+UNITS = {"pet": "s", "ttc": "s", "gap": "m", "arrival_gap": "s", "closing_speed": "m/s", "unlooking": "s"}
 """The figures that a target can be set on, with their units; `scenario_gen.method.evaluation.measures` defines them."""
-Pair = tuple[int, int]  # of vehicle indices
-_FORM = "NAME=LOW..HIGH or NAME[a,b]=LOW..HIGH"
+Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical
+_FORM = "NAME=LOW..HIGH, NAME[a]=LOW..HIGH or NAME[a,b]=LOW..HIGH"
 _EXAMPLE = "pet=0.5..1.5; ttc[1,2]=1..2"
 
 
@@ -25,7 +25,7 @@ class Target:
     Attributes:
         name: of the figure, one of UNITS.
         low, high: the bounds; one of them may be infinite.
-        vehicles: ids of the pair it is of; none: the most critical of all pairs.
+        vehicles: ids of the pair it is of; of one vehicle: its most critical pair; none: the most critical of all pairs.
     """
 
     name: str
@@ -47,17 +47,17 @@ class Target:
         return self.low <= value <= self.high
 
     def pair(self, encounter: Encounter) -> Pair | None:
-        """Return the indices of its two vehicles, None for all pairs.
+        """Return the indices of its vehicles, None for all pairs.
 
         Raises:
             InputError: a vehicle is not the encounter's, or both are the same.
         """
         if not self.vehicles:
             return None
-        a, b = (vehicle_index(encounter, name, "target") for name in self.vehicles)
-        if a == b:
+        pair = tuple(vehicle_index(encounter, name, "target") for name in self.vehicles)
+        if len(set(pair)) < len(pair):
             raise InputError(f"target: {self.label} names one vehicle twice")
-        return a, b
+        return pair
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def read_targets(text: str) -> tuple[Target, ...]:
         name, bracket, inside = head.strip().partition("[")
         ids = tuple(word.strip() for word in inside.rstrip("] ").split(",")) if bracket else ()
         words = bounds.split("..")
-        if len(words) != 2 or (bracket and not (head.strip().endswith("]") and len(ids) == 2 and all(ids))):
+        if len(words) != 2 or (bracket and not (head.strip().endswith("]") and len(ids) in (1, 2) and all(ids))):
             raise InputError(f"target: {piece!r} is not of the form `{_FORM}`, e.g. `{_EXAMPLE}`")
         if name.strip() not in UNITS:
             raise InputError(f"target: {name.strip()!r} is none of {', '.join(UNITS)}")

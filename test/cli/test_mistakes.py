@@ -8,6 +8,8 @@ import resource
 import subprocess
 import sys
 
+import numpy as np
+from PIL import Image
 import pytest
 
 ROWS = "".join(f"{k / 10},a,{-60 + 0.8 * k:.2f},0,8\n{k / 10},b,0,{-70 + 0.8 * k:.2f},8\n" for k in range(150))
@@ -30,6 +32,13 @@ def folder(code_of, tmp_path_factory):
     (place / "bad.yaml").write_text("a: [")
     (place / "bad.json").write_text("{")
     (place / "cut.mcap").write_bytes(b"\x89MCAP0\r\n" + b"\xff" * 100)
+    (place / "disorder.csv").write_text("\n".join([(lines := LOG.split("\n"))[0], *lines[20:], *lines[1:20]]))
+    cells = np.full((900, 900), 254, dtype=np.uint8)
+    cells[:, ::100] = 0  # strips of road with walls between, none of them long enough
+    Image.fromarray(cells).save(place / "walled.pgm")
+    (place / "walled.yaml").write_text(
+        "{image: walled.pgm, resolution: 0.2, origin: [-90, -90, 0], negate: 0, occupied_thresh: 0.65, free_thresh: 0.196}"
+    )
     (place / "nothing").mkdir()
     assert code_of("generate", place / "my log ü.csv", *ROAD, "--out", place / "made") == 0
     assert (place / "made" / "report.html").is_file() and (place / "made" / "bag").is_dir()
@@ -78,6 +87,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("generate", "nothing", *ROAD), "nothing is an empty folder; name a folder with a recording"),
     (("generate", "letter.docx", *ROAD), "If its name misleads: --set log.format=table"),
     (("generate", "numbers.csv", *ROAD), "put a line such as t,id,x,y,speed above it"),
+    (("generate", "disorder.csv", *ROAD, "--set", "log.strict=true"), "disorder.csv, line "),
     (("generate", "columns.csv", *ROAD), "--set log.columns=time=…; is it tyme?"),
     ((*GENERATE, "--params", "bad.yaml"), "bad.yaml: not YAML (line 2"),
     ((*DRIVE, "--against", "bad.json"), "bad.json (give a drives.json of `scenario-gen drive`): not JSON"),
@@ -86,7 +96,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("compare", "made", "nothing"), "nothing/evaluation.json is no evaluation"),
     *(
         ((name, "cut.mcap", *more), "cut.mcap")
-        for name, *more in (("validate",), ("evaluate",), ("regenerate", "0"), ("reindex",))
+        for name, *more in (("validate",), ("evaluate",), ("regenerate", "0"), ("reindex",), ("generate", *ROAD))
     ),
     (("reindex", "nothing"), "no .mcap file here; name the folder of a recorded bag"),
     # folders that are written
@@ -104,6 +114,13 @@ def test_a_mistake_is_one_line_and_loses_nothing(folder, run, monkeypatch, words
     (line,) = [line for line in printed.splitlines() if line.strip()]
     assert line.startswith("error: ") and said in line
     assert files(folder) == before
+
+
+def test_a_road_with_no_way_through_is_refused(folder, run, monkeypatch):
+    monkeypatch.chdir(folder)
+    code, printed = run("generate", "my log ü.csv", "--road", "walled.yaml", "--out", "refused")
+    assert code == 2 and "walled" in printed and "no way leads from" in printed
+    assert not (folder / "refused").exists()
 
 
 def test_a_disk_that_is_full_is_one_line_and_loses_nothing(folder):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks._drive_others import braking_jerks
-from benchmarks._driving_worlds import Anything, draw_scenario, Witness
+from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, Witness
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, reaction_time
@@ -120,6 +120,13 @@ def test_who_waits_for_nobody_drives_as_certified(seed, vehicles):
     assert np.abs(drive.motion.position - scenario.position).max() < 1e-6 and drive.forced == 0
 
 
+def test_who_leaves_the_scene_does_not_brake_for_an_ego_that_passes_there_later():
+    scenario = replace(following(10.0, 20.0), present=np.array([[0, 149], [0, 60]]))
+    drive = ClosedLoop(scenario, 0).drive(Witness(scenario, 0), lambda state: state.step >= 149)
+    assert np.abs(drive.motion.position[1, :61] - scenario.position[1, :61]).max() < 1e-6
+    assert drive.here[1].sum() == 61
+
+
 @pytest.mark.parametrize("patience", [2.0, 5.0, NEVER])
 def test_who_waits_for_an_ego_that_stands_goes_first_after_its_patience(patience):
     """The ego went first in the template, but stands 20 m before the crossing."""
@@ -133,12 +140,34 @@ def test_who_waits_for_an_ego_that_stands_goes_first_after_its_patience(patience
         assert 0.1 * stands.sum() == pytest.approx(patience, abs=1.0)
 
 
-@pytest.mark.parametrize(("x", "speed"), [(-2.0, 0.0), (-20.0, 0.5)])
+@pytest.mark.parametrize(("x", "speed"), [(-2.0, 0.0), (-20.0, 2.0)])
 def test_nobody_goes_first_where_the_ego_stands_in_the_way_or_moves(x, speed):
     scenario = crossing()
     loop = ClosedLoop(scenario, 0)
     drive = states(loop, lambda k: Pose(min(-30.0 + 0.8 * k, x), 0.0, 0.0, speed), 300)
     assert drive[-1].vehicles[1, 1] < -2.0 and not np.isinf(drive[-1].waited[1])
+
+
+def test_who_waits_for_an_ego_that_creeps_far_away_goes_first():
+    drive = states(ClosedLoop(crossing(), 0), lambda k: Pose(-20.0 + 0.03 * k, 0.0, 0.0, 0.3), 200)
+    assert drive[-1].vehicles[1, 1] > 5.0
+
+
+@pytest.mark.parametrize(("beside", "passes"), [(2.0, False), (2.6, True)])
+def test_nobody_overtakes_a_slower_ego_in_its_lane_by_a_hand(beside, passes):
+    """The ego, 1.8 m wide as the other, drives so far beside the middle of the lane that 0.2 or 0.8 m are left."""
+    start = following(8.0, 20.0).position[1, 0, 0]
+    poses = [Pose(start + 0.3 * k, min(0.1 * k, beside), 0.0, 3.0) for k in range(1, 150)]
+    drive = states(ClosedLoop(following(8.0, 20.0), 1), poses.__getitem__, 130)
+    assert (drive[-1].vehicles[0, 0] > drive[-1].ego.x) == passes
+
+
+def test_who_stands_at_its_end_has_no_speed():
+    time = 0.1 * np.arange(60)
+    zero, slow = np.zeros_like(time), np.full_like(time, 0.4)
+    motions = [(np.stack([x + 0.4 * time, zero], axis=1), zero, slow) for x in (0.0, 20.0)]
+    drive = states(ClosedLoop(as_scenario(motions, len(time)), 1), lambda _: Command(-1.0, 0.0), 80)
+    assert drive[30].vehicles[0, 3] == pytest.approx(0.4) and drive[-1].vehicles[0, 3] == 0.0
 
 
 def test_a_drive_can_be_branched_anywhere():

@@ -6,6 +6,7 @@
 from driving_scenes import crossing
 import numpy as np
 import pytest
+from recordlike import drive, Phase, Writing
 from test_verdict import straight
 from typer.testing import CliRunner
 
@@ -31,20 +32,30 @@ class FullThrottle(RouteFollower):
         return Command(4.0, self.steer(observation.ego)[0])
 
 
-def generated(out, *words):
+def generated(out, log, road, *words):
     quick = ("--set", "evaluation.resamples=10")
-    command = ["generate", str(bundled("b")), "--road", "t_intersection", "--count", "3", "--for-testing", *quick]
+    command = ["generate", str(log), "--road", road, "--count", "3", "--for-testing", *quick]
     return CliRunner().invoke(app, [*command, *words, "--out", str(out)])
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    out = tmp_path_factory.mktemp("testing") / "out"
-    done = generated(out, "--ego", "auto")
+    """Of a follower so far behind that few natural scenarios need its reaction: sampling is directed to them."""
+    folder = tmp_path_factory.mktemp("testing")
+    phases = Phase(3.0, -0.8), Phase(9.0, 0.3)
+    drives = [drive(name, (x, 0.0, 0.0), 10.0, Phase(wait), *phases) for name, x, wait in (("1", 35.0, 3.0), ("2", 5.7, 4.2))]
+    Writing(5, 0.0, 14.0).doppler(drives).to_csv(folder / "log.csv", index=False)
+    done = generated(folder / "out", folder / "log.csv", "straight", "--ego", "auto")
     assert done.exit_code == 0 and "3 of 3 scenarios" in done.output, done.output
-    said = "synthetic_b on t_intersection: a planner that looks at nobody, in place of 2, passes"
-    assert said in " ".join(done.output.split()) and said in (out / "report.html").read_text()
-    return out / "bag"
+    said = "on straight: a planner that looks at nobody, in place of 2, passes 0 of 3"
+    assert said in " ".join(done.output.split()) and said in (folder / "out" / "report.html").read_text()
+    return folder / "out" / "bag"
+
+
+def test_scenarios_that_test_are_rare_and_say_how_rare(bag):
+    scenarios = [trial.scenario for trial in read_trials(bag)]
+    assert all(0.0 < float(scenario.facts["weight"]) < 0.5 for scenario in scenarios)
+    assert len({float(scenario.speed[1, 0]) for scenario in scenarios}) == 3  # the ego's motion varies, too
 
 
 def test_who_looks_at_nobody_fails_and_who_looks_passes(bag):
@@ -63,15 +74,15 @@ def test_such_a_set_is_checked_and_made_again_as_any(bag):
     regenerate_scenario(bag, read_trials(bag)[-1].scenario.index)  # raises if it comes out differently
 
 
-def test_what_does_not_need_a_reaction_is_left_out_and_said(tmp_path):
-    done = generated(tmp_path / "none", "--ego", "1", "--count", "1")
+def test_where_the_ego_does_not_have_to_react_who_has_to_is_said(tmp_path):
+    done = generated(tmp_path / "none", bundled("b"), "t_intersection", "--ego", "1", "--count", "1")
     said = " ".join(str(done.exception or done.output).split())
-    assert done.exit_code != 0 and "0 of 20 valid scenarios are kept; in the other 20 a planner that looks at nobody" in said
-    assert "has to react as ego: 2 in " in said
+    assert done.exit_code != 0 and "for testing ego 1: 0 of 1 scenarios found in which it has to react" in said
+    assert "has to react as ego: 2 in 12 of 12" in said
 
 
 def test_without_an_ego_it_is_refused(tmp_path):
-    done = generated(tmp_path / "none")
+    done = generated(tmp_path / "none", bundled("b"), "t_intersection")
     assert done.exit_code != 0 and "name the vehicle in whose place the planner drives" in str(done.exception)
 
 

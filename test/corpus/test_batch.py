@@ -20,9 +20,11 @@ from scenario_gen.base.folders import sha256_of
 from scenario_gen.cli.commands import app
 from scenario_gen.corpus import batch as batches
 from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch
+from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
+from scenario_gen.method.evaluation import at_period, criticality
 from scenario_gen.method.fitting import LostEncounterError
 
 pytestmark = pytest.mark.xdist_group("corpus")
@@ -61,7 +63,7 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(batch, tmp_pa
     words = ["--json", "find", str(out), condition, "--limit", "1", "--bag", str(tmp_path / "hits")]
     told = CliRunner().invoke(app, words)
     total = len(found.rows)
-    assert total > 1 and f"{total} scenarios found, the first 1 are listed; --limit 0 lists all" in told.stderr, told.output
+    assert total > 1 and f"{total} found, the first 1 are listed; --limit 0 lists all" in told.stderr, told.output
     assert len(json.loads(told.stdout)["scenarios"]) == total, "a limit of what is listed leaves nothing out of the results"
     namespaces = read_recording(tmp_path / "hits").namespaces
     assert {one.hashes for one in namespaces.values()} == {(row["sha256"],) for row in found.rows}
@@ -83,6 +85,17 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(batch, tmp_pa
         with pytest.raises(InputError, match="condition"):
             find(out, hostile)
     assert not list(tmp_path.glob("a.*"))
+
+
+def test_recorded_encounters_are_found_by_their_figures(corpus):
+    encounters = {row["name"]: encounter_of(row) for row in rows_of(tables_of(corpus[0]))}
+    found = find(corpus[0], "pet < 3 and gap < 6")
+    assert 0 < len(found.rows) < len(encounters) and "crossing on recorded" in "".join(coverage_lines(found, corpus[0]))
+    for row in found.rows:
+        measures = criticality(at_period(encounters[row["template"]], 0.1), 10.0)
+        assert row["pet"] == pytest.approx(measures.pet, abs=1e-6) and row["ttc"] == pytest.approx(measures.min_ttc, abs=1e-6)
+    with pytest.raises(InputError, match="holds recordings; for a bag write scenarios with"):
+        make_again(corpus[0], found.rows[0])
 
 
 def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):

@@ -35,8 +35,8 @@ def geographic(rows):
     return out
 
 
-def save(rows, folder, name="log.csv"):
-    """Write rows as a csv file."""
+def save(rows, folder, name="log.csv", **options):
+    """Write rows as a csv file; options are those of pandas."""
     path = folder / name
-    rows.to_csv(path, index=False)
+    rows.to_csv(path, index=False, **options)
     return path

@@ -1,22 +1,68 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Common slips in tables: what can be read is read, and said; for the rest the message says what to do."""
+"""Slips in tables, common ones and those that were reported: what can be read is read, and said; the rest says what to do."""
 
-from log_builders import crossing
+import zipfile
+
+from log_builders import crossing, geographic, save
 import numpy as np
+import pandas as pd
 import pytest
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs import read_log
+from scenario_gen.logs import LogConfig, read_log
 
 FOOT = 0.3048
+LONG = 9007199254740992
 
 
-def written(rows, tmp_path, **options):
-    path = tmp_path / "log.csv"
-    rows.to_csv(path, index=False, **options)
-    return path
+def held(rows):
+    """A fix each second, repeated in the rows between."""
+    fix = rows.groupby("vehicle_id").cumcount() % 10 == 0
+    position = rows[["x_m", "y_m"]].where(fix).groupby(rows["vehicle_id"]).ffill()
+    return rows.assign(x_m=position["x_m"], y_m=position["y_m"])
+
+
+def sparse(rows):
+    """Own slow tracks: a fix every 5 s, and the speeds do not help."""
+    return rows[rows.groupby("vehicle_id").cumcount() % 50 == 0].drop(columns="speed_mps")
+
+
+def with_kind(rows):
+    dog = rows[rows.vehicle_id == "a"].assign(vehicle_id="w", y_m=5.0)
+    names = {"a": "Car", "b": "vehicle.car", "w": "animal.dog.0007"}
+    return pd.concat([rows, dog]).assign(type=lambda own: own.vehicle_id.map(names))
+
+
+def numbered(rows):
+    own = with_kind(rows)
+    return own.assign(type=own.vehicle_id.map({"a": 1, "b": 2, "w": 3}))
+
+
+def mirrored(rows):
+    return rows.assign(y_m=-rows.y_m, yaw_deg=np.where(rows.vehicle_id == "a", 0.0, -90.0))
+
+
+def nmea(rows):
+    out = geographic(rows)
+    for name in ("lat_deg", "lon_deg"):
+        whole = np.trunc(out[name])
+        out[name] = 100.0 * whole + 60.0 * (out[name] - whole)
+    return out
+
+
+def swapped(rows):
+    return geographic(rows).rename(columns={"lat_deg": "lon_deg", "lon_deg": "lat_deg"})
+
+
+def ahead(rows, metres):
+    east = rows.vehicle_id == "a"
+    return rows.assign(x_m=rows.x_m + metres * east, y_m=rows.y_m + metres * ~east, heading=np.where(east, 0.0, np.pi / 2.0))
+
+
+def sized(rows, length, width):
+    return rows.assign(length=length, width=width)
 
 
 def plain(rows):
@@ -34,94 +80,167 @@ def ngsim(rows):
     return rows.assign(Global_X=6e6, Global_Y=1.8e6, v_Length=4.5 / FOOT, v_Width=1.8 / FOOT, v_Acc=0.0, Lane_ID=2)
 
 
-READ = {
-    "a decimal comma": (plain, {"sep": ";", "decimal": ","}, "its numbers have a decimal comma"),
-    "UTF-16": (plain, {"encoding": "utf-16"}, "the file is UTF-16"),
-    "bars": (plain, {"sep": "|"}, ""),
-    "spaces": (plain, {"sep": " "}, ""),
-    "units in brackets": (
-        lambda rows: plain(rows).rename(columns={"t": "Time [s]", "x": "x (m)", "y": "y (m)", "speed": "Speed [m/s]"}),
-        {},
+READ = {  # name: what is changed, columns, what is said (None: nothing), how the file is written
+    "held fixes": (held, "", "position repeated while the vehicle moves"),
+    "held fixes without speeds": (
+        lambda rows: held(rows).drop(columns="speed_mps"),
+        "",
+        "position repeated while the vehicle moves",
+    ),
+    "before 1970": (lambda rows: rows.assign(t_s=rows.t_s - 1006.0), "", "6 s are added to all"),
+    "frames for time": (
+        lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 10).rename(columns={"t_s": "frame"}),
+        "time=frame:10fps",
         "",
     ),
-    "no speed": (lambda rows: plain(rows).drop(columns="speed"), {}, "speeds are derived from the positions"),
-    "NGSIM": (ngsim, {}, "feet are converted to metres"),
+    "minutes": (lambda rows: rows.assign(t_min=rows.pop("t_s") / 60.0), "", ""),
+    "a left-handed frame": (mirrored, "y=-y_m,heading=-yaw_deg", ""),
+    "the front's position": (lambda rows: ahead(rows, 2.4), "point=front", ""),
+    "the rear axle's position": (lambda rows: ahead(rows, -1.44), "point=rear_axle", ""),
+    "dogs": (with_kind, "", "1 × animal.dog.0007"),
+    "dogs by a number": (numbered, "kind=type:1+2", "1 × unnamed 3"),
+    "columns not read": (lambda rows: rows.assign(lane=3), "", "not read: lane"),
+    "brackets": (lambda rows: rows.rename(columns={"x_m": "Ost X [m]", "y_m": "Nord [y] "}), "x=Ost X [m],y=Nord [y]", ""),
+    "spaces": (lambda rows: rows.rename(columns={"x_m": "Pos X [m]", "y_m": "Pos Y [m]"}), "", ""),
+    "feet": (lambda rows: sized(rows, 15.0, 6.0), "", "in feet"),
+    "zero": (lambda rows: sized(rows, 0.0, 0.0), "", "0 m long"),
+    "length and width swapped": (lambda rows: sized(rows, 1.8, 4.5), "", "it looks swapped"),
+    "lat and lon swapped": (swapped, "lat=lon_deg,lon=lat_deg", ""),
+    "degrees and minutes": (nmea, "lat=lat_deg:ddmm,lon=lon_deg:ddmm", ""),
+    "a decimal comma": (plain, "", "its numbers have a decimal comma", {"sep": ";", "decimal": ","}),
+    "UTF-16": (plain, "", "the file is UTF-16", {"encoding": "utf-16"}),
+    "bars": (plain, "", None, {"sep": "|"}),
+    "spaces between fields": (plain, "", None, {"sep": " "}),
+    "headings that fit": (with_headings, "", None),
+    "units in brackets": (
+        lambda rows: plain(rows).rename(columns={"t": "Time [s]", "x": "x (m)", "y": "y (m)", "speed": "Speed [m/s]"}),
+        "",
+        None,
+    ),
+    "no speed": (lambda rows: plain(rows).drop(columns="speed"), "", "speeds are derived from the positions"),
+    "NGSIM": (ngsim, "", "feet are converted to metres"),
     "headings in degrees": (
         lambda rows: with_headings(rows).assign(heading=lambda own: np.degrees(own.heading)),
-        {},
+        "",
         "if they were in degrees (name the column heading_deg)",
     ),
     "headings clockwise from north": (
         lambda rows: with_headings(rows).assign(heading=lambda own: np.pi / 2.0 - own.heading),
-        {},
+        "",
         "clockwise from north",
     ),
     "headings that are zero": (
         lambda rows: with_headings(rows).assign(heading=0.0),
-        {},
+        "",
         "headings that contradict it are not used",
     ),
 }
 
 
-@pytest.mark.parametrize(("change", "options", "said"), READ.values(), ids=READ)
-def test_what_can_be_read_is_read_and_said(tmp_path, change, options, said):
-    (right,) = read_log(written(plain(crossing()), tmp_path)).encounters
-    result = read_log(written(change(crossing()), tmp_path, **options))
+@pytest.mark.parametrize(("change", "columns", "said", "options"), [(*row, {})[:4] for row in READ.values()], ids=READ)
+def test_it_is_read_as_it_was_driven(tmp_path, change, columns, said, options):
+    (driven,) = read_log(save(crossing(), tmp_path)).encounters
+    result = read_log(save(change(crossing()), tmp_path, "other.csv", **options), LogConfig(columns=columns))
     (encounter,) = result.encounters
-    np.testing.assert_allclose(encounter.position, right.position, atol=0.1)
-    np.testing.assert_allclose(encounter.speed, right.speed, atol=0.3)
-    assert any(said in note for note in result.quality.notes) if said else not result.quality.notes
-    if change is ngsim:
-        assert encounter.vehicles[0].length == pytest.approx(4.5) and "front" in " ".join(result.quality.notes)
+    size, names = ((4.5, 1.8), "12") if change is ngsim else ((4.8, 1.9), "ab")
+    assert [(one.id, one.length, one.width) for one in encounter.vehicles] == [
+        (name, *map(pytest.approx, size)) for name in names
+    ]
+    count = min(len(encounter.time), len(driven.time))
+    for name in ("position", "speed"):
+        mine, right = getattr(encounter, name)[:, :count], getattr(driven, name)[:, :count]
+        origin = mine[:, :1] - right[:, :1] if encounter.origin and name == "position" else 0.0
+        np.testing.assert_allclose(mine - origin, right, atol=0.7 if said and "repeated" in said else 0.25)
+    assert said is not None or not result.quality.notes
+    assert (said or "") in " ".join(result.quality.notes) + " ".join(map(str, result.quality.dropped))
 
 
-def test_swapped_axes_are_noticed_by_the_headings(tmp_path):
-    result = read_log(written(with_headings(crossing()).rename(columns={"x": "y", "y": "x"}), tmp_path))
-    assert any("if x and y are swapped (log.columns=x=…,y=…)" in note for note in result.quality.notes)
-
-
-def test_speeds_in_another_unit_are_noticed(tmp_path):
-    result = read_log(written(plain(crossing()).assign(speed=lambda own: own.speed * 3.6), tmp_path))
-    assert any("positions in 2 of 2 vehicles; they look like km/h (name" in note for note in result.quality.notes)
-
-
-def test_headings_that_fit_are_not_spoken_of(tmp_path):
-    assert not read_log(written(with_headings(crossing()), tmp_path)).quality.notes
-
-
-REFUSED = {
-    "no header": (plain, {"header": False}, "line 1 has numbers instead of column names; put a line such as t,id,x,y,speed"),
-    "another name for the vehicle": (
-        lambda rows: plain(rows).rename(columns={"id": "who"}),
-        {},
-        "it could be who: --set log.columns=vehicle=who",
+SAID = {  # what is read, but looks otherwise
+    "swapped": (swapped, "if lat and lon were swapped"),
+    "frames": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 24, speed_mps=rows.speed_mps), "24fps"),
+    "knots": (lambda rows: rows.assign(speed_mps=rows.speed_mps * 3600 / 1852), "knots (speed_kn)"),
+    "overlaps": (
+        lambda rows: rows.assign(x_m=rows.x_m.where(rows.vehicle_id == "a", rows.x_m.shift(1) + 2.0), y_m=0.0),
+        "overlap",
     ),
-    "no vehicle": (lambda rows: plain(rows).drop(columns="id"), {}, "no column names the vehicle; add a column `id`"),
-    "one vehicle": (lambda rows: plain(rows[rows.vehicle_id == "a"]).drop(columns="id"), {}, "Give the files of all vehicles"),
-    "decimal commas between commas": (
-        lambda rows: plain(rows).assign(t=[f"{t:.1f}".replace(".", ",") for t in rows.t_s]),
-        {"quoting": 3, "escapechar": " "},
-        "write 0.5, not 0,5",
+    "kinds without a meaning": (lambda rows: rows.assign(type=1), "column type has numbers (1), whose meaning is not known"),
+    "y down": (lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)), "y=-…"),
+    "swapped axes": (
+        lambda rows: with_headings(rows).rename(columns={"x": "y", "y": "x"}),
+        "if x and y are swapped (log.columns=x=…,y=…)",
     ),
-    "a slip in a name": (
-        lambda rows: plain(rows).rename(columns={"t": "timstamp"}),
-        {},
-        "--set log.columns=time=…; is it timstamp?",
-    ),
-    "latitude and longitude swapped": (
-        lambda rows: plain(rows).assign(lon=48.0 + rows.x_m * 1e-5, lat=111.0 + rows.y_m * 1e-5).drop(columns=["x", "y"]),
-        {},
-        "lat and lon may be swapped",
+    "km/h": (
+        lambda rows: plain(rows).assign(speed=lambda own: own.speed * 3.6),
+        "positions in 2 of 2 vehicles; they look like km/h (name",
     ),
 }
 
 
-@pytest.mark.parametrize(("change", "options", "said"), REFUSED.values(), ids=REFUSED)
-def test_what_cannot_be_read_says_what_to_do(tmp_path, change, options, said):
-    with pytest.raises(InputError) as error:
-        read_log(written(change(crossing()), tmp_path, **options))
-    assert said in str(error.value) and "log.csv" in str(error.value)
+@pytest.mark.parametrize(("change", "said"), SAID.values(), ids=SAID)
+def test_what_looks_otherwise_is_said_once(tmp_path, change, said):
+    notes = read_log(save(change(crossing()), tmp_path), LogConfig(travel=0.0)).quality.remarks()
+    assert sum(said in note for note in notes) == 1
+
+
+@pytest.mark.parametrize(("back", "rate"), [(0.5, 10.0), (1.0, 10.0), (1.0, 1.0), (1.5, 1.0), (0.7, 2.0)])
+def test_a_clock_set_back_cuts(tmp_path, back, rate):
+    rows = crossing(seconds=14.0, rate=rate)
+    rows["t_s"] -= np.where(rows["t_s"] > 1006.0, back, 0.0)
+    result = read_log(save(rows, tmp_path))
+    assert len(result.encounters) == 2 and max(encounter.speed.max() for encounter in result.encounters) < 8.2
+    assert "the clock starts anew" in " ".join(result.quality.notes)
+
+
+def test_runs_that_begin_anew_are_apart(tmp_path):
+    again = crossing().assign(x_m=lambda own: own.x_m + 50.0)
+    found = read_log(save(pd.concat([crossing(), again]), tmp_path))
+    assert len(found.encounters) == 2 and "the clock starts anew" in " ".join(found.quality.notes)
+
+
+def test_a_jump_without_speeds_is_not_driven(tmp_path):
+    rows = crossing(seconds=16.0, rate=2.0).drop(columns="speed_mps")
+    rows.loc[(rows.vehicle_id == "a") & (rows.t_s > 1008.0), "y_m"] += 30.0
+    result = read_log(save(rows, tmp_path))
+    assert max(encounter.speed.max() for encounter in result.encounters) < 8.5
+
+
+def test_fixes_seconds_apart_do_not_refuse_the_log(tmp_path):
+    points = [(7.9, -3.4), (12.4, -4.2), (21.5, -6.4), (28.8, -0.8), (46.2, -9.2), (55.1, -13.5), (61.4, -23.0), (57.3, -47.5)]
+    rows = [(5.0 * k, name, x, y + off) for k, (x, y) in enumerate(points) for name, off in (("1", 0.0), ("2", 8.0))]
+    assert read_log(save(pd.DataFrame(rows, columns=["t", "id", "x", "y"]), tmp_path)).encounters
+
+
+@pytest.mark.parametrize("ids", [(LONG, LONG + 1), ("1e5", "100000"), ("12e3", "120e2")])
+def test_ids_stay_what_they_are(tmp_path, ids):
+    rows = crossing().assign(vehicle_id=lambda own: own.vehicle_id.map(dict(zip("ab", map(str, ids), strict=True))))
+    rows.loc[4, "vehicle_id"] = None
+    (encounter,) = read_log(save(rows, tmp_path)).encounters
+    assert {vehicle.id for vehicle in encounter.vehicles} == set(map(str, ids))
+
+
+@pytest.mark.parametrize("above", ["# ours\n# ego: 1\n", "sep=,\n", "\n"])
+def test_lines_above_the_header(tmp_path, above):
+    rows = crossing()
+    rows.loc[3, "x_m"] = np.nan
+    (tmp_path / "log.csv").write_text(above + rows.to_csv(index=False))
+    result = read_log(tmp_path / "log.csv")
+    assert str(result.quality.dropped[0]).endswith(f"log.csv, line {above.count(chr(10)) + 5}")
+
+
+@pytest.mark.parametrize("ending", ["gz", "zip"])
+def test_packed_logs(tmp_path, ending):
+    crossing().to_csv(tmp_path / f"log.csv.{ending}", index=False, compression=None if ending == "zip" else "gzip")
+    if ending == "zip":
+        with zipfile.ZipFile(tmp_path / "log.csv.zip", "w") as archive:
+            archive.writestr("drive/log.csv", crossing().to_csv(index=False))
+    (plain,) = read_log(save(crossing(), tmp_path, "plain.csv")).encounters
+    path = tmp_path / f"log.csv.{ending}"
+    np.testing.assert_array_equal(read_log(path).encounters[0].position, plain.position)
+    with pytest.raises(InputError, match=rf"log\.csv\.{ending}.* at most 100 are read"):
+        read_log(path, LogConfig(row_limit=100))
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(InputError, match=rf"log\.csv\.{ending} cannot be unpacked"):
+        read_log(path)
 
 
 def test_files_without_a_vehicle_column_are_one_vehicle_each(tmp_path):
@@ -131,3 +250,60 @@ def test_files_without_a_vehicle_column_are_one_vehicle_each(tmp_path):
     result = read_log([tmp_path / "car_a.csv", tmp_path / "car_b.csv"])
     assert [vehicle.id for vehicle in result.encounters[0].vehicles] == ["car_a", "car_b"]
     assert "each file is read as one vehicle" in " ".join(result.quality.notes)
+
+
+REFUSED = {  # name: what is changed, what is said, how the file is written
+    "ms since 1970": (
+        lambda rows: rows.assign(t_s=((rows.t_s + 1.66e9) * 1000).round()),
+        "looks like ms since 1970: --set log.columns=time=t_s:ms",
+    ),
+    "dates of another order": (
+        lambda rows: rows.assign(t_s="31.08.2022 12:00"),
+        "nor a date such as 2022-08-31T12:00:00.5, but '31.08.2022 12:00'",
+    ),
+    "x, y in degrees": (
+        lambda rows: geographic(rows).rename(columns={"lat_deg": "Y", "lon_deg": "X"}),
+        "--set log.columns=lon=X,lat=Y",
+    ),
+    "ids that number the rows": (
+        lambda rows: rows.rename(columns={"vehicle_id": "tracker"}).assign(id=range(len(rows))),
+        "--set log.columns=vehicle=tracker",
+    ),
+    "hours": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0), "the time may be in h: --set log.columns=time="),
+    "degrees and minutes": (nmea, "lat=…:ddmm"),
+    "1e-7 degrees": (lambda rows: geographic(rows).assign(lat_deg=4.8e8, lon_deg=1.1e8), "lat=…:e7"),
+    "a dog": (lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "dog"})), "1 × dog"),
+    "another unknown point": (lambda rows: rows, "point is one of centre, front"),
+    "ids of one ROS name": (
+        lambda rows: rows.assign(vehicle_id=rows.vehicle_id.map({"a": "car-1", "b": "car_1"})),
+        "vehicle ids 'car-1' and 'car_1' are both 'car_1' as ROS names; rename one",
+    ),
+    "no header": (plain, "line 1 has numbers instead of column names; put a line such as t,id,x,y,speed", {"header": False}),
+    "another name for the vehicle": (
+        lambda rows: plain(rows).rename(columns={"id": "who"}),
+        "it could be who: --set log.columns=vehicle=who",
+    ),
+    "no vehicle": (lambda rows: plain(rows).drop(columns="id"), "no column names the vehicle; add a column `id`"),
+    "one vehicle": (lambda rows: plain(rows[rows.vehicle_id == "a"]).drop(columns="id"), "Give the files of all vehicles"),
+    "decimal commas between commas": (
+        lambda rows: plain(rows).assign(t=[f"{t:.1f}".replace(".", ",") for t in rows.t_s]),
+        "write 0.5, not 0,5",
+        {"quoting": 3, "escapechar": " "},
+    ),
+    "a slip in a name": (
+        lambda rows: plain(rows).rename(columns={"t": "timstamp"}),
+        "--set log.columns=time=…; is it timstamp?",
+    ),
+    "latitude and longitude swapped": (
+        lambda rows: plain(rows).assign(lon=48.0 + rows.x_m * 1e-5, lat=111.0 + rows.y_m * 1e-5).drop(columns=["x", "y"]),
+        "lat and lon may be swapped",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "said", "options"), [(*row, {})[:3] for row in REFUSED.values()], ids=REFUSED)
+def test_what_cannot_be_read_says_what_to_do(tmp_path, change, said, options):
+    columns = "point=roof" if said.startswith("point") else ""
+    with pytest.raises(InputError) as error:
+        read_log(save(change(crossing()), tmp_path, **options), LogConfig(columns=columns))
+    assert said in str(error.value)

@@ -21,7 +21,7 @@ from figures import Figure, ROOT
 from rich.console import Console
 from rich.table import Table
 
-PARTS = ("cpu", "cuts", "fuzz", "kills", "long", "newest", "properties", "recorded", "ros", "tests")
+PARTS = ("cpu", "fuzz", "kills", "long", "newest", "properties", "recorded", "ros", "tests")
 OUT = Path("out/soak")
 
 

@@ -29,7 +29,7 @@ from scenario_gen.closed_loop.search.journal import open_journal
 from scenario_gen.closed_loop.search.objective import AT_FAULT, COLLISION, Objective
 from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.trials import find_planner, named_vehicle, Rate, trial_runner
-from scenario_gen.method.evaluation import wilson
+from scenario_gen.method.evaluation import measures_in, wilson
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.report.html import render_page
@@ -191,7 +191,8 @@ def search_failures(
     plain = replace(request.request, target="", choose="natural")
     plan = plan_of(request.planned, request.sampling, request.limits, plain)
     check = checker_of(plan, request.sampling, request.limits, request.request).check
-    natural = NaturalScenarios.of(plan, check, request.sampling, request.planned.seed)
+    measures = measures_in(request.sampling.variety, plan.encounter)
+    natural = NaturalScenarios.of(plan, check, request.sampling, request.planned.seed, measures)
     if not natural.size:
         raise InputError("the scenarios have no freedom: all are the same, so there is nothing to search")
     journal_path = out.with_name(out.name + JOURNAL)

@@ -11,8 +11,8 @@ import numpy as np
 
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.closed_loop.search.estimate import Response
-from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.closed_loop.trials import Outcome
+from scenario_gen.method.evaluation import time_apart
 
 AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = "at_fault", "collision", "off_road", "goal", "ttc", "pet"
 NAMES = (AT_FAULT, COLLISION, OFF_ROAD, GOAL)

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.journal import Journal
-from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.closed_loop.search.objective import Objective
 from scenario_gen.closed_loop.trials import RunTrials
+from scenario_gen.method.evaluation import time_apart
 from scenario_gen.method.sampling import NaturalScenarios
 from scenario_gen.numerics import Floats
 from scenario_gen.types import mask, Road, Scenario

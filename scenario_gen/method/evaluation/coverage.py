@@ -20,7 +20,7 @@ BINS = ("below 0 s", "0 … 0.5 s", "0.5 … 1 s", "1 … 2 s", "2 … 4 s", "4 
 LABELS = {
     "pet": ("PET", "s"),
     "ttc": ("time to collision", "s"),
-    "gap": ("least gap", "m"),
+    "gap": ("minimum gap", "m"),
     "arrival_gap": ("arrival gap", "s"),
     "closing_speed": ("closing speed", "m/s"),
     "speed": ("mean speed", "m/s"),

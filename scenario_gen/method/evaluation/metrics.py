@@ -196,9 +196,9 @@ def _criticality_of(template: Template) -> Mapping[str, float]:
 
 CRITICALITY = MetricGroup(
     (
-        Metric("min_distance", "min distance", "m", "", _CRITICAL, "least distance of two footprints, mean over samples"),
+        Metric("min_distance", "min distance", "m", "", _CRITICAL, "smallest distance of two footprints, mean over samples"),
         Metric(
-            "min_ttc", "min TTC", "s", "", _CRITICAL, "least time to collision at constant velocity, capped, mean over samples"
+            "min_ttc", "min TTC", "s", "", _CRITICAL, "smallest time to collision at constant velocity, capped, mean over samples"
         ),
         Metric("pet", "PET", "s", "", _CRITICAL, "from the first vehicle's exit of the shared area to the second's entry, mean"),
         Metric(

@@ -179,7 +179,7 @@ def member_of(motion: Encounter | Scenario, recording: str, template: int, pair:
     return Member(_kind(whole, conflict), np.array([*common, *each[0], *each[1]]), recording, template, chosen)
 
 
-def _generated(scenario: Scenario, template: Member, encounter: Encounter) -> Member:
+def generated_member(scenario: Scenario, template: Member, encounter: Encounter) -> Member:
     """The member that a scenario is, by the pair of its template, whose vehicles may stand in another order."""
     ids = [vehicle.id for vehicle in scenario.vehicles]
     a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
@@ -240,7 +240,7 @@ def population_of(
         if own.kind != APART:
             recorded.append(own)
             names.append(result.encounter.name)
-            made += [_generated(join_ego(scenario), own, result.encounter) for scenario in result]
+            made += [generated_member(join_ego(scenario), own, result.encounter) for scenario in result]
     if len({member.recording for member in recorded}) < 2:
         raise InputError("encounters of at least two recordings are needed; give results of more logs")
     drawn = [n for n in sorted(set(counts)) if n <= CHOSEN * len(recorded)]

@@ -112,6 +112,10 @@ def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Ite
         a, b = (tracks[k].vehicle.id for k in pair)
         if pair not in after:
             following = before[pair].following
+            if following and _in_two_lanes(*(tracks[k] for k in pair)):
+                how = "drive side by side less than a lane apart in the template, in two lanes on this road"
+                yield Loss("beside", (a, b), f"vehicles {a} and {b} {how}")
+                continue
             what = "follow each other" if following else "have crossing or merging paths"
             kind = "following" if following else "conflict"
             yield Loss(kind, (a, b), f"vehicles {a} and {b} {what} in the template, and do not meet on this road")
@@ -120,6 +124,12 @@ def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Ite
         elif before[pair].first != after[pair].first and not before[pair].following:
             first, late = tracks[before[pair].first].vehicle.id, abs(after[pair].arrival_gap)
             yield Loss("order", (a, b), f"vehicle {first} goes first in the template, {late:.1f} s after the other on this road")
+
+
+def _in_two_lanes(track: Track, other: Track) -> bool:
+    """Whether two vehicles drive beside each other at both ends, however near: a record may have them overlap."""
+    aside = np.abs([_aside(one, another, end) for one, another in ((track, other), (other, track)) for end in (0, 1)])
+    return bool((aside > _IN_LANE).any() and not (aside <= _IN_LANE).any())
 
 
 def _lost_lanes(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:

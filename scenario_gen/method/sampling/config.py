@@ -3,10 +3,13 @@
 
 """Parameters of sampling."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.types import OF_CARS
+
+ARRIVAL_S, PACE, WAIT_S, END_SPEED_MPS = 2.0, 0.2, 2.0, 1.5
+"""Standard deviations of `population`, at least: as wide as encounters differ; which scenarios remain, the population decides."""
 
 
 @dataclass(frozen=True)
@@ -20,8 +23,9 @@ class SamplingConfig(Parameters):
 
     variety: str = parameter(
         "wide",
-        "what is free: `narrow` keeps one clock, sizes, start and end states; `wide` frees them, each by its parameter",
-        choices=("narrow", "wide"),
+        "what is free: `narrow` keeps one clock, sizes, start and end states; `wide` frees them, each by its parameter; "
+        "`population` frees them more, and keeps what is usual among recorded encounters of the kind",
+        choices=("narrow", "wide", "population"),
     )
     arrival_sigma: float = parameter(
         1.5, "wide: standard deviation of each vehicle's own shift in time against the others", unit="s", low=0.0, high=10.0
@@ -32,6 +36,11 @@ class SamplingConfig(Parameters):
     place_sigma: float = parameter(0.2, "wide: standard deviation of the place in the lane", unit="m", low=0.0, high=2.0)
     sizes: str = parameter(
         "catalogue", "wide: sizes of cars, from the catalogue of eight or as recorded", choices=("catalogue", "recorded")
+    )
+    ego: str = parameter(
+        "keep",
+        "wide: start and end states of the vehicle that is left out; `keep`: its template's, `free`: free as those of the others",
+        choices=("keep", "free"),
     )
     reactions: str = parameter(
         "keep",
@@ -72,3 +81,17 @@ class SamplingConfig(Parameters):
         0.2, "share by which the clock may be longer than the template's, where bends or lengths ask for it", low=0.0, high=1.0
     )
     attempts: int = parameter(20, "candidates drawn per scenario asked for, at most", low=1, high=10_000)
+
+    @property
+    def drawn(self) -> "SamplingConfig":
+        """The parameters that candidates are drawn with: for `population` those of a `wide` that is wider."""
+        if self.variety != "population":
+            return self
+        return replace(
+            self,
+            variety="wide",
+            arrival_sigma=max(self.arrival_sigma, ARRIVAL_S),
+            pace_sigma=max(self.pace_sigma, PACE),
+            wait_sigma=max(self.wait_sigma, WAIT_S),
+            end_speed_sigma=max(self.end_speed_sigma, END_SPEED_MPS),
+        )

@@ -49,12 +49,13 @@ def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: Samp
 
     A vehicle that starts a seconds later or earlier, starts as far along its lane as it drives in that time.
     """
+    config = config.drawn
     if config.variety != "wide":
         return replace(requested, relaxed=np.zeros_like(requested.relaxed)) if requested.relaxed.any() else requested
     ego = request.ego_of(encounter)
     relaxed = np.zeros((len(encounter.vehicles), 2, 2))
     own = [np.asarray(np.isfinite(request.rows(end, encounter)).any(axis=1)) for end in ("starts", "goals")]
-    if ego is not None:
+    if ego is not None and config.ego == "keep":
         for rows in own:
             rows[ego] = True
     tied = [rows.any() for rows in own]

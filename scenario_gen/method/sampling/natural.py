@@ -10,10 +10,10 @@ from scenario_gen.method.sampling.adapt import Check, Judge
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.prepare import prepare
-from scenario_gen.method.sampling.sample import PILOT
-from scenario_gen.method.sampling.sampler import BLOCK, ENOUGH, LEVELS, Sampler, searched_index
+from scenario_gen.method.sampling.sampler import ENOUGH, LEVELS, Sampler, searched_index
+from scenario_gen.method.sampling.usual import PILOT, pilot, Usual, usual_of
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Scenario
+from scenario_gen.types import Measures, Scenario
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +24,18 @@ class NaturalScenarios:
         sampler: draws candidates.
         judge: refuses them.
         level: whose standard deviations they have, as in a set.
+        usual: refuses those that are rarer than what a set keeps.
     """
 
     sampler: Sampler
     judge: Judge
     level: int
+    usual: Usual
 
     @classmethod
-    def of(cls, plan: Plan, check: Check, config: SamplingConfig, seed: int) -> "NaturalScenarios":
+    def of(
+        cls, plan: Plan, check: Check, config: SamplingConfig, seed: int, measures: Measures | None = None
+    ) -> "NaturalScenarios":
         """Prepare a template on its road; the level is the first of which enough candidates are valid, or the best.
 
         Raises:
@@ -41,18 +45,11 @@ class NaturalScenarios:
         if prepared.model is None:
             raise RefusedError(prepared.refusal)
         sampler = Sampler(prepared.model, seed, plan.road.frame_id)
-        judge = Judge.of(sampler, check, ENOUGH[config.variety])
-        shares: list[float] = []
-        for level in range(len(LEVELS)):
-            drawn = [
-                scenario for k in range(PILOT // BLOCK) for scenario in _scenarios(sampler, level, k) if scenario is not None
-            ]
-            shares.append(judge(drawn).count(None) / PILOT if drawn else 0.0)
-            if shares[-1] >= judge.enough:
-                break
-        if not any(shares):
-            raise RefusedError(f"none of {PILOT * len(shares)} candidates is valid; there is nothing to search in")
-        return cls(sampler, judge, shares.index(max(shares)))
+        judge = Judge.of(sampler, check, ENOUGH[config.drawn.variety])
+        level, valid = pilot(sampler, judge)
+        if not valid:
+            raise RefusedError(f"none of {PILOT * len(LEVELS)} candidates is valid; there is nothing to search in")
+        return cls(sampler, judge, level, usual_of(sampler, judge, measures))
 
     @property
     def size(self) -> int:
@@ -64,9 +61,5 @@ class NaturalScenarios:
         batch = self.sampler.model.draw(numbers, LEVELS[self.level])
         drawn = batch.scenarios(self.sampler.seed, [searched_index(row) for row in numbers], self.sampler.frame_id)
         causes = iter(self.judge([scenario for scenario in drawn if scenario is not None]))
-        return [scenario if scenario is not None and next(causes) is None else None for scenario in drawn]
-
-
-def _scenarios(sampler: Sampler, level: int, number: int) -> list[Scenario | None]:
-    batch, index = sampler.block(level, number)
-    return batch.scenarios(sampler.seed, index, sampler.frame_id)
+        valid = [scenario if scenario is not None and next(causes) is None else None for scenario in drawn]
+        return [scenario if scenario is not None and self.usual(scenario) else None for scenario in valid]

@@ -44,9 +44,11 @@ class Callbacks:
     Attributes:
         progress: called with (valid so far, count, candidates so far).
         cancelled: called before each candidate; if True, the set so far is returned.
+        accepts: asked of each valid scenario; one that it does not accept is left out of the set.
         found: called with each valid scenario as it is drawn, in the set's order; of a chosen set, when it is chosen.
     """
 
     progress: Progress = lambda *_: None
     cancelled: Cancelled = lambda: False
+    accepts: Callable[[Scenario], bool] = lambda _: True
     found: OnValid = lambda *_: None

@@ -61,6 +61,7 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
     Raises:
         InputError: routes, segmentation and encounter disagree in their numbers.
     """
+    config = config.drawn
     encounter, road, routes, requested = plan.encounter, plan.road, plan.routes, plan.requested
     times = encounter.time[np.concatenate([[0], plan.segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):

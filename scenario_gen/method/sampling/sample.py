@@ -29,12 +29,12 @@ from scenario_gen.method.sampling.sampler import (
     place_of,
     Sampler,
 )
+from scenario_gen.method.sampling.usual import ANYTHING, PILOT, Usual, usual_of
 from scenario_gen.types import Cause, EgoSlot, Measures, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
 
 KEPT = 1000  # scenarios up to which a set stays in memory
 LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried
 EXAMPLES = 3  # refused candidates of each cause that are kept to be looked at
-PILOT = 2 * BLOCK  # candidates by which a level is judged
 DIRECTED_BUDGET = 10  # times the budget of a request without a target
 HOPELESS = 20 * BLOCK  # candidates of a proposal after which it is given up if none of them is valid and in the range
 
@@ -85,10 +85,10 @@ def draw_scenarios(
         kept = tuple(edge for edge in prepared.model.reactions.edges if (edge.who, edge.whom) not in judge.lost)
         sampler = replace(sampler, label=label_of(encounter, request, aim, measures, kept, judge.lost))
         loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.requested, slot))
-        loop.aim, loop.measures = aim, measures
+        loop.aim, loop.measures, loop.usual = aim, measures, usual_of(sampler, judge, measures)
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
         lost = [f"{NOT_KEPT}: {message}" for message in judge.lost.values()]
-        notes = (*prepared.adaptations, *lost, *loop.adaptations)
+        notes = (*prepared.adaptations, *lost, *loop.usual.notes(), *loop.adaptations)
         drawn = ScenarioSet(
             count, loop.scenarios(), loop.candidates, loop.refused, notes, slot, loop.reached, loop.chosen_from, kept,
             examples=tuple(loop.examples),
@@ -131,7 +131,7 @@ def regenerate(
 
 def _enough(config: SamplingConfig, request: Request) -> float:
     """Return the share of valid candidates by which a level is good enough; any, where the order alone makes most invalid."""
-    return 0.0 if request.order == "swap" else ENOUGH[config.variety]
+    return 0.0 if request.order == "swap" else ENOUGH[config.drawn.variety]
 
 
 @dataclass
@@ -151,6 +151,7 @@ class _Loop:
     adaptations: list[str] = field(default_factory=list)
     aim: Aim | None = None
     measures: Measures | None = None
+    usual: Usual = ANYTHING
     reached: Reached | None = None
     chosen_from: int = 0
     keep: int = field(default_factory=lambda: KEPT)
@@ -191,6 +192,11 @@ class _Loop:
         plain = replace(self.sampler, ego=None, label=lambda _: {}, weighted=False)
         for _, together in itertools.groupby(index, lambda number: number // BLOCK):
             yield from plain.redraw(list(together))
+
+    def _take(self, number: int, scenario: Scenario) -> None:
+        """Keep a valid candidate of all vehicles if it is accepted."""
+        if self.callbacks.accepts(scenario):
+            self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
 
     def _keep(self, number: int, scenario: Scenario) -> None:
         self.index.append(number)
@@ -245,8 +251,10 @@ class _Loop:
             self.candidates += 1
             if scenario is None or cause is not None or not self._in_range(scenario):
                 self.refused[cause or (Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE)] += 1
+            elif not self.usual(scenario):
+                self.refused[Cause.UNUSUAL] += 1
             else:
-                self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+                self._take(number, scenario)
 
     def run(self, budget: int) -> None:
         """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
@@ -276,7 +284,7 @@ class _Loop:
             yield self.sampler.block(level, number)
 
     def _spend(self, blocks: Iterator[tuple[Batch, list[int]]], most: int) -> tuple[int, int]:
-        """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many of them were valid."""
+        """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many were valid, usual or not."""
         seen = good = 0
         while seen < most and len(self.index) < self.count and not self.callbacks.cancelled():
             batch, index = next(blocks)
@@ -290,7 +298,9 @@ class _Loop:
                 cause = next(causes) if ok else Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE
                 if scenario is not None and cause is None:
                     good += 1
-                    self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+                    cause = None if self.usual(scenario) else Cause.UNUSUAL
+                if scenario is not None and cause is None:
+                    self._take(number, scenario)
                 else:
                     self.refused[cause or Cause.SPEED_PROFILE] += 1
                     if scenario is not None and cause is not None and self.refused[cause] <= EXAMPLES:

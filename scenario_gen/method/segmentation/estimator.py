@@ -71,7 +71,6 @@ class StickyHDPHMM:
         startprob_: (K,) probability of a sequence's first state.
         dof_: degrees of freedom of the noise; inf: Gaussian.
         r_hat_: split R̂ of each trace, by its name.
-        ess_: effective sample size of each trace, by its name.
         converged_: whether every R̂ is as low as was asked for.
         posterior_: all that was sampled.
     """
@@ -138,7 +137,6 @@ class StickyHDPHMM:
         self.transitions_, self.startprob_ = mean_transitions(posterior, self.n_states_)
         self.dof_ = posterior.dof or np.inf
         self.r_hat_ = dict(zip(TRACE, posterior.r_hat.tolist(), strict=True))
-        self.ess_ = dict(zip(TRACE, posterior.ess.tolist(), strict=True))
         requested = config.r_hat if config.r_hat > 1.0 else USUAL_R_HAT
         self.converged_ = max(self.r_hat_.values()) <= requested
         for concern in self._concerns(x, visible, requested):

@@ -55,11 +55,6 @@ class Posterior:
         """(5,) split R̂ of each trace over all chains."""
         return r_hat(list(self.trace))
 
-    @property
-    def ess(self) -> Floats:
-        """(5,) effective sample size of each trace over all chains."""
-        return ess(list(self.trace))
-
     @classmethod
     def constant(cls, ends: Ints) -> "Posterior":
         """The posterior of sequences that do not vary: one primitive, with certainty; they end before the samples `ends` (Q,)."""
@@ -119,27 +114,6 @@ def r_hat(traces: list[Floats]) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.sqrt((half - 1) / half + between / within)
     return np.where(within > 0.0, ratio, np.where(between > 0.0, np.inf, 1.0))
-
-
-def ess(traces: list[Floats]) -> Floats:
-    """Effective sample size (Gelman et al. 2013, 11.5) of traces, each (S, n): (n,), by Geyer's initial positive pairs."""
-    half = min((len(trace) for trace in traces), default=0) // 2
-    if half < 4:
-        return np.zeros(5)
-    parts = np.array([part for trace in traces for part in (trace[:half], trace[half : 2 * half])])
-    chains, n, quantities = parts.shape
-    centred = parts - parts.mean(axis=1, keepdims=True)
-    within = parts.var(axis=1, ddof=1).mean(axis=0)
-    total = (n - 1) / n * within + parts.mean(axis=1).var(axis=0, ddof=1)
-    lags = np.array([(centred[:, lag:] * centred[:, : n - lag]).sum(axis=1).mean(axis=0) / n for lag in range(n)])
-    result = np.full(quantities, float(chains * n))
-    for i in range(quantities):
-        if total[i] > 0.0:
-            rho = 1.0 - (within[i] - lags[:, i] * n / (n - 1)) / total[i]
-            pairs = rho[: n // 2 * 2].reshape(-1, 2).sum(axis=1)
-            stop = int(np.argmax(pairs < 0.0)) if (pairs < 0.0).any() else len(pairs)
-            result[i] = chains * n / max(2.0 * float(np.minimum.accumulate(pairs[:stop]).sum()) - 1.0, 1e-2)
-    return result
 
 
 def changepoints_of(labels: Ints, ends: Ints) -> Ints:

@@ -196,7 +196,7 @@ def match(
     for track, (first, last) in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
         course = _course(chains, track, _placed(track, spot), scale, first, last)
         if course is None:
-            yield Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
+            yield Match((), math.inf, f"no lanes lead along the way of vehicle {track.vehicle.id}, from its start to its end")
             return
         courses.append(course)
     yield judged(chains, _tied(chains.network, courses, tracks, scale, [None] * len(courses)), tracks, spot)

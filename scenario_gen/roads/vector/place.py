@@ -89,9 +89,9 @@ def placements(
             found = True
             yield placed
     if not found:
-        what = "road" if network.drawn else "map"
+        what, why = ("road", network.notes) if network.drawn else ("map", ())
         *_, reason = min(search.failures, default=("it has no lanes of its directions",))
-        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {recorded}{reason}")
+        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {'; '.join((recorded + reason, *why))}")
 
 
 @dataclass(frozen=True, eq=False)

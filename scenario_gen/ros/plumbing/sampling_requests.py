@@ -368,7 +368,7 @@ def answer_request(
         with turn:
             sender.scenario(scenario, requested, ego)
 
-    callbacks = Callbacks(advance, cancelled, in_turn)
+    callbacks = Callbacks(advance, cancelled, found=in_turn)
     stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
     chain = Chain(encounter, segmentation, road, stages, config, config.count, config.seed)
     try:

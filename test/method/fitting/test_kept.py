@@ -99,6 +99,11 @@ def test_who_drives_in_whose_lane_is_kept(template, road, kind):
     assert [loss.kind for loss in find_losses(template, road) if loss.kind in LOSABLE] == [kind]
 
 
+def test_who_is_recorded_beside_another_one_in_its_width_does_not_follow_it():
+    template = along(SAME, (1.7,) * 5, ahead=1.0)
+    assert {loss.kind for loss in find_losses(template, along(SAME, LEFT, ahead=1.0))} == {"beside"}
+
+
 def test_who_passes_whom_and_on_which_side_is_kept():
     ahead, past = np.arange(0.0, 150.0), np.arange(-30.0, 270.0, 2.0)
     swerve = np.interp(past, [-10.0, 20.0, 60.0, 90.0], [0.0, 3.5, 3.5, 0.0])

@@ -67,7 +67,7 @@ def test_states_have_their_means_covariances_and_transitions_in_units(fitted):
     assert model.startprob_.sum() == pytest.approx(1.0)
     assert model.dof_ == np.inf
     assert model.converged_ == (max(model.r_hat_.values()) <= 1.1)
-    assert set(model.ess_) == {"log_joint", "occupied", "gamma", "alpha_kappa", "rho"}
+    assert set(model.r_hat_) == {"log_joint", "occupied", "gamma", "alpha_kappa", "rho"}
 
 
 def test_score_and_predict_proba_are_those_of_the_hidden_markov_model(fitted):

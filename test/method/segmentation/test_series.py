@@ -11,7 +11,7 @@ import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.segmentation import SamplerConfig, segment_series
-from scenario_gen.method.segmentation.posterior import ess, r_hat
+from scenario_gen.method.segmentation.posterior import r_hat
 from scenario_gen.method.segmentation.series import usual_distances, without_outliers
 
 
@@ -144,25 +144,19 @@ def test_chains_agree_and_say_so():
     x, labels = many_states(1)
     posterior = segment_series(x, seed=0)
     assert found_as_drawn(posterior, labels)
-    assert posterior.r_hat.shape == posterior.ess.shape == (5,)
+    assert posterior.r_hat.shape == (5,)
     assert posterior.r_hat.max() <= SamplerConfig().r_hat
     assert posterior.kept.all()
-    assert posterior.ess.min() > 10.0
     unfinished = segment_series(x, SamplerConfig(sweeps=10, r_hat=1.0001), seed=0)
     assert unfinished.r_hat.max() > 1.0001
 
 
-def test_r_hat_and_ess_of_known_traces():
+def test_r_hat_of_known_traces():
     rng = np.random.default_rng(0)
     same = [rng.normal(size=(400, 5)) for _ in range(4)]
     assert np.abs(r_hat(same) - 1.0).max() < 0.02
-    np.testing.assert_allclose(ess(same), 1600.0, rtol=0.3)
     apart = [trace + 3.0 * k for k, trace in enumerate(same)]
     assert r_hat(apart).min() > 2.0
-    slow = np.zeros((4, 2000, 5))
-    for t in range(1, 2000):  # an AR(1) series of coefficient 0.9 is worth a nineteenth of its length
-        slow[:, t] = 0.9 * slow[:, t - 1] + rng.normal(size=(4, 5))
-    np.testing.assert_allclose(ess(list(slow)), 8000.0 / 19.0, rtol=0.4)
     constant = [np.ones((20, 5)), np.ones((20, 5))]
     np.testing.assert_array_equal(r_hat(constant), 1.0)
     assert np.isinf(r_hat([constant[0], 2.0 * constant[1]])).all()

@@ -10,10 +10,11 @@ each other in their lanes are always near, and never meet.
 
 import numpy as np
 
+from scenario_gen.method.evaluation.motion import Motion
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import F2, kernel, OUT1
-from scenario_gen.types import Scenario
+from scenario_gen.types import Scenario, Vehicle
 
 FINER = 4  # instants of the other vehicle for one of the ego
 APART = 5.0  # s, at most: what is farther apart, or never meets, is all the same
@@ -28,18 +29,33 @@ def time_apart(motion: Scenario, here: Bools, ego: int, other: int) -> float:
         ego: index.
         other: index.
     """
-    mine, its = np.flatnonzero(here[ego]), np.flatnonzero(here[other])
-    if len(mine) == 0 or len(its) < 2:
-        return APART
+    mine = np.flatnonzero(here[ego])
+    poses = np.column_stack([motion.time[mine], motion.position[ego][mine], motion.heading[ego][mine]])
+    return least_shift(poses, timed_poses(motion, here[other], other), (motion.vehicles[ego], motion.vehicles[other]))
+
+
+def timed_poses(motion: Scenario | Motion, here: Bools, n: int) -> Floats:
+    """Return (R, 4) time [s], x, y [m], yaw [rad] of a vehicle while it is here (T,), FINER times as dense as the motion."""
+    its = np.flatnonzero(here)
+    if len(its) < 2:
+        return np.empty((0, 4))
     time = motion.time
     fine = np.linspace(time[its[0]], time[its[-1]], FINER * (len(its) - 1) + 1)
-    a = np.column_stack([time[mine], motion.position[ego][mine], motion.heading[ego][mine]])
-    columns = (*motion.position[other].T, motion.heading[other])
-    b = np.column_stack([fine, *(np.interp(fine, time[its], column[its]) for column in columns)])
-    vehicles = motion.vehicles
-    half = np.array([vehicles[k].half for k in (ego, other)])
+    columns = (*motion.position[n].T, motion.heading[n])
+    return np.column_stack([fine, *(np.interp(fine, time[its], column[its]) for column in columns)])
+
+
+def least_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) -> float:
+    """Return the least difference of times [s] at which two vehicles' footprints overlap, at most APART.
+
+    Args:
+        a: (S, 4) time [s], x, y [m], yaw [rad] of one.
+        b: (R, 4) likewise, of the other.
+        vehicles: whose footprints these are.
+    """
     out = np.array([APART])
-    _least_shift(a, b, half, out)
+    if len(a) and len(b):
+        _least_shift(a, b, np.array([vehicle.half for vehicle in vehicles]), out)
     return float(out[0])
 
 

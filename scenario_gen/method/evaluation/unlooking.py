@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a vehicle that looks at nobody would do: follow its path as fast as it ever drove, and slow down in bends and to stop.
+
+That is the baseline that planners are compared with, and the figure `unlooking`: by how much it would miss the others.
+"""
+
+import numpy as np
+
+from scenario_gen.method.evaluation.motion import Motion
+from scenario_gen.method.evaluation.nearness import APART, least_shift, timed_poses
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import edge_lengths
+
+PULLS_AWAY, BRAKING, LATERAL = 2.5, 2.5, 2.5  # m/s², with which it speeds up, slows down, and takes bends
+STANDS = 0.5  # m/s, below which a vehicle's last speed says that it stands at its end
+_FORESIGHT = np.arange(0.0, 21.0, 4.0)  # m ahead of it where it looks for bends
+_CELL = 0.5  # m of its path for which it has one speed
+
+
+def wanted_speeds(route: Curve, station: Floats, top: float, *, stops: bool) -> Floats:
+    """Return (S,) speeds [m/s] wanted at stations (S,) [m] of a free route: `top`, less before bends and a stop at its end."""
+    bend = np.abs(np.diff(route.at(station[:, None] + _FORESIGHT)[..., 2], axis=1)).max(axis=1) / _FORESIGHT[1]
+    wanted = np.minimum(top, np.sqrt(LATERAL / np.maximum(bend, 1e-6)))
+    if stops:
+        wanted = np.minimum(wanted, np.sqrt(2.0 * BRAKING * np.maximum(route.length - station, 0.0)) + 0.3)
+    return np.asarray(wanted)
+
+
+def free_acceleration(speed: float, wanted: float, most: float = PULLS_AWAY) -> float:
+    """Return the acceleration [m/s²] towards a wanted speed on a free way (IDM); to be too fast is no reason to brake hard."""
+    over = speed / max(wanted, 0.1)
+    return max(most * (1.0 - over * over), -BRAKING)
+
+
+def unlooking_apart(motion: Motion, a: int, b: int) -> float:
+    """Return the least time [s] by which vehicle a, if it looked at nobody, would have to be shifted to meet b.
+
+    0: it would meet b. At most APART.
+    """
+    own = motion.own(a)
+    position, speed = motion.position[a, own], motion.speed[a, own]
+    position = position[np.concatenate([[True], edge_lengths(position) > 1e-3])]
+    if len(position) < 3:
+        return APART
+    route = Curve.through(position)
+    stops = bool(speed[-1] < STANDS)
+    wanted = wanted_speeds(route, np.arange(0.0, route.length + _CELL, _CELL), float(speed.max()), stops=stops).tolist()
+    stations, now, dt = [0.0], float(speed[0]), motion.dt
+    while stations[-1] < route.length and len(stations) < motion.speed.shape[1]:
+        after = max(now + free_acceleration(now, wanted[int(stations[-1] / _CELL)]) * dt, 0.0)
+        stations.append(stations[-1] + 0.5 * (now + after) * dt)
+        now = after
+    poses = np.column_stack([motion.time[own.start] + dt * np.arange(len(stations)), route.at(np.array(stations))])
+    return least_shift(poses, timed_poses(motion, motion.there[b], b), (motion.vehicles[a], motion.vehicles[b]))

@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which valid candidates `sampling.variety=population` keeps: those that are usual among recorded encounters of the kind.
+
+A template may be unusual itself, and then nothing generated from it is usual. So kept is what has a rarity of at most 1, or the
+quarter of the valid candidates that is least rare. The bound is found with the first candidates, and is the same for all.
+"""
+
+from dataclasses import dataclass
+import math
+
+from scenario_gen.method.sampling.adapt import Judge
+from scenario_gen.method.sampling.sampler import BLOCK, LEVELS, Sampler
+from scenario_gen.types import Measures, Scenario
+
+PILOT = 2 * BLOCK  # candidates by which a level is judged
+LEAST_RARE = 0.25  # share of the valid candidates that is kept at least
+
+
+@dataclass(frozen=True, eq=False)
+class Usual:
+    """Says whether a valid candidate is kept.
+
+    Attributes:
+        measures: with the rarity of a scenario.
+        most: the greatest rarity that is kept.
+    """
+
+    measures: Measures
+    most: float
+
+    def __call__(self, scenario: Scenario) -> bool:
+        """Whether it is."""
+        return self.measures.rarity is None or self.measures.rarity(scenario) <= self.most
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what is to be said of the bound: nothing where what is kept is usual."""
+        if self.measures.rarity is None or self.most <= 1.0:
+            return ()
+        bound = f"up to a rarity of {self.most:.2f}" if math.isfinite(self.most) else "whatever they are"
+        return (f"this template is unusual among recorded encounters of its kind (rarity 1): scenarios {bound} are kept",)
+
+
+ANYTHING = Usual(Measures(lambda *_: math.nan, lambda _: ()), math.inf)
+"""Keeps all."""
+
+
+def usual_of(sampler: Sampler, judge: Judge, measures: Measures | None) -> Usual:
+    """Find the bound."""
+    if measures is None or measures.rarity is None:
+        return ANYTHING
+    _, valid = pilot(sampler, judge)
+    rarities = sorted(map(measures.rarity, valid))
+    return Usual(measures, max(1.0, rarities[int(LEAST_RARE * len(rarities))]) if rarities else math.inf)
+
+
+def pilot(sampler: Sampler, judge: Judge) -> tuple[int, list[Scenario]]:
+    """Return the first level of which enough candidates are valid, or the best, and its valid candidates."""
+    levels: list[list[Scenario]] = []
+    for level in range(len(LEVELS)):
+        drawn = [scenario for k in range(PILOT // BLOCK) for scenario in _scenarios(sampler, level, k) if scenario is not None]
+        causes = judge(drawn) if drawn else []
+        levels.append([scenario for scenario, cause in zip(drawn, causes, strict=True) if cause is None])
+        if len(levels[-1]) >= judge.enough * PILOT:
+            break
+    best = max(range(len(levels)), key=lambda level: len(levels[level]))
+    return best, levels[best]
+
+
+def _scenarios(sampler: Sampler, level: int, number: int) -> list[Scenario | None]:
+    batch, index = sampler.block(level, number)
+    return batch.scenarios(sampler.seed, index, sampler.frame_id)

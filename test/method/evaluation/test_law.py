@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How encounters of a kind differ, and what `sampling.variety=population` makes of it."""
+
+from dataclasses import replace
+import json
+
+import numpy as np
+import pytest
+from textbook_motions import labelled
+
+from scenario_gen import generate, PipelineConfig
+from scenario_gen.method.evaluation.law import Law, measures_in, SHIPPED
+from scenario_gen.method.evaluation.population import FEATURES, member_of
+from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, regenerate, SamplingConfig
+from scenario_gen.types import Cause, Request, Scenario
+
+POPULATION = PipelineConfig(sampling=SamplingConfig(variety="population"))
+SPEED = FEATURES.index("speed at conflict of the first")
+KIND = "crossing, rolls"
+
+
+def as_scenario(encounter, pace=1.0):
+    """The encounter driven `pace` times as fast."""
+    return Scenario(
+        encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.speed * pace, 0.0 * encounter.speed
+    )
+
+
+@pytest.fixture(scope="module")
+def encounters():
+    return [labelled(KIND, seed).encounter for seed in range(24)]
+
+
+@pytest.fixture(scope="module")
+def sets(encounters):
+    """Of the first encounter: as recorded ones differ, and as by default."""
+    return [generate(encounters, "corridor", config, count=40, seed=5) for config in (POPULATION, PipelineConfig())]
+
+
+def test_the_shipped_law_is_one_of_these_features_names_its_source_and_has_no_rows():
+    document = json.loads(SHIPPED.read_text())
+    assert "public domain" in document["source"] and tuple(document["features"]) == FEATURES
+    for law in document["kinds"].values():
+        assert set(law) == {"encounters", "mean", "covariance"} and np.linalg.eigvalsh(law["covariance"]).min() > 0.0
+
+
+def test_few_encounters_hardly_move_the_shipped_law_and_many_make_it_theirs():
+    shipped = json.loads(SHIPPED.read_text())["kinds"]["following"]["mean"]
+    rng = np.random.default_rng(4)
+    centre, spread = np.array(shipped) + 3.0, np.linspace(0.5, 2.0, len(FEATURES))
+    seen = centre + spread * rng.standard_normal((4000, len(FEATURES)))
+    none, few, many = (Law.of("following", list(seen[:n])) for n in (0, 1, 4000))
+    np.testing.assert_allclose(none.mean, shipped)
+    assert np.abs(few.mean - shipped).max() < np.abs(few.mean - seen[0]).max()
+    np.testing.assert_allclose(many.mean, centre, atol=0.1)
+    distances = np.array([many.distance(row) for row in seen])
+    assert abs(np.square(distances).mean() - 1.0) < 0.05
+
+
+def test_what_no_recorded_driver_does_is_rarer_and_others_that_do_it_make_it_usual(encounters):
+    own, fast = encounters[0], replace(encounters[0], speed=3.0 * encounters[0].speed)
+    rarity = measures_in("population", own).rarity
+    alike = measures_in("population", own, [replace(fast, name=f"fast {n}") for n in range(9)]).rarity
+    assert rarity(as_scenario(own, 3.0)) > 1.5 * rarity(as_scenario(own))
+    assert alike(as_scenario(own, 3.0)) < 0.7 * rarity(as_scenario(own, 3.0))
+    assert measures_in("wide", own).rarity is None
+
+
+def test_the_template_counts_once_whether_it_is_named_or_not(encounters):
+    scenario = as_scenario(encounters[1])
+    named, unnamed = (measures_in("population", encounters[0], others).rarity for others in (encounters, encounters[1:]))
+    assert named(scenario) == pytest.approx(unnamed(scenario))
+
+
+def test_vehicles_that_share_no_area_are_in_no_population(encounters):
+    position = encounters[0].position.copy()
+    position[0] += 1000.0
+    assert measures_in("population", encounters[0]).rarity(as_scenario(replace(encounters[0], position=position))) == np.inf
+
+
+def test_speeds_of_a_set_spread_towards_those_of_the_population(sets, encounters):
+    def spread(motions):
+        return np.std([member_of(motion, "", 0).features[SPEED] for motion in motions])
+
+    population, wide = map(spread, sets)
+    recorded = spread(encounters)
+    assert wide < population < recorded and population > 1.3 * wide
+
+
+def test_scenarios_say_their_rarity_and_the_others_are_counted(sets):
+    population, wide = (made.generated for made in sets)
+    rarities = np.array([float(scenario.facts["rarity"]) for scenario in population])
+    assert len(population) == 40 and population.refused[Cause.UNUSUAL] > 0
+    assert rarities.max() <= 1.0 or any("unusual" in note and f"{rarities.max():.0f}" in note for note in population.adaptations)
+    assert not wide.refused[Cause.UNUSUAL] and "rarity" not in wide[0].facts
+
+
+def test_the_same_seed_gives_the_same_and_an_index_one_alone(sets, encounters):
+    made = sets[0]
+    again = generate(encounters, "corridor", POPULATION, count=5, seed=5)
+    assert [one.index for one in again] == [one.index for one in made][:5]
+    plan = plan_of(again, POPULATION.sampling, POPULATION.limits, Request())
+    alone = regenerate(plan, POPULATION.sampling, seed=5, index=again[4].index)
+    np.testing.assert_allclose(alone.position, made[4].position, atol=1e-9)
+
+
+def test_an_unusual_template_keeps_its_least_rare_quarter_and_says_so(encounters):
+    others = [replace(other, name=f"{n}", speed=0.1 * other.speed) for n, other in enumerate(4 * encounters)]
+    made = generate([encounters[0], *others], "corridor", POPULATION, count=10, seed=5)
+    assert len(made) == 10 and any("unusual among recorded encounters" in note for note in made.generated.adaptations)
+
+
+def test_natural_scenarios_of_a_population_are_usual_too(sets, encounters):
+    plan, sampling = plan_of(sets[0], POPULATION.sampling, POPULATION.limits, Request()), POPULATION.sampling
+    measures = measures_in("population", encounters[0], encounters)
+    check = checker_of(plan, sampling, POPULATION.limits, Request()).check
+    natural, any_of_them = (NaturalScenarios.of(plan, check, sampling, 5, given) for given in (measures, None))
+    numbers = np.random.default_rng(0).standard_normal((40, natural.size))
+    usual, valid = natural.scenarios(numbers), any_of_them.scenarios(numbers)
+    kept = [one is not None and measures.rarity(one) <= natural.usual.most for one in valid]
+    assert [one is not None for one in usual] == kept and sum(kept) < sum(one is not None for one in valid)
