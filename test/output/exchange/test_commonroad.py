@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from small_scenarios import crossing, moving, observed, one_vehicle
+from small_scenarios import crossing, observed, one_vehicle
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.output.exchange.cases import Case, Exported
