@@ -4,11 +4,11 @@
 """How much unseen traffic a few recordings stand for: coverage and precision of what is generated, beside two nulls.
 
 Recorded encounters of two vehicles (SCENARIO_GEN_DATA), each on its own road, with default settings and with
-`sampling.variety=population` (the template and the shipped law alone: encounters that are to be reached say nothing); without data
-the drawn motions of test/worlds. `_coverage_pairs.json` lists 105: pairs within 4 s at the shared area or 15 m, of four kinds, whose
-road keeps the kind.
-Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no generator: *shifted* moves each
-vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another scenario of the same set.
+`sampling.variety=population` (of the template and the shipped law alone: encounters that are to be reached say nothing); without
+data the drawn motions of test/worlds. `_coverage_pairs.json` lists 105: pairs within 4 s at the shared area or 15 m, of four
+kinds, whose road keeps the kind. Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no
+generator: *shifted* moves each vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another one of
+the set.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
