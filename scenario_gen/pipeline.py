@@ -63,7 +63,8 @@ def generate(
     result = chain.sample(planned, Callbacks(progress, accepts=partial(accepts, road)))
     if not result.generated.scenarios:
         causes = ", ".join(f"{count} × {cause}" for cause, count in causes_in_words(result.generated.refused))
-        raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {causes or 'none was drawn'}")
+        why = "; ".join((causes or "none was drawn", *result.generated.adaptations))
+        raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {why}")
     if config.evaluation.compare:
         result = with_references(result, config, request, population)
     result = replace(result, oracle=replay(encounter, result.placed()[1], road.frame_id))

@@ -14,7 +14,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
-from scenario_gen.template import clean_tracks
+from scenario_gen.template import clean_tracks, drivers_of
 from scenario_gen.types import Encounter, LaneNetwork, Road
 from scenario_gen.types.markings import markings
 
@@ -55,7 +55,7 @@ def map_picture(name: str, encounter: Encounter | None = None) -> tuple[str, lis
     found: list[Place] = []
     if encounter is not None:
         try:
-            found = list(islice(_apart(places(network, clean_tracks(encounter))), PLACES))
+            found = list(islice(_apart(places(network, drivers_of(clean_tracks(encounter)))), PLACES))
         except RefusedError as error:
             said.append(f"no place for {encounter.name}: {error}")
         said += [

@@ -20,7 +20,16 @@ from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, PLAIN_LINE
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
-from scenario_gen.template import clean_tracks, main_line, mirrored, refuse_reversing, refuse_too_large, to_frenet, traffic_side
+from scenario_gen.template import (
+    clean_tracks,
+    drivers_of,
+    main_line,
+    mirrored,
+    refuse_reversing,
+    refuse_too_large,
+    to_frenet,
+    traffic_side,
+)
 from scenario_gen.types import Encounter, LaneNetwork, MIRRORED, Road
 
 
@@ -119,7 +128,7 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
     if config.paper and name_or_path in BUILT_IN:
         return draw_paper(name_or_path, config)
     if is_vector_map(name_or_path):
-        return vector_road(name_or_path, None if encounter is None else clean_tracks(encounter), config)
+        return vector_road(name_or_path, None if encounter is None else drivers_of(clean_tracks(encounter)), config)
     path = Path(name_or_path)
     if path.suffix.lower() in (".yaml", ".yml"):
         with reading(path):

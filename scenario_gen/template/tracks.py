@@ -105,6 +105,11 @@ def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
     return tuple(_clean(encounter, i) for i in range(len(encounter.vehicles)))
 
 
+def drivers_of(tracks: tuple[Track, ...]) -> tuple[Track, ...]:
+    """Return those who drive, whom lanes are for; everybody, where nobody does."""
+    return tuple(track for track in tracks if not track.vehicle.kind.walks) or tracks
+
+
 def _clean(encounter: Encounter, i: int) -> Track:
     """Clean one vehicle's motion while it is there."""
     first, last = encounter.present[i].tolist()

@@ -12,7 +12,7 @@ from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import find_losses
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
-from scenario_gen.roads import nearest_pose_with_room
+from scenario_gen.roads import ground_for, nearest_pose_with_room
 from scenario_gen.template import clean_tracks, manoeuvre_of, Track, turn_of
 from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Road, Segmentation
 
@@ -44,12 +44,13 @@ def finish(
         stands = _stands(track, index)
         progress = _snapped(track, index, stands)
         anchors = track.curve.at(progress)
+        ground = ground_for(road, track.vehicle)
         given_ends = np.zeros(2, dtype=np.bool_) if given is None else np.isfinite(given[i, :, 0])
         if given is not None and given_ends[0]:
             anchors[progress == progress[0]] = given[i, 0, :3]
         if given is not None and given_ends[1] and not track.still:
             anchors[progress == progress[-1]] = given[i, 1, :3]
-        anchors, moved, sentences = _repaired(road, track, anchors, progress, [float(t) for t in index * encounter.dt], config)
+        anchors, moved, sentences = _repaired(ground, track, anchors, progress, [float(t) for t in index * encounter.dt], config)
         notes += sentences
         moved = moved + placement.moved[i]
         if moved.max() > config.max_move:

@@ -11,7 +11,6 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.roads import CORRIDOR
 from scenario_gen.template import in_words, keeps, Track, turn_of, turns_to_keep
 from scenario_gen.template.answers import meetings
 from scenario_gen.types import Loss, Road
@@ -25,7 +24,6 @@ LOSABLE = {
     "overtaking": "a vehicle does not pass another one",
     "stand": "a vehicle does not pass one that stands, on its side",
     "turn": "a vehicle turns otherwise",
-    "footway": "who walks does so on a lane of vehicles",
 }
 """What a fit may lose only where `fitting.allow` names it, as lost_KIND; other losses are only reported."""
 
@@ -91,16 +89,6 @@ def find_unused(road: Road, used: Iterable[int]) -> tuple[Loss, ...]:
         return ()
     used_by_nobody = f"{'is' if unused == 1 else 'are'} not used: nobody in the template comes or goes there"
     return (Loss("arm", (), f"{unused} of the {len(arms)} arms of road {road.name} {used_by_nobody}"),)
-
-
-def find_walkers_on_lanes(road: Road, tracks: Iterable[Track]) -> tuple[Loss, ...]:
-    """That who walks is on lanes of vehicles, as on every road with lanes but one that is drawn around what was recorded."""
-    if road.lanes is None or road.lanes.name == CORRIDOR:
-        return ()
-    walkers = (track.vehicle.id for track in tracks if track.vehicle.kind.walks)
-    return tuple(
-        Loss("footway", (name,), f"road {road.name} has no footway or crossing for {name}, who walks") for name in walkers
-    )
 
 
 def find_losses(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> tuple[Loss, ...]:

@@ -7,15 +7,17 @@ from dataclasses import replace
 import math
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.kept import find_losses, find_unused, find_walkers_on_lanes, refused_losses
+from scenario_gen.method.fitting.kept import find_losses, find_unused, refused_losses
 from scenario_gen.method.fitting.placement import check_scale, max_repair, Placement, SCALES, separated
 from scenario_gen.numerics import frozen
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.roads import Course, placements, tracks_on, ways_through
-from scenario_gen.template import in_words, MOST_CHANGE, to_frenet, Track, turn_of
+from scenario_gen.template import drivers_of, in_words, MOST_CHANGE, to_frenet, Track, turn_of
 from scenario_gen.types import LaneNetwork, Road
 
 _END_ROOM = 1.0  # metres kept between a footprint and the end of the road
@@ -26,7 +28,7 @@ _TRIED, _MORE = 12, 40  # placements that are looked at cell by cell; where some
 def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:
     """Lay a template on a road's lanes at the best place where all have room: where nothing of its encounter is lost, or least.
 
-    One that is longer than a drawn road is scaled.
+    One that is longer than a drawn road is scaled. Who walks stays beside the driver that comes nearest.
 
     Raises:
         RefusedError: there is none; the message says what stands against the attempt that came farthest.
@@ -34,18 +36,21 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     network = _lanes_of(road)
     own = tracks if network.drawn else ()
     reason, best = "", None
+    drivers = drivers_of(tracks)
+    if drivers[0].vehicle.kind.walks:
+        raise RefusedError(f"nobody in the template drives, so it cannot be laid on the lanes of road {road.name}")
     if network.drawn:
-        _refuse_turns(tracks, road)
-    shortened = _shortened(tracks, road, config) if network.drawn else 1.0
-    laid = tracks if shortened == 1.0 else tuple(_scaled(track, shortened) for track in tracks)
+        _refuse_turns(drivers, road)
+    shortened = _shortened(drivers, road, config) if network.drawn else 1.0
+    laid = drivers if shortened == 1.0 else tuple(_scaled(track, shortened) for track in drivers)
     scales = list(filter(config.accepts, SCALES)) if shortened == 1.0 else [1.0]
     for tried, (match, scale) in enumerate(placements(network, laid, scales=scales)):
         if tried >= (_TRIED if best is None else _MORE):
             break
-        notes = [*network.notes, *(_note(c, t, network) for c, t in zip(match.courses, tracks, strict=True))]
+        notes = [*network.notes, *(_note(c, t, network) for c, t in zip(match.courses, drivers, strict=True))]
         if scale * shortened != 1.0:
             notes.append(f"scaled by {scale * shortened:.3g} to fit the lanes")
-        placement = Placement.of(tracks_on(match, laid), scale * shortened, notes)
+        placement = Placement.of(_with_walkers(tracks, drivers, tracks_on(match, laid)), scale * shortened, notes)
         try:
             placement = separated(placement, config, sideways=0.0, own=own)
             astray = max_repair(placement.tracks, road, config.max_move) > _ASTRAY
@@ -56,12 +61,29 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         lacks = len(refused_losses(lost, config.allow)), astray
         if best is None or lacks < best[0]:
             unused = find_unused(road, (k for course in match.courses for k in course.lanes))
-            best = lacks, replace(placement, unused=(*unused, *find_walkers_on_lanes(road, tracks)))
+            best = lacks, replace(placement, unused=unused)
         if not any(lacks):
             break
     if best is None:
         raise RefusedError(f"the template does not fit the lanes of road {road.name}: {reason}")
     return best[1]
+
+
+def _with_walkers(tracks: tuple[Track, ...], drivers: tuple[Track, ...], placed: tuple[Track, ...]) -> tuple[Track, ...]:
+    """All tracks on the road: drivers as they are placed, who walks as before beside the driver that comes nearest."""
+    where = dict(zip((track.vehicle.id for track in drivers), placed, strict=True))
+    return tuple(where.get(track.vehicle.id) or _beside_nearest(track, drivers, placed) for track in tracks)
+
+
+def _beside_nearest(track: Track, drivers: tuple[Track, ...], placed: tuple[Track, ...]) -> Track:
+    """The track of who walks, moved as that driver is moved where its path comes nearest."""
+    points = track.curve.points
+    away = [cdist(points[:, :2], driver.poses[:, :2]) for driver in drivers]
+    n = int(np.argmin([float(each.min()) for each in away]))
+    k = int(np.argmin(away[n].min(axis=0)))
+    before, after = drivers[n].poses[k], placed[n].poses[k]
+    moved = place(after, *ahead_and_left(points[:, :2] - before[:2], before[2]))
+    return replace(track, curve=Curve(np.column_stack((moved, points[:, 2] + after[2] - before[2]))))
 
 
 def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.numerics import Floats, frozen
-from scenario_gen.roads import footprint_fits, nearest_pose_with_room
+from scenario_gen.roads import footprint_fits, ground_for, nearest_pose_with_room
 from scenario_gen.template import separate, smallest_gaps, Track
 from scenario_gen.types import Loss, Road, Vehicle
 
@@ -110,12 +110,12 @@ def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
     astray = []
     for track in tracks:
         first, last = track.present.tolist()
-        poses = track.poses
+        poses, ground = track.poses, ground_for(road, track.vehicle)
         worst, at = 0.0, first
         for t in sorted({first, last, *range(first, last + 1, 5)}):
-            answer = nearest_pose_with_room(road, poses[t], track.vehicle.length, track.vehicle.width, max_move)
+            answer = nearest_pose_with_room(ground, poses[t], track.vehicle.length, track.vehicle.width, max_move)
             if answer is None:
-                answer = nearest_pose_with_room(road, poses[t], track.vehicle.length, track.vehicle.width, _LOOKED)
+                answer = nearest_pose_with_room(ground, poses[t], track.vehicle.length, track.vehicle.width, _LOOKED)
             away = np.inf if answer is None else answer[1]
             if away > worst:
                 worst, at = away, t

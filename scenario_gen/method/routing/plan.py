@@ -30,7 +30,7 @@ from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, squared_gaps, Targets
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
-from scenario_gen.roads import clearance_field, footprint_fits, nearest_pose_with_room, own_ground
+from scenario_gen.roads import clearance_field, footprint_fits, ground_for, nearest_pose_with_room, own_ground
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits, Vehicle
 
 STANDS = 0.05  # [m] a vehicle whose start and end are nearer than this has no path
@@ -110,10 +110,10 @@ def plan_routes(
             drivable curve was found; the message names the vehicle and the anchor.
     """
     planner = make_planner(config)
-    tasks = (
-        _Task(road, vehicle, fitted, config, planner, seed + 7919 * n, limits.of(vehicle.type).planned.max_curvature)
-        for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
-    )
+    tasks = []
+    for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True)):
+        sharpest = limits.of(vehicle.type).planned.max_curvature
+        tasks.append(_Task(ground_for(road, vehicle), vehicle, fitted, config, planner, seed + 7919 * n, sharpest))
     return tuple(_on_own_lanes(task) for task in tasks)
 
 
@@ -369,7 +369,8 @@ def _searched_poses(
         except BudgetSpentError:
             error = RefusedError(
                 f"no drivable route for vehicle {vehicle.id} on road {task.road.name!r} {where}: none with a curvature of at "
-                f"most {limit:.3f} 1/m was found in {patience * config.iterations} iterations{_off_road(task)}"
+                f"most {limit:.3f} 1/m (limits.{vehicle.type}.max_curvature) was found in {patience * config.iterations} "
+                f"iterations{_off_road(task)}"
             )
         except BlockedError as reason:  # of the larger footprint: the anchors themselves have room
             error = RefusedError(f"{task.name(a if reason.end == 'start' else b)} is blocked: {reason}")
@@ -490,7 +491,7 @@ def _reason(task: _Task, curve: Curve) -> str:
     if curve.curvature > task.max_curvature:
         reasons.append(
             f"its curvature reaches {curve.curvature:.3f} 1/m at ({where[0]:.2f}, {where[1]:.2f}) m, "
-            f"the limit is {task.max_curvature:.3f}"
+            f"the limit is {task.max_curvature:.3f} (9/10 of limits.{task.vehicle.type}.max_curvature)"
         )
     if len(curve.off_road):
         where = curve.off_road[len(curve.off_road) // 2, :2]

@@ -28,6 +28,7 @@ from scenario_gen.method.sampling.speed_profile.model import speed_model
 from scenario_gen.method.sampling.speed_profile.stops import least_shares, standing_part
 from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
 from scenario_gen.numerics import Bools, Floats
+from scenario_gen.roads import ground_for
 from scenario_gen.template import least_gaps, reactions_of
 from scenario_gen.types import Encounter, FOLLOW, ReactionGraph, Road
 
@@ -125,7 +126,7 @@ def _freedom(
 ) -> Freedom:
     """What preset `wide` relaxes for a vehicle that came so near [m] to others in the template, and `answers` one or not."""
     fastest = routed.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * routed.limits.max_acceleration * FADES
-    ahead = road_ahead(routed.path, routed.vehicle, road, MOST_ONWARD * fastest)
+    ahead = road_ahead(routed.path, routed.vehicle, ground_for(road, routed.vehicle), MOST_ONWARD * fastest)
     clock = OwnClock.of(nominal, routed.rests, (bool(tied[0]), bool(tied[1])), config)
     if answers:  # what the other one does comes on top of its own
         clock = replace(clock, bound=_ANSWERS * clock.bound)
@@ -167,7 +168,7 @@ def _model(
     jerk = float(np.abs(motion.jerk @ mean).max())
     if jerk > bounds.jerk + _REPORTED_JERK:
         sentences.append(f"{name} needs a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth")
-    room = lateral_room(path, routed.vehicle, road, MAX_ROOM_SIGMAS * config.lateral_sigma)
+    room = lateral_room(path, routed.vehicle, ground_for(road, routed.vehicle), MAX_ROOM_SIGMAS * config.lateral_sigma)
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
         sentences.append(f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow")

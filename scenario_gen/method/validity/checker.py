@@ -19,7 +19,7 @@ from scenario_gen.method.validity.presence import driven_on
 from scenario_gen.method.validity.reactions import broken_reactions, LaneGaps, tailgaters
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.roads import drives_against, RuleCheck
+from scenario_gen.roads import drives_against, ground_for, RuleCheck
 from scenario_gen.template import Conflict, conflict_of, conflicts_in, lane_gaps, required_orders, Wait
 from scenario_gen.types import (
     at_ends,
@@ -30,6 +30,7 @@ from scenario_gen.types import (
     Road,
     Scenario,
     together,
+    Vehicle,
     Verdict,
     Violation,
 )
@@ -73,7 +74,7 @@ class Checker:
         self._limits = self.limits or Limits()
         self._dynamics_limits: dict[str, Floats] = {}
         if self.road is not None:
-            self._ground = inside.Ground.of(self.road)
+            self._grounds: dict[str, inside.Ground] = {}
         lanes = self.road.lanes if self.road is not None else None
         swapped = self._first != tuple(conflict.first for conflict in self.conflicts or ())
         against = lanes is not None and lanes.drawn and swapped  # the signs of a drawn road say who went first in the template
@@ -310,7 +311,7 @@ class Checker:
                 np.ascontiguousarray(control[rows, at.start : at.stop - 1]),
                 np.ascontiguousarray(scenario.heading[rows, at]),
                 half[rows],
-                self._ground,
+                self._ground_of(scenario.vehicles[rows.start]),
                 self._limits.time_resolution,
                 out[rows],
             )
@@ -322,12 +323,20 @@ class Checker:
                     Cause.OFF_ROAD, time, (i,), f"vehicle {i}: footprint {what} at {time:.3f} s near ({x:.2f}, {y:.2f})"
                 )
 
+    def _ground_of(self, vehicle: Vehicle) -> inside.Ground:
+        """Return where road users of a type may be."""
+        if vehicle.type not in self._grounds:
+            assert self.road is not None
+            self._grounds[vehicle.type] = inside.Ground.of(ground_for(self.road, vehicle))
+        return self._grounds[vehicle.type]
+
     def _wrong_ways(self, scenario: Scenario) -> Iterator[Violation]:
         """Vehicles that drive against all lanes where they are, at the samples."""
         if self.road is None or self.road.map_lanes is None:
             return
         against = drives_against(self.road, scenario.position, scenario.heading) & scenario.there
-        for i in np.flatnonzero(against.any(axis=1)).tolist():
+        drives = np.array([not vehicle.kind.walks for vehicle in scenario.vehicles])
+        for i in np.flatnonzero(against.any(axis=1) & drives).tolist():
             k = int(np.argmax(against[i]))
             x, y = scenario.position[i, k].tolist()
             message = f"vehicle {i}: drives against its lane near ({x:.2f}, {y:.2f}), {int(against[i].sum())} samples in all"

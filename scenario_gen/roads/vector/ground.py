@@ -67,6 +67,21 @@ def drives_against(road: Road, position: Floats, heading: Floats) -> Bools:
     return np.asarray(inside & ((directions(road)[row, column] >> turn.astype(np.uint16)) & 1 == 0))
 
 
+def ground_for(road: Road, vehicle: Vehicle) -> Road:
+    """Return where a road user may be: who walks also off the lanes, on kerbs and beside the road, but not in obstacles.
+
+    A road without lanes does not tell a kerb from a wall: there all keep to drivable cells.
+    """
+    return _walkable(road) if vehicle.kind.walks and road.lanes is not None else road
+
+
+@once_per_object
+def _walkable(road: Road) -> Road:
+    """A road on which all cells but those of obstacles are drivable, without lanes."""
+    blocked = np.zeros(road.drivable.shape, dtype=np.bool_) if road.obstructed is None else road.obstructed
+    return replace(road, drivable=~blocked, lanes=None)
+
+
 def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
     """Return the part of a road on which a vehicle keeps to its side: its own lanes, those beside them, and a metre more.
 

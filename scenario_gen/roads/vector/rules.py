@@ -70,8 +70,10 @@ class RuleCheck:
             scenario: in the map's frame.
             conflicts: where the paths of two of its vehicles meet; all of them (`find_conflicts`).
         """
-        stops = [breach for n in range(len(scenario.vehicles)) for breach in self._runs(scenario, n)]
-        return [*stops, *(breach for met in conflicts for breach in self._taken(scenario, met))]
+        drives = [n for n, vehicle in enumerate(scenario.vehicles) if not vehicle.kind.walks]  # the others know no such rules
+        stops = [breach for n in drives for breach in self._runs(scenario, n)]
+        met = [one for one in conflicts if {one.first, one.second} <= set(drives)]
+        return [*stops, *(breach for one in met for breach in self._taken(scenario, one))]
 
     def kept_orders(self, scenario: Scenario, conflicts: Sequence[Conflict]) -> int:
         """Return at how many conflicts, where two meet within 5 s, the one who goes second has to give way."""

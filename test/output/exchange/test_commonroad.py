@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from small_scenarios import crossing, moving, observed, one_vehicle
+from small_scenarios import crossing, observed, one_vehicle
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.output.exchange.cases import Case, Exported
@@ -129,11 +129,6 @@ def test_the_goal_of_an_ego_that_leaves_early_is_where_it_leaves(tmp_path):
     _, root, _ = written(tmp_path, crossing(), ego)
     goal = root.find("planningProblem/goalState/position/rectangle")
     assert np.allclose([number(goal, f"center/{axis}") for axis in "xy"], ego.position[0, 40], atol=1e-9)
-
-
-def test_trucks_are_trucks(tmp_path):
-    truck = moving([[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]], vehicles=[type(one_vehicle().vehicles[0])("9", 12.0, 2.5)])
-    assert [element.text for element in written(tmp_path, truck)[1].iterfind("dynamicObstacle/type")] == ["truck"]
 
 
 def test_signs_lights_and_stop_lines_of_a_vector_map_are_written_and_read_again(tmp_path):
