@@ -77,7 +77,7 @@ def _curve(variety: str, found: Population, beside: Mapping[str, Population]) ->
             f"{name} {sets.curve[k].generated.value:.2f} at precision {sets.curve[k].precision.value:.2f}"
             for name, sets in beside.items()
         )
-        peer = f"templates alone {in_words(point.alone)}; {others}"
+        peer = f"{in_words(point.generated)}; templates alone {in_words(point.alone)}; {others}"
         yield Row(f"{variety}: coverage with {n}", point.generated.value, "", "higher", TARGETS.get(n), peer)
         recorded = f"of the recorded {in_words(point.recorded)}"
         yield Row(f"{variety}: precision with {n}", point.precision.value, "", "higher", None, recorded)
