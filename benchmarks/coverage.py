@@ -3,12 +3,13 @@
 
 """How much unseen traffic a few recordings stand for: coverage and precision of what is generated, beside two nulls.
 
-Recorded encounters (SCENARIO_GEN_DATA), each on its own road with default settings; without data the drawn motions of
-test/worlds. Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no generator: *shifted*
-moves each vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another scenario of the same set.
+Recorded encounters (SCENARIO_GEN_DATA), each on its own road with default settings and with `sampling.variety=population` (the
+template and the shipped law alone: encounters that are to be reached say nothing); without data the drawn motions of test/worlds.
+Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no generator: *shifted* moves each
+vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another scenario of the same set.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -24,7 +25,8 @@ from benchmarks.row import Row
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation.population import in_words, Population, population_of
-from scenario_gen.pipeline import generate
+from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types import Encounter, Scenario
 
 COUNT, MOST = sized((50, None), (3, 12))
@@ -46,15 +48,22 @@ class Set:
 
 def run() -> list[Row]:
     """Measure."""
-    made = [(name, Set(encounter, members)) for name, encounter, members in _generated()]
-    rng = np.random.default_rng(1)
-    nulls = {
-        "shifted": [(name, Set(own.encounter, tuple(_shifted(own.encounter, rng) for _ in own.members))) for name, own in made],
-        "mixed": [(name, Set(own.encounter, _mixed(own.members, rng))) for name, own in made],
-    }
-    found = _population(made)
-    beside = {name: _population(sets) for name, sets in nulls.items()}
-    rows = [Row("encounters", sum(found.encounters.values()), "", "higher")]
+    encounters = list(_encounters())[:MOST]
+    rows: list[Row] = []
+    for variety in ("wide", "population"):
+        made = [(name, Set(encounter, members)) for name, encounter, members in _generated(encounters, variety)]
+        rng = np.random.default_rng(1)
+        shifted = [(name, Set(one.encounter, tuple(_shifted(one.encounter, rng) for _ in one.members))) for name, one in made]
+        mixed = [(name, Set(one.encounter, _mixed(one.members, rng))) for name, one in made]
+        nulls = {"shifted": shifted, "mixed": mixed}
+        found, beside = _population(made), {name: _population(sets) for name, sets in nulls.items()}
+        rows.append(Row(f"{variety}: encounters", sum(found.encounters.values()), "", "higher"))
+        rows += _curve(variety, found, beside)
+    return rows
+
+
+def _curve(variety: str, found: Population, beside: Mapping[str, Population]) -> Iterator[Row]:
+    """Yield the rows of the numbers of templates."""
     for k, point in enumerate(found.curve):
         n = point.templates
         others = "; ".join(
@@ -62,23 +71,24 @@ def run() -> list[Row]:
             for name, sets in beside.items()
         )
         peer = f"templates alone {in_words(point.alone)}; {others}"
-        rows.append(Row(f"coverage with {n} templates", point.generated.value, "", "higher", TARGETS.get(n), peer))
-        rows.append(
-            Row(f"precision with {n}", point.precision.value, "", "higher", None, f"of the recorded {in_words(point.recorded)}")
-        )
-        rows.append(Row(f"multiplier with {n} (inf: more than there are)", point.multiplier, "", "higher", 10.0))
-    return rows
+        yield Row(f"{variety}: coverage with {n}", point.generated.value, "", "higher", TARGETS.get(n), peer)
+        recorded = f"of the recorded {in_words(point.recorded)}"
+        yield Row(f"{variety}: precision with {n}", point.precision.value, "", "higher", None, recorded)
+        yield Row(f"{variety}: multiplier with {n} (inf: more than there are)", point.multiplier, "", "higher", 10.0)
 
 
 def _population(sets: Sequence[tuple[str, Set]]) -> Population:
     return population_of(sets, TEMPLATES)  # type: ignore[arg-type]
 
 
-def _generated() -> Iterator[tuple[str, Encounter, tuple[Scenario, ...]]]:
+def _generated(
+    encounters: Sequence[tuple[str, Encounter]], variety: str
+) -> Iterator[tuple[str, Encounter, tuple[Scenario, ...]]]:
     """Yield recording, encounter and scenarios."""
-    for name, encounter in list(_encounters())[:MOST]:
+    config = PipelineConfig(sampling=SamplingConfig(variety=variety))
+    for name, encounter in encounters:
         try:
-            yield name, encounter, tuple(generate(encounter, "corridor", count=COUNT, seed=3))
+            yield name, encounter, tuple(generate(encounter, "corridor", config, count=COUNT, seed=3))
         except ScenarioGenError as error:
             print(f"{encounter.name}: {error}", file=sys.stderr)
 

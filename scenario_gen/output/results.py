@@ -57,7 +57,8 @@ def write_results(
     if not (folder / BAG).exists():
         names = namespaces(len(cases))
         with BagWriter(folder / BAG) as bag:
-            add_results(bag, {name: replace(case, provenance=provenance) for name, case in zip(names, cases, strict=True)})
+            own = [replace(case, provenance={**provenance, **case.provenance}) for case in cases]
+            add_results(bag, dict(zip(names, own, strict=True)))
     write_report(folder / REPORT, ReportInput(cases, title, quality, provenance, BAG))
     figures = {"provenance": dict(provenance), "cases": [_figures(case) for case in cases]}
     write_text(folder / FIGURES, json.dumps(figures, indent=2) + "\n")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 NEARNESS = {"closest_approach": "gap", "pet": "pet"}
 """Facts that say how near vehicles come [m, s], and the figures (`UNITS`) that they are, of the most critical pair."""
-FACTS = (*NEARNESS, "weight", "target.", "order", "passing_order", "reactions", "search.")
+FACTS = (*NEARNESS, "rarity", "weight", "target.", "order", "passing_order", "reactions", "search.")
 """How the names of a scenario's facts begin."""
 
 
@@ -46,7 +46,7 @@ class Scenario:
         present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
         witness: of a scenario with an ego slot: a trajectory of the vehicle that was left out, as a scenario of that vehicle
             alone on the same clock. Both together were proven valid, so the slot can be driven.
-        facts: what else its entry in `scenarios/info` says: `closest_approach`, `pet`, `weight`, `target.…`, `order`,
+        facts: what else its entry in `scenarios/info` says: `closest_approach`, `pet`, `rarity`, `weight`, `target.…`, `order`,
             `passing_order`, `reactions`, `search.…` (FACTS).
     """
 

@@ -26,7 +26,6 @@ from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.openscenario import write_openscenario
 
 FILE = re.compile(rb"\n\x00FILE ([\w./=-]+)\x00\n")  # begins a file of an input of several
@@ -84,26 +83,13 @@ def files_target(name: str, seeds: Callable[[Path], object], read: Callable[[Pat
 
 def read_all(folder: Path) -> None:
     """Read a folder of tables, or its only file, as a log."""
-    main = [path for path in sorted(folder.iterdir()) if path.suffix in (".parquet", ".xml", ".mcap")]
+    main = [path for path in sorted(folder.iterdir()) if path.suffix in (".parquet", ".xml", ".xosc", ".mcap")]
     read_log(main[0] if main else folder, SHORT)
 
 
-def scenario_file(suffix: str) -> Callable[[Path], object]:
-    """Return what writes a scenario as a file of others."""
-
-    def write(folder: Path) -> object:
-        data = (
-            write_commonroad(*case_of(crossing()))[0] if suffix == ".xml" else write_openscenario(*case_of(crossing()), "r.xodr")
-        )
-        return (folder / f"one{suffix}").write_bytes(data)
-
-    return write
-
-
-def import_all(folder: Path) -> None:
-    """Read every file as a log."""
-    for path in sorted(folder.iterdir()):
-        read_log(path, SHORT)
+def openscenario(folder: Path) -> None:
+    """Write a scenario in OpenSCENARIO."""
+    (folder / "one.xosc").write_bytes(write_openscenario(*case_of(crossing()), "r.xodr"))
 
 
 def corpus_tables(folder: Path) -> None:
@@ -133,7 +119,7 @@ def parse_archive(folder: Path) -> None:
 
 def batch_tables(folder: Path) -> None:
     """Write the two tables of a part of a batch."""
-    kinds = {"string": ["a", "b"], "int64": [1, 2], "double": [1.5, None]}
+    kinds = {"string": ["a", "b"], "int64": [1, 2], "double": [1.5, None], "string[]": [["a"], []]}
     for name, columns in (("scenarios", SCENARIO_COLUMNS), ("cases", CASE_COLUMNS)):
         place = folder / name / "road=straight" / "part-00000.parquet"
         place.parent.mkdir(parents=True)
@@ -155,8 +141,7 @@ TARGETS = (
     files_target("nocturne", nocturne, read_all),
     files_target("omega_prime", omega_prime, read_all),
     files_target("osi", osi, read_all),
-    files_target("import_commonroad", scenario_file(".xml"), import_all),
-    files_target("import_openscenario", scenario_file(".xosc"), import_all),
+    files_target("openscenario", openscenario, read_all),
     files_target("corpus", corpus_tables, read_corpus),
     files_target("archive", archive, parse_archive),
 )

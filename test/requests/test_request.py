@@ -20,7 +20,7 @@ def test_states_are_read_by_vehicle_and_written_back():
 
 
 STATES = ["1", "1: 2 3", "1: 1 2 3 4 5", "1: a b c", ": 1 2 3", "1: nan 0 0", "1: 0 0 0 -1", "1: 0 0 0; 1: 1 1 1"]
-TARGETS = ["pet", "pet=1", "pet=2..1", "pet=..", "speed=1..2", "pet[1]=1..2", "pet[1,2=1..2", "pet=a..2", "pet=1..2; pet=2..3"]
+TARGETS = ["pet", "pet=1", "pet=2..1", "pet=..", "speed=1..2", "pet[1,]=1..2", "pet[1,2=1..2", "pet=a..2", "pet=1..2; pet=2..3"]
 
 
 @pytest.mark.parametrize(("name", "texts"), [("goals", STATES), ("target", TARGETS)])

@@ -182,6 +182,13 @@ class Client:
         self.context.try_shutdown()
 
 
+def memory(pid: int, key: str) -> int:
+    """Return VmRSS or VmHWM [kB] of a process; 0 if it is gone."""
+    path = Path("/proc") / str(pid) / "status"
+    lines = path.read_text().splitlines() if path.exists() else ()
+    return next((int(line.split()[1]) for line in lines if line.startswith(key)), 0)
+
+
 def whole_chain(folder: Path, domain: int, nodes: Iterable[str], *, count: int, apart: Iterable[str] = ()) -> Iterator[Processes]:
     """Run nodes on one log, with sets of `count` scenarios and a bag in `folder`; a test that has not ended them has failed."""
     arguments: dict[str, list[str]] = {node: [] for node in nodes}

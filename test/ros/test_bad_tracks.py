@@ -4,11 +4,10 @@
 """Tracks that no road user drove hurt nobody: every node says what is wrong with them, and serves the next good ones."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from suite_processes import Processes, RESOURCES
+from suite_processes import memory, Processes, RESOURCES
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.fits import decode_fit
@@ -48,12 +47,6 @@ def _repeated(encounter: Encounter, samples: int) -> bytes:
     )
 
 
-def _peak(pid: int) -> int:
-    """The most memory [kB] that a process has had."""
-    lines = (Path("/proc") / str(pid) / "status").read_text().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
-
-
 def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tmp_path, domain, client):
     (good,) = read_log(RESOURCES / "synthetic_c").encounters
     client.hear("/diagnostics", "/fit", "/report")
@@ -75,7 +68,7 @@ def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tm
         client.say("/tracks", encode_tracks(later))
         client.wait("/report", 2)
         assert decode_fit(client.heard["/fit"][-1])[0] == later.start_ns
-        assert {node: _peak(pid) for node, pid in made.pids.items() if _peak(pid) >= GIBIBYTE} == {}
+        assert {node: peak for node, pid in made.pids.items() if (peak := memory(pid, "VmHWM")) >= GIBIBYTE} == {}
         client.until(lambda: _levels(client) == dict.fromkeys(NODES, Level.OK), "the end of what was wrong with the tracks")
     finally:
         codes = made.end()

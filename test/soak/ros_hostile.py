@@ -23,7 +23,7 @@ from typing import Any
 from figures import Figure, kept
 from mutators import BYTES
 from rosbags.typesys import get_typestore, Stores
-from suite_processes import Client, Processes, RESOURCES
+from suite_processes import Client, memory, Processes, RESOURCES
 
 from msg_conventions.cdr import CdrReader
 from msg_conventions.diagnostics import decode_diagnostics, Level
@@ -65,13 +65,6 @@ LISTENERS = {
     "scenarios": ("evaluator",),
     "scenarios/info": ("evaluator",),
 }
-
-
-def memory(pid: int, key: str) -> int:
-    """Return VmRSS or VmHWM [kB] of a process; 0 if it is gone."""
-    path = Path("/proc") / str(pid) / "status"
-    lines = path.read_text().splitlines() if path.exists() else ()
-    return next((int(line.split()[1]) for line in lines if line.startswith(key)), 0)
 
 
 def hostile(rng: random.Random, kind: str, seeds: list[bytes]) -> bytes:

@@ -15,7 +15,7 @@ from scenario_gen.method.fitting.kept import find_losses, find_unused, refused_l
 from scenario_gen.method.fitting.placement import check_scale, max_repair, Placement, SCALES, separated
 from scenario_gen.numerics import frozen
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import ahead_and_left, edge_lengths, place
+from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.roads import Course, placements, tracks_on, ways_through
 from scenario_gen.template import drivers_of, in_words, MOST_CHANGE, to_frenet, Track, turn_of
 from scenario_gen.types import LaneNetwork, Road
@@ -94,8 +94,7 @@ def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
     """
     if not any(lane.junction for lane in _lanes_of(road).lanes):
         to_frenet(tracks)
-    ways = list(ways_through(road).values()) or [Curve.through(lane.centre) for lane in _lanes_of(road).lanes]
-    yaws = [way.points[:, 2] for way in ways]
+    yaws = [way.points[:, 2] for way in _ways(road)]
     left = max(float((yaw - np.minimum.accumulate(yaw)).max()) for yaw in yaws)
     right = max(float((np.maximum.accumulate(yaw) - yaw).max()) for yaw in yaws)
     for track in tracks:
@@ -109,15 +108,18 @@ def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> 
         low, high = to_frenet(tracks).span(tracks)
     except RefusedError:  # turns or crossings
         return 1.0
-    lanes = _lanes_of(road).lanes
-    ways = [way.length for way in ways_through(road).values()] or [float(edge_lengths(lane.centre).sum()) for lane in lanes]
-    size = max(ways)
+    size = max(way.length for way in _ways(road))
     if high - low <= size - 2.0 * _END_ROOM:
         return 1.0
     cars = max(track.vehicle.length for track in tracks)
     scale = (size - 2.0 * _END_ROOM - cars) / (high - low - cars)
     check_scale(scale, f"the template is {high - low:.0f} m long, road {road.name} {size:.0f} m: it", config)
     return scale
+
+
+def _ways(road: Road) -> list[Curve]:
+    """The ways through a drawn road; of one without a junction its lanes."""
+    return list(ways_through(road).values()) or [Curve.through(lane.centre) for lane in _lanes_of(road).lanes]
 
 
 def _scaled(track: Track, scale: float) -> Track:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.types import OF_CARS
 
-ARRIVAL_S, PACE, WAIT_S, END_SPEED_MPS = 2.0, 0.2, 2.0, 1.5
+ARRIVAL_S, PACE, WAIT_S, END_SPEED_MPS = 2.0, 0.2, 2.0, 1.0
 """Standard deviations of `population`, at least: as wide as encounters differ; which scenarios remain, the population decides."""
 
 

@@ -162,6 +162,7 @@ class _Loop:
         remaining = self.count
         if diverse:
             self.count, self.keep, self.publish = remaining * POOL_SHARE, 0, False
+        attempts *= self.usual.valid_each
         if self.aim is None:
             self.run(attempts * max(self.count, LEAST_COUNT if self.sampler.free else 1))
         else:

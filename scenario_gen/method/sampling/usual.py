@@ -34,12 +34,18 @@ class Usual:
         """Whether it is."""
         return self.measures.rarity is None or self.measures.rarity(scenario) <= self.most
 
+    @property
+    def valid_each(self) -> int:
+        """Valid candidates of which one is kept, in the worst case."""
+        return 1 if self.measures.rarity is None else round(1.0 / LEAST_RARE)
+
     def notes(self) -> tuple[str, ...]:
         """Return what is to be said of the bound: nothing where what is kept is usual."""
         if self.measures.rarity is None or self.most <= 1.0:
             return ()
-        bound = f"up to a rarity of {self.most:.2f}" if math.isfinite(self.most) else "whatever they are"
-        return (f"this template is unusual among recorded encounters of its kind (rarity 1): scenarios {bound} are kept",)
+        if math.isinf(self.most):
+            return ("vehicles share no area, so nothing is known of such encounters: whatever is valid counts as usual",)
+        return (f"the template is unusual among recorded encounters (rarity 1): scenarios up to {self.most:.2f} are kept",)
 
 
 ANYTHING = Usual(Measures(lambda *_: math.nan, lambda _: ()), math.inf)

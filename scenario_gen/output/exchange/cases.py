@@ -17,7 +17,7 @@ from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.roads import RoadConfig
-from scenario_gen.types import Road, Scenario, split_off, tokens
+from scenario_gen.types import join_ego, Road, Scenario, split_off, tokens
 
 TOPICS = ("tracks", "map", "road/lanes", "fit/info", SCENARIOS, INFO)
 
@@ -43,9 +43,14 @@ class Exported:
     driven: bool
 
     @property
+    def everybody(self) -> Scenario:
+        """All vehicles, the ego last."""
+        return join_ego(replace(self.others, witness=self.ego))
+
+    @property
     def duration(self) -> float:
         """Seconds until the last vehicle, or the ego, is at its end."""
-        return max(float(s.time[-1]) for s in (self.others, self.ego) if s is not None)
+        return float(self.everybody.time[-1])
 
     def refuse_late_ego(self) -> None:
         """Refuse an ego that arrives late: a controller under test is there from the first instant on.

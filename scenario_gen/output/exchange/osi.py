@@ -21,7 +21,6 @@ from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.markup import read_xml
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported
-from scenario_gen.output.exchange.motion import at_times, EVEN
 from scenario_gen.output.exchange.xml import date_of
 from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE
 
@@ -41,8 +40,8 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """Vehicles on the instants of the file: their motion, numbers, and rates of yaw (N, T) [rad/s]."""
+class _Moving:
+    """All vehicles, the ego last: their motion, numbers, and rates of yaw (N, T) [rad/s]."""
 
     motion: Scenario
     numbers: tuple[int, ...]
@@ -66,7 +65,8 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
     import betterosi
 
     numbers, notes = object_numbers(exported)
-    time, parts = _parts(exported, numbers)
+    motion = exported.everybody
+    moving = _Moving(motion, numbers, _yaw_rates(motion))
     host = numbers[-1] if exported.ego is not None else numbers[0]
     text, frame = _text(road), _frame(road)
     about = f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}"
@@ -74,8 +74,8 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
     with betterosi.Writer(path, metadata=metadata, library="scenario_gen", descriptor_set=_definitions()) as trace:
         drawn = betterosi.MapAsamOpenDrive(map_reference=road.name, open_drive_xml_content=text)
         trace.add(drawn, topic=MAP, log_time=0)
-        for k, stamp in enumerate(np.round(time * NS).astype(np.int64).tolist()):
-            trace.add(_ground_truth(parts, k, stamp, host, road.name, frame), topic=OBJECTS, log_time=stamp)
+        for k, stamp in enumerate(np.round(motion.time * NS).astype(np.int64).tolist()):
+            trace.add(_ground_truth(moving, k, stamp, host, road.name, frame), topic=OBJECTS, log_time=stamp)
     return notes
 
 
@@ -84,32 +84,12 @@ def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]
 
     OSI's ids are numbers: if one id is none, the vehicles are numbered from 1.
     """
-    vehicles = exported.others.vehicles if exported.ego is None else (*exported.others.vehicles, *exported.ego.vehicles)
-    ids = [vehicle.id for vehicle in vehicles]
+    ids = [vehicle.id for vehicle in exported.everybody.vehicles]
     if all(name.isascii() and name.isdigit() and str(int(name)) == name and int(name) <= LARGEST_ID for name in ids):
         return tuple(int(name) for name in ids), ()
     numbers = tuple(range(1, len(ids) + 1))
     listed = ", ".join(f"{name} is {number}" for name, number in zip(ids, numbers, strict=True))
     return numbers, (f"ids are numbers in OSI: {listed}",)
-
-
-def _parts(exported: Exported, numbers: tuple[int, ...]) -> tuple[Floats, tuple[_Part, ...]]:
-    """Return the instants of the file (T,) [s], with those of an ego that is there longer, and who moves.
-
-    A part ends before the file where its own time does.
-    """
-    time = exported.others.time
-    scenarios = [exported.others]
-    if exported.ego is not None:
-        time = np.concatenate([time, exported.ego.time[exported.ego.time > time[-1] + EVEN]])
-        scenarios.append(exported.ego)
-    parts, first = [], 0
-    for scenario in scenarios:
-        motion = at_times(scenario, time[time <= scenario.time[-1] + EVEN])
-        count = len(motion.vehicles)
-        parts.append(_Part(motion, numbers[first : first + count], _yaw_rates(motion)))
-        first += count
-    return time, tuple(parts)
 
 
 def _yaw_rates(motion: Scenario) -> Floats:
@@ -122,11 +102,11 @@ def _yaw_rates(motion: Scenario) -> Floats:
     return rates
 
 
-def _ground_truth(parts: tuple[_Part, ...], k: int, stamp: int, host: int, road_file: str, frame: Frame) -> Any:
+def _ground_truth(moving: _Moving, k: int, stamp: int, host: int, road_file: str, frame: Frame) -> Any:
     """Return the message of instant `k`; the host is named while it is there."""
     import betterosi as osi
 
-    objects = [one for part in parts for one in _objects(part, k)]
+    objects = list(_objects(moving, k))
     there = any(one.id.value == host for one in objects)
     major, minor, patch = map(int, osi.DEFAULT_VERSION.split("."))
     offset = None
@@ -144,17 +124,15 @@ def _ground_truth(parts: tuple[_Part, ...], k: int, stamp: int, host: int, road_
     )
 
 
-def _objects(part: _Part, k: int) -> Iterator[Any]:
+def _objects(moving: _Moving, k: int) -> Iterator[Any]:
     """Yield the vehicles that are there at instant `k`."""
     import betterosi as osi
 
-    motion = part.motion
-    if k >= len(motion.time):
-        return
+    motion = moving.motion
     for n in np.flatnonzero(motion.there[:, k]).tolist():
         vehicle, heading = motion.vehicles[n], motion.heading[n, k]
         cos, sin = float(np.cos(heading)), float(np.sin(heading))
-        speed, along, rate = (float(values[n, k]) for values in (motion.speed, motion.acceleration, part.yaw_rate))
+        speed, along, rate = (float(values[n, k]) for values in (motion.speed, motion.acceleration, moving.yaw_rate))
         x, y = motion.position[n, k].tolist()
         across = speed * rate
         base = osi.BaseMoving(
@@ -165,7 +143,7 @@ def _objects(part: _Part, k: int) -> Iterator[Any]:
             acceleration=osi.Vector3d(x=along * cos - across * sin, y=along * sin + across * cos, z=0.0),
             orientation_rate=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=rate),
         )
-        number, classes = osi.Identifier(value=part.numbers[n]), osi.MovingObject.VehicleClassification
+        number, classes = osi.Identifier(value=moving.numbers[n]), osi.MovingObject.VehicleClassification
         if vehicle.kind.walks:
             yield osi.MovingObject(id=number, type=osi.MovingObject.Type.PEDESTRIAN, base=base)
             continue

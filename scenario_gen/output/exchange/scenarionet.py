@@ -11,7 +11,6 @@ written so that every version of NumPy reads them and the same scenario has the 
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 import io
 import pickle
 from typing import Any
@@ -23,7 +22,7 @@ from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
-from scenario_gen.types import height, join_ego, Scenario, Vehicle
+from scenario_gen.types import height, Scenario, Vehicle
 
 VERSION = "MetaDrive v0.4.3"  # the description's, not the simulator's
 DATASET = "scenario_gen"
@@ -44,8 +43,7 @@ def description(case: Case, exported: Exported, export: ExportConfig) -> dict[st
         exported: the scenario.
         export: `step` is the time step where the scenario has uneven ones.
     """
-    motion = join_ego(replace(exported.others, witness=exported.ego))
-    motion = at_even_steps(motion, even_step(motion) or export.step)
+    motion = at_even_steps(exported.everybody, even_step(exported.everybody) or export.step)
     tracks = {vehicle.id: _track(motion, n, vehicle) for n, vehicle in enumerate(motion.vehicles)}
     ego = exported.ego.vehicles[0].id if exported.ego is not None else motion.vehicles[0].id
     steps = len(motion.time)

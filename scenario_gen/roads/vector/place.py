@@ -21,6 +21,7 @@ from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
+from scenario_gen.template.answers import meetings
 from scenario_gen.types import LaneNetwork, LEVEL, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
@@ -147,8 +148,7 @@ class _Judged:
         self._network = network
         self._check = RuleCheck(network)
         self._tracks = tracks
-        met = (conflict for conflict in conflicts_in(_motion(tracks)) if not conflict.following)
-        self._met = {frozenset((conflict.first, conflict.second)) for conflict in met}
+        self._met = {pair for pair, met in meetings(tracks).items() if not met.following}
 
     def broken(self, placement: Match) -> str:
         """Return what a placement breaks; "" if nothing."""
@@ -185,27 +185,23 @@ class _Judged:
             return 0, True
         motion = _laid(placement, self._tracks)
         conflicts = conflicts_in(motion)
-        lost = self._met - {frozenset((conflict.first, conflict.second)) for conflict in conflicts}
+        lost = self._met - {(min(met.first, met.second), max(met.first, met.second)) for met in conflicts}
         return len(lost), not self._check.kept_orders(motion, conflicts)
 
 
 @once_per_object
 def _laid(placement: Match, tracks: tuple[Track, ...]) -> Scenario:
-    """The motion of a template at a placement."""
-    return _motion(tracks_on(placement, tracks))
-
-
-def _motion(tracks: Sequence[Track]) -> Scenario:
-    """The motion of tracks as it is, unchecked."""
-    poses = np.stack([track.poses for track in tracks])
+    """The motion of a template at a placement, as it is, unchecked."""
+    laid = tracks_on(placement, tracks)
+    poses = np.stack([track.poses for track in laid])
     return Scenario(
-        vehicles=tuple(track.vehicle for track in tracks),
-        time=frozen(np.arange(poses.shape[1]) * tracks[0].dt),
+        vehicles=tuple(track.vehicle for track in laid),
+        time=frozen(np.arange(poses.shape[1]) * laid[0].dt),
         position=poses[..., :2],
         heading=poses[..., 2],
-        speed=np.stack([track.speed for track in tracks]),
+        speed=np.stack([track.speed for track in laid]),
         acceleration=np.zeros(poses.shape[:2]),
-        present=np.stack([track.present for track in tracks]),
+        present=np.stack([track.present for track in laid]),
     )
 
 

@@ -86,7 +86,7 @@ def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int
         return
     low, high = (end + room for end, room in zip(compact.span(tracks), (-_ROOM, _ROOM), strict=True))
     stretches = sorted(_stretches(chains, high - low, lanes), key=lambda candidate: (round(candidate.bend, 4), candidate.chain))
-    ways = [compact.spread(), compact]
+    ways = [compact.spread(), *([compact] if any(compact.between) else [])]
     if compact.swerve.any():  # where there is no room for that, others say what is lost
         ways.append(replace(compact, swerve=np.zeros_like(compact.swerve)))
     for frenet in ways:
