@@ -3,32 +3,39 @@
 
 """How much unseen traffic a few recordings stand for: coverage and precision of what is generated, beside two nulls.
 
-Recorded encounters (SCENARIO_GEN_DATA), each on its own road with default settings and with `sampling.variety=population` (the
-template and the shipped law alone: encounters that are to be reached say nothing); without data the drawn motions of test/worlds.
-Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no generator: *shifted* moves each
-vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another scenario of the same set.
+Recorded encounters of two vehicles (SCENARIO_GEN_DATA), each on its own road, with default settings and with
+`sampling.variety=population` (of the template and the shipped law alone: encounters that are to be reached say nothing); without
+data the drawn motions of test/worlds. `_coverage_pairs.json` lists 105: pairs within 4 s at the shared area or 15 m, of four
+kinds, whose road keeps the kind. Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no
+generator: *shifted* moves each vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another one of
+the set.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
+import json
 from pathlib import Path
 import sys
 from typing import Any
 
 import numpy as np
 
-from benchmarks._naturalness_cuts import cuts, recorded
 from benchmarks._size import sized
 from benchmarks.naturalness import DATA
 from benchmarks.row import Row
 from scenario_gen.base.errors import ScenarioGenError
-from scenario_gen.logs import read_log
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation.population import in_words, Population, population_of
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.method.segmentation import segment
+from scenario_gen.roads import road_and_template
 from scenario_gen.types import Encounter, Scenario
 
+PAIRS = Path(__file__).with_name("_coverage_pairs.json")
+SEED = 3
 COUNT, MOST = sized((50, None), (3, 12))
 TEMPLATES = sized((5, 10, 20), (1,))
 SHIFT_S, PACE = 1.0, 0.06
@@ -88,7 +95,9 @@ def _generated(
     config = PipelineConfig(sampling=SamplingConfig(variety=variety))
     for name, encounter in encounters:
         try:
-            yield name, encounter, tuple(generate(encounter, "corridor", config, count=COUNT, seed=3))
+            road, template = road_and_template("corridor", encounter, config.road)
+            chain = Chain(template, segment(template, config.segmentation, SEED), road, config, count=COUNT, seed=SEED)
+            yield name, encounter, tuple(chain.run())
         except ScenarioGenError as error:
             print(f"{encounter.name}: {error}", file=sys.stderr)
 
@@ -99,9 +108,9 @@ def _encounters() -> Iterator[tuple[str, Encounter]]:
         drawn = import_module("textbook_motions")
         yield from ((f"drawn {seed}", drawn.labelled(kind, seed).encounter) for seed in range(3) for kind in drawn.REACTIONS)
         return
-    for cut in [*cuts()[0], *recorded(DATA)]:
-        for encounter in read_log([DATA / "trajectories" / file for file in cut.files], cut.config()).encounters[:1]:
-            yield cut.files[0], encounter
+    for row in json.loads(PAIRS.read_text()):
+        config = LogConfig(vehicles=",".join(row["vehicles"]), start=row["start"], end=row["end"])
+        yield row["name"], read_log([DATA / "trajectories" / file for file in row["files"]], config).encounters[0]
 
 
 def _shifted(encounter: Encounter, rng: np.random.Generator) -> Scenario:

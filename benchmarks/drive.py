@@ -34,6 +34,7 @@ from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.method.evaluation.bootstrap import paired_difference, wilson
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.road import Road
 
 PLANNERS = "scenario_gen.closed_loop.planners"
 BAD, GOOD = f"{PLANNERS}:ConstantSpeed", f"{PLANNERS}:IdmFollower"
@@ -57,7 +58,7 @@ def run(count: int = sized(200, quick=2)) -> list[Row]:
         rows += found + discriminating(spread(trials, TRIED))
         rows += reactive_planner(spread(trials, max(3 * count // 5, 1)), bad) + witnesses(spread(trials, WITNESSES))
     found, wild = anything()
-    return rows + found + rear_ends() + collisions([*driven, *wild]) + speed() + dds(made)
+    return rows + found + rear_ends() + collisions([*driven, *wild]) + speed() + gymnasium_steps() + dds(made)
 
 
 def recorded(count: int) -> tuple[list[Trial], GenerationResult | None]:
@@ -302,6 +303,29 @@ def speed() -> list[Row]:
         rows.append(Row(f"in process, reactive, {vehicles} vehicles", best, "vehicle-steps/s", "higher", 40_000.0))
         rows += [*highway_env(vehicles), *sumo(vehicles)]
     return rows
+
+
+def gymnasium_steps() -> list[Row]:
+    """Steps per CPU second of the Gymnasium environment on one large road, where gymnasium is."""
+    try:
+        from scenario_gen.closed_loop.environment import DriveEnv
+    except ImportError as error:
+        print(f"the Gymnasium environment is not measured: {error}", file=sys.stderr)
+        return []
+    none = np.zeros((0, 3))
+    road = Road("large", np.ones((3000, 3000), dtype=np.bool_), 0.2, np.array((-300.0, -300.0)), none, none)
+    environment = DriveEnv([Trial(str(seed), draw_scenario(seed), 0, road) for seed in range(1, 13)])
+    best, action = 0.0, np.array((0.1, 0.0), dtype=np.float32)
+    for _ in range(4):  # the first prepares the scenarios
+        began, steps = process_time(), 0
+        for index in range(sized(12, quick=2)):
+            environment.reset(options={"index": index})
+            over = False
+            while not over:
+                _, _, terminated, truncated, _ = environment.step(action)
+                over, steps = terminated or truncated, steps + 1
+        best = max(best, steps / (process_time() - began))
+    return [Row("Gymnasium environment, road of 600 m by 600 m", best, "steps/s", "higher", 3_000.0, "12 scenarios")]
 
 
 def dds(made: GenerationResult | None) -> list[Row]:

@@ -49,7 +49,7 @@ COLUMNS = {  # of a table
     **dict.fromkeys(("name", "source", "kind", "kinds", "reactions"), "string"),
     "vehicles": "string[]",
     **dict.fromkeys(("count", "start_ns"), "int64"),
-    **dict.fromkeys(("seconds", "gap", "distance", "travel", "lat", "lon", "closest", "ttc", "pet", "speed"), "double"),
+    **dict.fromkeys(("seconds", "gap", "distance", "lat", "lon", "ttc", "pet", "speed"), "double"),
     "tracks": "binary",
 }
 MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
@@ -156,7 +156,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         both = both[apart < config.log.proximity] if (apart < config.log.proximity).sum() > 1 else both
         a, b = (Motion(encounter.position[n, both], encounter.heading[n, both], encounter.speed[n, both]) for n in (i, j))
         gap, _, _ = space_time_gap(a.position, b.position, encounter.dt)
-        pairs.append((gap, i, j, kind_of(a, b, encounter.dt), float(apart.min())))
+        pairs.append((gap, i, j, kind_of(a, b, encounter.dt)))
     pairs.sort()
     measures = criticality(at_period(encounter, encounter.dt), EvaluationConfig().ttc_horizon)
     latitude, longitude = encounter.origin or (None, None)
@@ -165,17 +165,15 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "source": source,
         "kind": pairs[0][3],
         "reactions": json.dumps(reactions_of(encounter).document([vehicle.id for vehicle in encounter.vehicles])),
-        "kinds": json.dumps({f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind for _, i, j, kind, _ in pairs}),
+        "kinds": json.dumps({f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind for _, i, j, kind in pairs}),
         "vehicles": [vehicle.id for vehicle in encounter.vehicles],
         "count": len(encounter.vehicles),
         "start_ns": encounter.start_ns,
         "seconds": encounter.duration,
         "gap": pairs[0][0],
-        "distance": min(pair[4] for pair in pairs),
-        "travel": float((encounter.speed * encounter.there).sum(axis=1).max() * encounter.dt),
+        "distance": measures.min_distance,
         "lat": latitude,
         "lon": longitude,
-        "closest": measures.min_distance,
         "ttc": measures.min_ttc,
         "pet": measures.pet,
         "speed": float((encounter.speed * encounter.there).max()),

@@ -23,7 +23,7 @@ MEMORY = 500  # MiB
 COLUMNS = ("template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet", "speed", "braking")
 UNITS = {"seconds": "s", "distance": "m", "ttc": "s", "pet": "s", "speed": "m/s", "braking": "m/s²"}
 RECORDED = (  # an encounter's columns, with the names of a scenario's
-    "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index, NULL AS type, seconds, closest AS distance, "
+    "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index, NULL AS type, seconds, distance, "
     "ttc, pet, speed, NULL AS braking, gap"
 )
 PET = (0.0, 1.0, 2.0, 4.0)  # s: bounds of the classes of the table of coverage

@@ -18,7 +18,6 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.roads import build_road
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.request import Request
-from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import Cause
 
 
@@ -50,23 +49,19 @@ def test_two_to_eight_vehicles(count):
 
 @pytest.fixture(scope="module")
 def tight(made_data):
-    """A left turn on a T-intersection: its bends are driven just below the lateral limits set here."""
+    """A left turn on a T-intersection, checked without any tolerance for accelerations."""
     (log,) = (made_data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
     encounter = read_log(log).encounters[0]
     config = SamplingConfig(
         variety="narrow", lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=2.0, bend_acceleration=2.0
     )
-    return Given(encounter, segment(encounter), build_road("t_intersection", encounter), 0, sampling=config)
-
-
-def limited(chain, lateral, **sampling):
-    limits = Limits(car=Dynamics(max_lateral_acceleration=lateral), acceleration_tolerance=0.1)
-    return replace(chain, limits=limits, sampling=replace(chain.sampling, **sampling))
+    limits = Limits(acceleration_tolerance=0.0)
+    return Given(encounter, segment(encounter), build_road("t_intersection", encounter), 0, sampling=config, limits=limits)
 
 
 def test_variance_adapts_where_validity_is_hard(tight):
     """Few candidates at full variance keep to the limit; with smaller deviations the set is had, and it is said."""
-    made = answer(limited(tight, 1.7), Request(), count=30).generated
+    made = answer(tight, Request(), count=30).generated
     assert len(made.scenarios) == 30
     (said,) = (line for line in made.adaptations if "few candidates were valid" in line)
     assert "standard deviations multiplied by 0" in said
@@ -75,11 +70,12 @@ def test_variance_adapts_where_validity_is_hard(tight):
 
 
 def test_a_short_set_says_how_many_and_why(tight):
-    made = answer(limited(tight, 1.6, attempts=3), Request(), count=80).generated
+    made = answer(replace(tight, sampling=replace(tight.sampling, attempts=3)), Request(), count=80).generated
     assert 0 < len(made.scenarios) < made.requested == 80
     assert made.candidates == 240 == len(made.scenarios) + made.refused.total()
-    assert set(made.refused) == {Cause.LATERAL_ACCELERATION}
-    impossible = answer(limited(tight, 1.0), Request(), count=10).generated
+    assert set(made.refused) == {Cause.LONGITUDINAL_ACCELERATION}
+    limits = replace(tight.limits, slip=0.0, slip_share=0.0)
+    impossible = answer(replace(tight, limits=limits), Request(), count=10).generated
     assert impossible.scenarios == ()
     assert impossible.refused.total() == impossible.candidates == 200
     assert "few candidates were valid, and smaller standard deviations did not help" in impossible.adaptations
