@@ -7,7 +7,7 @@ Its reference point is the centre of the footprint, and its velocity points alon
 what was certified can be driven by it. The curvature of its way stands for the angle of its front wheels, κ = tan(δ) / wheelbase.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.numerics.plane import angle_between
+from scenario_gen.types import Vehicle
 
 
 class EgoState(NamedTuple):
@@ -63,6 +64,18 @@ JUMPED, NO_PLACE = "jumped", "pose is"  # how the faults of poses begin
 def misplaced(fault: str) -> bool:
     """Whether a fault is that of a pose which no body can take after one step."""
     return fault.startswith((JUMPED, NO_PLACE))
+
+
+def as_able_as(config: ClosedLoopConfig, vehicle: Vehicle) -> ClosedLoopConfig:
+    """Return the parameters with a body that can do no more than the ego's type."""
+    own = vehicle.kind.dynamics
+    return replace(
+        config,
+        ego_acceleration=min(config.ego_acceleration, own.max_acceleration),
+        ego_braking=min(config.ego_braking, own.max_deceleration),
+        ego_speed=min(config.ego_speed, own.max_speed),
+        ego_curvature=min(config.ego_curvature, own.sharpest),
+    )
 
 
 def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig) -> Moved:

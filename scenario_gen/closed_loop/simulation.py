@@ -19,7 +19,7 @@ from scenario_gen.closed_loop.advance import advance, ego_hits
 from scenario_gen.closed_loop.certified import world_of
 from scenario_gen.closed_loop.config import ClosedLoopConfig, FORESIGHT, REPLAY, TEMPLATE
 from scenario_gen.closed_loop.driver import Manner
-from scenario_gen.closed_loop.ego import Command, EgoState, misplaced, move, Pose
+from scenario_gen.closed_loop.ego import as_able_as, Command, EgoState, misplaced, move, Pose
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.types import Road, Scenario, Vehicle
@@ -181,9 +181,10 @@ class ClosedLoop:
         """
         if road is not None and road.frame_id != scenario.frame_id:
             raise InputError(f"scenario {scenario.index} is in frame {scenario.frame_id!r}, its road in {road.frame_id!r}")
-        self.scenario, self.road, self.config = scenario, road, config
+        self.scenario, self.road = scenario, road
         self.world = world_of(scenario, ego, config.step)
         self.ego = self.world.ego
+        self.config = as_able_as(config, scenario.vehicles[self.ego])
         reactive = config.policy != REPLAY
         self.reactions = np.array(
             [reaction_time(scenario, vehicle.id, config.reaction * reactive) for vehicle in scenario.vehicles]
