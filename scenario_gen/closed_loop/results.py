@@ -200,7 +200,9 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
         "sentence": verdict.sentence(),
         "road": road,
         "ego": drive.ego,
-        "vehicles": [{"id": v.id, "length": round(v.length, 3), "width": round(v.width, 3)} for v in motion.vehicles],
+        "vehicles": [
+            {"id": v.id, "type": v.type, "length": round(v.length, 3), "width": round(v.width, 3)} for v in motion.vehicles
+        ],
         "motion": {"states": pack(states(motion, frames)[None]), "durations": [round(verdict.duration, 3)]},
         "witness": [
             [round(x, 2), round(y, 2)] for x, y in witness.position[drive.ego, :: max(1, len(witness.time) // 100)].tolist()

@@ -53,7 +53,9 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     frames = min(MAX_FRAMES, int(np.ceil(longest / FRAME_PERIOD)) + 1)
     return {
         "row": case.row,
-        "vehicles": [{"id": v.id, "length": _short(v.length), "width": _short(v.width)} for v in case.encounter.vehicles],
+        "vehicles": [
+            {"id": v.id, "type": v.type, "length": _short(v.length), "width": _short(v.width)} for v in case.encounter.vehicles
+        ],
         "left_out": [n for n, known in enumerate(ids) if known not in case.evaluation.vehicles],
         "road": road_data(case.road) if case.road else None,
         "template": _template(case.encounter, case.segmentation, frames),

@@ -24,7 +24,7 @@ function chipLine(vehicle, n, ...rest) {
   const line = document.createElement("li");
   const chip = document.createElement("i");
   chip.style.background = vehicleColour(n);
-  line.append(chip, document.createTextNode(`${vehicle.id} `), ...rest);
+  line.append(chip, document.createTextNode(vehicle.type === "car" ? `${vehicle.id} ` : `${vehicle.id}, ${vehicle.type} `), ...rest);
   return line;
 }
 
