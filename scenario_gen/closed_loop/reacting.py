@@ -146,7 +146,7 @@ def hardly_tests(passed: int, driven: int) -> str:
     """Say that a set hardly tests a planner, by how many of its scenarios the baseline passes; "" if it does test one."""
     if passed <= EASY * driven:
         return ""
-    return f"these scenarios hardly test a planner: one that looks at nobody passes {passed} of {driven}"
+    return f"these scenarios hardly test a planner: the non-reactive baseline passes {passed} of {driven}"
 
 
 def unlooking_pass(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
@@ -157,5 +157,5 @@ def unlooking_pass(case: GenerationResult, config: ClosedLoopConfig = ClosedLoop
     ego = drawn.ego.vehicle.id
     loops = [ClosedLoop(join_ego(scenario), ego, case.road, config) for scenario in drawn.scenarios[:UNLOOKING]]
     passed = sum(judge(loop, loop.drive(Unlooking())).passed for loop in loops)
-    said = f"a planner that looks at nobody, in place of {ego}, passes {passed} of {len(loops)}"
+    said = f"the non-reactive baseline, in place of {ego}, passes {passed} of {len(loops)}"
     return f"{case.title}: {hardly_tests(passed, len(loops)) or said}"

@@ -86,7 +86,7 @@ class Drives:
             sets = {name: [one for one in self.unlooking if one.origin.encounter == name] for name in encounters}
             each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
             parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
-            messages.append(f"a planner that looks at nobody passes {passed_of(self.unlooking)}{parts}")
+            messages.append(f"the non-reactive baseline passes {passed_of(self.unlooking)}{parts}")
             if self.easy:
                 messages.append(self.easy)
         if self.comparison is not None:

@@ -66,7 +66,7 @@ class Bars(Parameters):
     at_fault: float = parameter(0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0)
     jumps: float = parameter(0.0, "largest share of drives in which the ego jumps", low=0.0, high=1.0)
     progress: float = parameter(
-        0.9, "smallest share of drives with progress: 20 % of the witness' way, as in nuPlan; who never moves has none",
+        0.9, "smallest share of drives with progress: 20 % of the reference drive's path, as in nuPlan; who never moves has none",
         low=0.0, high=1.0,
     )  # fmt: skip
 
@@ -178,7 +178,7 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     ids = [vehicle.id for vehicle in scenario.vehicles]
     if slot and asked in ("", slot):
         raise InputError(
-            f"{where}: it was made for ego {slot!r}, whose witness is not in the bag (it was recorded before 0.6, or without "
+            f"{where}: it was made for ego {slot!r}, whose reference drive is not in the bag (it was recorded before 0.6, or without "
             f"`{WITNESS}`): make it again, or name another vehicle with --ego; it has {', '.join(ids)}"
         )
     wanted = named_vehicle(ids, asked or ids[0])

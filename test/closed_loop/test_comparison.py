@@ -104,9 +104,9 @@ def test_the_command_compares_and_says_what_a_planner_that_looks_at_nobody_passe
         return CliRunner().invoke(app, [*words, *(word for one in loose for word in ("--set", one)), *more])
 
     first = drive("IdmFollower", "--out", str(tmp_path / "one"))
-    assert first.exit_code == 0 and "a planner that looks at nobody passes" in first.output, first.output
+    assert first.exit_code == 0 and "the non-reactive baseline passes" in first.output, first.output
     again = drive("IdmFollower", "--out", str(tmp_path / "two"), "--against", str(tmp_path / "one"), "--no-unlooking")
-    assert again.exit_code == 0 and "failures +0.0 %" in again.output and "looks at nobody" not in again.output
+    assert again.exit_code == 0 and "failures +0.0 %" in again.output and "non-reactive" not in again.output
     said = (tmp_path / "two" / "drives.html").read_text()
     assert "Scenarios that changed sides" in said and "failures +0.0 %" in said
     trials = read_trials(bag)

@@ -47,7 +47,7 @@ def bag(tmp_path_factory):
     Writing(5, 0.0, 14.0).doppler(drives).to_csv(folder / "log.csv", index=False)
     done = generated(folder / "out", folder / "log.csv", "straight", "--ego", "auto")
     assert done.exit_code == 0 and "3 of 3 scenarios" in done.output, done.output
-    said = "on straight: a planner that looks at nobody, in place of 2, passes 0 of 3"
+    said = "on straight: the non-reactive baseline, in place of 2, passes 0 of 3"
     assert said in " ".join(done.output.split()) and said in (folder / "out" / "report.html").read_text()
     return folder / "out" / "bag"
 
@@ -102,6 +102,6 @@ def test_a_set_that_hardly_tests_says_so(tmp_path):
     outcomes = run_trials(trials, Unlooking)
     drives = Drives(outcomes, "p:C", ClosedLoopConfig(), unlooking=outcomes)
     drives.write(tmp_path)
-    said = "one that looks at nobody passes 3 of 3"
+    said = "the non-reactive baseline passes 3 of 3"
     assert said in drives.easy and said in (tmp_path / "junit.xml").read_text() and drives.easy in drives.notes()
     assert 'name="policy" value="reactive"' in (tmp_path / "junit.xml").read_text()

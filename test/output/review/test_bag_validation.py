@@ -245,7 +245,7 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
     assert altered.found[ALTERED].count == 3
     with pytest.raises(InputError, match="the witness with SHA-256"):
         regenerate_scenario(tmp_path / "lost", slot.generated.scenarios[0].index)
-    with pytest.raises(InputError, match="whose witness is not in the bag"):
+    with pytest.raises(InputError, match="whose reference drive is not in the bag"):
         read_trials(tmp_path / "lost")
     hitting = tuple(replace(one, witness=on_top_of(one)) for one in slot.generated.scenarios)
     (hit,) = validate_bag(write_recording(tmp_path / "hit", replace(slot, generated=replace(slot.generated, scenarios=hitting))))
