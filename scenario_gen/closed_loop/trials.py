@@ -178,8 +178,8 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     ids = [vehicle.id for vehicle in scenario.vehicles]
     if slot and asked in ("", slot):
         raise InputError(
-            f"{where}: it was made for ego {slot!r}, whose reference drive is not in the bag (it was recorded before 0.6, or without "
-            f"`{WITNESS}`): make it again, or name another vehicle with --ego; it has {', '.join(ids)}"
+            f"{where}: it was made for ego {slot!r}, whose reference drive is not in the bag (it was recorded before 0.6, or "
+            f"without `{WITNESS}`): make it again, or name another vehicle with --ego; it has {', '.join(ids)}"
         )
     wanted = named_vehicle(ids, asked or ids[0])
     if not wanted:
