@@ -244,6 +244,7 @@ import math
 from pathlib import Path
 import subprocess
 import sys
+import time
 
 import rclpy
 from geometry_msgs.msg import Twist
@@ -258,6 +259,7 @@ def act(heard, left=[int(sys.argv[2])]):
     left[0] -= 1
     if left[0] < 0:
         return
+    time.sleep(float(sys.argv[3]) if sys.argv[3:] else 0.0)
     twist = Twist()
     twist.linear.x = 3.0 + math.sin(heard.pose.pose.position.x)
     command.publish(twist)
@@ -293,7 +295,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag,
         (f"{sys.executable} -c 'print(7)'", (), "ended with code 0; its last output: 7"),
         ("no_such_program", (), "No such"),
         (f"{command} 9", (), "has sent no command for 1 s: it hangs"),
-        (f"{command} 1000000", ("--set", "drive_time=0.1"), "did not come to an end in 0.1 s (drive_time)"),
+        (f"{command} 1000000 0.05", ("--set", "drive_time=0.1"), "did not come to an end in 0.1 s (drive_time)"),
     ):
         refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", planner, *more])
         assert said in str(refused.exception), refused.output
