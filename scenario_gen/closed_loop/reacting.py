@@ -3,6 +3,7 @@
 
 """The scenarios that test a planner: one that looks at nobody collides in them, and a simple one that looks passes."""
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -59,13 +60,12 @@ class Testing:
                 f"--for-testing: name the vehicle in whose place the planner drives by --ego, or auto; there are {ids}"
             )
         most: GenerationResult | None = None
-        for tried in (self, self.freer()):
+        for tried in self.attempts():
             with suppress(TargetError):
                 case = tried.generate(count, progress)
                 if tried is not self:
-                    case = _noted(
-                        case, "drawn with more freedom: " + ", ".join(f"sampling.{name}={FREER[name]:g}" for name in FREER)
-                    )
+                    freer = ", ".join(f"sampling.{name}={getattr(tried.config.sampling, name):g}" for name in FREER)
+                    case = _noted(case, f"drawn with more freedom: {freer}")
                 if most is None or len(case.generated) > len(most.generated):
                     most = case
                 if len(case.generated) == count:
@@ -97,11 +97,12 @@ class Testing:
             request=replace(self.request, target=targets), progress=progress, accepts=accepts,
         )  # fmt: skip
 
-    def freer(self) -> "Testing":
-        """Return the request with the freedom of FREER, where it had less."""
-        sampling = self.config.sampling
-        most = {name: max(value, getattr(sampling, name)) for name, value in FREER.items()}
-        return replace(self, config=replace(self.config, sampling=replace(sampling, **most)))
+    def attempts(self) -> Iterator["Testing"]:
+        """Yield the request as it is, and with the freedom of FREER, where it had less."""
+        yield self
+        sampling = self.config.sampling.at_least(FREER)
+        if sampling != self.config.sampling:
+            yield replace(self, config=replace(self.config, sampling=sampling))
 
     def who_reacts(self) -> dict[str, int]:
         """Return in how many of PROBED scenarios each vehicle has to react if it is the ego; who does in most comes first."""
@@ -119,7 +120,7 @@ class Testing:
             TargetError: nobody has to, with more freedom neither; the message names roads where somebody has.
             RefusedError: as `pipeline.generate`.
         """
-        for tried in (self, self.freer()):
+        for tried in self.attempts():
             for ego in tried.who_reacts():
                 return ego
         raise TargetError(f"--ego auto: nobody has to react in any scenario that was found; {self.elsewhere()}")

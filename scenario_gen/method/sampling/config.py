@@ -3,12 +3,13 @@
 
 """Parameters of sampling."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.types import OF_CARS
 
-ARRIVAL_S, PACE, WAIT_S, END_SPEED_MPS = 2.0, 0.2, 2.0, 1.0
+POPULATION = {"arrival_sigma": 2.0, "pace_sigma": 0.2, "wait_sigma": 2.0, "end_speed_sigma": 1.0}
 """Standard deviations of `population`, at least: as wide as encounters differ; which scenarios remain, the population decides."""
 
 
@@ -85,13 +86,8 @@ class SamplingConfig(Parameters):
     @property
     def drawn(self) -> "SamplingConfig":
         """The parameters that candidates are drawn with: for `population` those of a `wide` that is wider."""
-        if self.variety != "population":
-            return self
-        return replace(
-            self,
-            variety="wide",
-            arrival_sigma=max(self.arrival_sigma, ARRIVAL_S),
-            pace_sigma=max(self.pace_sigma, PACE),
-            wait_sigma=max(self.wait_sigma, WAIT_S),
-            end_speed_sigma=max(self.end_speed_sigma, END_SPEED_MPS),
-        )
+        return replace(self, variety="wide").at_least(POPULATION) if self.variety == "population" else self
+
+    def at_least(self, least: Mapping[str, float]) -> "SamplingConfig":
+        """Return the parameters with those named at least so large."""
+        return replace(self, **{name: max(value, getattr(self, name)) for name, value in least.items()})
