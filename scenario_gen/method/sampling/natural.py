@@ -11,7 +11,7 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.sampling.sampler import ENOUGH, LEVELS, Sampler, searched_index
-from scenario_gen.method.sampling.usual import PILOT, pilot, Usual, usual_of
+from scenario_gen.method.sampling.usual import PILOT, pilot, Usual
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Measures, Scenario
 
@@ -49,7 +49,8 @@ class NaturalScenarios:
         level, valid = pilot(sampler, judge)
         if not valid:
             raise RefusedError(f"none of {PILOT * len(LEVELS)} candidates is valid; there is nothing to search in")
-        return cls(sampler, judge, level, usual_of(sampler, judge, measures))
+        rarity = None if measures is None else measures.rarity
+        return cls(sampler, judge, level, Usual() if rarity is None else Usual.among(rarity, valid))
 
     @property
     def size(self) -> int:

@@ -29,7 +29,7 @@ from scenario_gen.method.sampling.sampler import (
     place_of,
     Sampler,
 )
-from scenario_gen.method.sampling.usual import ANYTHING, PILOT, Usual, usual_of
+from scenario_gen.method.sampling.usual import PILOT, pilot, Usual
 from scenario_gen.types import Cause, EgoSlot, Measures, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
 
 KEPT = 1000  # scenarios up to which a set stays in memory
@@ -85,7 +85,9 @@ def draw_scenarios(
         kept = tuple(edge for edge in prepared.model.reactions.edges if (edge.who, edge.whom) not in judge.lost)
         sampler = replace(sampler, label=label_of(encounter, request, aim, measures, kept, judge.lost))
         loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.requested, slot))
-        loop.aim, loop.measures, loop.usual = aim, measures, usual_of(sampler, judge, measures)
+        loop.aim, loop.measures = aim, measures
+        if measures is not None and measures.rarity is not None:
+            loop.usual = Usual.among(measures.rarity, pilot(sampler, judge)[1])
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
         lost = [f"{NOT_KEPT}: {message}" for message in judge.lost.values()]
         notes = (*prepared.adaptations, *lost, *loop.usual.notes(), *loop.adaptations)
@@ -151,7 +153,7 @@ class _Loop:
     adaptations: list[str] = field(default_factory=list)
     aim: Aim | None = None
     measures: Measures | None = None
-    usual: Usual = ANYTHING
+    usual: Usual = Usual()  # noqa: RUF009 - frozen
     reached: Reached | None = None
     chosen_from: int = 0
     keep: int = field(default_factory=lambda: KEPT)

@@ -7,12 +7,13 @@ A template may be unusual itself, and then nothing generated from it is usual. S
 quarter of the valid candidates that is least rare. The bound is found with the first candidates, and is the same for all.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 
 from scenario_gen.method.sampling.adapt import Judge
 from scenario_gen.method.sampling.sampler import BLOCK, LEVELS, Sampler
-from scenario_gen.types import Measures, Scenario
+from scenario_gen.types import Scenario
 
 PILOT = 2 * BLOCK  # candidates by which a level is judged
 LEAST_RARE = 0.25  # share of the valid candidates that is kept at least
@@ -23,42 +24,35 @@ class Usual:
     """Says whether a valid candidate is kept.
 
     Attributes:
-        measures: with the rarity of a scenario.
+        rarity: returns that of a scenario; None: all are kept.
         most: the greatest rarity that is kept.
     """
 
-    measures: Measures
-    most: float
+    rarity: Callable[[Scenario], float] | None = None
+    most: float = math.inf
+
+    @classmethod
+    def among(cls, rarity: Callable[[Scenario], float], valid: Sequence[Scenario]) -> "Usual":
+        """Find the bound by the first valid candidates."""
+        rarities = sorted(map(rarity, valid))
+        return cls(rarity, max(1.0, rarities[int(LEAST_RARE * len(rarities))]) if rarities else math.inf)
 
     def __call__(self, scenario: Scenario) -> bool:
         """Whether it is."""
-        return self.measures.rarity is None or self.measures.rarity(scenario) <= self.most
+        return self.rarity is None or self.rarity(scenario) <= self.most
 
     @property
     def valid_each(self) -> int:
         """Valid candidates of which one is kept, in the worst case."""
-        return 1 if self.measures.rarity is None else round(1.0 / LEAST_RARE)
+        return 1 if self.rarity is None else round(1.0 / LEAST_RARE)
 
     def notes(self) -> tuple[str, ...]:
         """Return what is to be said of the bound: nothing where what is kept is usual."""
-        if self.measures.rarity is None or self.most <= 1.0:
+        if self.rarity is None or self.most <= 1.0:
             return ()
         if math.isinf(self.most):
             return ("vehicles share no area, so nothing is known of such encounters: whatever is valid counts as usual",)
         return (f"the template is unusual among recorded encounters (rarity 1): scenarios up to {self.most:.2f} are kept",)
-
-
-ANYTHING = Usual(Measures(lambda *_: math.nan, lambda _: ()), math.inf)
-"""Keeps all."""
-
-
-def usual_of(sampler: Sampler, judge: Judge, measures: Measures | None) -> Usual:
-    """Find the bound."""
-    if measures is None or measures.rarity is None:
-        return ANYTHING
-    _, valid = pilot(sampler, judge)
-    rarities = sorted(map(measures.rarity, valid))
-    return Usual(measures, max(1.0, rarities[int(LEAST_RARE * len(rarities))]) if rarities else math.inf)
 
 
 def pilot(sampler: Sampler, judge: Judge) -> tuple[int, list[Scenario]]:
