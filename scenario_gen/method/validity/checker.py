@@ -74,7 +74,7 @@ class Checker:
         self._limits = self.limits or Limits()
         self._dynamics_limits: dict[str, Floats] = {}
         if self.road is not None:
-            self._grounds: dict[str, inside.Ground] = {}
+            self._grounds: dict[bool, inside.Ground] = {}
         lanes = self.road.lanes if self.road is not None else None
         swapped = self._first != tuple(conflict.first for conflict in self.conflicts or ())
         against = lanes is not None and lanes.drawn and swapped  # the signs of a drawn road say who went first in the template
@@ -324,11 +324,12 @@ class Checker:
                 )
 
     def _ground_of(self, vehicle: Vehicle) -> inside.Ground:
-        """Return where road users of a type may be."""
-        if vehicle.type not in self._grounds:
+        """Return where those who walk, or those who drive, may be."""
+        walks = vehicle.kind.walks
+        if walks not in self._grounds:
             assert self.road is not None
-            self._grounds[vehicle.type] = inside.Ground.of(ground_for(self.road, vehicle))
-        return self._grounds[vehicle.type]
+            self._grounds[walks] = inside.Ground.of(ground_for(self.road, vehicle))
+        return self._grounds[walks]
 
     def _wrong_ways(self, scenario: Scenario) -> Iterator[Violation]:
         """Vehicles that drive against all lanes where they are, at the samples."""
