@@ -70,7 +70,7 @@ def _conflicts(motion: Motion) -> dict[tuple[int, int], Conflict]:
 
 
 def _by_pair(conflicts: Iterable[Conflict]) -> dict[tuple[int, int], Conflict]:
-    return {(min(one.first, one.second), max(one.first, one.second)): one for one in conflicts}
+    return {one.pair: one for one in conflicts}
 
 
 @lru_cache(maxsize=4)  # of one template many places are looked at

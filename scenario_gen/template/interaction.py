@@ -70,6 +70,11 @@ class Conflict:
     entry_second: float
 
     @property
+    def pair(self) -> tuple[int, int]:
+        """Its vehicles, the lower index first."""
+        return min(self.first, self.second), max(self.first, self.second)
+
+    @property
     def encroachment(self) -> float:
         """Post-encroachment time [s]: from the first one's exit to the second one's entry."""
         return self.entry_second - self.exit_first

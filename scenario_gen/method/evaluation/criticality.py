@@ -56,5 +56,5 @@ def criticality(motion: Motion, horizon: float) -> Criticality:
         if pairs
         else float("nan"),
         pet=min(encroachments, default=float("nan")),
-        order=tuple(((min(c.first, c.second), max(c.first, c.second)), c.first) for c in conflicts),
+        order=tuple((c.pair, c.first) for c in conflicts),
     )

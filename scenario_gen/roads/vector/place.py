@@ -185,7 +185,7 @@ class _Judged:
             return 0, True
         motion = _laid(placement, self._tracks)
         conflicts = conflicts_in(motion)
-        lost = self._met - {(min(met.first, met.second), max(met.first, met.second)) for met in conflicts}
+        lost = self._met - {met.pair for met in conflicts}
         return len(lost), not self._check.kept_orders(motion, conflicts)
 
 
