@@ -76,28 +76,33 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
 
 def area_of(network: LaneNetwork) -> BaseGeometry:
     """Return all that lies in lanes."""
-    return union_all(make_valid([Polygon(lane.outline) for lane in network.lanes]))
+    return union_all(make_valid(_outlines(network)))
+
+
+def _outlines(network: LaneNetwork) -> list[Polygon]:
+    return [Polygon(lane.outline) for lane in network.lanes]
 
 
 def _not_kept(network: LaneNetwork, scenarios: Sequence[Scenario]) -> dict[str, Curve]:
     """Return the paths, by id, of vehicles that leave the lanes or drive across them."""
     area = area_of(network).buffer(SEAM_M, join_style="mitre").buffer(-SEAM_M, join_style="mitre")
     prepare(area)
+    outlines = _outlines(network)
     missing: dict[str, Curve] = {}
     for scenario in scenarios:
         for n, vehicle in enumerate(scenario.vehicles):
             if vehicle.id not in missing:
                 path = driven_path(scenario, n)
-                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, network) > CUT:
+                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, network, outlines) > CUT:
                     missing[vehicle.id] = path
     return missing
 
 
-def _unled(path: Curve, network: LaneNetwork) -> float:
-    """Return the metres of a path on which no lane has nearly its direction."""
+def _unled(path: Curve, network: LaneNetwork, outlines: Sequence[Polygon]) -> float:
+    """Return the metres of a path on which no lane, of these outlines, has nearly its direction."""
     led = np.zeros(len(path.points), dtype=np.bool_)
-    for lane in network.lanes:
-        inside = np.flatnonzero(~led & contains_xy(Polygon(lane.outline), path.points[:, :2]))
+    for lane, outline in zip(network.lanes, outlines, strict=True):
+        inside = np.flatnonzero(~led & contains_xy(outline, path.points[:, :2]))
         if len(inside):
             middle = Curve.through(lane.centre)
             yaw = middle.at(middle.project(path.points[inside, :2])[0])[:, 2]
