@@ -19,7 +19,7 @@ from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES
 
 TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
-SHARPEST = 0.4  # 1/m: no car turns sharper, noise included;
+SHARPEST = 0.4  # 1/m: no car turns sharper, noise included
 NOISY = 1.6  # times as sharp as others can turn, if that is sharper
 BACKWARDS = np.radians(150.0)  # headings further off the path are those of a vehicle that drives backwards
 REVERSES_MPS = 5.0  # the fastest that cars are driven backwards; above, the axes are mirrored (`remarks_on_units`)

@@ -34,10 +34,8 @@ _SAME_WAY = np.radians(30.0)
 _ENOUGH = 0.5  # share of that time in which they are beside each other on the road, on the same side
 _IN_LANE, _OFF_LANE = 1.4, 2.3  # metres sideways up to which a vehicle is in another one's lane, and from which on beside it
 _STILL_IN_LANE = 2.0  # metres, likewise on the road
-_BEYOND, _DRIFT = (
-    30.0,
-    1.0,
-)  # metres beyond a path's, or its lanes', ends, straight on, for which it says where its lane lies, to so many
+_BEYOND = 30.0  # metres beyond the ends of a path, or of its lanes, for which it says, straight on, where its lane lies …
+_DRIFT = 1.0  # … to so many metres
 _PASSED = 2.0  # metres by which one that passes another is behind it first, and then before it
 
 
