@@ -11,7 +11,7 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.segmentation import segment
-from scenario_gen.roads import NoPlaceError, road_and_template, ROADS
+from scenario_gen.roads import drives_about_ring, NoPlaceError, road_and_template, ROADS, ROUNDABOUT
 from scenario_gen.template import refuse_reversing, refuse_too_large
 from scenario_gen.types import Encounter, GenerationResult, Road, Segmentation
 
@@ -29,8 +29,13 @@ def takes(road: Road | str, encounter: Encounter, segmentation: Segmentation, co
 
 
 def suitable_roads(encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> Iterator[str]:
-    """Yield the names of the built-in roads that take the template; `corridor`, its own road, is the last."""
-    return (name for name in ROADS.built_in if takes(name, encounter, segmentation, config))
+    """Yield the names of the built-in roads that take the template: `roundabout` first for who drives about a ring.
+
+    The last is `corridor`, its own road.
+    """
+    ring = drives_about_ring(encounter, config.road)
+    names = sorted(ROADS.built_in, key=lambda name: ring and name != ROUNDABOUT)
+    return (name for name in names if takes(name, encounter, segmentation, config))
 
 
 def on_first_suitable_road(

@@ -168,10 +168,11 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
 
 CORRIDOR = "corridor"
 """The road that is drawn around what was recorded."""
+ROUNDABOUT = "roundabout"
 BUILT_IN: dict[str, DrawRoad] = {
     **dict.fromkeys(("straight", "curve", "t_intersection", "four_way"), draw_main_road),
     "merge": draw_merge,
-    "roundabout": draw_roundabout,
+    ROUNDABOUT: draw_roundabout,
 }
 """The built-in roads that need no template, by name."""
 ROADS = Registry[DrawRoad]("scenario_gen.roads", {**BUILT_IN, CORRIDOR: draw_corridor})

@@ -192,6 +192,11 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     return draw_plan(plan, name, config)
 
 
+def drives_about_ring(encounter: Encounter, config: RoadConfig) -> bool:
+    """Whether somebody in the template drives about the ring of a roundabout."""
+    return _ring_driven(clean_tracks(encounter), config) is not None
+
+
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float] | None:
     """Centre (2,) and radius [m] of the circle about which those drive who bend to the other side before or after, or go far.
 

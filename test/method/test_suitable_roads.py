@@ -6,6 +6,7 @@
 from pathlib import Path
 
 import pytest
+from textbook_motions import labelled
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
@@ -43,3 +44,9 @@ def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):
         generate(crossing, "t_intersection", count=2, seed=7)
     answer = answer_refusal(caught.value, crossing, "t_intersection", config, Request(), 2, 7)
     assert str(answer).endswith(f"Roads that take it: {', '.join(names)}")
+
+
+def test_who_drives_about_a_ring_is_taken_to_a_roundabout_first():
+    encounter, config = labelled("roundabout entry", 1).encounter, PipelineConfig()
+    names = list(suitable_roads(encounter, segment(encounter, config.segmentation, 7), config))
+    assert names[0] == "roundabout" and names[-1] == "corridor"
