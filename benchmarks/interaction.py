@@ -112,10 +112,13 @@ def _encounters(*, held_out: bool) -> Any:
 
 def _measured(name: str, encounter: Encounter, road_name: str, count: int, variety: str) -> Case:
     """Generate on a road, and measure."""
-    graph, ids = reactions_of(encounter), [vehicle.id for vehicle in encounter.vehicles]
+    graph = reactions_of(encounter)
     config = PipelineConfig()
     config = replace(config, sampling=replace(config.sampling, variety=variety))
-    case = Case({"name": name, "road": road_name, "edges": [edge.document(ids) for edge in graph.edges]}, *([] for _ in range(6)))
+    case = Case(
+        {"name": name, "road": road_name, "edges": [edge.document(encounter.vehicles) for edge in graph.edges]},
+        *([] for _ in range(6)),
+    )
     try:
         road, segmentation = build_road(road_name, encounter, config.road), segment(encounter, config.segmentation, SEED)
         begun = process_time()
@@ -133,10 +136,10 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
     if len(scenarios) < 2:
         case.figures["refused"] = "fewer than two scenarios"
         return case
-    clean = [n for n in range(len(ids)) if ghosts(encounter, n) == 0]
+    clean = [n for n in range(len(encounter.vehicles)) if ghosts(encounter, n) == 0]
     braking = np.array([[ghosts(one, n) > 0 for n in clean] for one in scenarios])
     case.figures |= {"clean drives": braking.size, "ghosts": int(braking.sum())}
-    if len(clean) == len(ids):
+    if len(clean) == len(encounter.vehicles):
         case.figures |= {"clean scenarios": len(scenarios), "haunted": int(braking.any(axis=1).sum())}
     lanes, others = shared(encounter)
     follows = {(edge.who, edge.whom): edge for edge in graph.edges if edge.kind == FOLLOW}

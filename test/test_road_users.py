@@ -3,9 +3,12 @@
 
 """Trucks, buses, motorcycles, bicycles and pedestrians: read, kept with their types, and generated within their own limits."""
 
+import io
+
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 
 from scenario_gen import generate, read_log
 from scenario_gen.base.errors import RefusedError
@@ -13,6 +16,7 @@ from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.boxes import footprint_gaps
+from scenario_gen.output.report.summary import summary
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Dynamics, VEHICLE_TYPES
 
@@ -119,6 +123,14 @@ def test_road_users_of_all_types_are_generated_within_their_limits(road, name):
     assert {tuple(vehicle.type for vehicle in scenario.vehicles) for scenario in made} == {
         tuple(v.type for v in encounter.vehicles)
     }
+
+
+def test_the_terminal_calls_road_users_by_their_types():
+    (encounter,) = read_log(WORLDS["a car waits for a pedestrian"][0]).encounters
+    console = Console(record=True, width=200, file=io.StringIO())
+    console.print(summary([generate(encounter, "corridor", count=1, seed=1)]))
+    text = console.export_text()
+    assert "2 road users (car, pedestrian)" in text and "vehicle c waits for pedestrian p" in text
 
 
 @pytest.mark.parametrize("road", ["four_way", "t_intersection", "roundabout"])

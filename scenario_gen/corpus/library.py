@@ -223,7 +223,7 @@ def assign_table(task: AssignTask) -> None:
             found = assign(pair, library, task.config)
             rows.append({
                 "encounter": row["name"], "kind": row["kind"], "pair": pair.name, "seconds": pair.duration,
-                "reactions": json.dumps(reactions_of(pair).document([vehicle.id for vehicle in pair.vehicles])),
+                "reactions": json.dumps(reactions_of(pair).document(pair.vehicles)),
                 "changepoints": found.segmentation.changepoints.tolist(), "primitives": found.primitives.tolist(),
             })  # fmt: skip
     texts, ints = dict.fromkeys(("encounter", "kind", "pair", "reactions"), "string"), "int64[]"

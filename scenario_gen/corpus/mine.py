@@ -182,7 +182,7 @@ def _write_gallery(path: Path, tables: _Encounters, made: Mined) -> None:
         lines = [
             f"{row['count']} vehicles, {row['seconds']:.1f} s, nearest {row['distance']:.1f} m, gap {row['gap']:.1f} m",
             ", ".join(f"{pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()),
-            *reactions_of(encounter).sentences([vehicle.id for vehicle in encounter.vehicles]),
+            *reactions_of(encounter).sentences(encounter.vehicles),
         ]
         cards.append({"title": f"{row['kind']}: {row['name']}", "lines": lines, "pictures": [sketch(encounter)]})
     first, *rest = made.lines()

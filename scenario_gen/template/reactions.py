@@ -89,12 +89,12 @@ def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
     """Say why nobody is seen to react."""
     nearest = min(seen, key=lambda found: found.apart, default=None)
     if nearest is None or nearest.apart == math.inf:
-        stand = [vehicle.id for n, vehicle in enumerate(encounter.vehicles) if np.all(encounter.speed[n] < WAIT_SPEED)]
-        standing = f"; {' and '.join(f'vehicle {name}' for name in stand)} stands throughout" if stand else ""
+        stand = [vehicle.label for n, vehicle in enumerate(encounter.vehicles) if np.all(encounter.speed[n] < WAIT_SPEED)]
+        standing = f"; {' and '.join(stand)} stands throughout" if stand else ""
         return f"none drives behind another one in its lane, or crosses its way{standing}"
-    who, whom = (encounter.vehicles[n].id for n in (nearest.who, nearest.whom))
+    who, whom = (encounter.vehicles[n].label for n in (nearest.who, nearest.whom))
     least = math.floor(10.0 * nearest.apart) / 10.0
-    return f"the nearest are vehicle {who} and vehicle {whom}, and they are never within {least:.1f} s of each other"
+    return f"the nearest are {who} and {whom}, and they are never within {least:.1f} s of each other"
 
 
 def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:

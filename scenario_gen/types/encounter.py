@@ -13,7 +13,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
-from scenario_gen.types.road_users import usual_type, VEHICLE_TYPES, VehicleType
+from scenario_gen.types.road_users import CAR, OTHER, usual_type, VEHICLE_TYPES, VehicleType
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,6 +49,11 @@ class Vehicle:
     def kind(self) -> VehicleType:
         """What is known of its type."""
         return VEHICLE_TYPES[self.type]
+
+    @property
+    def label(self) -> str:
+        """Type and id, as in "bus 7"; whose type is none in particular, or a car, is a vehicle."""
+        return f"{'vehicle' if self.type in (CAR, OTHER) else self.type} {self.id}"
 
     @property
     def half(self) -> tuple[float, float]:

@@ -192,8 +192,8 @@ class GenerationResult:
     @property
     def reacting(self) -> dict[str, Any]:
         """Who reacts to whom in the template, and what the scenarios keep of it, as a document."""
-        graph, ids = self.generated.graph, [vehicle.id for vehicle in self.encounter.vehicles]
-        return {"edges": [], "cut": [], "sentences": []} if graph is None else graph.document(ids, self.generated.reactions)
+        graph, vehicles = self.generated.graph, self.encounter.vehicles
+        return {"edges": [], "cut": [], "sentences": []} if graph is None else graph.document(vehicles, self.generated.reactions)
 
     @property
     def lost(self) -> tuple[str, ...]:

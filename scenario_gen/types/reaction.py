@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.pieces import join_pieces, split_pieces
 
 FOLLOW, YIELD = "follow", "yield"
@@ -66,9 +67,9 @@ class Reaction:
         """Return who reacts to whom, by the vehicles' ids: as it is named in an entry of `scenarios/info`."""
         return f"{ids[self.who]}{_FOLLOWS if self.kind == FOLLOW else _YIELDS}{ids[self.whom]}"
 
-    def words(self, ids: Sequence[str]) -> str:
-        """Return the reaction in words, with the vehicles' ids."""
-        who, whom = f"vehicle {ids[self.who]}", f"vehicle {ids[self.whom]}"
+    def words(self, vehicles: Sequence[Vehicle]) -> str:
+        """Return the reaction in words, with the vehicles' types and ids."""
+        who, whom = vehicles[self.who].label, vehicles[self.whom].label
         if self.kind == FOLLOW:
             text = f"{who} follows {whom}, {self.headway[1]:.1f} s bumper to bumper, and answers its speed after {self.lag:.1f} s"
         else:
@@ -84,12 +85,12 @@ class Reaction:
         """Whether the record hardly distinguishes it from none."""
         return self.confidence < DOUBTFUL
 
-    def document(self, ids: Sequence[str]) -> dict[str, str | float | bool]:
+    def document(self, vehicles: Sequence[Vehicle]) -> dict[str, str | float | bool]:
         """Return the reaction as a flat document, with the vehicles' ids and the words."""
         return {
-            "kind": self.kind, "who": ids[self.who], "whom": ids[self.whom], "lag": round(self.lag, 3),
+            "kind": self.kind, "who": vehicles[self.who].id, "whom": vehicles[self.whom].id, "lag": round(self.lag, 3),
             "gain": round(self.gain, 3), "residual": round(self.residual, 3), "confidence": round(self.confidence, 3),
-            "doubtful": self.doubtful, "words": self.words(ids),
+            "doubtful": self.doubtful, "words": self.words(vehicles),
         }  # fmt: skip
 
 
@@ -109,19 +110,19 @@ class ReactionGraph:
     cut: tuple[Reaction, ...] = ()
     why: str = ""
 
-    def sentences(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> tuple[str, ...]:
+    def sentences(self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None) -> tuple[str, ...]:
         """Return one sentence for each edge of the graph, which also names those that are not among the `kept`."""
         free = "" if kept is None else ": the scenarios are not held to it"
-        sentences = [edge.words(ids) if edge in (kept or ()) else f"{edge.words(ids)}{free}" for edge in self.edges]
-        sentences += [f"{edge.words(ids)}: left out, for it closes a circle of reactions" for edge in self.cut]
+        sentences = [edge.words(vehicles) if edge in (kept or ()) else f"{edge.words(vehicles)}{free}" for edge in self.edges]
+        sentences += [f"{edge.words(vehicles)}: left out, for it closes a circle of reactions" for edge in self.cut]
         return tuple(sentences) or (f"no vehicle is seen to react to another{self.why and ': '}{self.why}",)
 
-    def document(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> dict[str, Any]:
+    def document(self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None) -> dict[str, Any]:
         """Return the graph as a document: edges, those that were cut, sentences; and of each edge whether it is `kept`."""
         return {
-            "edges": [edge.document(ids) | ({} if kept is None else {"kept": edge in kept}) for edge in self.edges],
-            "cut": [edge.document(ids) for edge in self.cut],
-            "sentences": list(self.sentences(ids, kept)),
+            "edges": [edge.document(vehicles) | ({} if kept is None else {"kept": edge in kept}) for edge in self.edges],
+            "cut": [edge.document(vehicles) for edge in self.cut],
+            "sentences": list(self.sentences(vehicles, kept)),
         }
 
 

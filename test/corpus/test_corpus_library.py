@@ -55,8 +55,7 @@ def test_a_library_of_a_corpus(corpus):
         assert len(row["primitives"]) == len(row["changepoints"]) + 1 and max(row["primitives"]) < len(library.means)
         assert all(0 < point < len(pairs[row["pair"]].time) for point in row["changepoints"])
         assert json.loads(row["reactions"])["edges"] == [
-            edge.document([vehicle.id for vehicle in pairs[row["pair"]].vehicles])
-            for edge in reactions_of(pairs[row["pair"]]).edges
+            edge.document(pairs[row["pair"]].vehicles) for edge in reactions_of(pairs[row["pair"]]).edges
         ]
     page = (out / "library" / "library.html").read_text()
     assert "the second follows in" in page and "nobody reacts in" in page

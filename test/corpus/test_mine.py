@@ -59,7 +59,7 @@ def test_who_reacts_to_whom_stands_in_table_and_page(corpus):
     for row in rows_of(tables_of(corpus[0])):
         found, encounter = json.loads(row["reactions"]), encounter_of(row)
         assert (encounter.name, encounter.duration, encounter.origin) == (row["name"], row["seconds"], (row["lat"], row["lon"]))
-        assert found["edges"] == [edge.document(row["vehicles"]) for edge in reactions_of(encounter).edges]
+        assert found["edges"] == [edge.document(encounter.vehicles) for edge in reactions_of(encounter).edges]
         assert all(sentence in page for sentence in found["sentences"])
         kinds.setdefault(row["kind"], []).append([edge["kind"] for edge in found["edges"]])
     assert ["follow"] in kinds["following"] and not any("follow" in found for found in kinds["opposing"])

@@ -11,7 +11,10 @@ from reaction_scenes import answering, crossing, lane_encounter, wander
 from textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
 from scenario_gen.template.reactions import reactions_of, without_circles
+from scenario_gen.types import Vehicle
 from scenario_gen.types.reaction import FOLLOW, Reaction, YIELD
+
+TWO, AB = (tuple(map(Vehicle, names)) for names in ("12", "ab"))
 
 
 @pytest.mark.parametrize("lag", [0.6, 1.2, 2.0])
@@ -45,15 +48,13 @@ def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
     (edge,) = graph.edges
     assert (edge.kind, edge.who, edge.whom, edge.stands) == (YIELD, 1, 0, True)
     assert edge.lag == pytest.approx(lag, abs=0.35)  # it leaves when it is faster than 0.5 m/s
-    assert graph.sentences(("1", "2"))[0].startswith("vehicle 2 waits for vehicle 1, then passes")
+    assert graph.sentences(TWO)[0].startswith("vehicle 2 waits for vehicle 1, then passes")
 
 
 def test_who_leaves_long_after_waits_for_something_else():
     graph = reactions_of(crossing(14.0))
     assert graph.edges == ()
-    assert graph.sentences(("1", "2"))[0].startswith(
-        "no vehicle is seen to react to another: the nearest are vehicle 2 and vehicle 1"
-    )
+    assert graph.sentences(TWO)[0].startswith("no vehicle is seen to react to another: the nearest are vehicle 2 and vehicle 1")
 
 
 def seen(kinds, seeds):
@@ -92,7 +93,7 @@ def test_confidence_is_how_often_an_edge_is_right():
 
 def test_why_none_is_seen_is_said():
     apart = reactions_of(labelled("crossing, long after", 0).encounter)
-    assert "never within" in apart.why and apart.sentences("12")[0].endswith(apart.why)
+    assert "never within" in apart.why and apart.sentences(TWO)[0].endswith(apart.why)
     assert "none drives behind another" in reactions_of(labelled("beside", 1).encounter).why
 
 
@@ -104,7 +105,7 @@ def test_the_least_sure_edge_of_a_circle_is_cut_and_said():
     graph = without_circles([edge(0, 1, 0.9), edge(1, 2, 0.4), edge(2, 0, 0.8)], 3)
     assert [(one.who, one.whom) for one in graph.cut] == [(1, 2)]
     assert graph.order == (1, 0, 2)
-    assert "left out, for it closes a circle" in graph.sentences("abc")[-1]
+    assert "left out, for it closes a circle" in graph.sentences(tuple(map(Vehicle, "abc")))[-1]
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
@@ -120,6 +121,6 @@ def test_whatever_the_edges_everybody_comes_behind_those_it_reacts_to(count):
 
 
 def test_a_doubtful_edge_is_said_to_be():
-    assert edge(0, 1, 0.4).words("ab").endswith("(doubtful)")
-    assert "doubtful" not in edge(0, 1, 0.6).words("ab")
-    assert edge(0, 1, 0.6).document("ab")["words"].startswith("vehicle a follows vehicle b, 1.0 s bumper to bumper")
+    assert edge(0, 1, 0.4).words(AB).endswith("(doubtful)")
+    assert "doubtful" not in edge(0, 1, 0.6).words(AB)
+    assert edge(0, 1, 0.6).document(AB)["words"].startswith("vehicle a follows vehicle b, 1.0 s bumper to bumper")

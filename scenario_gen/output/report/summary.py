@@ -12,6 +12,7 @@ from rich.text import Text
 
 from scenario_gen.base.errors import printable
 from scenario_gen.types import (
+    CAR,
     causes_in_words,
     ERRORS,
     formatted,
@@ -62,7 +63,9 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
     )
     complete = len(result) >= result.requested
     table = Table.grid(padding=(0, 1))
-    table.add_row("", "recording", f"{len(recorded.vehicles)} vehicles for {recorded.duration:.1f} s")
+    types = sorted({vehicle.type for vehicle in recorded.vehicles})
+    users = "vehicles" if types == [CAR] else f"road users ({', '.join(types)})"
+    table.add_row("", "recording", f"{len(recorded.vehicles)} {users} for {recorded.duration:.1f} s")
     for sentence in case.reacting["sentences"]:
         table.add_row("", "reaction", printable(sentence))
     valid = Text.assemble((f"{len(result)} of {result.requested} scenarios", "green" if complete else "red"), f"; {tried}")

@@ -229,9 +229,8 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
         wrong += [(violation.cause.value, violation.message) for violation in verdict.violations]
         result.add(k, wrong, (*silent, *checker.not_applicable))
         broken = {violation.vehicles for violation in verdict.violations if violation.cause == Cause.REACTION}
-        ids = tokens(vehicle.id for vehicle in scenario.vehicles)
         for edge in checker.reactions:
-            result.proven[edge.words(ids)] += (edge.who, edge.whom) not in broken
+            result.proven[edge.words(scenario.vehicles)] += (edge.who, edge.whom) not in broken
     return result
 
 

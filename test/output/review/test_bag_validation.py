@@ -92,13 +92,13 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     bag = write_recording(tmp_path / "b", {"/here": made})
     (kept,) = validate_bag(bag)
     (edge,) = made.generated.reactions
-    assert kept.found == {} and kept.proven == {edge.words("12"): 4}
+    assert kept.found == {} and kept.proven == {edge.words(made.encounter.vehicles): 4}
     (found,) = validate_bag(bag, Limits(anticipation=0.0, patience=0.0))
     assert set(found.found) == {"reaction"}
-    assert found.proven == {edge.words("12"): 4 - found.found["reaction"].count}
+    assert found.proven == {edge.words(made.encounter.vehicles): 4 - found.found["reaction"].count}
     (measured,) = bag_results(bag)  # evaluate holds them to the same
     assert measured.published == 4 and measured.generated.reactions == (edge,)
-    assert measured.reacting["edges"] == [edge.document("12") | {"kept": True}]
+    assert measured.reacting["edges"] == [edge.document(made.encounter.vehicles) | {"kept": True}]
     assert bag_results(bag, limits=Limits(anticipation=0.0, patience=0.0))[0].generated.refused["reaction"] >= 1
     (summary,) = read_recording(bag).namespaces["/here"].summaries
     assert summary.reactions == tuple(made.reacting["edges"])
