@@ -138,7 +138,7 @@ def _write_problem(path: Path, trial: Trial) -> None:
     scenario, export = trial.scenario, ExportConfig()
     ids = [vehicle.id for vehicle in scenario.vehicles]
     others, ego = split_off(scenario, trial.ego if isinstance(trial.ego, int) else ids.index(trial.ego))
-    one = Exported(scenario.index, scenario.seed, "0" * 64, replace(others, witness=None), ego, driven=True)
+    one = Exported(scenario.index, scenario.seed, "0" * 64, replace(others, reference_drive=None), ego, driven=True)
     lanes = lane_map_of(trial.road, [scenario], RoadConfig.lane_width, export.run_out)
     path.write_bytes(write_commonroad(Case(1, "", "road", 0, (one,), lanes), one, export)[0])
     (vehicle,) = ego.vehicles

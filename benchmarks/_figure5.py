@@ -24,8 +24,9 @@ from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
-from scenario_gen.types.generation import GenerationResult, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road
+from scenario_gen.types.row_names import REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.segmentation import Segmentation
 
 COUNT, SEEDS = sized((50, (7, 8, 9)), quick=(4, (7,)))
@@ -104,7 +105,7 @@ def _measure(
                 say(f"{encounter.name} on {road.name}, seed {seed}, {name_of}: {error}")
         found.append(_evaluated(encounter, arms, road, own_road=own_road, seed=seed))
         values = found[-1].value
-        figures = (f"{arm} {values(arm, 'e_position'):.4f} / {values(arm, 'e_speed'):.4f}" for arm in (*arms, ORACLE))
+        figures = (f"{arm} {values(arm, 'e_position'):.4f} / {values(arm, 'e_speed'):.4f}" for arm in (*arms, REPLAY))
         say(f"{encounter.name} on {road.name}, K = {len(segmentation.changepoints)}, seed {seed}: " + "; ".join(figures))
     return found
 
@@ -113,12 +114,12 @@ def _evaluated(encounter: Encounter, arms: dict[str, GenerationResult], road: Ro
     """Evaluate the arms, and with the first seed make the report too."""
     started = process_time()
     with_ = arms[WITH]
-    oracle = replay(encounter, with_.placed()[1], road.frame_id)
-    rows = {arm: made.generated.scenarios for arm, made in arms.items()} | {ORACLE: (oracle,)}
+    oracle = replay(encounter, with_.road_and_fit()[1], road.frame_id)
+    rows = {arm: made.generated.scenarios for arm, made in arms.items()} | {REPLAY: (oracle,)}
     evaluation = evaluate_scenarios(encounter, rows, changepoints=len(with_.segmentation.changepoints), road=road.name)
     if seed != SEEDS[0]:
         return Measured(evaluation, own_road, seed, 0.0)
     references = {WITHOUT: arms[WITHOUT].generated} if WITHOUT in arms else {}
-    case = replace(with_, references=references, evaluation=evaluation, oracle=oracle)
+    case = replace(with_, references=references, evaluation=evaluation, replay=oracle)
     render(ReportInput([case]))
     return Measured(evaluation, own_road, seed, process_time() - started)

@@ -134,7 +134,7 @@ def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, va
         own,
         "" if len(drawn.scenarios) > 1 else f"{len(drawn.scenarios)} scenarios: {dict(drawn.refused)}",
         template=arrays(encounter),
-        oracle=arrays(made.oracle),
+        oracle=arrays(made.replay),
         samples=[arrays(scenario) for scenario in drawn.scenarios],
         sizes=[(vehicle.length, vehicle.width) for vehicle in encounter.vehicles],
         changepoints=len(made.segmentation.changepoints),

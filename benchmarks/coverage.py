@@ -138,5 +138,5 @@ def _mixed(members: Sequence[Scenario], rng: np.random.Generator) -> tuple[Scena
             for name in ("position", "heading", "speed", "acceleration", "present")
         }
         rows["present"] = np.minimum(np.stack([one.present[n] for n, one in enumerate(own)]), count - 1)
-        mixed.append(replace(members[0], time=own[0].time[:count], witness=None, **rows))
+        mixed.append(replace(members[0], time=own[0].time[:count], reference_drive=None, **rows))
     return tuple(mixed)

@@ -48,8 +48,8 @@ class RequestMessages:
         """
         stamp = self.encounter.start_ns
         data = encode_scenario(scenario, stamp)
-        if scenario.witness is not None:
-            yield WITNESS, encode_scenario(scenario.witness, stamp)
+        if scenario.reference_drive is not None:
+            yield WITNESS, encode_scenario(scenario.reference_drive, stamp)
         for message in (data,) if scenario.all_present else messages_of(data):
             yield SCENARIOS, message
         entry = scenario_entry(

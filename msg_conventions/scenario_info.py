@@ -265,6 +265,7 @@ def scenario_entry(
     own = asked.relaxed[[ids.index(ego.vehicle.id)] if ego is not None else []]
     several = messages_of(data) if not scenario.all_present else ()
     sizes = [[vehicle.length, vehicle.width] for vehicle in scenario.vehicles]
+    drive = scenario.reference_drive
     spans = [[float(scenario.time[first]), float(scenario.time[last])] for first, last in scenario.present.tolist()]
     values = {
         "request": request,
@@ -279,7 +280,7 @@ def scenario_entry(
         **(about or {}),
         **scenario.facts,
         **ego_values(ego),
-        **({} if scenario.witness is None else {EGO_WITNESS: digest(encode_scenario(scenario.witness, stamp_of(data, INFO)))}),
+        **({} if drive is None else {EGO_WITNESS: digest(encode_scenario(drive, stamp_of(data, INFO)))}),
         "asked_start": json.dumps(asked.start[rows].tolist()),
         "asked_end": json.dumps(asked.end[rows].tolist()),
         **{key: json.dumps(freed.tolist()) for key, freed in ((FREED, asked.relaxed[rows]), (EGO_FREED, own)) if freed.any()},

@@ -67,6 +67,6 @@ def generate(
         raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {why}")
     if config.evaluation.compare:
         result = with_references(result, config, request, population)
-    result = replace(result, oracle=replay(encounter, result.placed()[1], road.frame_id))
+    result = replace(result, replay=replay(encounter, result.road_and_fit()[1], road.frame_id))
     coverage = coverage_of(encounter, result.generated.scenarios)
     return replace(result, evaluation=evaluate(result, config.evaluation), coverage=coverage)

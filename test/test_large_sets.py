@@ -29,8 +29,8 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
 from scenario_gen.template.interaction import waits_to_keep
-from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
 from scenario_gen.types.request import Request
+from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
 
 FIELDS = ("time", "position", "heading", "speed", "acceleration")
 

@@ -22,12 +22,12 @@ from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types.generation import NARROW, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.request import Request
+from scenario_gen.types.row_names import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 
 QUICK = EvaluationConfig(resamples=50, compare=True)
-WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replay": ORACLE}
+WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replay": REPLAY}
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def written(case, folder):
 
 
 def test_every_arm_has_its_row_and_its_account(case):
-    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, UNIFORM, NARROW, ORACLE]
+    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, UNIFORM, NARROW, REPLAY]
     assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
     accepted = case.evaluation.value(UNIFORM, "acceptance")
     assert accepted == pytest.approx(1.0 - sum(case.references[UNIFORM].refused.values()) / case.references[UNIFORM].candidates)
@@ -70,7 +70,7 @@ def test_by_default_no_further_set_is_drawn_and_nothing_else_changes(encounter, 
     assert all(rows[0][name] == rows[1][name] for name in rows[0])
     page, figures = written(plain, tmp_path)
     assert "--compare" in page and not any(f">{name}" in page.lower() for name in (WITHOUT, UNIFORM))
-    assert set(figures["similarity"]["compared"]) == {WITH} and set(figures["similarity"]["beside"]) == {ORACLE}
+    assert set(figures["similarity"]["compared"]) == {WITH} and set(figures["similarity"]["beside"]) == {REPLAY}
     text = printed(plain)
     assert "--compare" in text and "uniform" not in text and "|" not in text
 
@@ -100,7 +100,7 @@ def test_the_first_figures_that_anybody_sees_are_those_of_the_delivered_set(case
 def test_a_set_with_a_target_is_not_compared_with_sets_without_it(encounter):
     config = PipelineConfig(evaluation=QUICK)
     made = generate(encounter, "t_intersection", config, count=2, seed=3, request=Request(order="free"))
-    assert made.compared == (WITH,) and "order" in made.apart
+    assert made.compared == (WITH,) and "order" in made.not_compared
     assert "nothing is compared" in printed(made)
 
 

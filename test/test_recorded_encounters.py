@@ -17,8 +17,9 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types.generation import GenerationResult, WITHOUT
+from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road_users import Dynamics
+from scenario_gen.types.row_names import WITHOUT
 
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
@@ -47,7 +48,7 @@ def assert_sound(case: GenerationResult) -> None:
 
 def assert_nearer(case: GenerationResult, figure: str) -> None:
     """Scenarios with changepoints are more like the template than those without."""
-    with_, without = case.evaluation.value(case.row, figure), case.evaluation.value(WITHOUT, figure)
+    with_, without = case.evaluation.value(case.row_name, figure), case.evaluation.value(WITHOUT, figure)
     if without >= 0.03:
         assert with_ < without, f"{figure}: {with_:.3f} with, {without:.3f} without changepoints on {case.road.name}"
 

@@ -180,7 +180,7 @@ def regenerate(
     remind(bag)
     config = configured(parameter_file, assignments).bag
     result = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log, config=config)
-    give(index=index, bytes=len(result.data), sha256=result.sha256, apart_m=result.apart)
+    give(index=index, bytes=len(result.data), sha256=result.sha256, apart_m=result.distance)
     say(f"scenario {index}: {result.comparison}, {len(result.data)} bytes, sha256 {result.sha256}")
     if out is not None:
         written = write_regenerated(result, out, [bag, *([log] if log else ())])

@@ -170,8 +170,8 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     Raises:
         InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
     """
-    if scenario.witness is not None:
-        own = scenario.witness.vehicles[0].id
+    if scenario.reference_drive is not None:
+        own = scenario.reference_drive.vehicles[0].id
         if asked and not named_vehicle([own], asked):
             raise InputError(f"{where}: it was made for ego {own!r}; leave --ego out, or name that one")
         return own

@@ -139,7 +139,7 @@ class _Search:
     def base(self) -> dict[str, Floats]:
         """Start and end states of the fitting without any requested, (N, 4) by end; nothing where that is not possible either."""
         try:
-            _, fit = replace(self.requested, request=Request()).plan().placed()
+            _, fit = replace(self.requested, request=Request()).plan().road_and_fit()
         except ScenarioGenError:
             return {}
         return {"starts": fit.requested.start, "goals": fit.requested.end}

@@ -25,7 +25,7 @@ def with_references(
     Raises:
         InputError: road or fit of the result are not known.
     """
-    road, _ = result.placed()
+    road, _ = result.road_and_fit()
     count = min(result.generated.requested, MEASURED)
     plain = Chain(result.encounter, result.segmentation, road, config, request.plain, count, result.seed, population=population)
     chains = {WITHOUT: replace(plain, segmentation=without_changepoints(result.segmentation), waits=())}
@@ -41,5 +41,5 @@ def with_references(
         except RefusedError as error:
             refusals[name] = str(error)
     requested = [name for name in ("target", "choose", "order") if getattr(request, name) != getattr(request.plain, name)]
-    apart = f"only the delivered set was drawn with {' and '.join(requested)} as asked" if requested else ""
-    return replace(result, references=references, refusals=refusals, apart=apart)
+    not_compared = f"only the delivered set was drawn with {' and '.join(requested)} as requested" if requested else ""
+    return replace(result, references=references, refusals=refusals, not_compared=not_compared)

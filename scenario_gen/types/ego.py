@@ -26,15 +26,15 @@ def with_witness(scenario: Scenario, index: int) -> Scenario:
     others, witness = split_off(scenario, index)
     last = int(others.present[:, 1].max()) + 1
     arrays = {name: getattr(others, name)[:, :last] for name in _ROWS}
-    return replace(others, time=others.time[:last], **arrays, witness=witness)
+    return replace(others, time=others.time[:last], **arrays, reference_drive=witness)
 
 
 def join_ego(scenario: Scenario) -> Scenario:
     """Return a scenario and its witness as one of all vehicles, the witness last; the same where there is no witness."""
-    witness = scenario.witness
+    witness = scenario.reference_drive
     if witness is None:
         return scenario
-    parts = (replace(scenario, witness=None), witness)
+    parts = (replace(scenario, reference_drive=None), witness)
     time = np.unique(np.concatenate([part.time for part in parts]))  # whole nanoseconds, so equal instants are equal
     vehicles = (*scenario.vehicles, *witness.vehicles)
     arrays: dict[str, Any] = {

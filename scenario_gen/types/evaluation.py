@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from scenario_gen.base.documents import COUNT, NUMBER, parse_json
 from scenario_gen.base.errors import printable
+from scenario_gen.types.row_names import FORMERLY_REPLAY, REPLAY, row_name
 from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 
 Better = Literal["lower", "higher", ""]
@@ -54,8 +55,6 @@ SCHEMA = _object(
 )
 """Of the JSON that `to_json` writes."""
 _KEYS = {"duration": "duration_s", "level": "confidence_level"}  # of fields that are named otherwise in JSON
-TEMPLATE = "template"
-"""Name of the row that `evaluate` adds: the recorded encounter itself."""
 
 
 @dataclass(frozen=True)
@@ -162,6 +161,7 @@ class Evaluation:
 
     def row(self, name: str) -> Row | None:
         """Return the row of that name, or None."""
+        name = row_name(name)
         return next((row for row in self.rows if row.name == name), None)
 
     def value(self, row: str, metric: str) -> float:
@@ -264,4 +264,5 @@ def _row(document: Mapping[str, Any]) -> Row:
         key: Interval(*(math.nan if entry[bound] is None else entry[bound] for bound in ("value", "low", "high")))
         for key, entry in document["values"].items()
     }
-    return Row(document["name"], document["samples"], values, tuple(document["notes"]))
+    name = REPLAY if document["name"] == FORMERLY_REPLAY else document["name"]
+    return Row(name, document["samples"], values, tuple(document["notes"]))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.base.renaming import Renamed
 from scenario_gen.numerics import Bools, canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import BoundaryStates
@@ -76,7 +77,7 @@ class Fit:
         anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T - 1).
         requested: start and end states requested of every scenario (after repair).
         notes: what was decided, in sentences (an entry chosen and why, an anchor moved by how much).
-        lost: what of the template's turns, conflicts and neighbours is lost on this road; none where nothing is.
+        losses: what of the template's turns, conflicts and neighbours is lost on this road; none where nothing is.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -84,11 +85,12 @@ class Fit:
     anchor_index: Ints
     requested: BoundaryStates
     notes: tuple[str, ...]
-    lost: tuple[Loss, ...] = ()
+    losses: tuple[Loss, ...] = ()
+    lost = Renamed("losses")
 
     def figures(self) -> dict[str, Any]:
         """Return what is lost, and by vehicle what was decided, ready for JSON."""
         return {
-            "lost": [{"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.message} for loss in self.lost],
+            "lost": [{"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.message} for loss in self.losses],
             "vehicles": {vehicle.id: fitted.figures() for vehicle, fitted in zip(self.vehicles, self.fitted, strict=False)},
         }

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.renaming import Renamed
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
@@ -18,6 +19,7 @@ from scenario_gen.types.fit import Fit
 from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
+from scenario_gen.types.row_names import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.scenario import causes_in_words, dataframe, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
 
@@ -25,9 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
 
-WITH, WITHOUT, UNIFORM, ORACLE = "with changepoints", "without changepoints", "uniform changepoints", "oracle"
-NARROW = "with changepoints, narrow"
-"""Names of the rows of an evaluation: what was generated, and what it is measured against."""
 ERRORS = {"e_position": "position", "e_speed": "speed", "e_heading": "heading"}
 """The figures of likeness, and what they are of."""
 _WORDS = {WITHOUT: "no changepoints at all keep", UNIFORM: "evenly spaced changepoints keep"}
@@ -45,15 +44,16 @@ class GenerationResult:
         routes: one for each vehicle, or none.
         generated: the valid scenarios, and the account of every candidate.
         seed: of the request.
-        evaluation: of `generated`, `references` and `oracle`; without rows if they were not evaluated.
+        evaluation: of `generated`, `references` and `replay`; without rows if they were not evaluated.
         references: sets to measure `generated` against, by row: WITHOUT is the paper's ablation, UNIFORM has as many changepoints
             evenly spaced, both drawn as `generated` is; NARROW has the same changepoints and preset `narrow`.
         refusals: why a reference is missing, by row.
-        oracle: the fitted template replayed.
-        row: name of the evaluation's row of `generated`.
+        replay: the recording as fitted to the road, replayed.
+        row_name: that of the evaluation's row of `generated`.
         provenance: what is needed to make it again: log hashes, versions, parameters.
         coverage: what `generated` covers, None if it was not measured.
-        apart: what was requested of `generated` and not of the references (a target, a choice, an order): they are not compared.
+        not_compared: why `generated` is not compared with the references: what was requested of it alone (a target, a choice, an
+            order); "" if it is.
         valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of them are.
     """
 
@@ -67,12 +67,14 @@ class GenerationResult:
     evaluation: Evaluation = Evaluation.empty()  # noqa: RUF009 - frozen
     references: Mapping[str, ScenarioSet] = field(default_factory=dict)
     refusals: Mapping[str, str] = field(default_factory=dict)
-    oracle: Scenario | None = None
-    row: str = WITH
+    replay: Scenario | None = None
+    row_name: str = WITH
     provenance: Mapping[str, str] = field(default_factory=dict)
     valid: int | None = None
     coverage: Coverage | None = None
-    apart: str = ""
+    not_compared: str = ""
+    apart, row, oracle = Renamed("not_compared"), Renamed("row_name"), Renamed("replay")
+    outdone, placed, lost = Renamed("better_references"), Renamed("road_and_fit"), Renamed("losses")
 
     def __repr__(self) -> str:
         road = self.road.name if self.road is not None else "no road"
@@ -137,7 +139,7 @@ class GenerationResult:
     @property
     def compared(self) -> tuple[str, ...]:
         """Rows whose E may be compared: that of `generated` first, then the references drawn with the same freedom."""
-        return (self.row, *(name for name in (WITHOUT, UNIFORM) if name in self.references and not self.apart))
+        return (self.row_name, *(name for name in (WITHOUT, UNIFORM) if name in self.references and not self.not_compared))
 
     def best(self, metric: str) -> str:
         """Return the compared row with the least figure, that of `generated` where they are equal; "" if there is none."""
@@ -145,13 +147,13 @@ class GenerationResult:
         known = [row for row, value in values.items() if math.isfinite(value)]
         return min(known, key=values.__getitem__) if len(known) > 1 else ""
 
-    def outdone(self) -> tuple[str, ...]:
-        """Return a sentence for each reference that is more like the template than what was generated, by a thousandth."""
+    def better_references(self) -> tuple[str, ...]:
+        """Return a sentence for each reference that is nearer to the recording than `generated`, by at least 0.001 in E."""
         sentences = []
         for row in self.compared[1:]:
             better = []
             for metric, what in ERRORS.items():
-                own, other = (self.evaluation.value(name, metric) for name in (self.row, row))
+                own, other = (self.evaluation.value(name, metric) for name in (self.row_name, row))
                 if math.isfinite(own - other) and round(other, 3) < round(own, 3):
                     better.append(f"E {what} {other:.3f} against {own:.3f}")
             if better:
@@ -166,15 +168,15 @@ class GenerationResult:
             return {metric: float(f"{value:.6g}") if math.isfinite(value) else None for metric, value in values.items()}
 
         rows = [row.name for row in self.evaluation.rows]
-        beside = [row for row in (WITHOUT, UNIFORM, NARROW, ORACLE) if row in rows and row not in self.compared]
+        beside = [row for row in (WITHOUT, UNIFORM, NARROW, REPLAY) if row in rows and row not in self.compared]
         return {
             "compared": {row: figures(row) for row in self.compared if row in rows},
             "beside": {row: figures(row) for row in beside},
             "best": {metric: best for metric in ERRORS if (best := self.best(metric))},
-            "said": [*self.outdone(), *([f"nothing is compared: {self.apart}"] if self.apart else [])],
+            "said": [*self.better_references(), *([f"nothing is compared: {self.not_compared}"] if self.not_compared else [])],
         }
 
-    def placed(self) -> tuple[Road, Fit]:
+    def road_and_fit(self) -> tuple[Road, Fit]:
         """Return road and fit.
 
         Raises:
@@ -196,9 +198,9 @@ class GenerationResult:
         return {"edges": [], "cut": [], "sentences": []} if graph is None else graph.document(vehicles, self.generated.reactions)
 
     @property
-    def lost(self) -> tuple[str, ...]:
-        """What of the template the road does not allow, in sentences."""
-        return tuple(loss.message for loss in self.fit.lost) if self.fit else ()
+    def losses(self) -> tuple[str, ...]:
+        """What of the recording the road does not allow, in sentences."""
+        return tuple(loss.message for loss in self.fit.losses) if self.fit else ()
 
     @property
     def route_remarks(self) -> tuple[str, ...]:

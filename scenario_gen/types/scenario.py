@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenario_gen.base.renaming import Renamed
 from scenario_gen.numerics import Bools, canonical_heading, canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.encounter import columns_of, Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
@@ -41,11 +42,11 @@ class Scenario:
         heading: (N, T) rad, unwrapped.
         speed: (N, T) m/s in the body frame, >= 0.
         acceleration: (N, T) m/s², longitudinal.
-        seed: the request's seed; index: the sample's number within the request.
+        seed: the request's seed; index: the scenario's number within the request.
         frame_id: the road's frame.
         present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
-        witness: of a scenario with an ego slot: a trajectory of the vehicle that was left out, as a scenario of that vehicle
-            alone on the same clock. Both together were proven valid, so the slot can be driven.
+        reference_drive: of a scenario with an ego slot: the motion of the vehicle that was left out, as a scenario of it alone
+            on the same clock. Both together were proven valid, so the slot can be driven.
         facts: what else its entry in `scenarios/info` says: `closest_approach`, `pet`, `rarity`, `weight`, `target.…`, `order`,
             `passing_order`, `reactions`, `search.…` (FACTS).
     """
@@ -60,8 +61,9 @@ class Scenario:
     index: int = 0
     frame_id: str = "map"
     present: Ints = field(default_factory=lambda: ALWAYS)
-    witness: "Scenario | None" = None
+    reference_drive: "Scenario | None" = None
     facts: Mapping[str, str] = field(default_factory=dict)
+    witness = Renamed("reference_drive")
 
     def __post_init__(self) -> None:
         n, t = len(self.vehicles), len(self.time)
@@ -201,7 +203,7 @@ class ScenarioSet:
     """What a request got: valid scenarios, and an account of every candidate.
 
     `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there. `ego` is the
-    vehicle that was left out for a planner under test, if one was; each scenario then has its witness.
+    vehicle that was left out for a planner under test, if one was; each scenario then has its reference drive.
     The scenarios of a large set are not in memory but drawn again whenever they are looked at. `reached` says what sampling
     towards a target came to, `chosen` from how many valid candidates the set was chosen (0: as they were drawn).
     `graph` says who reacts to whom in the template (None: nobody looked), `reactions` are those that every scenario keeps.

@@ -75,8 +75,8 @@ fit = fit_template(encounter, segment(encounter), road)
 config = PlanningConfig(planner="one_corner", drivable=False)
 routes = plan_routes(road, fit, config, seed=1)
 assert [len(route.points) > 1 for route in routes] == [not fitted.stands.all() for fitted in fit.fitted]
-evaluation = evaluate_scenarios(encounter, {"oracle": [replay(encounter, fit)]})
-assert abs(evaluation.value("oracle", "mean_speed") / evaluation.value("template", "mean_speed") - 1.0) < 0.1
+evaluation = evaluate_scenarios(encounter, {"replay": [replay(encounter, fit)]})
+assert abs(evaluation.value("replay", "mean_speed") / evaluation.value("template", "mean_speed") - 1.0) < 0.1
 assert "| **Speed** |" in evaluation.to_markdown()
 """
 

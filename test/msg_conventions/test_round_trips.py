@@ -279,12 +279,12 @@ def test_ego_slot():
 def test_a_scenario_with_a_witness_names_its_message():
     one = with_witness(scenario(3, n=2), 1)
     asked = BoundaryStates(np.zeros((2, 4)), np.ones((2, 4)))
-    slot = EgoSlot(one.witness.vehicles[0], np.full(4, 0.25), np.full(4, 0.5))
+    slot = EgoSlot(one.reference_drive.vehicles[0], np.full(4, 0.25), np.full(4, 0.5))
     data = scenarios.encode_scenario(one, 17)
-    template = (*one.vehicles, *one.witness.vehicles)
+    template = (*one.vehicles, *one.reference_drive.vehicles)
     made = scenario_info.scenario_entry(one, data, "r", "/n", template=template, asked=asked, ego=slot)
     (entry,) = scenario_info.decode_info(scenario_info.encode_info(made, 17))
-    assert entry.witness == scenarios.digest(scenarios.encode_scenario(one.witness, 17))
+    assert entry.witness == scenarios.digest(scenarios.encode_scenario(one.reference_drive, 17))
     assert entry.asked().start.tolist() == [[0.0] * 4] and entry.asked(witness=True).end.tolist() == [[1.0] * 4, [0.5] * 4]
 
 

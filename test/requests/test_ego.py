@@ -41,13 +41,13 @@ def test_of_two_vehicles_one_is_left(chain, plain, ego):
     slot = made.ego
     assert slot.vehicle.id == ego
     assert np.array_equal([slot.start, slot.goal], [asked.start[index], asked.end[index]])
-    for track in (s.witness for s in made.scenarios):
+    for track in (s.reference_drive for s in made.scenarios):
         assert [v.id for v in track.vehicles] == [ego]
         for k, state in ((0, slot.start), (-1, slot.goal)):
             assert track.position[0, k] == pytest.approx(state[:2], abs=1e-5)
             assert np.cos(track.heading[0, k] - state[2]) == pytest.approx(1.0)
             assert track.speed[0, k] == pytest.approx(state[3], abs=1e-9)
-    assert len({s.witness.position.tobytes() for s in made.scenarios}) == 5, "each has its own"
+    assert len({s.reference_drive.position.tobytes() for s in made.scenarios}) == 5, "each has its own"
 
 
 def test_a_slot_that_cannot_be_driven_is_refused(chain):

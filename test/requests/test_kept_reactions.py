@@ -67,7 +67,7 @@ def assert_kept(result, names):
 def test_an_ego_slot_before_a_follower_or_behind_a_leader(ego, tmp_path):
     """The follower answers the witness in the slot before it; a witness in the slot behind answers the leader."""
     result = made(LANE, Request(ego=ego))
-    assert all(scenario.witness.vehicles[0].id == ego for scenario in result.generated.scenarios)
+    assert all(scenario.reference_drive.vehicles[0].id == ego for scenario in result.generated.scenarios)
     assert_kept(result, ["2 follows 1"])
     bag = write_recording(tmp_path / "bag", result)
     (found,) = validate_bag(bag)

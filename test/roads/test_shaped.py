@@ -74,20 +74,20 @@ def test_a_turn_of_any_angle_is_kept_and_its_conflict_too(angle, road_name):
     for vehicle in fit.fitted:
         assert np.degrees(vehicle.turned[1]) == pytest.approx(np.degrees(vehicle.turned[0]), abs=15.0)
         assert np.ptp(np.diff(vehicle.path[:, 2])) < 0.1
-    assert not [loss for loss in fit.lost if loss.kind in ("turn", "conflict", "order")]
+    assert not [loss for loss in fit.losses if loss.kind in ("turn", "conflict", "order")]
 
 
 def test_who_crosses_needs_four_arms_and_a_road_of_three_is_refused():
     encounter = made(motion(line(0.0), 8.0), motion(line(np.radians(70.0), 25.0, -40.0), 8.0))
     road, fit = fitted(encounter, "four_way")
-    assert len(road.lanes.arms) == 4 and fit.lost == ()
+    assert len(road.lanes.arms) == 4 and fit.losses == ()
     with pytest.raises(RefusedError, match="t_intersection has 3 arms, and the template comes and goes by 4"):
         build_road("t_intersection", encounter)
 
 
 def test_an_arm_that_nobody_uses_is_said():
     _, fit = fitted(made(motion(line(0.0), 8.0, 20.0), motion(line(0.0), 8.0)), "four_way")
-    assert [loss.message for loss in fit.lost] == [
+    assert [loss.message for loss in fit.losses] == [
         "2 of the 4 arms of road four_way are not used: nobody in the template comes or goes there"
     ]
 
@@ -107,7 +107,7 @@ def test_a_merge_is_used_by_who_changes_lanes_and_refused_where_nobody_does():
     assert away[0] == pytest.approx(0.0, abs=0.5) and 8.0 < away[1] < 20.0  # the second comes up the ramp
     assert len(road.entries) == len(road.exits) + 1
     _, fit = fitted(made(motion(line(0.0), 10.0, 28.0), motion(joining, 10.0)), "curve")
-    assert fit.lost == ()  # who ends beyond another one's path in a bend is in its lane
+    assert fit.losses == ()  # who ends beyond another one's path in a bend is in its lane
     with pytest.raises(RefusedError, match="nobody would use the ramp"):
         build_road("merge", made(motion(line(0.0), 8.0, 20.0), motion(line(0.0), 8.0)))
 
@@ -144,7 +144,7 @@ def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_dri
         speeds[1] = np.full(T, 50.0 * radius / T)
     road, fit = fitted(made(*zip(poses, speeds, strict=True)), "roundabout")
     assert ring_of(road)[1] == pytest.approx(radius, abs=0.3)
-    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and {loss.kind for loss in fit.lost} <= {"arm"}
+    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and {loss.kind for loss in fit.losses} <= {"arm"}
 
 
 def test_roads_without_a_template_are_of_their_kind():

@@ -66,7 +66,7 @@ def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
     encounter, made = in_process(3, ego="1")
     digests, accounts = published(client, result)
     assert digests == [digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios]
-    witnesses = [digest(encode_scenario(s.witness, encounter.start_ns)) for s in made.scenarios]
+    witnesses = [digest(encode_scenario(s.reference_drive, encounter.start_ns)) for s in made.scenarios]
     assert [values["ego_witness"] for values in accounts] == witnesses
     client.until(lambda: set(witnesses) <= set(map(digest, client.heard["/ego/witness"])), "the witnesses")
     for topic, data in ego_messages(made.ego, "map", encounter.start_ns):

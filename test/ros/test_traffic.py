@@ -216,7 +216,7 @@ def test_live_scenarios_are_driven_on_the_road_that_they_name(start, client):
             if topic == wanted:
                 client.say(topic, data)
     _, _, child, goal = decode_state(client.wait("ego/goal")[0])
-    witness = parted[0].witness
+    witness = parted[0].reference_drive
     assert child == f"vehicle_{token(slot.vehicle.id)}"
     assert goal[:2] == pytest.approx(witness.position[0, -1])
     client.announce("ego/cmd_vel")

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from scenario_gen.types.evaluation import Evaluation, Interval, Row
-from scenario_gen.types.generation import GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.row_names import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.scenario import dataframe, ScenarioSet
 
 
 def result(**figures):
     """A result whose rows have these (E position, E speed); of references there are those that are given."""
-    names = {"own": WITH, "without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "oracle": ORACLE}
+    names = {"own": WITH, "without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replay": REPLAY}
     rows = [
         Row(names[key], 1, {"e_position": Interval(position), "e_speed": Interval(speed)})
         for key, (position, speed) in figures.items()
@@ -26,42 +27,42 @@ def result(**figures):
     return GenerationResult(None, None, None, None, (), evaluation=evaluation, references=references)
 
 
-FIVE = {"own": (0.1, 0.2), "without": (0.3, 0.4), "uniform": (0.08, 0.2), "narrow": (0.01, 0.02), "oracle": (0.001, 0.002)}
+FIVE = {"own": (0.1, 0.2), "without": (0.3, 0.4), "uniform": (0.08, 0.2), "narrow": (0.01, 0.02), "replay": (0.001, 0.002)}
 
 
 def test_the_delivered_set_stands_first_and_only_what_is_drawn_likewise_is_compared():
     similar = result(**FIVE).similarity()
     assert list(similar["compared"]) == [WITH, WITHOUT, UNIFORM]
     assert similar["compared"][WITH] == {"e_position": 0.1, "e_speed": 0.2, "e_heading": None}
-    assert list(similar["beside"]) == [NARROW, ORACLE]  # nearer, and no match for it: they have less freedom, or none
+    assert list(similar["beside"]) == [NARROW, REPLAY]  # nearer, and no match for it: they have less freedom, or none
 
 
 def test_a_reference_that_does_better_is_said_with_both_figures():
     made = result(**FIVE)
     assert made.best("e_position") == UNIFORM
-    assert made.outdone() == ("evenly spaced changepoints keep it better here: E position 0.080 against 0.100",)
+    assert made.better_references() == ("evenly spaced changepoints keep it better here: E position 0.080 against 0.100",)
     assert made.best("e_speed") == WITH, "equal is not better"
-    worse = result(own=(0.1, 0.2), without=(0.05, 0.1)).outdone()
+    worse = result(own=(0.1, 0.2), without=(0.05, 0.1)).better_references()
     assert worse == ("no changepoints at all keep it better here: E position 0.050 against 0.100, E speed 0.100 against 0.200",)
 
 
 def test_what_does_not_show_in_three_digits_is_not_said():
-    assert result(own=(0.1001, 0.2), without=(0.1, 0.3)).outdone() == ()
+    assert result(own=(0.1001, 0.2), without=(0.1, 0.3)).better_references() == ()
 
 
 @pytest.mark.parametrize("missing", [{"own": (np.nan, np.nan)}, {"without": (np.nan, np.nan), "uniform": (np.nan, np.nan)}])
 def test_where_there_is_no_figure_nothing_is_best(missing):
     made = result(**{**{key: FIVE[key] for key in ("own", "without")}, **missing})
-    assert made.outdone() == () and made.best("e_heading") == ""
+    assert made.better_references() == () and made.best("e_heading") == ""
     assert made.similarity()["said"] == []
 
 
 def test_what_was_asked_of_the_delivered_set_alone_takes_it_out_of_the_comparison():
-    made = replace(result(**FIVE), apart="only the delivered set was drawn with target as asked")
+    made = replace(result(**FIVE), not_compared="only the delivered set was drawn with target as requested")
     similar = made.similarity()
-    assert list(similar["compared"]) == [WITH] and list(similar["beside"]) == [WITHOUT, UNIFORM, NARROW, ORACLE]
+    assert list(similar["compared"]) == [WITH] and list(similar["beside"]) == [WITHOUT, UNIFORM, NARROW, REPLAY]
     assert similar["best"] == {}
-    assert similar["said"] == ["nothing is compared: only the delivered set was drawn with target as asked"]
+    assert similar["said"] == ["nothing is compared: only the delivered set was drawn with target as requested"]
 
 
 def test_results_are_counted_indexed_and_made_a_table():
@@ -77,3 +78,26 @@ def test_results_are_counted_indexed_and_made_a_table():
     assert list(dataframe([]).columns) == list(table.columns)
     for thing in (result, result.generated, first, result.encounter, result.road):
         assert len(repr(thing)) < 120 and repr(thing).startswith(type(thing).__name__)
+
+
+def test_names_of_the_version_before_still_work_with_a_warning():
+    """Fields, properties, methods and the row of the replay; a set that is measured under the old name is the replay."""
+    made = hand_made_run()
+    names = {"apart": "not_compared", "row": "row_name", "oracle": "replay", "lost": "losses"}
+    for old, new in names.items():
+        with pytest.warns(DeprecationWarning, match=f"GenerationResult.{old} is now {new}"):
+            assert getattr(made, old) is getattr(made, new) or getattr(made, old) == getattr(made, new)
+    with pytest.warns(DeprecationWarning, match="road_and_fit"):
+        assert made.placed() == made.road_and_fit()
+    with pytest.warns(DeprecationWarning, match=r"Fit.lost is now losses"):
+        assert made.fit.lost == made.fit.losses
+    with pytest.warns(DeprecationWarning, match=r"Scenario.witness is now reference_drive"):
+        assert made[0].witness is made[0].reference_drive
+
+
+def test_the_replay_is_found_by_the_name_that_its_row_had():
+    case = result(**FIVE)
+    with pytest.warns(DeprecationWarning, match="row 'oracle' of an evaluation is now 'replay'"):
+        assert case.evaluation.value("oracle", "e_position") == case.evaluation.value(REPLAY, "e_position") == 0.001
+    former = replace(case.evaluation, level=0.95).to_json().replace('"replay"', '"oracle"')
+    assert [row.name for row in Evaluation.from_json(former).rows] == [row.name for row in case.evaluation.rows]

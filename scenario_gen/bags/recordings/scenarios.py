@@ -219,7 +219,7 @@ def decode_with_witness(
     known = {vehicle.id for vehicle in scenario.vehicles}
     if (of, own.frame_id) != (stamp, scenario.frame_id) or len(own.vehicles) != 1 or own.vehicles[0].id in known:
         raise InputError(f"{where}, of scenario {index}: it is not one other vehicle with the scenario's stamp and frame")
-    return stamp, replace(scenario, witness=own)
+    return stamp, replace(scenario, reference_drive=own)
 
 
 def joined_messages(messages: Sequence[BagMessage], entries: Iterable[ScenarioEntry]) -> Sequence[BagMessage]:

@@ -40,7 +40,7 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     Raises:
         InputError: its road or its fit is not known.
     """
-    road, fit = result.placed()
+    road, fit = result.road_and_fit()
     encounter, stamp = result.encounter, result.encounter.start_ns
     template = {
         "tracks": encode_tracks(encounter),

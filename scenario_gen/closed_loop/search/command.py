@@ -87,7 +87,7 @@ class SearchRequest:
         source = Path(getattr(__import__(make.__module__, fromlist=["_"]), "__file__", None) or "")
         return {
             "template": self.planned.encounter.name,
-            "road": self.planned.placed()[0].name,
+            "road": self.planned.road_and_fit()[0].name,
             "scenarios": str(self.planned.seed),
             "request": parameter_texts(self.request),
             "sampling": parameter_texts(self.sampling),
@@ -216,7 +216,7 @@ def _write(folder: Path, result: SearchResult, request: SearchRequest, identity:
     write_text(folder / JUNIT, as_junit([one.outcome for one in result.findings], request.planner, _facts(request)))
     write_text(folder / PAGE, _page(result, request))
     if result.findings:
-        encounter, fit = request.planned.encounter, request.planned.placed()[1]
+        encounter, fit = request.planned.encounter, request.planned.road_and_fit()[1]
         scenarios = tuple(one.scenario() for one in sorted(result.findings, key=lambda one: one.drive))
         ego = request.request.ego_of(encounter)
         slot = None

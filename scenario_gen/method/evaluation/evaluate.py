@@ -20,8 +20,9 @@ from scenario_gen.types import (
     Evaluation,
     GenerationResult,
     Interval,
-    ORACLE,
+    REPLAY,
     Row,
+    row_name,
     Scenario,
     ScenarioSet,
     TEMPLATE,
@@ -35,21 +36,21 @@ Scenarios = Sequence[Scenario] | ScenarioSet
 
 
 def evaluate(result: GenerationResult, config: EvaluationConfig = EvaluationConfig()) -> Evaluation:
-    """Measure what was generated, beside its references and the fitted template replayed (the oracle row).
+    """Measure what was generated, beside its references and the fitted template replayed.
 
     Args:
         result: as `generate` returns it.
         config: how to measure.
 
     Returns:
-        One row for the recorded template, one for `generated` and for each reference, and the oracle's if there is one.
+        One row for the recorded template, one for `generated` and for each reference, and `REPLAY` if there is a replay.
 
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
     """
-    sets: dict[str, Scenarios] = {result.row: result.generated, **result.references}
-    if result.oracle is not None:
-        sets[ORACLE] = (result.oracle,)
+    sets: dict[str, Scenarios] = {result.row_name: result.generated, **result.references}
+    if result.replay is not None:
+        sets[REPLAY] = (result.replay,)
     road = result.road.name if result.road else ""
     points = len(result.segmentation.changepoints)
     return evaluate_scenarios(result.encounter, sets, changepoints=points, road=road, config=config, seed=result.seed)
@@ -61,7 +62,7 @@ def evaluate_scenarios(
     *,
     changepoints: int = 0,
     checks: Mapping[str, CheckCounts] | None = None,
-    oracle: str = ORACLE,
+    replay: str = REPLAY,
     road: str = "",
     config: EvaluationConfig = EvaluationConfig(),
     seed: int = 0,
@@ -70,12 +71,12 @@ def evaluate_scenarios(
 
     Args:
         encounter: the recorded template.
-        sets: scenarios, or several sets of them by name, each a row: "mine", "oracle". A `ScenarioSet` brings its account of
+        sets: scenarios, or several sets of them by name, each a row: "mine", "replay". A `ScenarioSet` brings its account of
             candidates along. An empty set gives an empty row, with a note. Of a set of more than MEASURED
             scenarios that many are measured, see `measured`.
         changepoints: their number K stands beside E, for more changepoints always fit better.
         checks: the checker's account of the candidates of a row, where its set brings none.
-        oracle: the row whose first scenario is the fitted template, to which displacements are measured.
+        replay: the row whose first scenario is the fitted template, to which displacements are measured.
         road: name of the road, for the heading.
         config: how to measure.
         seed: of the bootstrap.
@@ -89,7 +90,7 @@ def evaluate_scenarios(
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
     """
-    named = sets if isinstance(sets, Mapping) else {"scenarios": sets}
+    named = {row_name(name): given for name, given in sets.items()} if isinstance(sets, Mapping) else {"scenarios": sets}
     accounts = {name: CheckCounts.of_set(given) for name, given in named.items() if isinstance(given, ScenarioSet)}
     counts = accounts | dict(checks or {})
     rows = {name: given.scenarios if isinstance(given, ScenarioSet) else given for name, given in named.items()}
@@ -98,7 +99,7 @@ def evaluate_scenarios(
     ids = shared_vehicles(encounter, rows)
     pairs = max(math.comb(len(ids), 2), 1)
     steps = min(encounter.speed.shape[1], config.max_steps, max(math.isqrt(config.max_entries // pairs), LEAST_STEPS))
-    template = Template(encounter, ids, steps, next(iter(rows.get(oracle, ())), None), config, seed)
+    template = Template(encounter, ids, steps, next(iter(rows.get(replay, ())), None), config, seed)
     own = _template_row(template)
     evaluated = [_row(name, sizes[name], Samples(scenarios, counts.get(name), template)) for name, scenarios in rows.items()]
     return Evaluation(

@@ -62,7 +62,7 @@ def fit_template(
     placement = _place(encounter, road.cleared, config)
     fit = finish(encounter, segmentation, road, placement, config)
     if not placement.at_home:
-        refuse_lost(fit.lost, config.allow, road.name)
+        refuse_lost(fit.losses, config.allow, road.name)
     return fit
 
 
@@ -75,7 +75,7 @@ def _fit_request(
     placement, given = place_given(encounter, road, config, starts, goals, base)
     fit = finish(encounter, segmentation, road, placement, config, given)
     refuse_misfits(fit, starts, goals)
-    refuse_lost((loss for loss in fit.lost if loss.kind == "conflict"), config.allow, road.name)  # lanes are as requested
+    refuse_lost((loss for loss in fit.losses if loss.kind == "conflict"), config.allow, road.name)  # lanes are as requested
     return fit
 
 

@@ -47,7 +47,7 @@ def sample_scenarios(
     drawn = draw_scenarios(
         plan, check, sampling, count=count, seed=planned.seed, request=request, callbacks=callbacks, measures=measures
     )
-    road, fit = planned.placed()
+    road, fit = planned.road_and_fit()
     mirrored = [note for note in (road.lanes.notes if road.lanes is not None else ()) if note.startswith(MIRRORED)]
     drawn = replace(drawn, adaptations=(*mirrored, *drawn.adaptations), graph=reactions_of(plan.encounter))
     return replace(planned, fit=replace(fit, requested=plan.requested), generated=drawn)
@@ -65,7 +65,7 @@ def plan_of(
     Raises:
         InputError: road or fit are not known.
     """
-    encounter, segmentation, (road, fit) = planned.encounter, planned.segmentation, planned.placed()
+    encounter, segmentation, (road, fit) = planned.encounter, planned.segmentation, planned.road_and_fit()
     states = relaxed_states(fit.requested, encounter, sampling, request)
     waits = waits_to_keep(encounter, segmentation) if waits is None else waits
     return Plan(encounter, segmentation, road, planned.routes, states, waits, limits)

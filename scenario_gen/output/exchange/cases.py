@@ -45,7 +45,7 @@ class Exported:
     @property
     def everybody(self) -> Scenario:
         """All vehicles, the ego last."""
-        return join_ego(replace(self.others, witness=self.ego))
+        return join_ego(replace(self.others, reference_drive=self.ego))
 
     @property
     def duration(self) -> float:
@@ -167,10 +167,10 @@ def _with_ego(
     if slot:
         if requested not in ("", slot):
             raise InputError(f"{where} was made for ego {slot!r}; leave --ego out, or name that one")
-        track = scenario.witness
+        track = scenario.reference_drive
         if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
             raise InputError(f"{where} was made for ego {slot!r}, whose track is not on {space.where(WITNESS)}")
-        return replace(scenario, witness=None), track, True
+        return replace(scenario, reference_drive=None), track, True
     if not requested:
         return scenario, None, False
     if requested not in ids:

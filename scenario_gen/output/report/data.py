@@ -44,15 +44,15 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
             tuple(scenario for scenario in case.generated.scenarios[samples:] if scenario.index in extra) if extra else ()
         )
     ids = [vehicle.id for vehicle in case.encounter.vehicles]
-    if case.oracle is not None:
-        arms["oracle"] = (case.oracle,)
+    if case.replay is not None:
+        arms["replay"] = (case.replay,)
     longest = max([case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)])
     refused = case.generated.examples
     if refused:
         arms["refused"] = tuple(scenario for _, scenario in refused)
     frames = min(MAX_FRAMES, int(np.ceil(longest / FRAME_PERIOD)) + 1)
     return {
-        "row": case.row,
+        "row": case.row_name,
         "vehicles": [
             {"id": v.id, "type": v.type, "length": _short(v.length), "width": _short(v.width)} for v in case.encounter.vehicles
         ],
@@ -161,7 +161,7 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
     Without a witness it is drawn where the first vehicle is, underneath it.
     """
     own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)}
-    track = next(iter(own.values())) if scenario.witness is None else states(scenario.witness, frames)[0]
+    track = next(iter(own.values())) if scenario.reference_drive is None else states(scenario.reference_drive, frames)[0]
     return np.stack([own.get(known, track) for known in ids])
 
 

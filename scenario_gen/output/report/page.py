@@ -20,7 +20,7 @@ from scenario_gen.types import (
     GenerationResult,
     Interval,
     NARROW,
-    ORACLE,
+    REPLAY,
     Route,
     routes_in_words,
     UNIFORM,
@@ -84,7 +84,7 @@ def _is_parameter(name: str) -> bool:
 
 def _view(index: int, case: GenerationResult) -> dict[str, Any]:
     """Return what the page's tables say about one case."""
-    arms = [(case.row, case.generated), *((name, case.references.get(name)) for name in (WITHOUT, UNIFORM))]
+    arms = [(case.row_name, case.generated), *((name, case.references.get(name)) for name in (WITHOUT, UNIFORM))]
     evaluation = case.evaluation
     duration = case.encounter.duration
     bounds = [*(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)), duration]
@@ -108,7 +108,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "verdict": _in_words(case),
         "reactions": case.reacting,
         "not_kept": case.lost_reactions,
-        "outdone": case.similarity()["said"],
+        "nearer": case.similarity()["said"],
         "segments": [
             {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
             for k, (start, text) in enumerate(
@@ -128,7 +128,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
             for v, f, r in vehicles
         ],
         "remarks": case.route_remarks,
-        "lost": case.lost,
+        "lost": case.losses,
         "planned": routes_in_words(case.routes),
     }
 
@@ -160,11 +160,11 @@ def _criticality(case: GenerationResult) -> str:
 def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
     """E of the delivered set, and what stands below it: each with its words and whether it is the best of what is compared."""
     best = case.best(metric)
-    words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", ORACLE: "replay"}
+    words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", REPLAY: "replay"}
     errors = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
     return {
-        "own": formatted(Interval(case.evaluation.value(case.row, metric)), ""),
-        "kind": "" if not best else "good" if best == case.row else "bad",
+        "own": formatted(Interval(case.evaluation.value(case.row_name, metric)), ""),
+        "kind": "" if not best else "good" if best == case.row_name else "bad",
         "beside": [(f"{value} {words[row]}", row == best) for row, value in errors.items() if value != "–"],
     }
 
@@ -175,7 +175,7 @@ def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for row, words in ((WITHOUT, "without changepoints"), (UNIFORM, "with as many evenly spaced ones")):
         cases = [view["case"] for view in views if row in view["case"].compared]
         for key, what in ERRORS.items():
-            pairs = [(case.evaluation.value(case.row, key), case.evaluation.value(row, key)) for case in cases]
+            pairs = [(case.evaluation.value(case.row_name, key), case.evaluation.value(row, key)) for case in cases]
             known = [value < other for value, other in pairs if other >= SIGNIFICANT]
             if known:
                 better.setdefault(words, {})[what] = (sum(known), len(known))

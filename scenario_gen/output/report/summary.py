@@ -19,7 +19,7 @@ from scenario_gen.types import (
     GenerationResult,
     Interval,
     NARROW,
-    ORACLE,
+    REPLAY,
     routes_in_words,
     Row,
     UNIFORM,
@@ -27,7 +27,7 @@ from scenario_gen.types import (
     WITHOUT,
 )
 
-SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", ORACLE: "replay"}
+SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", REPLAY: "replay"}
 COMPARED = (
     "; after | of sets drawn likewise, without changepoints and with K evenly spaced; in brackets, not compared: preset "
     "narrow, replay of the recording"
@@ -74,7 +74,7 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
         table.add_row("", "variety", varied)
     row = case.evaluation.row(WITH)
     vanished = [] if row is None else _vanished(row.values)
-    losses = case.fit.lost if case.fit else ()
+    losses = case.fit.losses if case.fit else ()
     lost = [loss.message for loss in losses if loss.kind != "arm"]
     remark = case.segmentation.remark(recorded.duration)
     unused = [loss.message for loss in losses if loss.kind == "arm"]
@@ -121,7 +121,7 @@ def _errors(case: GenerationResult, metric: str) -> Text:
     """E of the delivered set, of those it is compared with and of those beside it; the best of the compared is green."""
     compared, best, value = case.compared, case.best(metric), case.evaluation.value
     text = Text(f"  E {ERRORS[metric]} ")
-    text.append(_figure(value(case.row, metric)), style="bold green" if best == case.row else "bold")
+    text.append(_figure(value(case.row_name, metric)), style="bold green" if best == case.row_name else "bold")
     for k, row in enumerate(compared[1:]):
         text.append(" | " if k == 0 else ", ").append(f"{SHORT[row]} ")
         text.append(_figure(value(row, metric)), style="green" if best == row else "")

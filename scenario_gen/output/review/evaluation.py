@@ -95,7 +95,7 @@ def _result(
     rows = [replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row for row in evaluation.rows]
     evaluation = replace(evaluation, rows=tuple(rows))
     ego = None
-    witness = next((scenario.witness for scenario in scenarios if scenario.witness is not None), None)
+    witness = next((scenario.reference_drive for scenario in scenarios if scenario.reference_drive is not None), None)
     if witness is not None:
         first, last = (np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]]) for k in (0, -1))
         ego = EgoSlot(witness.vehicles[0], first, last)
@@ -113,7 +113,7 @@ def _result(
         generated=generated,
         evaluation=evaluation,
         refusals={WITHOUT: "the bag holds one set of scenarios"},
-        row=SCENARIOS,
+        row_name=SCENARIOS,
         valid=counts.candidates - sum(counts.refused.values()),
         coverage=coverage_of(encounter, scenarios),
     )

@@ -19,6 +19,7 @@ from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
 from scenario_gen.base.provenance import read_parameters, versions
+from scenario_gen.base.renaming import Renamed
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
@@ -41,23 +42,24 @@ class Regenerated:
     """A scenario made again.
 
     Attributes:
-        scenario: that of the bag, its witness too.
+        scenario: that of the bag, its reference drive too.
         data: its CDR bytes as they are in the bag, whose SHA-256 is that in `scenarios/info`.
         messages: those of the bag that belong to it (template, road, routes, its own, its entry), for a bag of its own.
         sha256: of `data`.
-        apart: largest distance [m] of what was made from what is in the bag; None if the bytes are the same.
+        distance: largest distance [m] of what was made from what is in the bag; None if the bytes are the same.
     """
 
     scenario: Scenario
     data: bytes
     messages: tuple[BagMessage, ...]
     sha256: str
-    apart: float | None
+    distance: float | None
+    apart = Renamed("distance")
 
     @property
     def comparison(self) -> str:
         """Which of the two was seen."""
-        return "the same bytes" if self.apart is None else f"the same within {max(self.apart * 1e3, 0.001):.3f} mm"
+        return "the same bytes" if self.distance is None else f"the same within {max(self.distance * 1e3, 0.001):.3f} mm"
 
 
 def regenerate_scenario(
@@ -103,16 +105,16 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
     scenario = regenerate(plan, sampling, seed=seed, index=index, request=requested, check=check, measures=MEASURES)
     recorded, witness = found.namespace.published(found.entry)
     pairs = [] if scenario is None else [(scenario, recorded)]
-    if scenario is not None and scenario.witness is not None:
-        pairs.append((scenario.witness, witness))
+    if scenario is not None and scenario.reference_drive is not None:
+        pairs.append((scenario.reference_drive, witness))
     distances = [distance_apart(made, encounter, data) for made, data in pairs]
-    apart = max((each for each in distances if each is not None), default=None)
-    if scenario is None or bool(witness) != (scenario.witness is not None) or (apart or 0.0) > MOST_APART_M:
+    distance = max((each for each in distances if each is not None), default=None)
+    if scenario is None or bool(witness) != (scenario.reference_drive is not None) or (distance or 0.0) > MOST_APART_M:
         now = versions()
         other = [f"{name} {values[name]} there, {now[name]} here" for name in now if values.get(name, now[name]) != now[name]]
         why = ", ".join(other) or "the versions agree, so the bag was changed"
         raise ScenarioGenError(f"{what}: scenario {index} comes out differently: {why}")
-    return Regenerated(scenario, recorded, found.messages, found.entry.sha256, apart)
+    return Regenerated(scenario, recorded, found.messages, found.entry.sha256, distance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +149,7 @@ def replanned(bag: Path, namespace: str | None = None, config: BagConfig = BagCo
         found = _find(bag, own[0].index, namespace, own[0].request, config)
         known = _replan(found, f"{bag}: request {found.entry.request}", None)
         facts, planned = found.entry.status.values, known.planned
-        road, placed = planned.placed()
+        road, placed = planned.road_and_fit()
         fit = found.namespace.fit[0]  # with what was decided, which the messages of one request do not hold
         if fit is not None and not known.request.moves:
             placed = replace(fit, requested=placed.requested)
@@ -165,7 +167,7 @@ def _replan(found: "_Found", what: str, log: Path | None) -> Replanned:
     config = replace(config, limits=read_parameters(Limits(), values, "limits.", what))
     planned = replace(template, seed=seed)
     if requested.moves or log is not None:  # what the bag has on `fit` need not be this request's
-        encounter, segmentation, road = template.encounter, template.segmentation, template.placed()[0]
+        encounter, segmentation, road = template.encounter, template.segmentation, template.road_and_fit()[0]
         if log is not None:
             encounter, segmentation = _from_log(log, encounter, found.summary, seed, what)
         fitting = read_parameters(FittingConfig(), values, "fitting.", what)

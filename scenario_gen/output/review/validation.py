@@ -218,7 +218,7 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
             continue
         states = None
         if entry is not None:
-            states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
+            states = entry.asked(namespace.where(INFO), witness=scenario.reference_drive is not None)
         scenario = join_ego(scenario)
         checker = checkers.of(k, stamp, scenario, states)
         try:

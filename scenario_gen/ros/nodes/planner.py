@@ -87,7 +87,7 @@ class Planner(StageNode):
         _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
         stages = PipelineConfig(fitting=config.fitting, planning=config.planning, limits=config.limits)
         planned = Chain(encounter, segmentation, road, stages, seed=config.seed).plan()
-        (_, fit), routes = planned.placed(), planned.routes
+        (_, fit), routes = planned.road_and_fit(), planned.routes
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         results = {

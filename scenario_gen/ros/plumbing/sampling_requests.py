@@ -356,7 +356,7 @@ def answer_request(
         RefusedError: the request is impossible; the message says why, and which similar request is possible.
     """
     template = decode_template(messages)
-    encounter, segmentation, (road, _) = template.encounter, template.segmentation, template.placed()
+    encounter, segmentation, (road, _) = template.encounter, template.segmentation, template.road_and_fit()
 
     def advance(done: int, _total: int, candidates: int) -> None:
         request.progress(done, candidates, encounter.start_ns)

@@ -27,11 +27,11 @@ def set_of(count):
         arrays = (all_of_it.time, all_of_it.position, all_of_it.heading, all_of_it.speed, all_of_it.acceleration)
         one = with_witness(Scenario(all_of_it.vehicles, *arrays, 3, index, all_of_it.frame_id, present), 3)
         data = encode_scenario(one, 17)
-        slot = EgoSlot(one.witness.vehicles[0], np.zeros(4), np.ones(4))
+        slot = EgoSlot(one.reference_drive.vehicles[0], np.zeros(4), np.ones(4))
         asked = BoundaryStates(np.zeros((4, 4)), np.ones((4, 4)))
         entry = scenario_entry(one, data, "r", "/n", template=all_of_it.vehicles, asked=asked, ego=slot)
         messages += [(SCENARIOS, part) for part in messages_of(data)]
-        messages += [(WITNESS, encode_scenario(one.witness, 17)), (INFO, encode_info(entry, 17))]
+        messages += [(WITNESS, encode_scenario(one.reference_drive, 17)), (INFO, encode_info(entry, 17))]
         made.append(one)
     return made, messages
 
@@ -46,7 +46,7 @@ def test_whatever_comes_first(order):
     found = [one for k in order for one in arriving.take(*MESSAGES[k])]
     assert sorted(entry.index for entry, _, _ in found) == [0, 1] and arriving.unmatched == 0
     for entry, stamp, got in found:
-        assert stamp == 17 and entry.ego == got.witness.vehicles[0].id
+        assert stamp == 17 and entry.ego == got.reference_drive.vehicles[0].id
         wanted = join_ego(MADE[entry.index])
         assert encode_scenario(join_ego(got), 17) == encode_scenario(wanted, 17)
     assert [one for k in order for one in arriving.take(*MESSAGES[k])] == [], "what comes twice counts once"

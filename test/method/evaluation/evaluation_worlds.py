@@ -14,9 +14,10 @@ from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.generation import GenerationResult, WITHOUT
+from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
+from scenario_gen.types.row_names import WITHOUT
 from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
 
@@ -98,7 +99,7 @@ def report_case(count=12, name="crossing", without=True):
     far = ScenarioSet(
         count, tuple(samples(encounter, count, seed=4, spread=1.0, pace=0.0)), count + 1, Counter({Cause.OFF_ROAD: 1})
     )
-    rows = {"with changepoints": near.scenarios, "oracle": [oracle]}
+    rows = {"with changepoints": near.scenarios, "replay": [oracle]}
     if without:
         rows["without changepoints"] = far.scenarios
     checks = {"with changepoints": CheckCounts.of_set(near), "without changepoints": CheckCounts.of_set(far)}
@@ -121,7 +122,7 @@ def ego_case(count=4):
     left = tuple(with_witness(scenario, 0) for scenario in case.generated.scenarios)
     slot = EgoSlot(case.encounter.vehicles[0], np.zeros(4), np.ones(4))
     made = replace(case.generated, scenarios=left, ego=slot)
-    rows = {"with changepoints": left, "oracle": [case.oracle]}
+    rows = {"with changepoints": left, "replay": [case.replay]}
     evaluation = evaluate_scenarios(
         case.encounter, rows, changepoints=len(case.segmentation.changepoints), config=EvaluationConfig(resamples=50)
     )

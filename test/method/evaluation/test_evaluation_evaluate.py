@@ -29,16 +29,16 @@ def run(**extra):
     rows = {
         "with changepoints": samples(encounter, 50),
         "without changepoints": samples(encounter, 12, seed=4, pace=0.0),
-        "oracle": [replayed(encounter)],
+        "replay": [replayed(encounter)],
     }
     return evaluate_scenarios(encounter, rows, changepoints=K, config=QUICK, **extra)
 
 
 def test_rows_say_what_happened():
     found = run(checks={"with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1})}, road="cross")
-    assert [row.name for row in found.rows] == ["template", "with changepoints", "without changepoints", "oracle"]
+    assert [row.name for row in found.rows] == ["template", "with changepoints", "without changepoints", "replay"]
     assert found.changepoints == 2 and found.vehicles == ("west", "south")
-    assert found.value("oracle", "e_position") < 1e-6 and found.value("oracle", "min_ade") < 1e-6
+    assert found.value("replay", "e_position") < 1e-6 and found.value("replay", "min_ade") < 1e-6
     for key in ("e_position", "e_speed", "js_speed", "js_acceleration", "wasserstein_speed"):
         assert found.value("with changepoints", key) < found.value("without changepoints", key)
     assert found.value("with changepoints", "collision_rate") == pytest.approx(0.15)
@@ -46,8 +46,8 @@ def test_rows_say_what_happened():
     assert found.value("with changepoints", "acceptance") == pytest.approx(50 / 60)
     assert "from 12, not 50" in found.row("without changepoints").notes[0]
     assert not found.row("with changepoints").notes
-    assert all(math.isnan(estimate.low) for estimate in found.row("oracle").values.values())  # one sample has no interval
-    assert math.isnan(found.value("oracle", "diversity")) and math.isnan(found.value("nobody", "e_position"))
+    assert all(math.isnan(estimate.low) for estimate in found.row("replay").values.values())  # one sample has no interval
+    assert math.isnan(found.value("replay", "diversity")) and math.isnan(found.value("nobody", "e_position"))
 
 
 def test_every_estimate_lies_in_its_interval_and_survives_json_and_markdown():
@@ -106,7 +106,7 @@ def late(source, n, first):
 def test_who_arrives_late_is_measured_while_there():
     whole = crossing()
     encounter, made = late(whole, 1, 40), [late(sample, 1, 40) for sample in samples(whole, 3)]
-    found = evaluate_scenarios(encounter, {"x": made, "oracle": [late(replayed(whole), 1, 40)]}, changepoints=K, config=QUICK)
+    found = evaluate_scenarios(encounter, {"x": made, "replay": [late(replayed(whole), 1, 40)]}, changepoints=K, config=QUICK)
     # for the pair the same as where both are there from then on
     cut = replace(
         whole, position=whole.position[:, 40:], heading=whole.heading[:, 40:], speed=whole.speed[:, 40:], present=ALWAYS
@@ -117,7 +117,7 @@ def test_who_arrives_late_is_measured_while_there():
         assert found.value("x", key) == pytest.approx(after.value("x", key), rel=0.03), key
     for key in ("min_distance", "min_ttc"):
         assert found.value("x", key) == pytest.approx(after.value("x", key), rel=1e-9), key
-    assert found.value("oracle", "e_position") < 1e-6 and found.value("oracle", "js_gap") < 1e-9
+    assert found.value("replay", "e_position") < 1e-6 and found.value("replay", "js_gap") < 1e-9
     alone = late(encounter, 1, 115)
     last = evaluate_scenarios(alone, {"x": [late(replayed(whole), 1, 115)]}, changepoints=K, config=QUICK)
     assert any("E leaves out 1 pair(s)" in note for note in last.row("x").notes)
@@ -206,7 +206,7 @@ def alone(scenario, n):
 def test_a_vehicle_left_out_for_an_ego_is_left_out_of_every_row():
     encounter = crossing()
     ones = [alone(scenario, 1) for scenario in samples(encounter, 4)]
-    found = evaluate_scenarios(encounter, {"x": ones, "oracle": [replayed(encounter)]}, changepoints=K, config=QUICK)
+    found = evaluate_scenarios(encounter, {"x": ones, "replay": [replayed(encounter)]}, changepoints=K, config=QUICK)
     assert found.vehicles == (CARS[1].id,)
     for figure in ("e_position", "min_distance", "min_ttc", "pet", "js_gap", "order_kept"):
         assert np.isnan(found.value("x", figure)), figure

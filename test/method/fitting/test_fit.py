@@ -92,7 +92,7 @@ def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(recorded):
                 assert footprint_fits(road, f.anchors, vehicle.length, vehicle.width).all()
                 assert 0.8 <= f.scale <= 1.25
                 assert f.moved.max() <= 3.0
-            assert turned_otherwise(encounter, fit) <= {loss.vehicles[0] for loss in fit.lost if loss.kind == "turn"}
+            assert turned_otherwise(encounter, fit) <= {loss.vehicles[0] for loss in fit.losses if loss.kind == "turn"}
         assert fitted >= 2, name
 
 
@@ -116,7 +116,7 @@ def test_who_goes_straight_on_has_an_arm_ahead_even_where_its_record_ends_before
         for road_name in ("t_intersection", "four_way"):
             fit = fit_template(encounter, every(encounter), build_road(road_name, encounter))
             assert not turned_otherwise(encounter, fit), (name, road_name)
-            assert not any(loss.kind in ("turn", "conflict") for loss in fit.lost)
+            assert not any(loss.kind in ("turn", "conflict") for loss in fit.losses)
 
 
 def test_oncoming_vehicles_stay_as_far_apart_where_there_are_lanes():
@@ -219,7 +219,7 @@ def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_str
     assert np.abs(np.hypot(*(lead - follow)[:, :2].T) - 18.0).max() < 0.25
     for f in fit.fitted:
         assert f.turned[1] == pytest.approx(f.turned[0], abs=np.radians(5.0))
-    assert not [loss for loss in fit.lost if loss.kind != "arm"]
+    assert not [loss for loss in fit.losses if loss.kind != "arm"]
     with pytest.raises(RefusedError, match=r"vehicle 0 turns left by 80°: road straight has no way for that"):
         fit_template(encounter, every(encounter), build_road("straight", encounter))
 

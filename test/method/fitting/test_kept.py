@@ -49,7 +49,7 @@ def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
     ):
         fit_template(CROSSING, SEGMENTATION, OPEN)
     taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"))
-    assert [loss.kind for loss in taken.lost] == ["conflict"]
+    assert [loss.kind for loss in taken.losses] == ["conflict"]
 
 
 def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place):
@@ -59,14 +59,14 @@ def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place)
     with pytest.raises(LostEncounterError, match=r"fitting\.allow=lost_conflict"):
         fit_template(CROSSING, SEGMENTATION, OPEN, request=request)
     taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"), request=request)
-    assert [loss.kind for loss in taken.lost] == ["conflict"]
+    assert [loss.kind for loss in taken.losses] == ["conflict"]
 
 
 def test_what_is_kept_or_at_home_is_not_refused(place):
     place(apart(CROSSING, 1.0))
-    assert not fit_template(CROSSING, SEGMENTATION, OPEN).lost
+    assert not fit_template(CROSSING, SEGMENTATION, OPEN).losses
     place(replace(apart(CROSSING, 120.0), at_home=True))
-    assert [loss.kind for loss in fit_template(CROSSING, SEGMENTATION, OPEN).lost] == ["conflict"]
+    assert [loss.kind for loss in fit_template(CROSSING, SEGMENTATION, OPEN).losses] == ["conflict"]
 
 
 def along(*offsets, ahead=0.0):
@@ -130,7 +130,7 @@ def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
     with pytest.raises(LostEncounterError, match=r"drive in one lane .* fitting\.allow=lost_following takes it"):
         fit_template(encounter, segment(encounter), OPEN)
     taken = fit_template(encounter, segment(encounter), OPEN, FittingConfig(allow="lost_following, lost_merge"))
-    assert [loss.kind for loss in taken.lost] == ["following"]
+    assert [loss.kind for loss in taken.losses] == ["following"]
 
 
 def test_the_refusal_names_roads_that_keep_it():

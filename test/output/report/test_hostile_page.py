@@ -19,7 +19,7 @@ from benchmarks.paper import write_page
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.report.page import render, ReportInput, write_report
-from scenario_gen.types.generation import UNIFORM
+from scenario_gen.types.row_names import UNIFORM
 
 RUNS = "top.ran=1"
 PAGES = ("report.html", pytest.param("paper.html", marks=pytest.mark.long))
@@ -96,7 +96,7 @@ def hostile_case(names):
             vehicles=ids,
             rows=tuple(replace(row, notes=(*row.notes, *names)) for row in case.evaluation.rows),
         ),
-        oracle=replace(case.oracle, vehicles=renamed(case.oracle.vehicles)),
+        replay=replace(case.replay, vehicles=renamed(case.replay.vehicles)),
         refusals={UNIFORM: names[5]},
     )
 

@@ -58,7 +58,7 @@ def test_the_same_input_gives_the_same_bytes(tmp_path, page):
 
 def test_the_data_can_be_read_back(page):
     data = json.loads(re.search(r'id="data">(.*?)</script>', page, flags=re.S).group(1))
-    assert [list(case["arms"]) for case in data] == [["with", "without", "oracle"], ["with", "oracle"]]
+    assert [list(case["arms"]) for case in data] == [["with", "without", "replay"], ["with", "replay"]]
     assert data[0]["arms"]["with"]["states"]["shape"][:2] == [12, 2]
     assert data[0]["template"]["bounds"] == [0.0, 4.0, 8.0, 12.0] and data[0]["template"]["labels"] == [0, 1, 0]
 
@@ -104,7 +104,7 @@ def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path)
         replace(case.routes[0], joined=3, searched=0, farthest=0.04),
         replace(case.routes[1], joined=2, searched=1, farthest=2.25),
     )
-    case = replace(case, fit=replace(case.fit, lost=(lost,), fitted=fitted), routes=routes)
+    case = replace(case, fit=replace(case.fit, losses=(lost,), fitted=fitted), routes=routes)
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(summary([case], verbose=True))
     write_results(tmp_path, [case], title="", quality=(), provenance={})
@@ -117,7 +117,7 @@ def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path)
     assert figures["fit"]["vehicles"]["west"]["turned_on_road_deg"] == 20.1
     assert figures["routes"]["south"]["farthest_from_fit_m"] == 2.25
     read = read_recording(tmp_path / "bag").namespaces[""]
-    assert read.fit[0].lost == (lost,) and read.fit[0].notes == case.fit.notes  # a remark about a route is not a note
+    assert read.fit[0].losses == (lost,) and read.fit[0].notes == case.fit.notes  # a remark about a route is not a note
     assert [route.figures() for route in read.fit[1]] == [route.figures() for route in routes]
 
 

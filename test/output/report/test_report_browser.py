@@ -107,7 +107,7 @@ def test_samples_and_sets_can_be_chosen(tab):
     tab.part("previous").click()
     tab.part("previous").click()
     assert tab.part("sample").evaluate("s => s.selectedIndex") == 5
-    tab.part("arm").select_option("oracle")
+    tab.part("arm").select_option("replay")
     assert tab.part("sample").locator("option").count() == 1
     alone = tab.picture("stage")
     tab.part("arm").select_option("without")
@@ -199,7 +199,7 @@ def test_who_arrives_late_is_not_shown_before(browser, tmp_path):
 
     made = replace(case.generated, scenarios=tuple(map(late, case.generated.scenarios)))
     write_report(
-        tmp_path / "late.html", ReportInput([replace(case, encounter=late(case.encounter), generated=made, oracle=None)])
+        tmp_path / "late.html", ReportInput([replace(case, encounter=late(case.encounter), generated=made, replay=None)])
     )
     tab = Report(browser, tmp_path / "late.html", DESKTOP)
     tab.page.wait_for_timeout(300)

@@ -247,7 +247,7 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
         regenerate_scenario(tmp_path / "lost", slot.generated.scenarios[0].index)
     with pytest.raises(InputError, match="whose reference drive is not in the bag"):
         read_trials(tmp_path / "lost")
-    hitting = tuple(replace(one, witness=on_top_of(one)) for one in slot.generated.scenarios)
+    hitting = tuple(replace(one, reference_drive=on_top_of(one)) for one in slot.generated.scenarios)
     (hit,) = validate_bag(write_recording(tmp_path / "hit", replace(slot, generated=replace(slot.generated, scenarios=hitting))))
     assert hit.found["overlap"].count == 3
 
@@ -255,4 +255,4 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
 def on_top_of(scenario):
     """The scenario's witness where its first vehicle is."""
     arrays = {name: getattr(scenario, name)[:1] for name in ("position", "heading", "speed", "acceleration", "present")}
-    return replace(scenario.witness, time=scenario.time, **arrays)
+    return replace(scenario.reference_drive, time=scenario.time, **arrays)

@@ -2,7 +2,7 @@
 // The page: which case is shown, and the player.
 
 const CASES = JSON.parse(document.getElementById("data").textContent);
-const ARM_NAMES = { oracle: "recording as fitted", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints", refused: "refused candidates" };
+const ARM_NAMES = { replay: "recording as fitted", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints", refused: "refused candidates" };
 
 function option(value, text) {
   const element = document.createElement("option");
@@ -78,7 +78,7 @@ class Player {
   }
 
   title(index, k) {
-    if (this.arm === "oracle") return "the recording";
+    if (this.arm === "replay") return "the recording";
     return this.arm === "refused" ? `${this.data.causes[k]} (candidate ${index})` : `scenario ${index}`;
   }
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The oracle: the fitted template itself, replayed on the road; what the fitting costs before anything is generated."""
+"""The replay: the recording as fitted to the road; what the fitting costs before anything is generated."""
 
 import numpy as np
 
