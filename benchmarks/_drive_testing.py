@@ -10,7 +10,7 @@ from benchmarks.row import Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, Unlooking, WitnessFollower
+from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, NonReactive, ReferenceFollower
 from scenario_gen.closed_loop.reacting import needs_reaction
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Planner
 from scenario_gen.closed_loop.verdict import judge
@@ -29,11 +29,11 @@ def discriminating(trials: Sequence[Trial]) -> list[Row]:
     loops = [ClosedLoop(trial.scenario, trial.ego, trial.road, ClosedLoopConfig()) for trial in trials]
     kept = [loop for loop in loops if needs_reaction(loop)]
     planners: dict[str, tuple[Callable[[ClosedLoop], Planner], float, Literal["higher", "lower"]]] = {
-        "its witness' speed, looks at nobody": (lambda _: Unlooking(), 0.9, "higher"),
+        "non-reactive baseline": (lambda _: NonReactive(), 0.9, "higher"),
         "7 m/s, looks at nobody": (lambda _: ConstantSpeed(speed=7.0), 0.6, "higher"),
         "full throttle, looks at nobody": (lambda _: FullThrottle(), 0.6, "higher"),
         "IDM follower": (lambda _: IdmFollower(), 0.1, "lower"),
-        "witness": (WitnessFollower, 0.0, "lower"),
+        "reference drive": (ReferenceFollower, 0.0, "lower"),
     }
     rows = []
     for name, (planner, asked, better) in planners.items():

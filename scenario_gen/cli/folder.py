@@ -105,12 +105,12 @@ def generate_folder(
             cases, refusals = generate_all(pairs, requested, advance)
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
-        unlooking: list[str] = []
+        untested: list[str] = []
         if requested.request.ego:
-            from scenario_gen.closed_loop.reacting import unlooking_pass
+            from scenario_gen.closed_loop.reacting import baseline_passes
 
-            unlooking = [sentence for case in cases if (sentence := unlooking_pass(case))]
-        for line in (*faults_of(cases), *unlooking):
+            untested = [sentence for case in cases if (sentence := baseline_passes(case))]
+        for line in (*faults_of(cases), *untested):
             tell(line)
         if record is not None:
             record(folder / BAG, cases)
@@ -119,7 +119,7 @@ def generate_folder(
             folder,
             cases,
             title=requested.title or ", ".join(path.stem for path in requested.logs),
-            quality=[*quality, *refusals, *unlooking],
+            quality=[*quality, *refusals, *untested],
             provenance=provenance_of(
                 requested.logs, requested.seed, requested.count, requested.roads, requested.config, requested.request
             ),

@@ -54,7 +54,7 @@ class Generate:
     target: Annotated[
         list[str] | None,
         typer.Option(
-            help=r"Range of pet, ttc, gap, arrival_gap, closing_speed or unlooking, e.g. 'pet=0.5..1.5', 'ttc\[1,2]=1..2'. "
+            help=r"Range of pet, ttc, gap, arrival_gap, closing_speed or baseline_margin, e.g. 'pet=0.5..1.5', 'ttc\[1,2]=1..2'. "
             "Repeatable."
         ),
     ] = None

@@ -48,9 +48,10 @@ class Drive:
         Path | None,
         typer.Option(help="drives.json of another planner on the same bag. Exit code 1 if this planner is worse."),
     ] = None
-    unlooking: Annotated[
-        bool, typer.Option(help="Also drive a baseline that ignores the others, to show how many scenarios need no reaction.")
+    baseline: Annotated[
+        bool, typer.Option(help="Also drive the non-reactive baseline, to show how many scenarios need no reaction.")
     ] = True
+    unlooking: Annotated[bool, typer.Option(hidden=True, help="Earlier name of --baseline.")] = True
     out: Annotated[Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")] = Path("out/drives")
     assignments: Annotated[
         list[str] | None,
@@ -75,7 +76,7 @@ def drive(options: Drive) -> None:
             options.out,
             progress=lambda done, total: advance(planner, done, total),
             run=_over_dds() if options.ros else processes,
-            unlooking=processes if options.unlooking else None,
+            baseline=processes if options.baseline and options.unlooking else None,
         )
     _report(result, options.out)
     if result.broken:

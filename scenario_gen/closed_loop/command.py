@@ -19,8 +19,8 @@ from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, rates, r
 
 Progress = Callable[[int, int], None]  # of drives done, of how many
 RunTrials = Callable[[Sequence[Trial], str, ClosedLoopConfig, Progress], list[Outcome]]
-UNLOOKING = 200  # drives of the planner that looks at nobody, at most
-BLIND = "scenario_gen.closed_loop.planners:Unlooking"
+MAX_BASELINE_DRIVES = 200
+BASELINE = "scenario_gen.closed_loop.planners:NonReactive"
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def drive_bag(
     *,
     progress: Progress = lambda *_: None,
     run: RunTrials | None = None,
-    unlooking: RunTrials | None = None,
+    baseline: RunTrials | None = None,
 ) -> Drives:
     """Drive a planner through the scenarios of a bag and write what it came to.
 
@@ -81,7 +81,7 @@ def drive_bag(
         out: folder of the results.
         progress: called with how many are done of how many.
         run: drives them; `in_processes()` if None, or over DDS, one after the other.
-        unlooking: drives the same scenarios, at most UNLOOKING of them, with a planner that looks at nobody; None: nobody does.
+        baseline: drives at most MAX_BASELINE_DRIVES of the scenarios with the non-reactive baseline; None: it is left out.
 
     Raises:
         InputError: bag, planner, folder, a parameter or the file to compare with is wrong; the message names it.
@@ -98,13 +98,13 @@ def drive_bag(
         broken = broken_bars(rates(outcomes), config.bars)
         if comparison is not None and comparison.worse:
             broken.append(comparison.sentence())
-        blind = () if unlooking is None else _unlooking(trials, config.drive, unlooking)
+        blind = () if baseline is None else _baseline(trials, config.drive, baseline)
         drives = Drives(outcomes, planner, config.drive, trials, broken, blind, comparison)
         drives.write(folder)
     return drives
 
 
-def _unlooking(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:
-    """Return the drives of a planner that looks at nobody: in all scenarios, or in UNLOOKING at most, spread over all."""
-    chosen = trials[:: max(1, -(-len(trials) // UNLOOKING))]
-    return with_origins(run(chosen, BLIND, config, lambda *_: None), chosen)
+def _baseline(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:
+    """Return the drives of the non-reactive baseline: in all scenarios, or in MAX_BASELINE_DRIVES at most, spread over all."""
+    chosen = trials[:: max(1, -(-len(trials) // MAX_BASELINE_DRIVES))]
+    return with_origins(run(chosen, BASELINE, config, lambda *_: None), chosen)

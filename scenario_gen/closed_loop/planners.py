@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Planners of our own: one that keeps its distance, one that looks at nobody, and the witness, who knows the way."""
+"""Planners of our own: one that keeps its distance, one that ignores all others, and the reference drive."""
 
 from dataclasses import dataclass, replace
 import math
 
 import numpy as np
 
+from scenario_gen.base.renaming import warn_renamed
 from scenario_gen.closed_loop.ego import Command, EgoState, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Task
 from scenario_gen.method.evaluation import BRAKING, free_acceleration, PULLS_AWAY, STANDS, wanted_speeds
@@ -105,8 +106,8 @@ class IdmFollower(RouteFollower):
 
 
 @dataclass
-class Unlooking(IdmFollower):
-    """The baseline: drives as `IdmFollower` does, as fast as its witness, slows down in bends and stops, but looks at nobody."""
+class NonReactive(IdmFollower):
+    """The non-reactive baseline: `IdmFollower` at the reference drive's highest speed, ignoring all others."""
 
     def reset(self, task: Task) -> None:
         """Take route and speed in."""
@@ -118,7 +119,7 @@ class Unlooking(IdmFollower):
         return super().act(replace(observation, ids=(), others=observation.others[:0], sizes=observation.sizes[:0]))
 
 
-class WitnessFollower:
+class ReferenceFollower:
     """Is where the certificate has the ego: proof that a test can be passed."""
 
     def __init__(self, loop: ClosedLoop) -> None:
@@ -129,8 +130,21 @@ class WitnessFollower:
         self.step = task.step
 
     def act(self, observation: Observation) -> Pose:
-        """Be where the witness is next."""
+        """Be where the reference drive is next."""
         s, n = self.scenario, self.ego
         k = min(round((self.begin + observation.time + self.step) / float(s.time[1])), len(s.time) - 1)
         x, y = s.position[n, k].tolist()
         return Pose(x, y, float(s.heading[n, k]), float(s.speed[n, k]))
+
+
+def __getattr__(name: str) -> type:
+    """Return a planner by its name of an earlier version, with a warning.
+
+    Raises:
+        AttributeError: there is no such name.
+    """
+    renamed: dict[str, type] = {"Unlooking": NonReactive, "WitnessFollower": ReferenceFollower}
+    if name not in renamed:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warn_renamed(name, renamed[name].__name__)
+    return renamed[name]

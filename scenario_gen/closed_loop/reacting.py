@@ -11,7 +11,7 @@ from itertools import islice
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.parameters import updated
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.planners import IdmFollower, Unlooking, WitnessFollower
+from scenario_gen.closed_loop.planners import IdmFollower, NonReactive, ReferenceFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.method.sampling import Progress, TargetError
@@ -20,7 +20,7 @@ from scenario_gen.method.suitable_roads import suitable_roads
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types import Encounter, GenerationResult, join_ego, join_pieces, Request, Road, Scenario
 
-UNLOOKING = 50  # scenarios of a set that are driven to say how many need no reaction
+MAX_BASELINE_DRIVES = 50  # scenarios of a set that are driven to say how many need no reaction
 PROBED = 12  # scenarios by which it is told who has to react
 ROADS_TRIED = 2  # that are tried where nobody has to react
 EASY = 0.9  # share of a set that the baseline passes, from which on the set hardly tests
@@ -29,10 +29,10 @@ FREER = {"arrival_sigma": 3.0, "wait_sigma": 2.0, "pace_sigma": 0.12, "end_speed
 
 
 def needs_reaction(loop: ClosedLoop) -> bool:
-    """Whether the baseline that looks at nobody collides, while the witness and a follower that looks pass."""
-    if judge(loop, loop.drive(Unlooking())).collision is None:
+    """Whether the non-reactive baseline collides, while the reference drive and an IDM follower pass."""
+    if judge(loop, loop.drive(NonReactive())).collision is None:
         return False
-    references = (WitnessFollower(loop), IdmFollower(speed=loop.task().speed))
+    references = (ReferenceFollower(loop), IdmFollower(speed=loop.task().speed))
     return all(judge(loop, loop.drive(reference)).passed for reference in references)
 
 
@@ -81,13 +81,13 @@ class Testing:
     def generate(self, count: int, progress: Progress = lambda *_: None) -> GenerationResult:
         """Return `count` scenarios, or as many as the parameters give.
 
-        The ego's motion varies as the others' does; sampling is directed to where it meets one of them if it looks at nobody.
+        The ego's motion varies as the others' does; sampling is directed to where it meets one of them if it ignores all.
 
         Raises:
             InputError, RefusedError: as `pipeline.generate`; a TargetError if there is none.
         """
         ego = self.request.ego
-        targets = join_pieces(filter(None, [f"unlooking[{ego}]=..0", self.request.target]))
+        targets = join_pieces(filter(None, [f"baseline_margin[{ego}]=..0", self.request.target]))
 
         def accepts(road: Road, whole: Scenario) -> bool:
             return needs_reaction(ClosedLoop(whole, ego, road))
@@ -150,13 +150,13 @@ def hardly_tests(passed: int, driven: int) -> str:
     return f"these scenarios hardly test a planner: the non-reactive baseline passes {passed} of {driven}"
 
 
-def unlooking_pass(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
-    """Say how many scenarios of a set (UNLOOKING at most) one that looks at nobody passes; "" if no vehicle was left out."""
+def baseline_passes(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
+    """Say how many scenarios (of MAX_BASELINE_DRIVES at most) the non-reactive baseline passes; "" if no vehicle was left out."""
     drawn = case.generated
     if drawn.ego is None or not drawn.scenarios:
         return ""
     ego = drawn.ego.vehicle.id
-    loops = [ClosedLoop(join_ego(scenario), ego, case.road, config) for scenario in drawn.scenarios[:UNLOOKING]]
-    passed = sum(judge(loop, loop.drive(Unlooking())).passed for loop in loops)
+    loops = [ClosedLoop(join_ego(scenario), ego, case.road, config) for scenario in drawn.scenarios[:MAX_BASELINE_DRIVES]]
+    passed = sum(judge(loop, loop.drive(NonReactive())).passed for loop in loops)
     said = f"the non-reactive baseline, in place of {ego}, passes {passed} of {len(loops)}"
     return f"{case.title}: {hardly_tests(passed, len(loops)) or said}"

@@ -43,7 +43,7 @@ class Drives:
         config: the parameters of the drives.
         trials: that were driven; without them there is no page.
         broken: the bars that were not kept, and, if it is worse than the planner it is compared with, that.
-        unlooking: drives of a planner that looks at nobody.
+        baseline: drives of the non-reactive baseline.
         comparison: with an earlier planner.
     """
 
@@ -52,7 +52,7 @@ class Drives:
     config: ClosedLoopConfig
     trials: Sequence[Trial] = ()
     broken: Sequence[str] = ()
-    unlooking: Sequence[Outcome] = ()
+    baseline: Sequence[Outcome] = ()
     comparison: Comparison | None = None
 
     def by_severity(self) -> list[int]:
@@ -63,7 +63,7 @@ class Drives:
     @property
     def easy(self) -> str:
         """A sentence if a planner that looks at nobody passes most scenarios, else ""."""
-        return hardly_tests(sum(one.verdict.passed for one in self.unlooking), len(self.unlooking))
+        return hardly_tests(sum(one.verdict.passed for one in self.baseline), len(self.baseline))
 
     def scores(self) -> dict[str, float]:
         """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""
@@ -82,11 +82,11 @@ class Drives:
             messages.append(f"intervals are for {drawn}: drives of one encounter are alike")
         if copies:
             messages.append(f"{copies} of {len(self.outcomes)} scenarios are copies of another scenario of the same encounter")
-        if self.unlooking:
-            sets = {name: [one for one in self.unlooking if one.origin.encounter == name] for name in encounters}
+        if self.baseline:
+            sets = {name: [one for one in self.baseline if one.origin.encounter == name] for name in encounters}
             each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
             parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
-            messages.append(f"the non-reactive baseline passes {passed_of(self.unlooking)}{parts}")
+            messages.append(f"the non-reactive baseline passes {passed_of(self.baseline)}{parts}")
             if self.easy:
                 messages.append(self.easy)
         if self.comparison is not None:
@@ -114,7 +114,7 @@ class Drives:
             "parameters": {name: value for name, (_, value) in flatten(self.config).items()},
             "summary": {name: rate.document() for name, rate in rates(self.outcomes).items()},
             "scores": self.scores(),
-            "unlooking_pass": passed_of(self.unlooking).document() if self.unlooking else None,
+            "baseline_pass": passed_of(self.baseline).document() if self.baseline else None,
             "against": None if self.comparison is None else self.comparison.document(),
             "notes": self.notes(),
             "drives": drives,

@@ -33,7 +33,7 @@ class Request(Parameters):
     goals: str = parameter("", f"end states, likewise `{_FORM}`", unit="m, rad, m/s")
     target: str = parameter(
         "",
-        "ranges that sampling aims at, of pet, ttc, gap, arrival_gap, closing_speed, unlooking: `pet=0.5..1.5; ttc[1,2]=1..2`",
+        "ranges to aim at, of pet, ttc, gap, arrival_gap, closing_speed, baseline_margin: `pet=0.5..1.5; ttc[1,2]=1..2`",
     )
     choose: str = parameter(
         "natural", "natural: as sampled; diverse: of many valid candidates those that cover best", choices=("natural", "diverse")

@@ -11,11 +11,12 @@ from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
 from scenario_gen.types.pieces import join_pieces, split_pieces
 
-UNITS = {"pet": "s", "ttc": "s", "gap": "m", "arrival_gap": "s", "closing_speed": "m/s", "unlooking": "s"}
+UNITS = {"pet": "s", "ttc": "s", "gap": "m", "arrival_gap": "s", "closing_speed": "m/s", "baseline_margin": "s"}
 """The figures that a target can be set on, with their units; `scenario_gen.method.evaluation.measures` defines them."""
 Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical
 _FORM = "NAME=LOW..HIGH, NAME[a]=LOW..HIGH or NAME[a,b]=LOW..HIGH"
 _EXAMPLE = "pet=0.5..1.5; ttc[1,2]=1..2"
+_RENAMED = {"unlooking": "baseline_margin"}  # names of earlier versions
 
 
 @dataclass(frozen=True)
@@ -110,19 +111,20 @@ def read_targets(text: str) -> tuple[Target, ...]:
     for piece in split_pieces(text):
         head, _, bounds = piece.partition("=")
         name, bracket, inside = head.strip().partition("[")
+        name = _RENAMED.get(name.strip(), name.strip())
         ids = tuple(word.strip() for word in inside.rstrip("] ").split(",")) if bracket else ()
         words = bounds.split("..")
         if len(words) != 2 or (bracket and not (head.strip().endswith("]") and len(ids) in (1, 2) and all(ids))):
             raise InputError(f"target: {piece!r} is not of the form `{_FORM}`, e.g. `{_EXAMPLE}`")
-        if name.strip() not in UNITS:
-            raise InputError(f"target: {name.strip()!r} is none of {', '.join(UNITS)}")
+        if name not in UNITS:
+            raise InputError(f"target: {name!r} is none of {', '.join(UNITS)}")
         try:
             low, high = (float(word) if word.strip() else bound for word, bound in zip(words, (-math.inf, math.inf), strict=True))
         except ValueError:
             raise InputError(f"target: {piece!r}: the bounds must be numbers, as in `{_EXAMPLE}`") from None
         if not low < high or (math.isinf(low) and math.isinf(high)):
             raise InputError(f"target: {piece!r}: the lower bound must be below the upper one, and one of them finite")
-        target = Target(name.strip(), low, high, ids)
+        target = Target(name, low, high, ids)
         if target.label in {other.label for other in targets}:
             raise InputError(f"target: {target.label} comes twice")
         targets.append(target)

@@ -105,7 +105,7 @@ def test_the_command_compares_and_says_what_a_planner_that_looks_at_nobody_passe
 
     first = drive("IdmFollower", "--out", str(tmp_path / "one"))
     assert first.exit_code == 0 and "the non-reactive baseline passes" in first.output, first.output
-    again = drive("IdmFollower", "--out", str(tmp_path / "two"), "--against", str(tmp_path / "one"), "--no-unlooking")
+    again = drive("IdmFollower", "--out", str(tmp_path / "two"), "--against", str(tmp_path / "one"), "--no-baseline")
     assert again.exit_code == 0 and "failures +0.0 %" in again.output and "non-reactive" not in again.output
     said = (tmp_path / "two" / "drives.html").read_text()
     assert "Scenarios that changed sides" in said and "failures +0.0 %" in said

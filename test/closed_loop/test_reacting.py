@@ -12,10 +12,11 @@ from typer.testing import CliRunner
 
 from benchmarks._driving_worlds import as_scenario
 from scenario_gen.cli.commands import app
+from scenario_gen.closed_loop import planners
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, RouteFollower, Unlooking, WitnessFollower
+from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, NonReactive, ReferenceFollower, RouteFollower
 from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import read_trials, run_trials
@@ -23,6 +24,7 @@ from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.types.target import read_targets
 
 
 class FullThrottle(RouteFollower):
@@ -61,11 +63,11 @@ def test_scenarios_that_test_are_rare_and_say_how_rare(bag):
 def test_who_looks_at_nobody_fails_and_who_looks_passes(bag):
     trials = read_trials(bag)
     assert len(trials) == 3
-    planners = {"baseline": Unlooking, "fast": FullThrottle, "looks": IdmFollower}
-    failed = {name: sum(not one.verdict.passed for one in run_trials(trials, make)) for name, make in planners.items()}
+    drivers = {"baseline": NonReactive, "fast": FullThrottle, "looks": IdmFollower}
+    failed = {name: sum(not one.verdict.passed for one in run_trials(trials, make)) for name, make in drivers.items()}
     assert failed["baseline"] == 3 and failed["fast"] >= 2 and failed["looks"] == 0
     loops = [ClosedLoop(trial.scenario, trial.ego, trial.road) for trial in trials]
-    assert all(judge(loop, loop.drive(WitnessFollower(loop))).passed for loop in loops)
+    assert all(judge(loop, loop.drive(ReferenceFollower(loop))).passed for loop in loops)
 
 
 def test_such_a_set_is_checked_and_made_again_as_any(bag):
@@ -99,9 +101,15 @@ def test_who_is_committed_does_not_rescue_an_ego_that_looks_at_nobody():
 
 def test_a_set_that_hardly_tests_says_so(tmp_path):
     trials = [Trial(str(k), crossing(), 0, None) for k in range(3)]
-    outcomes = run_trials(trials, Unlooking)
-    drives = Drives(outcomes, "p:C", ClosedLoopConfig(), unlooking=outcomes)
+    outcomes = run_trials(trials, NonReactive)
+    drives = Drives(outcomes, "p:C", ClosedLoopConfig(), baseline=outcomes)
     drives.write(tmp_path)
     said = "the non-reactive baseline passes 3 of 3"
     assert said in drives.easy and said in (tmp_path / "junit.xml").read_text() and drives.easy in drives.notes()
     assert 'name="policy" value="reactive"' in (tmp_path / "junit.xml").read_text()
+
+
+def test_planners_and_targets_of_earlier_names_are_those_of_today():
+    with pytest.warns(DeprecationWarning, match="Unlooking is now NonReactive"):
+        assert planners.Unlooking is NonReactive
+    assert read_targets("unlooking[2]=..0") == read_targets("baseline_margin[2]=..0")

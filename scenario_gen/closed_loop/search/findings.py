@@ -12,7 +12,7 @@ import numpy as np
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.planners import WitnessFollower
+from scenario_gen.closed_loop.planners import ReferenceFollower
 from scenario_gen.closed_loop.search.estimate import Search
 from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.simulation import ClosedLoop
@@ -91,7 +91,7 @@ def findings_of(search: Search, problem: DrivenScenarios, config: ClosedLoopConf
 
 def _witness_passes(trial: Trial, config: ClosedLoopConfig) -> bool:
     loop = ClosedLoop(trial.scenario, trial.ego, trial.road, config)
-    return judge(loop, loop.drive(WitnessFollower(loop))).passed
+    return judge(loop, loop.drive(ReferenceFollower(loop))).passed
 
 
 def _station(outcome: Outcome) -> float:

@@ -16,11 +16,11 @@ from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.metrics import MetricGroup
 from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, Motion
 from scenario_gen.method.evaluation.nearness import time_apart
+from scenario_gen.method.evaluation.non_reactive import BRAKING, free_acceleration, PULLS_AWAY, STANDS, wanted_speeds
 from scenario_gen.method.evaluation.references import uniform_changepoints, without_changepoints
 from scenario_gen.method.evaluation.replay import replay
 from scenario_gen.method.evaluation.samples import Samples, Template
 from scenario_gen.method.evaluation.similarity import mean_correlation, mean_error, pair_similarities
-from scenario_gen.method.evaluation.unlooking import BRAKING, free_acceleration, PULLS_AWAY, STANDS, wanted_speeds
 
 __all__ = [
     "BRAKING", "MEASURED", "MEASURES", "PULLS_AWAY", "STANDS", "Bootstrap", "Difference",

@@ -15,8 +15,8 @@ They are taken on the published samples (0.1 s). Of a pair a, b:
 - `gap` [m]: least distance of the two footprints.
 - `closing_speed` [m/s]: rate at which the distance of the two centres shrinks when the first one enters the shared area; of a
   pair that neither crosses nor merges the greatest rate while both are there.
-- `unlooking` [s]: time by which vehicle a, if it looked at nobody, would have to be shifted to meet b; 0 if it would meet b. See
-  `scenario_gen.method.evaluation.unlooking`.
+- `baseline_margin` [s]: time by which vehicle a, as the non-reactive baseline, would have to be shifted to meet b; 0 if it
+  would. See `scenario_gen.method.evaluation.non_reactive`.
 
 Over all pairs the most critical value counts: the least, of `closing_speed` the greatest.
 """
@@ -30,7 +30,7 @@ import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import at_period, Motion
-from scenario_gen.method.evaluation.unlooking import unlooking_apart
+from scenario_gen.method.evaluation.non_reactive import baseline_margin
 from scenario_gen.numerics.plane import unit
 from scenario_gen.template import Conflict, conflict_of
 from scenario_gen.types import Encounter, Measures, Pair, Scenario
@@ -55,15 +55,16 @@ def measure(scenario: Scenario | Encounter, name: str, pair: Pair | None = None)
     """Return one figure of a pair, or the most critical of all pairs; NaN where no pair has it.
 
     Args:
-        scenario: with all its vehicles, an ego's witness too.
+        scenario: with all its vehicles, an ego's reference drive too.
         name: of the figure, see above.
         pair: indices of two vehicles, the sign of `arrival_gap` follows their order; of one: its most critical pair.
     """
     motion = at_period(scenario, PERIOD)
     ordered = permutations(range(len(motion.vehicles)), 2)
-    pairs = [(a, b) for a, b in ordered if (a, b)[: len(pair or ())] == (pair or ()) and (pair or a < b or name == "unlooking")]
+    chosen, directed = pair or (), name == "baseline_margin"
+    pairs = [(a, b) for a, b in ordered if (a, b)[: len(chosen)] == chosen and (chosen or a < b or directed)]
     values = [value for a, b in pairs if not math.isnan(value := _figure(motion, name, a, b))]
-    if len(pair or ()) < 2 and name == "arrival_gap":
+    if len(chosen) < 2 and name == "arrival_gap":
         values = [abs(value) for value in values]
     return (max if name == "closing_speed" else min)(values, default=math.nan)
 
@@ -120,8 +121,8 @@ def _figure(motion: Motion, name: str, a: int, b: int) -> float:
     both = motion.together(a, b)
     if both.stop - both.start < 2:
         return math.nan
-    if name == "unlooking":
-        return unlooking_apart(motion, a, b)
+    if name == "baseline_margin":
+        return baseline_margin(motion, a, b)
     if name == "ttc":
         return float(time_to_collision(motion, a, b)[both].min())
     if name == "gap":

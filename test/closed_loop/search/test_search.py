@@ -15,7 +15,7 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.ego import Command
-from scenario_gen.closed_loop.planners import IdmFollower, Unlooking
+from scenario_gen.closed_loop.planners import IdmFollower, NonReactive
 from scenario_gen.closed_loop.search.command import JOURNAL, search_failures, SearchRequest
 from scenario_gen.closed_loop.search.objective import Objective
 from scenario_gen.closed_loop.trials import read_trials, run_trials
@@ -31,7 +31,7 @@ LOG, ROAD = bundled("b"), "t_intersection"
 BUDGET = 60
 
 
-class Blind(Unlooking):
+class Blind(NonReactive):
     """Keeps no distance to anybody, but drives slowly: it fails now and then."""
 
 

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a vehicle that looks at nobody would do: follow its path as fast as it ever drove, and slow down in bends and to stop.
+"""The non-reactive baseline: follows its path as fast as it ever drove, slows down in bends and to stop, and ignores all others.
 
-That is the baseline that planners are compared with, and the figure `unlooking`: by how much it would miss the others.
+Planners are compared with it; the figure `baseline_margin` is the time by which it would miss the others.
 """
 
 import numpy as np
@@ -35,8 +35,8 @@ def free_acceleration(speed: float, wanted: float, most: float = PULLS_AWAY) -> 
     return max(most * (1.0 - over * over), -BRAKING)
 
 
-def unlooking_apart(motion: Motion, a: int, b: int) -> float:
-    """Return the least time [s] by which vehicle a, if it looked at nobody, would have to be shifted to meet b.
+def baseline_margin(motion: Motion, a: int, b: int) -> float:
+    """Return the least time [s] by which vehicle a, driven by the baseline, would have to be shifted to meet b.
 
     0: it would meet b. At most APART.
     """
