@@ -116,11 +116,11 @@ def advance(
         speed, was, clock = vehicles[i, 3], before[i, ACCELERATION], after[i, CLOCK]
         gained = (speed - before[i, RATE] * pose[3]) / h
         if after[i, HELD] > 0.0:
-            hard, sudden = gained + manner.strongest + HARDER / h, gained - min(was, 0.0) + manner.jerk * h + SUDDEN / h
+            hard, sudden = gained + manner.strongest[i] + HARDER / h, gained - min(was, 0.0) + manner.jerk * h + SUDDEN / h
             after[i, HELD] = 1.0 if min(hard, sudden) < 0.0 else 0.0
         if after[i, HELD] == 0.0 or speed == 0.0:
             after[i, ACCELERATION] = gained if speed > 0.0 else 0.0
-        after[i, ACCELERATION] = min(max(after[i, ACCELERATION], -manner.strongest), manner.acceleration)
+        after[i, ACCELERATION] = min(max(after[i, ACCELERATION], -manner.strongest[i]), manner.acceleration)
         begin, end = world.spans[i]
         here[i] = i == ego or (clock >= begin and not (world.leaves[i] and clock >= end))
 

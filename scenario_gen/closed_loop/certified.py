@@ -18,13 +18,14 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
-from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT3
+from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT2, OUT3
 from scenario_gen.numerics.plane import unit
 from scenario_gen.template import conflict_of, passing
 from scenario_gen.types import Scenario, tokens, yielders_of
 
 CELL = 0.1  # seconds of a certified clock that are taken together
 ROOM = 0.05  # metres by which the box of a cell is larger than its ends ask for: what bends between them, and a little distance
+BESIDE_LANE = 0.75  # metres beside the footprints of all that drive which belong to their lanes: 3.4 m of a car's
 STANDS = 0.5  # m/s; who is slower at the end of a scenario stands there, who is faster leaves the scene
 
 
@@ -44,6 +45,9 @@ class World(NamedTuple):
         order: (N, N, K) `order[i, j, k]`: clock [s] that vehicle i may not pass while the clock of j is in cell k, unless that
             of j is there, too; inf if nothing is in its way. It holds back who waits for j in the template, too.
         ego: index of the ego's witness.
+        walks: (N,) who is on foot.
+        kerbs: (N, K) clock [s] at which one on foot, in each cell, next steps onto a lane where somebody drives; the cell's start
+            if it is on one, inf if it never does, and for who drives.
     """
 
     step: float
@@ -56,9 +60,11 @@ class World(NamedTuple):
     cell: float
     order: Floats
     ego: int
+    walks: Bools
+    kerbs: Floats
 
 
-WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I)
+WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I, B1, F2)
 
 
 def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
@@ -91,7 +97,9 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
         if ego not in (who, whom):
             _keep_waiting(scenario, who, whom, order[who, whom])
     leaves = np.asarray((speed[:, -1] >= STANDS) | (spans[:, 1] < time[-1]))
-    return World(step, time, motion, half, spans, leaves, frozen(cells), CELL, frozen(order), ego)
+    walks, kerbs = np.array([vehicle.kind.walks for vehicle in scenario.vehicles]), np.full((n, count), np.inf)
+    fill_kerbs(cells, walks, CELL, kerbs)
+    return World(step, time, motion, half, spans, leaves, frozen(cells), CELL, frozen(order), ego, walks, frozen(kerbs))
 
 
 def _keep_waiting(scenario: Scenario, who: int, whom: int, order: Floats) -> None:
@@ -189,3 +197,24 @@ def fill_order(cells: Floats, cell: float, out: Floats) -> None:
                             least = l * cell
                             break
                 out[i, j, k] = least
+
+
+@kernel(F3, B1, F, OUT2)
+def fill_kerbs(cells: Floats, walks: Bools, cell: float, out: Floats) -> None:
+    """Fill `out` (N, K) with `kerbs` of `World`; it holds inf. Cells (N, K, 8), their length [s], who is on foot (N,)."""
+    n, count = cells.shape[0], cells.shape[1]
+    for i in range(n):
+        for j in range(n):
+            if not walks[i] or walks[j]:
+                continue
+            for l in range(count):  # noqa: E741 - the next letter
+                lane = cells[j, l, :7].copy()
+                lane[4] += BESIDE_LANE
+                lane[5] += BESIDE_LANE
+                lane[6] += 2.0 * BESIDE_LANE
+                for k in range(count):
+                    if out[i, k] == np.inf and boxes_meet(cells[i, k], lane):
+                        out[i, k] = k * cell
+        for k in range(count - 2, -1, -1):
+            if out[i, k] == np.inf:
+                out[i, k] = out[i, k + 1]

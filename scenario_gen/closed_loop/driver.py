@@ -10,7 +10,7 @@ import numpy as np
 from scenario_gen.closed_loop.certified import pose_at, World
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
-from scenario_gen.numerics.kernels import B, F, I1, kernel, named
+from scenario_gen.numerics.kernels import B, F, F1, I1, kernel, named
 
 AHEAD = 60.0  # metres of its path that it looks along for who is ahead
 HALVINGS = 4  # of a cell in which a vehicle meets what is ahead
@@ -35,13 +35,16 @@ class Self(NamedTuple):
 
 
 class Manner(NamedTuple):
-    """How the others drive: fields of `ClosedLoopConfig`; how far they look ahead [s]; whether, and after (N,) how many steps."""
+    """How the others drive: fields of `ClosedLoopConfig`; how far they look ahead [s]; whether, and after (N,) how many steps.
+
+    The strongest braking (N,) is that of each one's type, if less.
+    """
 
     headway: float
     standstill: float
     acceleration: float
     comfortable: float
-    strongest: float
+    strongest: Floats
     jerk: float
     patience: float
     foresight: float
@@ -50,7 +53,7 @@ class Manner(NamedTuple):
     delay: Ints
 
 
-MANNER = named(Manner, F, F, F, F, F, F, F, F, B, B, I1)
+MANNER = named(Manner, F, F, F, F, F1, F, F, F, B, B, I1)
 
 
 @kernel(inline=True)

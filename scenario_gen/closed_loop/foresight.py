@@ -30,6 +30,7 @@ class Foreseen(NamedTuple):
         rate: of that clock; negative if the ego is not on that path.
         coming: (N, M) clocks of the others at the step's begin and at the end of each [s].
         aside: metres that it leaves beside the ego if nothing makes it brake.
+        heeds: whether it keeps clear of the ego all the way; who is on foot decides at the kerb.
     """
 
     ego: Floats
@@ -37,6 +38,7 @@ class Foreseen(NamedTuple):
     rate: float
     coming: Floats
     aside: float
+    heeds: bool
 
 
 @kernel(inline=True)
@@ -88,7 +90,7 @@ def weakest(world: World, manner: Manner, me: Self, least: float, foreseen: Fore
     if _clear(world, manner, me, least, foreseen, others):
         return least
     low = max(least, -manner.acceleration)
-    comfortable, strongest = manner.comfortable, manner.strongest
+    comfortable, strongest = manner.comfortable, manner.strongest[me.i]
     for tried in (0.0, 0.5 * comfortable, comfortable, 0.5 * (comfortable + strongest), strongest):
         if tried <= low:
             continue
@@ -102,7 +104,7 @@ def weakest(world: World, manner: Manner, me: Self, least: float, foreseen: Fore
                     low = middle
             return high
         low = tried
-    return max(strongest, least)
+    return float(max(strongest, least))
 
 
 @kernel(inline=True)
@@ -126,7 +128,7 @@ def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: For
             return True
         there = foreseen.ego[m]
         dx, dy = there[0] - pose[0], there[1] - pose[1]
-        if dx * dx + dy * dy < reach * reach:
+        if foreseen.heeds and dx * dx + dy * dy < reach * reach:
             fill_box(pose[0], pose[1], pose[2], length, width, mine)
             fill_box(there[0], there[1], there[2], half[world.ego, 0], half[world.ego, 1], ego)
             if dx * mine[2] + dy * mine[3] > 0.0 and boxes_meet(mine, ego):

@@ -11,7 +11,8 @@ things slow it down, the strongest counts:
   lets it do; its acceleration changes by the jerk at most;
 - the order itself, without exception: see order.py.
 
-Each driver sees the ego as it was one reaction time ago, and goes before one that stands when it has waited long enough.
+Each driver sees the ego as it was one reaction time ago, and goes before one that stands when it has waited long enough. Who is
+on foot goes on whatever the ego does, but does not step onto a lane before one that cannot stop: see kerb.py.
 """
 
 from typing import NamedTuple
@@ -37,6 +38,7 @@ from scenario_gen.closed_loop.driver import (
     WAITED,
 )
 from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, Foreseen, weakest
+from scenario_gen.closed_loop.kerb import before_kerb, beyond_kerb, braking_at_kerb, foresee_fast_ego
 from scenario_gen.closed_loop.order import Clocks, keep_order, limit
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
@@ -146,7 +148,8 @@ def _expected(world: World, now: Now, i: int, spent: float) -> Foreseen:
     ego = now.seen[ago]
     rate = ego[EGO_RATE] if ego[ON_PATH] > 0.0 and spent < np.inf else -1.0
     aside = ASIDE if ego[ON_PATH] == 0.0 and spent < np.inf else 0.0
-    return Foreseen(now.ahead[i], ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step, rate, now.coming, aside)
+    clock, walks = ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step, world.walks[i]
+    return Foreseen(now.ahead[i], clock, rate, now.coming, aside, not walks)
 
 
 @kernel(inline=True)
@@ -186,13 +189,23 @@ def _regard_ego(world: World, manner: Manner, now: Now, level: Floats, rate: Flo
             now.ahead[i] = now.ahead[last]
         else:
             foresee_ego(world, now.seen[ago], ago, ahead)
-        last = i
+        last = last if world.walks[i] else i  # one on foot expects something else
         after[i, WAITED] = _spent(world, manner, now, i)
         v, a = now.pose[i, 3], now.pose[i, 4]
         _fill_ego(world, ahead[0], box)
         least = minded(world, manner, me, now.pose[i], world.ego, box, ahead[0, 3], world.step)
-        level[i] = weakest(world, manner, me, least, _expected(world, now, i, after[i, WAITED]), False)
+        level[i] = _for_ego(world, manner, now, i, least, after[i, WAITED])
         rate[i] = rate_after(manner, me.rate, v, a, me.was, level[i], 0.0, world.step)
+
+
+@kernel(inline=True)
+def _for_ego(world: World, manner: Manner, now: Now, i: int, least: float, spent: float) -> float:
+    """Braking [m/s²] of driver i for the ego, `least` or more."""
+    me, expected = _me(now, i), _expected(world, now, i, spent)
+    if before_kerb(world, me):
+        foresee_fast_ego(world, now.seen[0], now.ahead[i])
+        return max(least, braking_at_kerb(world, manner, me, now.pose[i], expected))
+    return weakest(world, manner, me, least, expected, False)
 
 
 @kernel(inline=True)
@@ -204,7 +217,7 @@ def _regard_others(world: World, manner: Manner, now: Now, i: int, level: float,
             other, speed = now.pose[j], now.drivers[j, RATE] * now.pose[j, 3]
             fill_box(other[0], other[1], other[2], world.half[j, 0], world.half[j, 1], box)
             least = max(least, minded(world, manner, me, now.pose[i], j, box, speed, 0.0))
-    least = weakest(world, manner, me, least, _expected(world, now, i, spent), True)
+    least = weakest(world, manner, me, least, beyond_kerb(world, me, _expected(world, now, i, spent)), True)
     if least <= level:
         return rate
     return min(rate, rate_after(manner, me.rate, v, a, me.was, least, _creep(world, now, i), world.step))

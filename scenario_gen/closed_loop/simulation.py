@@ -187,14 +187,17 @@ class ClosedLoop:
         self.config = as_able_as(config, scenario.vehicles[self.ego])
         reactive = config.policy != REPLAY
         self.reactions = np.array(
-            [reaction_time(scenario, vehicle.id, config.reaction * reactive) for vehicle in scenario.vehicles]
+            [
+                reaction_time(scenario, vehicle.id, config.reaction * (reactive and not vehicle.kind.walks))
+                for vehicle in scenario.vehicles
+            ]
         )
         self._manner = Manner(
             config.headway,
             config.standstill_gap,
             config.acceleration,
             config.comfortable_braking,
-            config.strongest_braking,
+            np.array([min(config.strongest_braking, vehicle.kind.dynamics.max_deceleration) for vehicle in scenario.vehicles]),
             config.jerk,
             config.patience,
             FORESIGHT.get(config.policy, 0.0),
