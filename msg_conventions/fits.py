@@ -76,7 +76,7 @@ def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None, rou
     sentences = (*fit.notes, *(remark for each in remarks for remark in each))
     notes = {f"note.{k}": note for k, note in enumerate(sentences)}
     lost = {f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.message]) for k, loss in enumerate(fit.losses)}
-    message = f"template fitted to the road, {len(lost)} things of it are lost" if lost else "template fitted to the road"
+    message = "recording fitted to the road" + (f"; {len(lost)} of its properties are not kept" if lost else "")
     level = Level.WARN if any(loss.kind != "arm" for loss in fit.losses) else Level.OK
     return (*per_vehicle, Status(f"{node}: fit", level, message, notes | lost | dict(more or {})))
 

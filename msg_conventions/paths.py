@@ -116,7 +116,7 @@ def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") ->
     """
     stamp_ns, frame_id, poses, stamps = decode_path(data, what)
     if stamp_ns != anchors_ns[0]:
-        raise InputError(f"{what}: stamp {stamp_ns} ns is not that of the template ({anchors_ns[0]} ns)")
+        raise InputError(f"{what}: stamp {stamp_ns} ns is not that of the recording ({anchors_ns[0]} ns)")
     if len(poses) == 0:
         raise InputError(f"{what}: the path holds no poses")
     if (np.diff(stamps) < 0).any():

@@ -49,7 +49,7 @@ def generate(
 
     Raises:
         InputError: a vehicle of the request does not exist.
-        RefusedError: the encounter is too large, the template does not fit the road, there is no way, what the request asks
+        RefusedError: the encounter is too large, the template does not fit the road, there is no route, what the request asks
             cannot be had, or no candidate is valid; the message says why.
     """
     encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter

@@ -20,12 +20,12 @@ class ClosedLoopConfig(Parameters):
     step: float = parameter(0.1, "time between two decisions", unit="s", low=0.005, high=0.5)
     policy: str = parameter(
         REACTIVE,
-        "the others replay what was certified, react to the ego early, or keep their course until a conflict is evident",
+        "the others replay the scenario, react to the ego early, or keep their course until a conflict is evident",
         choices=(REPLAY, REACTIVE, COMMITTED),
     )
     yield_to_ego: str = parameter(
         TEMPLATE,
-        "at conflicts the others wait for the ego as in the template, or never (they still brake for what is in their way)",
+        "at conflicts the others wait for the ego as in the recording, or never (they still brake for what is in their way)",
         choices=(TEMPLATE, NEVER),
     )
     reaction: float = parameter(
@@ -36,15 +36,13 @@ class ClosedLoopConfig(Parameters):
         high=5.0,
     )
     headway: float = parameter(1.2, "time gap that reactive vehicles keep (IDM)", unit="s", low=0.0, high=5.0)
-    standstill_gap: float = parameter(2.0, "gap at which they stop behind another (IDM)", unit="m", low=0.0, high=20.0)
-    acceleration: float = parameter(2.0, "with which they take up their certified speed again", unit="m/s²", low=0.1, high=10.0)
-    comfortable_braking: float = parameter(3.0, "with which they slow down where that suffices", unit="m/s²", low=0.1, high=10.0)
-    strongest_braking: float = parameter(8.0, "with which they brake at most for the ego", unit="m/s²", low=0.5, high=12.0)
-    jerk: float = parameter(
-        9.8, "by which they change their acceleration at most, unless the order forces them", unit="m/s³", low=1.0, high=1e6
-    )
+    standstill_gap: float = parameter(2.0, "gap at which the others stop behind another (IDM)", unit="m", low=0.0, high=20.0)
+    acceleration: float = parameter(2.0, "acceleration back to their certified speed", unit="m/s²", low=0.1, high=10.0)
+    comfortable_braking: float = parameter(3.0, "braking of the others where it suffices", unit="m/s²", low=0.1, high=10.0)
+    strongest_braking: float = parameter(8.0, "strongest braking of the others for the ego", unit="m/s²", low=0.5, high=12.0)
+    jerk: float = parameter(9.8, "largest jerk of the others, unless the order needs more", unit="m/s³", low=1.0, high=1e6)
     patience: float = parameter(
-        5.0, "after which who waits for an ego that hardly moves goes first where its way is free", unit="s", low=0.0, high=1e6
+        5.0, "time after which a vehicle that waits for an ego that hardly moves goes first", unit="s", low=0.0, high=1e6
     )
     ego_acceleration: float = parameter(4.0, "the ego's strongest speeding up", unit="m/s²", low=0.1, high=20.0)
     ego_braking: float = parameter(9.0, "the ego's strongest braking", unit="m/s²", low=0.1, high=20.0)

@@ -64,7 +64,7 @@ class Bars(Parameters):
     off_road: float = parameter(0.0, "largest share of drives that leave the road", low=0.0, high=1.0)
     goals: float = parameter(1.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
     at_fault: float = parameter(0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0)
-    jumps: float = parameter(0.0, "largest share of drives in which the ego jumps", low=0.0, high=1.0)
+    jumps: float = parameter(0.0, "largest share of drives in which the ego teleports", low=0.0, high=1.0)
     progress: float = parameter(
         0.9, "smallest share of drives with progress: 20 % of the reference drive's path, as in nuPlan; who never moves has none",
         low=0.0, high=1.0,
@@ -379,5 +379,5 @@ def broken_bars(found: dict[str, Rate], bars: Bars) -> list[str]:
         value = found[name].share.value
         if (value < wanted) if name in LEAST else (value > wanted):
             side = "at least" if name in LEAST else "at most"
-            messages.append(f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is asked")
+            messages.append(f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is required")
     return messages

@@ -155,10 +155,10 @@ class DriveVerdict:
             depth = f"{-self.road_margin:.2f} m deep, {self.off_road_area:.1f} m² of its footprint"
             messages.append(f"left the road at {self.off_road:.2f} s ({depth})")
         if self.jumps:
-            messages.append(f"{self.jumps} jump(s): poses that cannot be reached in a step")
+            messages.append(f"{self.jumps} teleport(s): poses that cannot be reached in a step")
         if math.isnan(self.goal):
             stands = ", stood at the end" if self.stood >= STANDING else ""
-            messages.append(f"did not reach its goal, {100.0 * self.progress:.0f} % of the way{stands}")
+            messages.append(f"did not reach its goal, {100.0 * self.progress:.0f} % of the route{stands}")
         elif not messages:
             messages.append(f"reached its goal at {self.goal:.1f} s")
         if self.faults:

@@ -113,7 +113,7 @@ def named(header: Sequence[str], path: Path, option: str) -> dict[str, Column | 
         if own.lower() not in spelled and ":" in own:
             own, _, unit = (p.strip() for p in own.rpartition(":"))
         if own.lower() not in spelled:
-            raise InputError(f"{path} has no column {name!r} (asked for as {quantity}); it has {', '.join(header)}")
+            raise InputError(f"{path} has no column {name!r} (requested as {quantity}); it has {', '.join(header)}")
         form = {"time": FRAMES, "kind": ALL_KINDS}.get(quantity)
         if unit and unit not in UNITS[quantity] and not (form and form.fullmatch(unit)):
             raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")

@@ -61,7 +61,7 @@ class LogConfig(Parameters):
     max_duration: float = parameter(
         60.0, "longest encounter; longer ones are cut into equal parts", unit="s", low=2.0, high=3600.0
     )
-    travel: float = parameter(5.0, "least distance that one vehicle of an encounter drives", unit="m", low=0.0, high=1000.0)
+    travel: float = parameter(5.0, "minimum distance that one vehicle of an encounter drives", unit="m", low=0.0, high=1000.0)
     standstill: float = parameter(
         10.0, "an encounter ends when all vehicles stand still for longer than this", unit="s", low=1.0, high=600.0
     )

@@ -78,7 +78,7 @@ def typed(log: RawLog, config: LogConfig) -> RawLog:
         kept.append(replace(seen, kind=called or ""))
     notes = [f"left out: {_counted(left_out)}"] if left_out else []
     if unknown := +unknown:
-        notes.append(f"types that are not known, told from the size: {_counted(unknown)}")
+        notes.append(f"types that are not known, read by size: {_counted(unknown)}")
     return replace(log, vehicles=tuple(kept), notes=(*log.notes, *notes))
 
 

@@ -76,7 +76,7 @@ def _apart(found: Iterator[Place]) -> Iterator[Place]:
 
 def _cost_in_words(place: Place) -> str:
     """Say how little a place resembles the template."""
-    return f"cost {place.cost:.1f} m² (about {np.sqrt(place.cost):.1f} m off the template's paths)"
+    return f"cost {place.cost:.1f} m² (about {np.sqrt(place.cost):.1f} m off the recording's paths)"
 
 
 class _Sheet:

@@ -98,7 +98,7 @@ def as_table(cases: Sequence[GenerationResult]) -> str:
 
 def _reactions(case: GenerationResult) -> str:
     sentences = [f"- {as_markdown(line)}" for line in case.reacting["sentences"]]
-    return "\n".join(["Who reacts to whom in the template:", "", *sentences]) if sentences else ""
+    return "\n".join(["Who reacts to whom in the recording:", "", *sentences]) if sentences else ""
 
 
 def namespaces(count: int) -> list[str]:

@@ -183,7 +183,7 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
         RefusedError: its vehicles overlap so far that they cannot be separated, or the grid would be too large.
     """
     if encounter is None:
-        raise InputError(f"road {name} is drawn around a template; give a log too")
+        raise InputError(f"road {name} is drawn around a recording; give a log too")
     surface, paths, widths = list[BaseGeometry](), dict[str, Curve](), dict[str, float]()
     for track in own_paths(encounter).tracks:
         reach = config.corridor_margin if track.still else config.corridor_run_out

@@ -15,8 +15,8 @@ class RoadConfig(Parameters):
     """Parameters of the built-in roads and of `corridor`, and what is read of a map; a map keeps its own geometry."""
 
     lane_width: float = parameter(3.5, "width of a lane", unit="m", low=2.0, high=1000.0)
-    lanes: int = parameter(0, "lanes per direction; 0: as many as the template needs", low=0, high=6)
-    arm_length: float = parameter(0.0, "length of an arm; 0: as long as the template needs", unit="m", low=0.0, high=2000.0)
+    lanes: int = parameter(0, "lanes per direction; 0: as many as the recording needs", low=0, high=6)
+    arm_length: float = parameter(0.0, "length of an arm; 0: as long as the recording needs", unit="m", low=0.0, high=2000.0)
     corner_radius: float = parameter(6.0, "radius of the kerb at a corner", unit="m", low=1.0, high=1000.0)
     resolution: float = parameter(0.2, "cell size of the grid", unit="m", low=0.02, high=1.0)
     traffic_side: str = parameter("right", "side of the road that traffic keeps", choices=("right", "left"))
@@ -31,7 +31,7 @@ class RoadConfig(Parameters):
         choices=("none", "auto", "all_way_stop"),
     )
     corridor_margin: float = parameter(
-        1.0, "room on each side of the template's footprints in a corridor", unit="m", low=0.1, high=10.0
+        1.0, "room on each side of the recording's footprints in a corridor", unit="m", low=0.1, high=10.0
     )
     corridor_run_out: float = parameter(6.0, "how far a corridor goes on beyond a path's ends", unit="m", low=1.0, high=50.0)
     paper: bool = parameter(False, "straight and t_intersection as in the paper: a grid of 1000 x 1000 cells, lengths in cells")

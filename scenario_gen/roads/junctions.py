@@ -161,11 +161,11 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
         if driven_about is None:
-            notes.append(f"nobody in the template drives about a ring; one of {radius:.0f} m radius is drawn in its middle")
+            notes.append(f"no recorded vehicle drives round a ring; one of {radius:.0f} m radius is drawn in its middle")
     if fastest > np.sqrt(_RING_FASTEST * radius):
         possible = float(np.sqrt(_RING_FASTEST * _RING[1]))
         raise RefusedError(
-            f"road roundabout: the template drives up to {fastest:.1f} m/s where the ring would be, and the largest one "
+            f"road roundabout: the recording drives up to {fastest:.1f} m/s where the ring would be, and the largest one "
             f"({_RING[1]:g} m) allows {possible:.1f} m/s"
         )
     turn = np.pi - directions[0].yaw
@@ -174,7 +174,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         straight = replace(direction, members=[end for end in direction.members if end.steady >= 2.0 * _SURE])
         most = max(_lanes(straight, config)[1].values(), default=0)
         if most > 0 and len({end.inward for end in direction.members}) < 2:
-            raise RefusedError(f"road roundabout has one lane, and the template drives in {most + 1} beside each other")
+            raise RefusedError(f"road roundabout has one lane, and the recording drives in {most + 1} beside each other")
         reach = config.arm_length or max(direction.reach(tracks) + ROOM + 2.0 * SLACK, radius + SHORTEST)
         yaw = direction.yaw + turn
         arms.append(Arm.towards(yaw, reach, 1))
@@ -283,8 +283,8 @@ def _directions(name: str, tracks: tuple[Track, ...], centre: Floats, ring: floa
         if apart > _MERGED:
             who = ", ".join(tracks[direction.members[0].vehicle].vehicle.id for direction in directions)
             raise RefusedError(
-                f"road {name} has {count} arms, and the template comes and goes by {len(directions)} (one each: vehicles "
-                f"{who}); choose another road"
+                f"road {name} has {count} arms, and the recorded vehicles enter and leave by {len(directions)} (one each: "
+                f"vehicles {who}); choose another road"
             )
         directions[k].members += directions[j].members
         directions[k].yaw = _mean(directions[k].members)

@@ -117,6 +117,5 @@ def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:
         if who and all(outermost not in frenet.lane[i] for i in own if i not in who):
             return who
     raise RefusedError(
-        "road merge: nobody in the template leaves the outermost lane of its direction for the next one, so nobody would use the "
-        "ramp"
+        "road merge: no recorded vehicle leaves the outermost lane of its direction for the next one, so none would use the ramp"
     )

@@ -132,7 +132,7 @@ def to_frenet(tracks: tuple[Track, ...]) -> FrenetTracks:
         if turned.max() > _ALONG:
             raise RefusedError(
                 f"vehicle {track.vehicle.id} lies across the others' road (turned from it by {np.degrees(turned.max()):.0f}°): "
-                f"this template needs a junction"
+                f"this recording needs a junction"
             )
     lane, change, swerve, lanes = _lanes(tracks, direction, station, offset)
     between = _between(direction, offset)

@@ -153,9 +153,7 @@ def required_orders(conflicts: Sequence[Conflict], order: str) -> tuple[int | No
         return (None,) * len(conflicts)
     closest = closest_crossing(conflicts)
     if closest is None:
-        raise RefusedError(
-            "order: in the template nobody crosses another one's path or merges into it, so no order can be swapped"
-        )
+        raise RefusedError("order: no recorded vehicle crosses another one's path or merges into it, so no order can be swapped")
     return tuple(c.second if c is closest else c.first if c.following else None for c in conflicts)
 
 

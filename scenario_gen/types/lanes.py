@@ -16,7 +16,7 @@ from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
 
 LEVEL = 2.5  # metres between the heights of two lanes of which one lies above the other
-MIRRORED = "the template is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
+MIRRORED = "the recording is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
 _ONCOMING = -0.9  # cosine between directions of traffic
 
 

@@ -40,7 +40,7 @@ class Request(Parameters):
     )
     order: str = parameter(
         "keep",
-        "who goes first at a conflict; keep: as in the template, free: anyone, swap: the other one at the closest crossing",
+        "who goes first at a conflict; keep: as in the recording, free: anyone, swap: the other one at the closest crossing",
         choices=ORDERS,
     )
 

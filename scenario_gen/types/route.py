@@ -24,7 +24,7 @@ class Route:
         length: (M,) arc length [m] from the start to each point.
         joined: legs between waypoints that a direct curve joined at once; None where it is not known (a bag).
         searched: legs that were searched for; likewise.
-        left_out: anchors that no free way leads through, so that the route passes them as near as it may.
+        left_out: anchors that no free route leads through, so that the route passes them as near as it may.
         farthest: largest distance [m] between the route and the fitted path, seen from either; NaN where it is not known.
     """
 
@@ -57,7 +57,7 @@ class Route:
         if self.left_out:
             which = ", ".join(str(k) for k in self.left_out)
             sentences.append(
-                f"vehicle {vehicle}: no free way leads through its changepoint {which} as fitted; its route passes beside"
+                f"vehicle {vehicle}: no free route leads through its changepoint {which} as fitted; its route passes beside"
             )
         return sentences
 

@@ -119,7 +119,7 @@ def test_a_mistake_is_one_line_and_loses_nothing(folder, run, monkeypatch, words
 def test_a_road_with_no_way_through_is_refused(folder, run, monkeypatch):
     monkeypatch.chdir(folder)
     code, printed = run("generate", "my log ü.csv", "--road", "walled.yaml", "--out", "refused")
-    assert code == 2 and "walled" in printed and "no way leads from" in printed
+    assert code == 2 and "walled" in printed and "no route leads from" in printed
     assert not (folder / "refused").exists()
 
 

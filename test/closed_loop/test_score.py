@@ -40,7 +40,7 @@ def test_at_fault_is_the_one_who_hits_with_the_front_or_what_stands():
 def test_a_jump_fails_whatever_the_goal_says():
     verdict, _ = verdict_of([straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)], lambda _: Pose(149.0, 0.0, 0.0, 10.0))
     assert np.isnan(verdict.goal) and verdict.jumps == 1 and verdict.collision is None
-    assert not verdict.passed and verdict.fault == verdict.failure == "jump" and "1 jump(s)" in verdict.sentence()
+    assert not verdict.passed and verdict.fault == verdict.failure == "jump" and "1 teleport(s)" in verdict.sentence()
 
 
 def test_a_jump_over_others_and_off_the_road_is_a_jump_and_nothing_else():

@@ -188,8 +188,8 @@ def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
         (LostEncounterError, "has no place that keeps the encounter: vehicles 1 and 2 do not meet", {LOST_CONFLICT: 4}),
         (
             RefusedError,
-            "has 4 arms, and the template goes by 3 (one each: vehicles 1, 2)",
-            {f"road {name} has … arms, and the template goes by …": 2 for name in ROADS},
+            "has 4 arms, and the recorded vehicles enter and leave by 3 (one each: vehicles 1, 2)",
+            {f"road {name} has … arms, and the recorded vehicles enter and leave by …": 2 for name in ROADS},
         ),
     ],
 )

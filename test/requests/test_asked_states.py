@@ -101,7 +101,7 @@ def test_a_start_on_top_of_another_vehicle(following):
     x, y, yaw, speed = made.fit.requested.start[0]
     texts = {"starts": f"2: {x + 1.0:.2f} {y:.2f} {yaw:.4f} {speed:.2f}"}
     error = refused(following, **texts)
-    assert "at the start that is asked vehicles 1 and 2 overlap by" in str(error)
+    assert "at the requested start vehicles 1 and 2 overlap by" in str(error)
     assert 3.8 <= moved(error, following, texts, "starts") < 10.0
 
 

@@ -81,14 +81,14 @@ def test_who_crosses_needs_four_arms_and_a_road_of_three_is_refused():
     encounter = made(motion(line(0.0), 8.0), motion(line(np.radians(70.0), 25.0, -40.0), 8.0))
     road, fit = fitted(encounter, "four_way")
     assert len(road.lanes.arms) == 4 and fit.losses == ()
-    with pytest.raises(RefusedError, match="t_intersection has 3 arms, and the template comes and goes by 4"):
+    with pytest.raises(RefusedError, match="t_intersection has 3 arms, and the recorded vehicles enter and leave by 4"):
         build_road("t_intersection", encounter)
 
 
 def test_an_arm_that_nobody_uses_is_said():
     _, fit = fitted(made(motion(line(0.0), 8.0, 20.0), motion(line(0.0), 8.0)), "four_way")
     assert [loss.message for loss in fit.losses] == [
-        "2 of the 4 arms of road four_way are not used: nobody in the template comes or goes there"
+        "2 of the 4 arms of road four_way are not used: no recorded vehicle enters or leaves there"
     ]
 
 
@@ -108,7 +108,7 @@ def test_a_merge_is_used_by_who_changes_lanes_and_refused_where_nobody_does():
     assert len(road.entries) == len(road.exits) + 1
     _, fit = fitted(made(motion(line(0.0), 10.0, 28.0), motion(joining, 10.0)), "curve")
     assert fit.losses == ()  # who ends beyond another one's path in a bend is in its lane
-    with pytest.raises(RefusedError, match="nobody would use the ramp"):
+    with pytest.raises(RefusedError, match="none would use the ramp"):
         build_road("merge", made(motion(line(0.0), 8.0, 20.0), motion(line(0.0), 8.0)))
 
 

@@ -87,7 +87,7 @@ def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
 @pytest.mark.parametrize(
     ("log", "error", "said"),
     [
-        pytest.param(RESOURCES / "synthetic_b", RefusedError, "/x/planner: plan: the template", marks=pytest.mark.long),
+        pytest.param(RESOURCES / "synthetic_b", RefusedError, "/x/planner: plan: the recording", marks=pytest.mark.long),
         ("none.csv", InputError, "/x/log_player"),
     ],
 )

@@ -218,7 +218,7 @@ class Namespace(RecordedScenarios):
         closing = replace(info, data=encode_info(summary.of_one_scenario(), stamp))
         own = [replace(same[-1], data=data) for data in messages_of(same[-1].data)] if len(entry.messages) > 1 else same[-1:]
         if self.without_witness(entry):
-            raise InputError(f"{self.path}: the witness with SHA-256 {entry.witness} is not on {self.where(WITNESS)}")
+            raise InputError(f"{self.path}: the reference drive with SHA-256 {entry.witness} is not on {self.where(WITNESS)}")
         witness = (self.witnesses[entry.witness],) if entry.witness else ()
         return (*self.template_messages(entry, stamp).values(), *witness, *own, info, closing)
 

@@ -49,7 +49,7 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     anchors = anchor_stamps(encounter, segmentation.changepoints)
     if poses.shape[:2] != (len(encounter.vehicles), len(anchors)):
         raise InputError(
-            f"fit: {poses.shape[0]} vehicles at {poses.shape[1]} points, where tracks and changepoints ask for "
+            f"fit: {poses.shape[0]} vehicles at {poses.shape[1]} points, where tracks and changepoints have "
             f"{len(encounter.vehicles)} at {len(anchors)}"
         )
     routes = decode_routes(messages, encounter, anchors)

@@ -223,7 +223,7 @@ def _write(folder: Path, result: SearchResult, request: SearchRequest, identity:
         if ego is not None:  # the request left it out
             slot = EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
             scenarios = tuple(with_witness(one, ego) for one in scenarios)
-        note = f"failures of {request.planner}, found by a search: they are no sample of the natural scenarios"
+        note = f"failures of {request.planner}, found by a search: they are no random sample of the natural scenarios"
         drawn = ScenarioSet(len(scenarios), scenarios, len(scenarios), Counter(), (note,), slot)
         texts = (value if isinstance(value, str) else json.dumps(value, ensure_ascii=False) for value in identity.values())
         provenance = dict(zip((f"search.{name}" for name in identity), texts, strict=True)) | versions()

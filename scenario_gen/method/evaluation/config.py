@@ -14,8 +14,8 @@ class EvaluationConfig(Parameters):
 
     level: float = parameter(0.95, "confidence level of the intervals", low=0.5, high=0.999)
     resamples: int = parameter(1000, "resamples of the bootstrap", low=10, high=100_000)
-    enough: int = parameter(50, "samples below which the figures are marked as few (the paper takes 50)", low=1)
-    max_steps: int = parameter(600, "most instants in a feature matrix; a longer template is resampled", low=10, high=5000)
+    enough: int = parameter(50, "scenarios below which the figures are marked as few (the paper takes 50)", low=1)
+    max_steps: int = parameter(600, "most instants in a feature matrix; a longer recording is resampled", low=10, high=5000)
     max_entries: int = parameter(
         400_000, "most entries of the feature matrices of all pairs together; of many vehicles each has fewer instants", low=1000
     )

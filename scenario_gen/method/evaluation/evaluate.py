@@ -180,15 +180,15 @@ def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple
     if measured < size:
         notes.append(f"measured on {measured:,} of {size:,} scenarios, in {RUNS} evenly spaced runs; candidates are all counted")
     if 1 < measured < enough:
-        notes.append(f"few samples: every figure, E included, comes from {measured}, not {enough}")
+        notes.append(f"few scenarios: every figure, E included, comes from {measured}, not {enough}")
     if np.isnan(values["min_distance"].value):
         return (*notes, "one vehicle is left: there is no pair to be measured")
     notes += [
-        f"E for {what} is undefined: the template's matrix is constant for every pair of vehicles"
+        f"E for {what} is undefined: the recording's matrix is constant for every pair of vehicles"
         for what in ("position", "speed")
         if not np.isfinite(values[f"e_{what}"].value)
     ]
     if values["vanished_conflicts"].value > 0.0:
         vanished, kept = (values[key].value for key in ("vanished_conflicts", "conflicts"))
-        notes.append(f"{vanished:.3g} of the template's {vanished + kept:.0f} conflict(s) vanish, mean over samples")
+        notes.append(f"{vanished:.3g} of the recording's {vanished + kept:.0f} conflict(s) vanish, mean over scenarios")
     return tuple(notes)

@@ -27,8 +27,8 @@ LIMIT_CAUSES = (Cause.SPEED, Cause.LONGITUDINAL_ACCELERATION, Cause.LATERAL_ACCE
 TURNS = math.radians(10.0)
 """Of a pair whose headings' differences spread by less, E for heading would measure noise; it has none."""
 HEADINGS = _SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY = (
-    "Similarity to the template",
-    "Distributions against the template",
+    "Similarity to the recording",
+    "Distributions against the recording",
     "Criticality",
     "Validity of the candidates",
     "Diversity",
@@ -117,17 +117,17 @@ def _turn_kept(samples: Samples) -> Floats:
     return np.array([np.mean(row) for row in kept])
 
 
-_E = "‖mean feature matrix − template's‖ / ‖template's‖, of"
+_E = "‖mean feature matrix − recording's‖ / ‖recording's‖, of"
 SIMILARITY = MetricGroup(
     (
         Metric("e_position", "E position", "", "lower", _SIMILARITY, f"{_E} positions"),
         Metric("e_speed", "E speed", "", "lower", _SIMILARITY, f"{_E} speeds"),
         Metric(
-            "e_heading", "E heading", "", "lower", _SIMILARITY, f"{_E} headings; none where they hardly differ in the template"
+            "e_heading", "E heading", "", "lower", _SIMILARITY, f"{_E} headings; none where they hardly differ in the recording"
         ),
         *(
             Metric(
-                f"correlation_{what}", f"correlation {what}", "", "higher", _SIMILARITY, "of the mean matrix with the template's"
+                f"correlation_{what}", f"correlation {what}", "", "higher", _SIMILARITY, "of the mean matrix with the recording's"
             )
             for what in ("position", "speed", "heading")
         ),
@@ -137,7 +137,7 @@ SIMILARITY = MetricGroup(
             "%",
             "higher",
             _SIMILARITY,
-            "vehicles that do the template's manoeuvre and turn as far, within 25°, from start to end",
+            "vehicles that do the recording's manoeuvre and turn as far, within 25°, from start to end",
         ),
     ),
     _similarity,
@@ -196,10 +196,8 @@ def _criticality_of(template: Template) -> Mapping[str, float]:
 
 CRITICALITY = MetricGroup(
     (
-        Metric("min_distance", "min distance", "m", "", _CRITICAL, "smallest distance of two footprints, mean over samples"),
-        Metric(
-            "min_ttc", "min TTC", "s", "", _CRITICAL, "smallest time to collision at constant velocity, capped, mean over samples"
-        ),
+        Metric("min_distance", "min distance", "m", "", _CRITICAL, "smallest distance of two footprints, mean over scenarios"),
+        Metric("min_ttc", "min TTC", "s", "", _CRITICAL, "smallest time to collision at constant velocity, capped, mean"),
         Metric("pet", "PET", "s", "", _CRITICAL, "from the first vehicle's exit of the shared area to the second's entry, mean"),
         Metric(
             "order_kept",
@@ -207,16 +205,16 @@ CRITICALITY = MetricGroup(
             "%",
             "higher",
             _CRITICAL,
-            "conflicts of the template in which the same vehicle goes first",
+            "conflicts of the recording in which the same vehicle goes first",
         ),
-        Metric("conflicts", "conflicts", "", "", _CRITICAL, "conflicts of the template, and how many of them a sample has, mean"),
+        Metric("conflicts", "conflicts", "", "", _CRITICAL, "conflicts of the recording, and how many a scenario has, mean"),
         Metric(
             "vanished_conflicts",
             "conflicts vanished",
             "",
             "lower",
             _CRITICAL,
-            "conflicts of the template that a sample does not have, mean; the passing order is of the others",
+            "conflicts of the recording that a scenario does not have, mean; the passing order is of the others",
         ),
     ),
     _criticality,
@@ -236,16 +234,16 @@ def _diversity(samples: Samples) -> Estimates:
 
 DIVERSITY = MetricGroup(
     (
-        Metric("diversity", "diversity", "m", "", _DIVERSITY, "mean displacement between two samples"),
+        Metric("diversity", "diversity", "m", "", _DIVERSITY, "mean displacement between two scenarios"),
         Metric(
             "coverage",
             "coverage",
             "%",
             "higher",
             _DIVERSITY,
-            "share of the template's values in histogram bins that the set visits",
+            "share of the recording's values in histogram bins that the set visits",
         ),
-        Metric("min_ade", "min ADE", "m", "lower", _DIVERSITY, "mean displacement of the nearest sample to the fitted template"),
+        Metric("min_ade", "min ADE", "m", "lower", _DIVERSITY, "mean displacement of the scenario nearest to the replay"),
     ),
     _diversity,
 )

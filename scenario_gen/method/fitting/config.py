@@ -15,7 +15,7 @@ class FittingConfig(Parameters):
 
     placement: str = parameter(
         "auto",
-        "how the template is placed: in its own frame, on the road's lanes, or searched for on the grid",
+        "how the recording is placed: in its own frame, on the road's lanes, or searched for on the grid",
         choices=("auto", "identity", "lanes", "search"),
     )
     allow: str = parameter(

@@ -28,7 +28,7 @@ def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) 
     """
     separation = own_paths(encounter)
     max_repair([track for track in separation.tracks if share_with_room(road, track) < 1.0], road, config.max_move)
-    notes = (f"placed on road {road.name} in the template's own frame", *separation.notes)
+    notes = (f"placed on road {road.name} in the recording's own frame", *separation.notes)
     return replace(Placement.of(separation.tracks, 1.0, notes), moved=separation.moved, at_home=True)
 
 
@@ -132,7 +132,7 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
     if track.still:
         if np.hypot(*v) > _SAME_PLACE:
             raise RefusedError(
-                f"vehicle {vehicle.id} waits throughout the template, but its start and goal are {np.hypot(*v):.1f} m apart"
+                f"vehicle {vehicle.id} waits throughout the recording, but its start and goal are {np.hypot(*v):.1f} m apart"
             )
         ahead = start[:3] + np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
         return replace(track, curve=Curve(np.array([start[:3], ahead]))), 1.0, "a wait"
@@ -150,7 +150,7 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
     else:
         turn = float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))  # eq 8a
         scale, how = float(np.hypot(*v) / np.hypot(*u)), "similarity"
-    check_scale(scale, f"vehicle {vehicle.id} (template chord {np.hypot(*u):.1f} m, asked {np.hypot(*v):.1f} m)", config)
+    check_scale(scale, f"vehicle {vehicle.id} (recorded chord {np.hypot(*u):.1f} m, requested {np.hypot(*v):.1f} m)", config)
     points = track.curve.points.copy()
     points[:, :2] = place(np.array([*start[:2], turn]), *(scale * (points[:, :2] - points[0, :2]).T))  # eqs 8b, 9
     share = track.curve.station / track.curve.length

@@ -85,7 +85,7 @@ def find_unused(road: Road, used: Iterable[int]) -> tuple[Loss, ...]:
     unused = len(arms) - len({of_lane[k] for k in used if k in of_lane})
     if len(arms) < 3 or not unused:
         return ()
-    used_by_nobody = f"{'is' if unused == 1 else 'are'} not used: nobody in the template comes or goes there"
+    used_by_nobody = f"{'is' if unused == 1 else 'are'} not used: no recorded vehicle enters or leaves there"
     return (Loss("arm", (), f"{unused} of the {len(arms)} arms of road {road.name} {used_by_nobody}"),)
 
 
@@ -101,7 +101,7 @@ def _lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterato
         there, name = turn_of(other), track.vehicle.id
         lost = next((turn for turn in turns_to_keep(track) if not keeps(turn, there)), None)
         if lost is not None:
-            yield Loss("turn", (name,), f"vehicle {name} {in_words(lost)} in the template, {in_words(there)} on this road")
+            yield Loss("turn", (name,), f"vehicle {name} {in_words(lost)} in the recording, {in_words(there)} on this road")
 
 
 def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
@@ -111,17 +111,17 @@ def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Ite
         if pair not in after:
             following = before[pair].following
             if following and _in_two_lanes(*(tracks[k] for k in pair)):
-                how = "drive side by side less than a lane apart in the template, in two lanes on this road"
+                how = "drive side by side less than a lane apart in the recording, in two lanes on this road"
                 yield Loss("beside", (a, b), f"vehicles {a} and {b} {how}")
                 continue
             what = "follow each other" if following else "have crossing or merging paths"
             kind = "following" if following else "conflict"
-            yield Loss(kind, (a, b), f"vehicles {a} and {b} {what} in the template, and do not meet on this road")
+            yield Loss(kind, (a, b), f"vehicles {a} and {b} {what} in the recording, and do not meet on this road")
         elif pair not in before:
-            yield Loss("new conflict", (a, b), f"vehicles {a} and {b} come into conflict on this road, not in the template")
+            yield Loss("new conflict", (a, b), f"vehicles {a} and {b} come into conflict on this road, not in the recording")
         elif before[pair].first != after[pair].first and not before[pair].following:
             first, late = tracks[before[pair].first].vehicle.id, abs(after[pair].arrival_gap)
-            yield Loss("order", (a, b), f"vehicle {first} goes first in the template, {late:.1f} s after the other on this road")
+            yield Loss("order", (a, b), f"vehicle {first} goes first in the recording, {late:.1f} s after the other on this road")
 
 
 def _in_two_lanes(track: Track, other: Track) -> bool:
@@ -142,13 +142,13 @@ def _lost_lanes(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterato
         a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
         known = [near for near, own in zip(together, before, strict=True) if not np.isnan(own)]
         if all(known):
-            yield Loss("following", (a, b), f"vehicles {a} and {b} drive in one lane in the template, not on this road")
+            yield Loss("following", (a, b), f"vehicles {a} and {b} drive in one lane in the recording, not on this road")
         elif known[-1]:
-            yield Loss("merge", (a, b), f"vehicle {b} comes into the lane of {a} in the template, not on this road")
+            yield Loss("merge", (a, b), f"vehicle {b} comes into the lane of {a} in the recording, not on this road")
         elif known[0]:
-            yield Loss("lane_change", (a, b), f"vehicle {b} leaves the lane of {a} in the template, not on this road")
+            yield Loss("lane_change", (a, b), f"vehicle {b} leaves the lane of {a} in the recording, not on this road")
         else:
-            yield Loss("lane_change", (a, b), f"vehicles {a} and {b} drive in two lanes in the template, otherwise on this road")
+            yield Loss("lane_change", (a, b), f"vehicles {a} and {b} drive in two lanes in the recording, otherwise on this road")
 
 
 def _differs(own: float, there: float, farthest: float) -> bool:
@@ -175,7 +175,7 @@ def _lost_passings(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iter
             continue
         a, b, word = tracks[i].vehicle.id, tracks[j].vehicle.id, "left" if side > 0 else "right"
         kind, what = ("stand", f"{b}, which stands") if tracks[j].still else ("overtaking", b)
-        yield Loss(kind, (a, b), f"vehicle {a} passes {what}, to its {word}, in the template, not on this road")
+        yield Loss(kind, (a, b), f"vehicle {a} passes {what}, to its {word}, in the recording, not on this road")
 
 
 def _passes(track: Track, other: Track, farthest: float) -> int:
@@ -206,7 +206,7 @@ def _lost_neighbours(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> It
             if kept < _ENOUGH:
                 a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
                 here = f"for {kept * seconds:.1f} s of these on this road"
-                yield Loss("beside", (a, b), f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the template, {here}")
+                yield Loss("beside", (a, b), f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the recording, {here}")
 
 
 def _side(path: Floats, other: Floats, reach: float, wider: float = 0.0) -> Ints:

@@ -38,7 +38,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     reason, best = "", None
     drivers = drivers_of(tracks)
     if drivers[0].vehicle.kind.walks:
-        raise RefusedError(f"nobody in the template drives, so it cannot be laid on the lanes of road {road.name}")
+        raise RefusedError(f"no recorded vehicle drives, so the encounter cannot be laid on the lanes of road {road.name}")
     if network.drawn:
         _refuse_turns(drivers, road)
     shortened = _shortened(drivers, road, config) if network.drawn else 1.0
@@ -65,7 +65,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         if not any(lacks):
             break
     if best is None:
-        raise RefusedError(f"the template does not fit the lanes of road {road.name}: {reason}")
+        raise RefusedError(f"the recording does not fit the lanes of road {road.name}: {reason}")
     return best[1]
 
 
@@ -99,7 +99,7 @@ def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
     right = max(float((np.maximum.accumulate(yaw) - yaw).max()) for yaw in yaws)
     for track in tracks:
         if not -right - MOST_CHANGE <= turn_of(track) <= left + MOST_CHANGE:
-            raise RefusedError(f"vehicle {track.vehicle.id} {in_words(turn_of(track))}: road {road.name} has no way for that")
+            raise RefusedError(f"vehicle {track.vehicle.id} {in_words(turn_of(track))}: road {road.name} has no lanes for that")
 
 
 def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> float:
@@ -113,7 +113,7 @@ def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> 
         return 1.0
     cars = max(track.vehicle.length for track in tracks)
     scale = (size - 2.0 * _END_ROOM - cars) / (high - low - cars)
-    check_scale(scale, f"the template is {high - low:.0f} m long, road {road.name} {size:.0f} m: it", config)
+    check_scale(scale, f"the recording is {high - low:.0f} m long, road {road.name} {size:.0f} m: it", config)
     return scale
 
 
@@ -130,7 +130,7 @@ def _scaled(track: Track, scale: float) -> Track:
 
 def _lanes_of(road: Road) -> LaneNetwork:
     if road.lanes is None:
-        raise RefusedError(f"road {road.name} has no lanes; choose another way of placing (fitting.placement)")
+        raise RefusedError(f"road {road.name} has no lanes; choose another fitting.placement")
     return road.lanes
 
 

@@ -27,7 +27,7 @@ def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: F
         for vehicle, state in zip(encounter.vehicles, rows, strict=True):
             if np.isnan(state[0]):
                 continue
-            what = f"the {NAMES[name]} asked of vehicle {vehicle.id} (x {state[0]:.2f}, y {state[1]:.2f})"
+            what = f"the {NAMES[name]} requested of vehicle {vehicle.id} (x {state[0]:.2f}, y {state[1]:.2f})"
             max_speed = limits.of(vehicle.type).planned.max_speed
             if state[3] > max_speed:
                 raise RefusedError(
@@ -50,12 +50,12 @@ def refuse_misfits(fit: Fit, starts: Floats, goals: Floats) -> None:
         for (i, a), (j, b) in combinations(enumerate(fit.vehicles), 2):
             gap = float(footprint_gaps(a.half, states[[i], :3], b.half, states[[j], :3])[0][0])
             if gap <= 0.0 and (requested[i] or requested[j]):
-                raise RefusedError(f"at the {NAMES[name]} that is asked vehicles {a.id} and {b.id} overlap by {-gap:.2f} m")
+                raise RefusedError(f"at the requested {NAMES[name]} vehicles {a.id} and {b.id} overlap by {-gap:.2f} m")
         for i in np.flatnonzero(requested).tolist():
             stands = fit.fitted[i].stands
             if rows[i, 3] > STAND and stands[0 if first else -1]:
                 when = "throughout" if stands.all() else "there"
                 raise RefusedError(
-                    f"vehicle {fit.vehicles[i].id} stands {when} in the template, so the speed at its {NAMES[name]} must be 0, "
+                    f"vehicle {fit.vehicles[i].id} stands {when} in the recording, so the speed at its {NAMES[name]} must be 0, "
                     f"not {rows[i, 3]:g} m/s"
                 )

@@ -53,7 +53,7 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
     discs, centre = _discs(tracks)
     required = max(t.vehicle.width for t in tracks) / 2.0 + config.margin
     best: tuple[float, Placement] | None = None
-    reason = f"the template ({np.ptp(discs, axis=0).max():.0f} m) is larger than the map"
+    reason = f"the recording ({np.ptp(discs, axis=0).max():.0f} m) is larger than the map"
     for scale in filter(config.accepts, SCALES):
         placements = sorted(_coarse(discs, road, required, scale), key=_order)[:_KEPT]
         for motion in sorted((_refined(discs, road, required, motion) for motion in placements), key=_order):
@@ -70,7 +70,7 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
             elif best is None:
                 reason = f"in the best placement a vehicle has room at only {100.0 * share:.0f} % of its samples"
     if best is None:
-        raise RefusedError(f"no placement on road {road.name} has room for the template: {reason}")
+        raise RefusedError(f"no placement on road {road.name} has room for the recording: {reason}")
     return best[1]
 
 

@@ -106,7 +106,7 @@ def plan_routes(
         N routes, geometry only.
 
     Raises:
-        RefusedError: a start or end is blocked, no way leads from anchor to anchor, the planner's budget is spent, or no
+        RefusedError: a start or end is blocked, no route leads from anchor to anchor, the planner's budget is spent, or no
             drivable curve was found; the message names the vehicle and the anchor.
     """
     planner = make_planner(config)
@@ -222,7 +222,7 @@ def _legs(task: _Task, waypoints: list[int]) -> tuple[list[_Leg], list[int], tup
     A waypoint between that cannot be passed as it stands (one at the road's edge that heads off it, say) is eased first.
 
     Raises:
-        RefusedError: there is no way from start to end.
+        RefusedError: there is no route from start to end.
     """
     kept, legs, eased = list(waypoints), list[_Leg](), set[int]()
     poses = task.anchors.copy()
@@ -385,7 +385,7 @@ def _off_road(task: _Task) -> str:
     if not len(off):
         return "; planning.iterations allows more"
     x, y = off[len(off) // 2, :2]
-    return f"; where the template was placed its footprint leaves the road, at {x:.2f}, {y:.2f} m: no search mends that"
+    return f"; where the recording was placed its footprint leaves the road, at {x:.2f}, {y:.2f} m: no search mends that"
 
 
 def _sides(config: PlanningConfig, against: float, away: float) -> tuple[float, float]:

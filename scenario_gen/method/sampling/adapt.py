@@ -76,11 +76,11 @@ def aim_of(encounter: Encounter, request: Request, measures: Measures | None) ->
             targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
             beyond = min(closest.exit_first - closest.entry_first, MOST_BEYOND)  # it must have left by then
             if closest.entry_first <= STARTS_INSIDE:
-                note = f"; in the template vehicle {names[0]} is in the shared area {closest.entry_first:.1f} s after the start"
+                note = f"; in the recording vehicle {names[0]} is in the shared area {closest.entry_first:.1f} s after the start"
     if not targets:
         return None
     if measures is None:
-        raise InputError("a target or another order is asked for, but nothing is given that measures scenarios (`measures`)")
+        raise InputError("a target or another order is requested, but nothing is given that measures scenarios (`measures`)")
     return Aim.of(targets, encounter, measures.figure, beyond, note)
 
 
@@ -118,8 +118,8 @@ def _order(encounter: Encounter, own: Conflict, whole: Scenario) -> str:
     conflict = conflict_of(whole, a, b)
     one, two = (encounter.vehicles[n].id for n in (own.first, own.second))
     if conflict is None:
-        return f"{one} and {two} do not meet (in the template {one} goes first)"
-    return f"{one} before {two}, as in the template" if conflict.first == own.first else f"{two} before {one}, swapped"
+        return f"{one} and {two} do not meet (in the recording {one} goes first)"
+    return f"{one} before {two}, as in the recording" if conflict.first == own.first else f"{two} before {one}, swapped"
 
 
 @dataclass(frozen=True, eq=False)

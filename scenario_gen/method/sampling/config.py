@@ -40,12 +40,12 @@ class SamplingConfig(Parameters):
     )
     ego: str = parameter(
         "keep",
-        "wide: start and end states of the vehicle that is left out; `keep`: its template's, `free`: free as those of the others",
+        "wide: start and end states of the vehicle that is left out; `keep`: as recorded, `free`: free as those of the others",
         choices=("keep", "free"),
     )
     reactions: str = parameter(
         "keep",
-        "wide: `keep` lets followers and yielders of the template answer to those they react to, `none` lets nobody",
+        "wide: `keep`: followers and yielders of the recording react in the scenarios, too; `none`: nobody does",
         choices=("keep", "none"),
     )
     freedom: float = parameter(2.5, "wide: standard deviations at which all that is free is cut", low=0.5, high=4.0)
@@ -56,9 +56,9 @@ class SamplingConfig(Parameters):
     observation_sigma: float = parameter(
         1.0, "σ_ω: standard deviation across the route at an interior anchor", unit="m", low=1e-3, high=10.0
     )
-    steering: float = parameter(1.0, "how much a driver corrects to the side, over what the template's does", low=0.0, high=10.0)
+    steering: float = parameter(1.0, "how much a driver corrects to the side, over what the recording's does", low=0.0, high=10.0)
     longitudinal_sigma: float = parameter(
-        1.2, "σ_s: standard deviation along the route, at the same template time", unit="m", low=0.0, high=10.0
+        1.2, "σ_s: standard deviation along the route, at the same time of the recording", unit="m", low=0.0, high=10.0
     )
     longitudinal_time: float = parameter(
         4.0, "time over which displacements along the route vary", unit="s", low=0.1, high=1000.0
@@ -66,22 +66,22 @@ class SamplingConfig(Parameters):
     time_sigma: float = parameter(
         1.0, "σ_t: standard deviation of the changepoint clock that all vehicles share", unit="s", low=0.0, high=10.0
     )
-    duration_tolerance: float = parameter(0.1, "share by which a sample may be longer or shorter", low=0.0, high=0.5)
-    fixed_duration: bool = parameter(False, "keep the template's duration")
+    duration_tolerance: float = parameter(0.1, "share by which a scenario may be longer or shorter", low=0.0, high=0.5)
+    fixed_duration: bool = parameter(False, "keep the recording's duration")
     max_jerk: float = parameter(
-        0.0, "largest jerk along the route; 0: 1.2 times the template's, 1.0 m/s³ at least", unit="m/s³", low=0.0, high=100.0
+        0.0, "largest jerk along the route; 0: 1.2 times the recording's, 1.0 m/s³ at least", unit="m/s³", low=0.0, high=100.0
     )
     bend_acceleration: float = parameter(
         0.0,
-        "lateral acceleration above which the pace is lowered ahead of bends; 0: 1.2 times the template's, 2 m/s² at least",
+        "lateral acceleration above which the pace is lowered ahead of bends; 0: 1.2 times the recording's, 2 m/s² at least",
         unit="m/s²",
         low=0.0,
         high=10.0,
     )
     max_stretch: float = parameter(
-        0.2, "share by which the clock may be longer than the template's, where bends or lengths ask for it", low=0.0, high=1.0
+        0.2, "share by which the clock may be longer than the recording's, where bends or lengths need it", low=0.0, high=1.0
     )
-    attempts: int = parameter(20, "candidates drawn per scenario asked for, at most", low=1, high=10_000)
+    attempts: int = parameter(20, "candidates drawn per requested scenario, at most", low=1, high=10_000)
 
     @property
     def drawn(self) -> "SamplingConfig":

@@ -98,7 +98,7 @@ def draw_scenarios(
     if request.moves and not drawn.scenarios and not callbacks.cancelled():
         causes = ", ".join(f"{number} × {cause.value}" for cause, number in drawn.refused.most_common())
         more = f"; {'; '.join(drawn.adaptations)}" if drawn.adaptations else ""
-        raise RefusedError(f"none of {drawn.candidates} candidate(s) with the asked states is valid ({causes}{more})")
+        raise RefusedError(f"none of {drawn.candidates} candidate(s) with the requested states is valid ({causes}{more})")
     return drawn
 
 
@@ -126,7 +126,7 @@ def regenerate(
     sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(plan.encounter, request, aim, measures))
     if place_of(index)[0] == DIRECTED:
         if aim is None or check is None:
-            raise InputError(f"index {index} is of a proposal, but no target was asked for")
+            raise InputError(f"index {index} is of a proposal, but no target was requested")
         sampler = adapted(sampler, Judge.of(sampler, check, _enough(config, request)), aim, lambda: False).sampler
     return sampler.scenario(index)
 
@@ -182,7 +182,7 @@ class _Loop:
         self.chosen_from, self.count, self.keep, self.publish = len(pool), count, KEPT, True
         self.index = array("q")
         self.adaptations.append(
-            f"chosen for diversity: {len(chosen)} of {len(pool)} valid scenarios; such a set is no sample, so it has no weights"
+            f"chosen for diversity: {len(chosen)} of {len(pool)} valid scenarios; no random sample, so it has no weights"
         )
         self.sampler = replace(self.sampler, weighted=False)
         for k in sorted(chosen):

@@ -52,7 +52,7 @@ class Usual:
             return ()
         if math.isinf(self.most):
             return ("vehicles share no area, so nothing is known of such encounters: whatever is valid counts as usual",)
-        return (f"the template is unusual among recorded encounters (rarity 1): scenarios up to {self.most:.2f} are kept",)
+        return (f"the recording is unusual among recorded encounters (rarity 1): scenarios up to {self.most:.2f} are kept",)
 
 
 def pilot(sampler: Sampler, judge: Judge) -> tuple[int, list[Scenario]]:

@@ -38,7 +38,7 @@ class SegmentationConfig(Parameters):
     )
     significance_level: float = parameter(
         1e-4,
-        "probability with which noise alone makes a changepoint look as useful as is asked of one",
+        "probability with which noise alone makes a changepoint look as useful as is required of one",
         low=1e-12,
         high=0.5,
     )

@@ -117,9 +117,9 @@ class Checker:
         """Sentences naming the checks that cannot be made, and why."""
         missing = {
             "off_road: no road is known": self.road,
-            "boundary_state: it is not known what was asked": self.requested,
-            "passing_order: no template's conflicts are known": self.conflicts,
-            "stop_not_kept: no template's waits are known": self.waits,
+            "boundary_state: the requested states are not known": self.requested,
+            "passing_order: the recording has no known conflicts": self.conflicts,
+            "stop_not_kept: the recording has no known waits": self.waits,
         }
         sentences = tuple(sentence for sentence, given in missing.items() if given is None)
         lanes = self.road.lanes if self.road is not None else None
@@ -177,13 +177,13 @@ class Checker:
         known = () if self.requested is None else (self.requested.start, self.requested.end, self.requested.relaxed)
         counts = sorted({len(states) for states in (*known, *(() if self.ends is None else (self.ends,)))} - {n})
         if counts:
-            raise InputError(f"{where} has {n} vehicle(s), but states were asked for {counts[0]}")
+            raise InputError(f"{where} has {n} vehicle(s), but states were requested for {counts[0]}")
         indices = [i for c in self.conflicts or () for i in (c.first, c.second)] + [w.vehicle for w in self.waits or ()]
         indices += [i for edge in self.reactions for i in (edge.who, edge.whom)]
         strangers = [i for i in indices if not 0 <= i < n]
         if strangers:
             raise InputError(
-                f"{where} has {n} vehicle(s), but the template's waits, conflicts and reactions name vehicle {strangers[0]}"
+                f"{where} has {n} vehicle(s), but the recording's waits, conflicts and reactions name vehicle {strangers[0]}"
             )
 
     def _ends(self, scenario: Scenario) -> Iterator[Violation]:
@@ -196,7 +196,7 @@ class Checker:
         for i, k in np.argwhere(self.ends & ~at_ends(scenario.present, len(scenario.time))).tolist():
             what, where = ("goes", "to its end") if k else ("comes", "from its start on")
             time = float(scenario.time[scenario.present[i, k]])
-            message = f"vehicle {i}: {what} at {time:.3f} s; the template has it {where}"
+            message = f"vehicle {i}: {what} at {time:.3f} s; the recording has it {where}"
             yield Violation(Cause.BOUNDARY_STATE, time, (i,), message)
 
     def _boundary_states(self, scenario: Scenario) -> Iterator[Violation]:
@@ -217,7 +217,7 @@ class Checker:
                 far, off = far + free + limits.position_tolerance, off + faster + limits.speed_tolerance
                 if not (distance <= far + 1e-9 and difference <= off + 1e-9):  # NaN is not near
                     bounds = f" (free are {free:.3f} m and {faster:.3f} m/s)" if free or faster else ""
-                    message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from what was asked{bounds}"
+                    message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from the request{bounds}"
                     yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[scenario.present[i, k]]), (i,), message)
 
     @staticmethod
@@ -358,7 +358,7 @@ class Checker:
             a, b = sorted((recorded.first, recorded.second))
             present += conflict is not None
             swapped = first == recorded.second
-            expected = "asked is that" if swapped else "in the template"
+            expected = "requested is that" if swapped else "in the recording"
             if conflict is not None and first is not None and conflict.first != first:
                 message = (
                     f"vehicle {conflict.first} goes first ({conflict.entry_first:.2f} s, vehicle {conflict.second} "
@@ -380,7 +380,7 @@ class Checker:
                 and self._slow(scenario, i, self._limits.stand_speed) != throughout
             ):
                 k = int(np.argmax(scenario.speed[i]))
-                message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
+                message = f"vehicle {i}: waits throughout in the recording, but reaches {scenario.speed[i, k]:.3f} m/s"
                 yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
                 continue
             standing = [wait for wait in recorded if not wait.moves_slowly]
@@ -393,7 +393,7 @@ class Checker:
                 served = sum(int((length + 1e-9) / self._limits.stand_duration) for length in lengths)
                 if served < len(required):
                     message = (
-                        f"vehicle {i}: {verb} {len(required)} time(s) in the template; is below {limit:g} m/s for "
+                        f"vehicle {i}: {verb} {len(required)} time(s) in the recording; is below {limit:g} m/s for "
                         f"{', '.join(f'{length:.1f} s' for length in lengths) or 'less than two samples'}"
                     )
                     yield Violation(Cause.STOP_NOT_KEPT, required[min(served, len(required) - 1)].start, (i,), message)

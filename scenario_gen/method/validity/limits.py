@@ -19,17 +19,17 @@ class Limits(TypeLimits):
     Speed and heading are linear between samples, position is the cubic of `Scenario`.
     """
 
-    position_tolerance: float = parameter(0.1, "start and end positions are this near to what was asked", unit="m", low=0.0)
-    speed_tolerance: float = parameter(0.1, "start and end speeds are this near to what was asked", unit="m/s", low=0.0)
-    stand_speed: float = parameter(0.1, "a vehicle that stands in the template is slower than this", unit="m/s", low=0.0)
+    position_tolerance: float = parameter(0.1, "start and end positions are this near to the request", unit="m", low=0.0)
+    speed_tolerance: float = parameter(0.1, "start and end speeds are this near to the request", unit="m/s", low=0.0)
+    stand_speed: float = parameter(0.1, "a vehicle that stands in the recording is slower than this", unit="m/s", low=0.0)
     creep_speed: float = parameter(
-        0.5, "a vehicle that waits in the template, but moves slowly, is slower than this", unit="m/s", low=0.0
+        0.5, "a vehicle that waits in the recording, but moves slowly, is slower than this", unit="m/s", low=0.0
     )
     stand_duration: float = parameter(1.0, "shortest stand or creep that counts as a wait", unit="s", low=0.01)
     min_clearance: float = parameter(
         -1.0,
         "smallest gap between two footprints, by their best separating axis; a gap of 0 (touching) is an overlap; -1: half the "
-        "template's own least gap, at most 0.5 m",
+        "recording's smallest gap, at most 0.5 m",
         unit="m",
         low=-1.0,
     )
@@ -53,28 +53,28 @@ class Limits(TypeLimits):
         high=10.0,
     )
     gap_share: float = parameter(
-        0.5, "who passes second does so with the template's gap behind the other's clearing, more or less by this share", low=0.0
+        0.5, "who passes second does so with the recording's gap behind the other's clearing, more or less by this share", low=0.0
     )
     anticipation: float = parameter(
         0.5,
-        "or earlier by this, but not before that one has cleared unless it does in the template; and who stands for another one "
-        "drives off at most this long before that one has cleared, or earlier by this than in the template",
+        "or earlier by this, but not before that one has cleared unless it does in the recording; and who stands for another one "
+        "drives off at most this long before that one has cleared, or earlier by this than in the recording",
         unit="s",
         low=0.0,
     )
     patience: float = parameter(1.0, "and later by this", unit="s", low=0.0)
     headway_share: float = parameter(
-        0.5, "a follower's median time gap is at most the template's greatest, and greater by this share", low=0.0, high=10.0
+        0.5, "a follower's median time gap is at most the recording's greatest, and greater by this share", low=0.0, high=10.0
     )
     floor_share: float = parameter(
         0.8,
-        "a vehicle comes as near to one ahead of it in its lane, bumper to bumper, as this share of the least gap that it has "
-        "in the template at such a speed (2 m/s more or less)",
+        "a vehicle comes as near to one ahead of it in its lane, bumper to bumper, as this share of the smallest gap that it has "
+        "in the recording at such a speed (2 m/s more or less)",
         low=0.0,
         high=1.0,
     )
     least_headway: float = parameter(
-        0.5, "and above 3 m/s no nearer than this time gap, unless it does in the template", unit="s", low=0.0, high=5.0
+        0.5, "and above 3 m/s no nearer than this time gap, unless it does in the recording", unit="s", low=0.0, high=5.0
     )
     time_resolution: float = parameter(
         1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0

@@ -37,7 +37,7 @@ def broken_reactions(
         elif edge.gap == math.inf:
             continue  # that it stops is a wait, and that it does not go first an order
         elif conflict is None:
-            message = f"vehicle {who}: does not come behind vehicle {whom}, for which it waits in the template"
+            message = f"vehicle {who}: does not come behind vehicle {whom}, for which it waits in the recording"
             yield Violation(Cause.REACTION, 0.0, pair, message)
         else:
             yield from _enters(scenario, conflict, edge, limits)

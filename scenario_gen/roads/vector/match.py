@@ -196,7 +196,7 @@ def match(
     for track, (first, last) in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
         course = _course(chains, track, _placed(track, spot), scale, first, last)
         if course is None:
-            yield Match((), math.inf, f"no lanes lead along the way of vehicle {track.vehicle.id}, from its start to its end")
+            yield Match((), math.inf, f"no lanes lead along the path of vehicle {track.vehicle.id}, from its start to its end")
             return
         courses.append(course)
     yield judged(chains, _tied(chains.network, courses, tracks, scale, [None] * len(courses)), tracks, spot)
@@ -370,7 +370,7 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
             reason = reason or f"the lanes of vehicle {track.vehicle.id} end {short:.1f} m too soon"
         if abs(course.turn - turn_of(track)) > _TURN:
             there = in_words(course.turn)
-            reason = reason or f"vehicle {track.vehicle.id} {in_words(turn_of(track))} in the template, {there} there"
+            reason = reason or f"vehicle {track.vehicle.id} {in_words(turn_of(track))} in the recording, {there} there"
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
         miss = np.minimum(np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED)

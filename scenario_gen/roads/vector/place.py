@@ -92,7 +92,7 @@ def placements(
     if not found:
         what, why = ("road", network.notes) if network.drawn else ("map", ())
         *_, reason = min(search.failures, default=("it has no lanes of its directions",))
-        raise NoPlaceError(f"the template fits no place on {what} {network.name}: {'; '.join((recorded + reason, *why))}")
+        raise NoPlaceError(f"the recording fits no place on {what} {network.name}: {'; '.join((recorded + reason, *why))}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +260,7 @@ def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int]
         where = ", ".join(f"junction {name}" for name in names if name) or f"lane {first.id}"
         yield Place(frozen(box), where, placement.cost, paths)
     if not found:
-        raise NoPlaceError(f"the template fits no place on map {network.name}: {reason}")
+        raise NoPlaceError(f"the recording fits no place on map {network.name}: {reason}")
 
 
 def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> tuple[Floats, str]:
@@ -270,4 +270,4 @@ def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[i
         NoPlaceError: there is no place for it.
     """
     best = next(places(network, tracks, lanes))
-    return best.box, f"the best place for the template is at {best.where}: {best.part} (cost {best.cost:.1f} m²)"
+    return best.box, f"the best place for the recording is at {best.where}: {best.part} (cost {best.cost:.1f} m²)"

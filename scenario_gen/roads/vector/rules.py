@@ -96,7 +96,7 @@ class RuleCheck:
             unseen = max(_APPROACH - float(driven[at]), 0.0)  # a stop there can have been before it came
             slowest = float(speed[before].min())
             if slowest > max(_STOPPED, math.sqrt(2.0 * _PULLS_AWAY * unseen)):
-                message = f"crosses the stop line of {rule.id}; its least speed before it is {slowest:.1f} m/s"
+                message = f"crosses the stop line of {rule.id}; its minimum speed before it is {slowest:.1f} m/s"
                 yield Breach(float(scenario.time[there][at]), (n,), message)
 
     def _crossing(self, rule: TrafficRule, front: Floats, heading: Floats) -> int | None:

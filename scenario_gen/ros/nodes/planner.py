@@ -51,7 +51,7 @@ class Config(Parameters):
     limits: Limits = field(default_factory=Limits)
     seed: int = parameter(0, "seed of the planner", low=0)
     radius: float = parameter(1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0)
-    pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
+    pair_map: bool = parameter(True, "take only a map with the recording's stamp; false: any map server's newest one")
 
 
 class Planner(StageNode):
@@ -153,7 +153,7 @@ def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> F
     """Return (M, 3) x, y, yaw along the path found; the heading is that of the piece ahead.
 
     Raises:
-        RefusedError: the start or goal is blocked, there is no way, or the budget is spent.
+        RefusedError: the start or goal is blocked, there is no route, or the budget is spent.
     """
     path = plan_with_retry(make_planner(config), road, query, config.iterations, seed).path
     ahead = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))

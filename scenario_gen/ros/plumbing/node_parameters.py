@@ -37,7 +37,7 @@ class SamplerParameters(Parameters):
     """Of the sampler; beside them those of a request, `fitting.…`, `planning.…`, `sampling.…` and `limits.…`."""
 
     count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
-    seed: int = parameter(0, "seed of the samples, and of the planner where states are asked for", low=0)
+    seed: int = parameter(0, "seed of the scenarios, and of the planner where states are requested", low=0)
     generate_on_input: bool = parameter(True, "generate whenever the inputs are complete or change; false: on ~/generate only")
     patience: float = parameter(
         60.0,
@@ -45,7 +45,7 @@ class SamplerParameters(Parameters):
         unit="s",
         low=0.0,
     )
-    pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
+    pair_map: bool = parameter(True, "take only a map with the recording's stamp; false: any map server's newest one")
 
 
 @dataclass(frozen=True)

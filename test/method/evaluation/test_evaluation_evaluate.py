@@ -93,7 +93,7 @@ def test_vanished_conflicts_are_counted_for_themselves():
     assert found.value("template", "conflicts") == 1.0
     assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
     assert found.value("x", "order_kept") == 1.0  # of those that are there
-    assert any("0.5 of the template's 1 conflict(s) vanish" in note for note in found.row("x").notes)
+    assert any("0.5 of the recording's 1 conflict(s) vanish" in note for note in found.row("x").notes)
 
 
 def late(source, n, first):

@@ -220,7 +220,7 @@ def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_str
     for f in fit.fitted:
         assert f.turned[1] == pytest.approx(f.turned[0], abs=np.radians(5.0))
     assert not [loss for loss in fit.losses if loss.kind != "arm"]
-    with pytest.raises(RefusedError, match=r"vehicle 0 turns left by 80°: road straight has no way for that"):
+    with pytest.raises(RefusedError, match=r"vehicle 0 turns left by 80°: road straight has no lanes for that"):
         fit_template(encounter, every(encounter), build_road("straight", encounter))
 
 

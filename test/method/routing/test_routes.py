@@ -173,7 +173,7 @@ def test_refusals_name_vehicle_and_anchor():
         routes_of(T, ([goal, goal], [True]), ([goal, [10, 53.0, LEFT]], [False]))
     cut = T.drivable.copy()
     cut[:, 150:153] = False
-    with pytest.raises(RefusedError, match=r"between the start of vehicle car0 .* and the end .*no way"):
+    with pytest.raises(RefusedError, match=r"between the start of vehicle car0 .* and the end .*no route leads"):
         routes_of(road_of("cut", cut, 0.2), ([[51.75, 10, UP], goal], [False]))
     with pytest.raises(RefusedError, match=r"no drivable route for vehicle car0 .*curvature"):
         routes_of(T, ([[51.75, 10, UP], [51.75, 20, -UP]], [False]))  # turn round within 10 m of a lane 7 m wide

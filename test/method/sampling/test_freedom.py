@@ -120,7 +120,7 @@ def test_a_start_off_its_bounds_is_refused():
     assert len(made.scenarios) == 20
     tight = replace(states, relaxed=0.0 * states.relaxed)
     verdicts = Checker(None, tight, None, None).check(made.scenarios)
-    assert any("from what was asked" in v.message for verdict in verdicts for v in verdict.violations)
+    assert any("from the request" in v.message for verdict in verdicts for v in verdict.violations)
 
 
 @pytest.mark.parametrize(("gap", "longest"), [(np.inf, 4.96), (3.1, 4.46), (0.4, 4.05), (0.0, 3.6), (-0.3, 3.6)])

@@ -53,7 +53,7 @@ def test_nan_frees_no_state():
 
 def test_a_request_for_fewer_vehicles_is_refused():
     scenario = passing()
-    with pytest.raises(InputError, match="states were asked for 1"):
+    with pytest.raises(InputError, match="states were requested for 1"):
         causes(scenario, requested=BoundaryStates(states(scenario, 0), states(scenario, -1)[:1]))
 
 

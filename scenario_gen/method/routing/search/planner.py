@@ -24,7 +24,7 @@ class BlockedError(RefusedError):
 
 
 class NoWayError(RefusedError):
-    """Connected components prove at once that no way leads from start to goal."""
+    """Connected components prove at once that no route leads from start to goal."""
 
 
 class BudgetSpentError(RefusedError):
@@ -82,7 +82,7 @@ class Planner(Protocol):
 
         Raises:
             BlockedError: start or goal collides.
-            NoWayError: there is no way.
+            NoWayError: there is no route.
             BudgetSpentError: none was found in time.
         """
         ...
@@ -124,7 +124,7 @@ def check_query(road: Road, query: Query) -> int:
     if label is None:
         (x0, y0), (x1, y1) = query.start, query.goal
         raise NoWayError(
-            f"no way leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r} "
+            f"no route leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r} "
             f"for a disc of radius {query.radius:.2f} m"
         )
     return label

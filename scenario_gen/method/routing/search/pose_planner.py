@@ -46,7 +46,7 @@ class PoseSearchConfig(Parameters):
     stride: float = parameter(15.0, "longest new edge from then on", unit="m", low=0.5, high=100.0)
     zeta: float = parameter(15.0, "largest near radius, zeta of eq 10", unit="m", low=0.5, high=100.0)
     gamma_factor: float = parameter(
-        1.1, "gamma of eq 10 as a multiple of the least that is asymptotically optimal", low=1.0, high=10.0
+        1.1, "gamma of eq 10 as a multiple of the minimum that is asymptotically optimal", low=1.0, high=10.0
     )
     about: float = parameter(0.7, "share of samples about a path that is known, a disc's or the best so far", low=0.0, high=0.95)
     spread: float = parameter(1.0, "how far from it", unit="m", low=0.05, high=20.0)
@@ -140,7 +140,7 @@ class PlansPoses(Protocol):
 
         Raises:
             BlockedError: the footprint has no room at start or goal.
-            NoWayError: there is no way.
+            NoWayError: there is no route.
             BudgetSpentError: none was found within the budget.
         """
         ...
@@ -231,8 +231,8 @@ class PoseRrtStarConnect:
                     continue
                 (x0, y0), (x1, y1) = disc.start, disc.goal
                 raise NoWayError(
-                    f"no way leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r}: it is too narrow "
-                    f"for a width of {query.width:.2f} m"
+                    f"no route leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r}: it is too "
+                    f"narrow for a width of {query.width:.2f} m"
                 ) from None
             except BudgetSpentError:
                 if radius > last:

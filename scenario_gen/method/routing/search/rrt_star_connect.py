@@ -33,7 +33,7 @@ class RrtStarConnectConfig(Parameters):
         120.0, "largest near radius, zeta of eq 10; it decides quality (the paper's preset: 30)", unit="cells", low=0.1, high=1e6
     )
     gamma_factor: float = parameter(
-        1.1, "gamma of eq 10 as a multiple of the least that is asymptotically optimal", low=1.0, high=10.0
+        1.1, "gamma of eq 10 as a multiple of the minimum that is asymptotically optimal", low=1.0, high=10.0
     )
     greedy: bool = parameter(True, "extend as far as possible until the first path is found (the paper: one step)")
     skip: bool = parameter(True, "let new edges skip visible ancestors, as Quick-RRT* does (the paper: no)")
