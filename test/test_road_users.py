@@ -144,8 +144,8 @@ def test_a_bus_of_12_m_drives_its_own_curves(road):
     (encounter,) = read_log(WORLDS["a bus turns"][0]).encounters
     made = generate(encounter, road, count=3, seed=1)
     (bus,) = (n for n, vehicle in enumerate(made.encounter.vehicles) if vehicle.type == "bus")
-    drive = ClosedLoop(made.generated.scenarios[0], bus).config
-    assert (drive.ego_curvature, drive.ego_acceleration) == (0.125, 3.0)  # a bus as ego turns and speeds up like one
+    drive = ClosedLoop(made.generated.scenarios[0], bus).limits
+    assert (drive.max_curvature, drive.max_acceleration) == (0.125, 3.0)  # a bus as ego turns and speeds up like one
     bend = np.abs(np.diff(made.routes[bus].points[:, 2]) / np.diff(made.routes[bus].length))
     assert bend.max() <= VEHICLE_TYPES["bus"].dynamics.planned.max_curvature and all(map(proven, made.generated.scenarios))
 
