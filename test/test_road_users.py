@@ -133,13 +133,31 @@ def test_the_terminal_calls_road_users_by_their_types():
     assert "2 road users (car, pedestrian)" in text and "vehicle c waits for pedestrian p" in text
 
 
+def test_pedestrians_stop_and_go_within_a_step_and_walk_as_people_do():
+    """One waits at the kerb for a car; waits differ, speeds stay about the recorded 1.4 m/s, and nobody creeps to its place."""
+    begin, end, braking, step = 4.0, 8.0, 3.0, 0.8
+    speeds = np.clip(np.where(begin > T, braking * (begin - T), braking * (T - end)), 0.0, 1.4)
+    walks = driven(straight((0.0, -7.5), (0.0, 40.0)), speeds)
+    table = log_of(c=("car", driven(straight((-40.0, 0.0), (120.0, 0.0)), np.full(len(T), 8.0))), p=("pedestrian", walks))
+    made = generate(read_log(table).encounters[0], "corridor", count=60, seed=1).generated.scenarios
+    walker = [vehicle.id for vehicle in made[0].vehicles].index("p")
+    speed = [scenario.speed[walker] for scenario in made]
+    waits = np.array([0.1 * np.count_nonzero(one < 0.05) for one in speed])
+    assert 3.0 < waits.mean() < 4.5 and waits.std() > 0.6 and waits.min() > 1.5
+    starts = [0.1 * one[(one > 0.05) & (one < 1.0)].sum() for one in speed]  # metres, of stopping and starting together
+    assert max(starts) < 2.0 * step
+    steady = np.concatenate([one[one > 1.0] for one in speed])
+    assert (np.percentile(steady, [1, 99]) < 2.0).all() and 1.2 < steady.mean() < 1.5 and steady.std() > 0.1
+    assert np.mean([np.percentile(one[one > 0.05], 20) > 0.5 for one in speed]) > 0.9
+
+
 @pytest.mark.parametrize("road", ["four_way", "t_intersection", "roundabout"])
 def test_a_bus_of_12_m_drives_its_own_curves(road):
     (encounter,) = read_log(WORLDS["a bus turns"][0]).encounters
     made = generate(encounter, road, count=3, seed=1)
     (bus,) = (n for n, vehicle in enumerate(made.encounter.vehicles) if vehicle.type == "bus")
-    drive = ClosedLoop(made.generated.scenarios[0], bus).config
-    assert (drive.ego_curvature, drive.ego_acceleration) == (0.125, 3.0)  # a bus as ego turns and speeds up like one
+    drive = ClosedLoop(made.generated.scenarios[0], bus).limits
+    assert (drive.max_curvature, drive.max_acceleration) == (0.125, 3.0)  # a bus as ego turns and speeds up like one
     bend = np.abs(np.diff(made.routes[bus].points[:, 2]) / np.diff(made.routes[bus].length))
     assert bend.max() <= VEHICLE_TYPES["bus"].dynamics.planned.max_curvature and all(map(proven, made.generated.scenarios))
 

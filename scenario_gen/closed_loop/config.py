@@ -3,9 +3,12 @@
 
 """The parameters of a drive in closed loop."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.types import TypeLimits
 
 REPLAY, REACTIVE, COMMITTED = "replay", "reactive", "committed"
 FORESIGHT = {REACTIVE: 5.0, COMMITTED: 0.5}
@@ -16,6 +19,13 @@ TEMPLATE, NEVER = "template", "never"
 @dataclass(frozen=True)
 class ClosedLoopConfig(Parameters):
     """How the others drive, what the ego's body can do, when a drive ends, and what the verdict counts."""
+
+    replaced: ClassVar[Mapping[str, str]] = {
+        "ego_acceleration": "limits.<type of the ego>.max_acceleration",
+        "ego_braking": "limits.<type of the ego>.max_deceleration",
+        "ego_speed": "limits.<type of the ego>.max_speed",
+        "ego_curvature": "limits.<type of the ego>.max_curvature",
+    }
 
     step: float = parameter(0.1, "time between two decisions", unit="s", low=0.005, high=0.5)
     policy: str = parameter(
@@ -44,10 +54,7 @@ class ClosedLoopConfig(Parameters):
     patience: float = parameter(
         5.0, "time after which a vehicle that waits for an ego that hardly moves goes first", unit="s", low=0.0, high=1e6
     )
-    ego_acceleration: float = parameter(4.0, "the ego's strongest speeding up", unit="m/s²", low=0.1, high=20.0)
-    ego_braking: float = parameter(9.0, "the ego's strongest braking", unit="m/s²", low=0.1, high=20.0)
-    ego_speed: float = parameter(45.0, "the ego's highest speed", unit="m/s", low=0.1, high=100.0)
-    ego_curvature: float = parameter(0.2, "the ego's sharpest turn", unit="1/m", low=0.001, high=2.0)
+    limits: TypeLimits = field(default_factory=TypeLimits)
     ego_curvature_rate: float = parameter(
         0.3, "how fast the ego's curvature changes: the rate of its steering", unit="1/(m s)", low=0.001, high=20.0
     )

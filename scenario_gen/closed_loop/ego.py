@@ -7,7 +7,7 @@ Its reference point is the centre of the footprint, and its velocity points alon
 what was certified can be driven by it. The curvature of its way stands for the angle of its front wheels, κ = tan(δ) / wheelbase.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.numerics.plane import angle_between
-from scenario_gen.types import Vehicle
+from scenario_gen.types import Dynamics
 
 
 class EgoState(NamedTuple):
@@ -66,19 +66,7 @@ def misplaced(fault: str) -> bool:
     return fault.startswith((JUMPED, NO_PLACE))
 
 
-def as_able_as(config: ClosedLoopConfig, vehicle: Vehicle) -> ClosedLoopConfig:
-    """Return the parameters with a body that can do no more than the ego's type."""
-    own = vehicle.kind.dynamics
-    return replace(
-        config,
-        ego_acceleration=min(config.ego_acceleration, own.max_acceleration),
-        ego_braking=min(config.ego_braking, own.max_deceleration),
-        ego_speed=min(config.ego_speed, own.max_speed),
-        ego_curvature=min(config.ego_curvature, own.sharpest),
-    )
-
-
-def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig) -> Moved:
+def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig, limits: Dynamics) -> Moved:
     """Return the ego one step later.
 
     A command is cut to the body's limits. Nothing asked, or something that is not finite, is a fault: the ego then brakes at its
@@ -95,37 +83,37 @@ def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig) 
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"a planner's `act` returned a {type(asked).__name__} that is not of numbers: {error}") from error
     if isinstance(asked, Pose):
-        return _placed(ego, asked, config)
+        return _placed(ego, asked, config.step, limits)
     fault = ""
     if asked is None or not finite:
         fault = "no command" if asked is None else "command is not finite"
-        asked = Command(-config.ego_braking, ego.curvature)
-    return Moved(_driven(ego, asked, config), fault)
+        asked = Command(-limits.max_deceleration, ego.curvature)
+    return Moved(_driven(ego, asked, config, limits), fault)
 
 
-def _placed(ego: EgoState, pose: Pose, config: ClosedLoopConfig) -> Moved:
+def _placed(ego: EgoState, pose: Pose, step: float, limits: Dynamics) -> Moved:
     largest = np.abs(pose).max()
     if not largest <= FARTHEST:
         fault = f"{NO_PLACE} {'out of range' if np.isfinite(largest) else 'not finite'}"
-        return Moved(EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / config.step), fault)
+        return Moved(EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / step), fault)
     way = np.hypot(pose.x - ego.x, pose.y - ego.y)
-    far = way > config.ego_speed * config.step + JUMP
+    far = way > limits.max_speed * step + JUMP
     turn = angle_between(pose.yaw, ego.yaw)  # the yaw stays continuous
     curvature = 0.0 if far or way < 0.01 else turn / way
-    acceleration = (pose.speed - ego.speed) / config.step
+    acceleration = (pose.speed - ego.speed) / step
     state = EgoState(pose.x, pose.y, ego.yaw + turn, max(pose.speed, 0.0), float(curvature), acceleration)
     return Moved(state, f"{JUMPED} {way:.1f} m" if far else "")
 
 
-def _driven(ego: EgoState, asked: Command, config: ClosedLoopConfig) -> EgoState:
+def _driven(ego: EgoState, asked: Command, config: ClosedLoopConfig, limits: Dynamics) -> EgoState:
     """Return the ego one step later; its way is an arc, along which its speed changes evenly until it stands.
 
     Source: kinematic bicycle, e.g. Rajamani 2012, section 2.2, with the reference point where there is no slip.
     """
     step, speed, change = config.step, ego.speed, config.ego_curvature_rate * config.step
-    a = min(max(float(asked.acceleration), -config.ego_braking), config.ego_acceleration, (config.ego_speed - speed) / step)
+    a = min(max(float(asked.acceleration), -limits.max_deceleration), limits.max_acceleration, (limits.max_speed - speed) / step)
     k = min(max(float(asked.curvature), ego.curvature - change), ego.curvature + change)
-    k = min(max(k, -config.ego_curvature), config.ego_curvature)
+    k = min(max(k, -limits.sharpest), limits.sharpest)
     end = speed + a * step
     way = 0.5 * (speed + end) * step
     if end < 0.0:  # it stands before the step is over

@@ -33,6 +33,7 @@ from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, angle_between, unit
+from scenario_gen.types import ON_THE_SPOT
 
 OTHERS = 8  # nearest others that are seen
 AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route at which it is seen
@@ -84,7 +85,7 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         if not self.trials:
             raise InputError("there is no scenario to drive in")
         self.config = config
-        self.observation_space = observation_space(config)
+        self.observation_space = observation_space()
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
         self._loops: dict[int, ClosedLoop] = {}
 
@@ -104,6 +105,7 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         if index not in self._loops:
             self._loops[index] = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config)
         self._loop = self._loops[index]
+        self.sharpest = min(self._loop.limits.sharpest, ON_THE_SPOT)  # 1/m, of the wheel's ends
         self._follower = RouteFollower()
         self._follower.reset(self._loop.task())
         self._states: list[State] = [self._loop.start()]
@@ -122,10 +124,10 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         if not np.isfinite(action).all():
             raise InputError(f"action {np.asarray(action).tolist()}: both numbers must be finite, from -1 to 1")
         pedal, wheel = (min(max(float(value), -1.0), 1.0) for value in action)
-        config, loop = self.config, self._loop
-        acceleration = pedal * (config.ego_acceleration if pedal > 0.0 else config.ego_braking)
+        config, loop, limits = self.config, self._loop, self._loop.limits
+        acceleration = pedal * (limits.max_acceleration if pedal > 0.0 else limits.max_deceleration)
         before = self._station
-        self._states.append(loop.step(self._states[-1], Command(acceleration, wheel * config.ego_curvature)))
+        self._states.append(loop.step(self._states[-1], Command(acceleration, wheel * self.sharpest)))
         state = self._states[-1]
         seen, reward = self._observed(), self._station - before
         info: dict[str, Any] = {"time": state.time}
@@ -176,9 +178,9 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         return within
 
 
-def observation_space(config: ClosedLoopConfig) -> Box:
+def observation_space() -> Box:
     """Return the space of what is seen, with finite bounds."""
-    own = np.array((FASTEST, config.ego_curvature, REACH, np.pi, FARTHEST))
+    own = np.array((FASTEST, ON_THE_SPOT, REACH, np.pi, FARTHEST))
     each = np.array((1.0, REACH, REACH, 1.0, 1.0, FASTEST, LONGEST))
     high = np.concatenate([own, np.full(2 * len(AHEAD), REACH), np.tile(each, OTHERS)])
     low = -high

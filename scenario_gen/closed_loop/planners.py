@@ -79,7 +79,7 @@ class IdmFollower(RouteFollower):
         closing = ego.speed * (ego.speed - ahead) / (2.0 * math.sqrt(self.acceleration * BRAKING))
         share = (self.standstill + max(0.0, ego.speed * self.headway + closing)) / max(gap, 0.1)
         acceleration = free_acceleration(ego.speed, wanted, self.acceleration) - self.acceleration * share * share
-        return Command(max(acceleration, -self.task.config.ego_braking), curvature)
+        return Command(max(acceleration, -self.task.limits.max_deceleration), curvature)
 
     def _nearest(self, seen: Observation, station: float) -> tuple[float, float]:
         """Return gap [m] and speed along the route [m/s] of who is, or comes, next on the route; infinity and 0 if nobody does.

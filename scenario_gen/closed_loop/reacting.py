@@ -90,7 +90,7 @@ class Testing:
         targets = join_pieces(filter(None, [f"baseline_margin[{ego}]=..0", self.request.target]))
 
         def accepts(road: Road, whole: Scenario) -> bool:
-            return needs_reaction(ClosedLoop(whole, ego, road))
+            return needs_reaction(ClosedLoop(whole, ego, road, ClosedLoopConfig(limits=self.config.limits)))
 
         return generate(
             self.encounter, self.road, updated(self.config, {"sampling.ego": "free"}), count=count, seed=self.seed,

@@ -19,10 +19,10 @@ from scenario_gen.closed_loop.advance import advance, ego_hits
 from scenario_gen.closed_loop.certified import world_of
 from scenario_gen.closed_loop.config import ClosedLoopConfig, FORESIGHT, REPLAY, TEMPLATE
 from scenario_gen.closed_loop.driver import Manner
-from scenario_gen.closed_loop.ego import as_able_as, Command, EgoState, misplaced, move, Pose
+from scenario_gen.closed_loop.ego import Command, EgoState, misplaced, move, Pose
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
-from scenario_gen.types import Road, Scenario, Vehicle
+from scenario_gen.types import Dynamics, Road, Scenario, Vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +71,9 @@ class Task:
         route: (M, 3) x, y [m], yaw [rad] of a way from start to goal that can be driven: the witness' path, without its speeds.
         road: what is drivable, if it is known.
         step: time between two decisions [s].
-        config: the body's limits among the rest.
+        config: the parameters of the drive.
         speed: the witness' highest speed [m/s].
+        limits: what the body can do.
     """
 
     vehicle: Vehicle
@@ -83,6 +84,7 @@ class Task:
     step: float
     config: ClosedLoopConfig
     speed: float
+    limits: Dynamics
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +186,7 @@ class ClosedLoop:
         self.scenario, self.road = scenario, road
         self.world = world_of(scenario, ego, config.step)
         self.ego = self.world.ego
-        self.config = as_able_as(config, scenario.vehicles[self.ego])
+        self.config, self.limits = config, config.limits.of(scenario.vehicles[self.ego].type)
         reactive = config.policy != REPLAY
         self.reactions = np.array(
             [
@@ -197,7 +199,7 @@ class ClosedLoop:
             config.standstill_gap,
             config.acceleration,
             config.comfortable_braking,
-            np.array([min(config.strongest_braking, vehicle.kind.dynamics.max_deceleration) for vehicle in scenario.vehicles]),
+            np.array([min(config.strongest_braking, config.limits.of(one.type).max_deceleration) for one in scenario.vehicles]),
             config.jerk,
             config.patience,
             FORESIGHT.get(config.policy, 0.0),
@@ -219,7 +221,7 @@ class ClosedLoop:
         own = self.world.motion[self.ego]
         route = own[np.concatenate([[True], edge_lengths(own[:, :2]) > 1e-3]), :3]
         vehicle, config = self.scenario.vehicles[self.ego], self.config
-        return Task(vehicle, own[0, :4], own[-1, :4], route, self.road, config.step, config, float(own[:, 3].max()))
+        return Task(vehicle, own[0, :4], own[-1, :4], route, self.road, config.step, config, float(own[:, 3].max()), self.limits)
 
     def start(self) -> State:
         """Return the first instant: where everyone is when the ego's witness comes onto the scene."""
@@ -235,7 +237,7 @@ class ClosedLoop:
     def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
         """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
         config = self.config
-        moved = move(state.ego, asked, config)
+        moved = move(state.ego, asked, config, self.limits)
         ego, n = moved.state, len(self._ids)
         number = state.step + 1
         time = number * config.step

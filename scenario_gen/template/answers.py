@@ -14,7 +14,7 @@ from scipy.spatial import distance
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.template.interaction import Conflict, find_conflicts, WAIT_SPEED
+from scenario_gen.template.interaction import Conflict, find_conflicts
 from scenario_gen.template.tracks import Track
 from scenario_gen.types import once_per_object, together, Vehicle
 
@@ -85,23 +85,23 @@ def meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
 def departure(motion: Motion, who: int, entry: float) -> float:
     """Return when [s] a vehicle leaves before it enters somewhere at `entry` [s].
 
-    That is when its speed rises above 0.5 m/s and stays there, or, if it never is so slow, when it is slowest. A vehicle that is
-    faster throughout and slowest at once is one that nothing is seen of: it left when it came. Who stands at the very place, or
-    in it, leaves when that stand ends.
+    That is when its speed rises above 0.5 m/s (on foot 0.2 m/s) and stays there, or, if it never is so slow, when it is slowest.
+    A vehicle that is faster throughout and slowest at once is one that nothing is seen of: it left when it came. Who stands at
+    the very place, or in it, leaves when that stand ends.
     """
-    first = int(motion.present[who, 0])
+    first, least = int(motion.present[who, 0]), motion.vehicles[who].kind.waits_below
     last = max(int(np.searchsorted(motion.time, entry + 1e-9)), first + 1)
     later = motion.speed[who, last : int(motion.present[who, 1]) + 1]
-    if motion.speed[who, last - 1] < WAIT_SPEED and len(later):  # it stands where the area begins
-        last += int(np.argmax(later >= WAIT_SPEED)) + 1 if (later >= WAIT_SPEED).any() else len(later)
+    if motion.speed[who, last - 1] < least and len(later):  # it stands where the area begins
+        last += int(np.argmax(later >= least)) + 1 if (later >= least).any() else len(later)
     speed, time = motion.speed[who, first:last], motion.time[first:last]
-    slow = np.flatnonzero(speed < WAIT_SPEED)
+    slow = np.flatnonzero(speed < least)
     if len(slow) == 0:
         return float(time[int(np.argmin(speed))])
     k = int(slow[-1])
     if k + 1 == len(speed):
         return float(time[k])
-    share = (WAIT_SPEED - speed[k]) / (speed[k + 1] - speed[k])
+    share = (least - speed[k]) / (speed[k + 1] - speed[k])
     return float(time[k] + share * (time[k + 1] - time[k]))
 
 

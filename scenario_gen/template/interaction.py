@@ -3,7 +3,8 @@
 
 """What drivers do to each other: waits, conflicts, and who goes first.
 
-A *wait* is a smoothed speed below 0.5 m/s for at least 1 s. A *conflict* is where the swept footprints of two vehicles'
+A *wait* is a smoothed speed below 0.5 m/s (on foot 0.2 m/s) for at least 1 s.
+A *conflict* is where the swept footprints of two vehicles'
 paths intersect; its order is that of first entry into the shared area, in following the order along the route.
 
 The shared area of vehicles a and b is the intersection of their swept footprints. A footprint of a lies in a's own sweep,
@@ -21,9 +22,9 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, Ints, runs
 from scenario_gen.numerics.boxes import Box, box_gap
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
-from scenario_gen.types import ALWAYS, Encounter, once_per_object, Segmentation, Vehicle
+from scenario_gen.types import ALWAYS, CAR, Encounter, once_per_object, Segmentation, Vehicle, VEHICLE_TYPES
 
-WAIT_SPEED = 0.5  # m/s
+WAIT_SPEED = VEHICLE_TYPES.built_in[CAR].waits_below  # m/s
 WAIT_DURATION = 1.0  # s
 WAIT_SMOOTHING = 0.5  # s, width of the centred moving mean
 STAND_SPEED = 0.1  # m/s; a wait in which the vehicle is never so slow for `WAIT_DURATION` is a creeping one
@@ -43,7 +44,7 @@ FOLLOWING_LENGTHS = 3.0  # a shared path longer than this many vehicle lengths i
 
 @dataclass(frozen=True)
 class Wait:
-    """Vehicle `vehicle` waits from `start` to `end` [s]: smoothed speed below 0.5 m/s for at least 1 s.
+    """Vehicle `vehicle` waits from `start` to `end` [s]: smoothed speed below that at which its type waits for at least 1 s.
 
     It `moves_slowly` if it does not stand (at most 0.1 m/s) for 1 s of that.
     """
@@ -97,7 +98,7 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     return tuple(
         Wait(vehicle, float(time[a]), float(time[b - 1]), _moves_slowly(encounter.speed[vehicle, a:b], time[a:b]))
         for vehicle, (speed, there) in enumerate(zip(smooth, encounter.there, strict=True))
-        for a, b in runs((speed < WAIT_SPEED) & there)
+        for a, b in runs((speed < encounter.vehicles[vehicle].kind.waits_below) & there)
         if time[b - 1] - time[a] >= WAIT_DURATION - 1e-9
     )
 

@@ -21,7 +21,7 @@ from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left, angle_between
 from scenario_gen.template.answers import ALIKE, bumper_gaps, conflicts_in, is_behind, LANE, passing, SLOWEST
-from scenario_gen.template.interaction import Conflict, find_waits, WAIT_SPEED
+from scenario_gen.template.interaction import Conflict, find_waits
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, ReactionGraph, YIELD
 
@@ -89,7 +89,8 @@ def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
     """Say why nobody is seen to react."""
     nearest = min(seen, key=lambda found: found.apart, default=None)
     if nearest is None or nearest.apart == math.inf:
-        stand = [vehicle.label for n, vehicle in enumerate(encounter.vehicles) if np.all(encounter.speed[n] < WAIT_SPEED)]
+        pairs = zip(encounter.vehicles, encounter.speed, strict=True)
+        stand = [vehicle.label for vehicle, speed in pairs if np.all(speed < vehicle.kind.waits_below)]
         standing = f"; {' and '.join(stand)} stands throughout" if stand else ""
         return f"none drives behind another one in its lane, or crosses its way{standing}"
     who, whom = (encounter.vehicles[n].label for n in (nearest.who, nearest.whom))
@@ -177,7 +178,7 @@ def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, gaps: Flo
     dt, time = encounter.dt, encounter.time
     rows = np.flatnonzero(behind)
     own, other = _smoothed(encounter.speed[who], dt), _smoothed(encounter.speed[whom], dt)
-    if len(rows) * dt < LONG_ENOUGH or own[rows].max() < WAIT_SPEED:
+    if len(rows) * dt < LONG_ENOUGH or own[rows].max() < encounter.vehicles[who].kind.waits_below:
         return None
     seconds = np.sort(gaps[rows] / np.maximum(own[rows], _STANDS_AS))
     apart = float(seconds[round(_KEPT_FOR / dt)])

@@ -64,6 +64,9 @@ class VehicleType:
         openscenario: its VehicleCategory, or "pedestrian".
         osi: its name in MovingObject.VehicleClassification.Type, or "PEDESTRIAN".
         scenarionet: its type in MetaDrive's and ScenarioNet's descriptions.
+        waits_below: speed [m/s] below which it waits.
+        speed_noise: differences of speed [m/s] that say nothing of what it is about; on foot those of a step.
+        varies: share of the spread of a car's end speeds, and places at a time, with which scenarios are drawn.
     """
 
     length: float
@@ -76,6 +79,14 @@ class VehicleType:
     openscenario: str = "car"
     osi: str = "OTHER"
     scenarionet: str = "VEHICLE"
+    waits_below: float = 0.5
+    speed_noise: float = 0.1
+    varies: float = 1.0
+
+    @property
+    def least_course(self) -> float:
+        """Speed [m/s] above which positions say where it is going."""
+        return 2.0 * self.waits_below
 
     @property
     def walks(self) -> bool:
@@ -113,7 +124,7 @@ VEHICLE_TYPES = Registry[VehicleType](
         "pedestrian": VehicleType(
             0.5, 0.5, 1.7, Dynamics(5.0, 4.0, 5.0, 4.0, 0.0),
             ("ped", "pedtype", "person", "people", "human", "walker", "adult", "child", "wheelchair", "stroller", "skater"),
-            7, "pedestrian", "pedestrian", "PEDESTRIAN", "PEDESTRIAN",
+            7, "pedestrian", "pedestrian", "PEDESTRIAN", "PEDESTRIAN", 0.2, 0.15, 0.3,
         ),
         OTHER: VehicleType(4.8, 1.9, 1.5, Dynamics()),
     },

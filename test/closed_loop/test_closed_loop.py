@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 
 from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.parameters import assigned
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.template.answers import conflict_of
+from scenario_gen.types import Dynamics
 
 EXAMPLES = 10_000 if LONG else 25
 FAR = Pose(1e4, 1e4, 0.0, 0.0)
@@ -99,16 +102,16 @@ def test_others_keep_their_order_behind_one_who_waits_for_the_ego():
 
 
 def test_the_body_keeps_to_its_limits_and_drives_arcs():
-    config = ClosedLoopConfig(ego_curvature_rate=20.0)
+    config, limits = ClosedLoopConfig(ego_curvature_rate=20.0), Dynamics()
     state, turn = EgoState(0.0, 0.0, 0.0, 5.0, 0.1), 0.1
     for _ in range(200):
-        state = move(state, Command(0.0, turn), config).state
+        state = move(state, Command(0.0, turn), config, limits).state
     centre = np.hypot(state.x, state.y - 10.0)
     assert centre == pytest.approx(10.0, abs=1e-9) and state.yaw == pytest.approx(5.0 * 20.0 * 0.1)
-    fast = move(state, Command(100.0, 9.0), config).state
-    assert fast.acceleration == pytest.approx(config.ego_acceleration) and fast.curvature == config.ego_curvature
+    fast = move(state, Command(100.0, 9.0), config, limits).state
+    assert fast.acceleration == pytest.approx(limits.max_acceleration) and fast.curvature == limits.max_curvature
     state = EgoState(0.0, 0.0, 0.0, 0.45)
-    stopped = move(state, Command(-9.0, 0.0), config).state
+    stopped = move(state, Command(-9.0, 0.0), config, limits).state
     assert stopped.speed == 0.0 and stopped.x == pytest.approx(0.45**2 / 18.0)
 
 
@@ -122,7 +125,7 @@ def test_the_body_keeps_to_its_limits_and_drives_arcs():
     ],
 )
 def test_what_is_wrong_with_a_command_is_said(asked, said):
-    moved = move(EgoState(0.0, 0.0, 0.0, 5.0), asked, ClosedLoopConfig())
+    moved = move(EgoState(0.0, 0.0, 0.0, 5.0), asked, ClosedLoopConfig(), Dynamics())
     assert said in moved.fault and np.isfinite(moved.state).all()
 
 
@@ -159,3 +162,13 @@ class Late(Witness):
 
     def act(self, seen):
         return super().act(replace(seen, time=seen.time + self.begin))
+
+
+def test_limits_of_its_type_bind_the_ego_and_their_former_names_are_refused():
+    config = assigned(ClosedLoopConfig(), "limits.car.max_acceleration=1.2")
+    loop = ClosedLoop(crossing(), 0, config=config)
+    state = loop.step(loop.start(), Command(9.0, 0.0))
+    assert state.ego.acceleration == pytest.approx(1.2) and loop.task().limits.max_acceleration == 1.2
+    for name in ("acceleration", "braking", "speed", "curvature"):
+        with pytest.raises(InputError, match=rf"ego_{name} is no longer there; set limits\.<type of the ego>\.max_"):
+            assigned(ClosedLoopConfig(), f"ego_{name}=1")

@@ -189,3 +189,13 @@ def test_who_is_there_only_for_a_time_enters_then():
 def test_a_vehicle_waits_only_while_it_is_there():
     (wait,) = find_waits(replace(speeds(5.0, 0.2), present=np.array([[0, 100], [30, 80]])))
     assert (wait.vehicle, wait.start, wait.end) == (1, 3.0, 8.0)
+
+
+def test_who_walks_slowly_does_not_wait():
+    """A pedestrian at 0.35 m/s walks, one that stands for 2 s waits; a car at that speed waits."""
+    speed = np.full((2, 101), 0.35)
+    speed[1, 40:61] = 0.05
+    on_foot = replace(encounter(speed), vehicles=tuple(Vehicle(name, 0.5, 0.5, "pedestrian") for name in "ab"))
+    (found,) = find_waits(on_foot)
+    assert found.vehicle == 1 and found.end - found.start == pytest.approx(2.0, abs=0.4)
+    assert [wait.end - wait.start for wait in find_waits(encounter(speed))] == pytest.approx([10.0, 10.0])

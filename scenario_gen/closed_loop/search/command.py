@@ -108,7 +108,7 @@ class SearchRequest:
         Raises:
             InputError: a name is unknown, or a value does not suit.
         """
-        return reduce(assigned, self.assignments, ClosedLoopConfig())
+        return reduce(assigned, self.assignments, ClosedLoopConfig(limits=self.limits))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.types import OF_CARS
+from scenario_gen.types import OF_CARS, VehicleType
 
 POPULATION = {"arrival_sigma": 2.0, "pace_sigma": 0.2, "wait_sigma": 2.0, "end_speed_sigma": 1.0}
 """Standard deviations of `population`, at least: as wide as encounters differ; which scenarios remain, the population decides."""
@@ -87,6 +87,11 @@ class SamplingConfig(Parameters):
     def drawn(self) -> "SamplingConfig":
         """The parameters that candidates are drawn with: for `population` those of a `wide` that is wider."""
         return replace(self, variety="wide").at_least(POPULATION) if self.variety == "population" else self
+
+    def of(self, kind: VehicleType) -> "SamplingConfig":
+        """Return the parameters for one of a type, whose speeds and places vary less than a car's if it is slow."""
+        share = kind.varies
+        return replace(self, end_speed_sigma=share * self.end_speed_sigma, longitudinal_sigma=share * self.longitudinal_sigma)
 
     def at_least(self, least: Mapping[str, float]) -> "SamplingConfig":
         """Return the parameters with those named at least so large."""

@@ -72,7 +72,7 @@ def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: Samp
             if own[end][n]:
                 continue
             top, there = max(float(near.max()), float(state[3])), float(state[3])
-            faster = config.freedom * config.end_speed_sigma
+            faster = config.freedom * config.of(encounter.vehicles[n].kind).end_speed_sigma
             along = 0.0 if tied[end] else slowest * seconds * (top + faster)
             off = 0.0 if tied[end] else max(slowest * top - there, there - float(near.min()))
             relaxed[n, end] = along + across, off + faster + _FASTEST

@@ -125,6 +125,7 @@ def _freedom(
     config: SamplingConfig,
 ) -> Freedom:
     """What preset `wide` relaxes for a vehicle that came so near [m] to others in the template, and `answers` one or not."""
+    config = config.of(routed.vehicle.kind)
     fastest = routed.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * routed.limits.max_acceleration * FADES
     ahead = road_ahead(routed.path, routed.vehicle, ground_for(road, routed.vehicle), MOST_ONWARD * fastest)
     clock = OwnClock.of(nominal, routed.rests, (bool(tied[0]), bool(tied[1])), config)
@@ -173,5 +174,6 @@ def _model(
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
         sentences.append(f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow")
     length = min(config.longitudinal_time, _TIME_SHARE * float(routed.times[-1] - routed.times[0]))
-    speed = speed_model(spline, mean, motion, bounds, routed.time, routed.speed, config.longitudinal_sigma, length)
+    sigma = config.of(routed.vehicle.kind).longitudinal_sigma
+    speed = speed_model(spline, mean, motion, bounds, routed.time, routed.speed, sigma, length)
     return VehicleModel(routed.vehicle, path, lateral_covariance_root(path, room, config, routed.steering), room, speed)

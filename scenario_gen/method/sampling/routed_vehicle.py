@@ -19,11 +19,11 @@ from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
 from scenario_gen.method.sampling.speed_profile.stops import lengthened, SHORTEST_WAIT, standing_within
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Floats
-from scenario_gen.template import clean_tracks, Track, Wait, WAIT_SPEED
+from scenario_gen.template import clean_tracks, Track, Wait
 from scenario_gen.types import Dynamics, Encounter, Vehicle
 
 _MOST_SCALE = 4.0  # largest factor on the template's speeds; a longer route only has the mean speed raised
-_SLOW_WAIT = 0.9 * WAIT_SPEED  # m/s, fastest while a wait is kept by moving slowly
+_SLOW_WAIT = 0.9  # of the speed below which its type waits: fastest while a wait is kept by moving slowly
 _RAMP = 1.5  # m/s², acceleration from the template's speed to a requested end speed
 _CURVE_REACH = 2.0  # m, to either side of a position, over which the sharpest curvature counts
 _CURVE_MARGIN = 0.85  # share of the lateral limit that the mean may use; the rest is for deviations
@@ -99,10 +99,10 @@ class RoutedVehicle:
         spline, rate = self.spline, clock.at(self.spline.stations)[1:]
         motion, target = Motion.of(spline, *rate), self.target(clock)
         at, pace = spline.middle, clock.at(spline.middle)[1]
-        top = self.limits.max_speed * pace
+        top, slow = self.limits.max_speed * pace, _SLOW_WAIT * self.vehicle.kind.waits_below
         for a, b in self.knots.stretches(self.knots.creeping):
             margin = float(spline.breaks[1] - spline.breaks[0])
-            top = np.where((at > a - margin) & (at < b + margin), np.minimum(top, _SLOW_WAIT * pace), top)
+            top = np.where((at > a - margin) & (at < b + margin), np.minimum(top, slow * pace), top)
         most, limit = top, ""
         for _ in range(_BOUND_ROUNDS):
             bounds = Bounds(most, self.limits.max_acceleration, self.limits.max_deceleration, self.jerk)

@@ -8,32 +8,31 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import Tracks
+from scenario_gen.types import Tracks, VehicleType
 
-STANDING = 0.5
 STEADY = 0.25
 TURNING = np.deg2rad(15.0)
 LEANING = 0.5
 
 
-def describe_motion(speed: Floats, heading: Floats, dt: float) -> str:
-    """Describe speed [m/s] and heading [rad], both (n,), of one vehicle in one primitive."""
-    n = len(speed)
+def describe_motion(speed: Floats, heading: Floats, dt: float, kind: VehicleType) -> str:
+    """Describe speed [m/s] and heading [rad], both (n,), of one vehicle of a type in one primitive."""
+    n, slow = len(speed), kind.waits_below
     line = np.column_stack([np.arange(n) * dt, np.ones(n)])
     slope, level = np.linalg.lstsq(line, speed, rcond=None)[0].tolist() if n > 1 else (0.0, float(speed[0]))
     first, last = max(level, 0.0), max(level + slope * (n - 1) * dt, 0.0)
-    if np.median(speed) < STANDING and max(first, last) < 2.0 * STANDING:
+    if np.median(speed) < slow and max(first, last) < 2.0 * slow:
         return "stands"
     turn = float(heading[-1] - heading[0])
     bend = ""
     if abs(turn) >= TURNING:
         bend = f", turning {'left' if turn > 0.0 else 'right'} by {abs(np.rad2deg(turn)):.0f}°"
-    if abs(last - first) < 0.5 or abs(slope) < STEADY:
-        return f"drives at {np.mean(speed):.1f} m/s{bend}"
+    if abs(last - first) < slow or abs(slope) < STEADY:
+        return f"{'walks' if kind.walks else 'drives'} at {np.mean(speed):.1f} m/s{bend}"
     if slope > 0.0:
-        verb = "pulls away" if first < STANDING else "accelerates"
+        verb = "pulls away" if first < slow else "accelerates"
         return f"{verb} from {first:.1f} to {last:.1f} m/s{bend}"
-    verb = "brakes to a stop" if last < STANDING else "brakes"
+    verb = "brakes to a stop" if last < slow else "brakes"
     return f"{verb} from {first:.1f} to {last:.1f} m/s{bend}"
 
 
@@ -54,7 +53,7 @@ def _in_segment(encounter: Tracks, i: int, a: int, b: int) -> str:
     if first >= b - 1:
         return "is not there yet"
     own = slice(max(a, first), min(b, last + 1))
-    motion = describe_motion(encounter.speed[i, own], encounter.heading[i, own], encounter.dt)
+    motion = describe_motion(encounter.speed[i, own], encounter.heading[i, own], encounter.dt, encounter.vehicles[i].kind)
     comes = f"arrives after {(first - a) * encounter.dt:.1f} s and " if first > a else ""
     goes = f", leaves after {(last - a) * encounter.dt:.1f} s" if last < b - 1 else ""
     return f"{comes}{motion}{goes}"

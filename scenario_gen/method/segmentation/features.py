@@ -21,7 +21,6 @@ from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Tracks
 
-STAND_SPEED = 0.5
 STAND_BLUR = 0.2
 STAND_WINDOW = 0.9
 POSITION_FLOOR, SPEED_FLOOR = 0.5, 0.5
@@ -104,10 +103,10 @@ def lateral_acceleration(position: Floats, dt: float, window: float) -> Floats:
     return _best_window([position[:, 0], position[:, 1]], max(4, round(window / dt)), 2, lateral)
 
 
-def moving(speed: Floats, dt: float) -> Floats:
-    """(T,) 0 where the vehicle stands, 1 where it moves, a ramp of 0.5 m/s between, from speed (T,) averaged over 0.9 s."""
+def moving(speed: Floats, dt: float, slow: float) -> Floats:
+    """(T,) 0 where the vehicle stands, 1 where it moves, a ramp of `slow` m/s between, from speed (T,) averaged over 0.9 s."""
     smooth = moving_mean(speed, max(1, min(round(STAND_WINDOW / dt), len(speed))))
-    return np.asarray(np.clip((smooth - 0.5 * STAND_SPEED) / STAND_SPEED, 0.0, 1.0))
+    return np.asarray(np.clip((smooth - 0.5 * slow) / slow, 0.0, 1.0))
 
 
 def driving_features(
@@ -126,7 +125,7 @@ def driving_features(
     for i, (first, last) in enumerate(encounter.present.tolist()):
         own = slice(first, last + 1)
         position, speed = encounter.position[i, own], encounter.speed[i, own]
-        moves = moving(speed, encounter.dt)
+        moves = moving(speed, encounter.dt, encounter.vehicles[i].kind.waits_below)
         features[own, i, 0] = longitudinal_acceleration(speed, encounter.dt, speed_window)
         features[own, i, 1] = lateral_acceleration(position, encounter.dt, turn_window) * moves
         features[own, i, 2] = moves

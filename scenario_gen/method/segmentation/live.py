@@ -29,7 +29,7 @@ class LiveSegmenter:
         last = self._past[-1] if self._past else None
         if self._online is None or last is None or not self._follows(last, sample):
             self._past.clear()
-            self._online = OnlineSegmenter(len(sample.vehicles), self._dt_ns * 1e-9, self._config)
+            self._online = OnlineSegmenter(sample.vehicles, self._dt_ns * 1e-9, self._config)
             self._start_ns = sample.stamp_ns
         self._past.append(sample)
         changepoints = self._online.push(sample.position, sample.speed)
@@ -43,8 +43,9 @@ class LiveSegmenter:
         at = (self._start_ns + time_ns - self._past[0].stamp_ns) // self._dt_ns
         position = np.stack([sample.position for sample in self._past], axis=1)
         speed = np.stack([sample.speed for sample in self._past], axis=1)
-        heading = np.array([course(xy, v, self._dt_ns * 1e-9)[0] for xy, v in zip(position, speed, strict=True)])
         vehicles = self._past[-1].vehicles
+        rows = zip(position, speed, vehicles, strict=True)
+        heading = np.array([course(xy, v, self._dt_ns * 1e-9, of.kind.least_course)[0] for xy, v, of in rows])
         return LiveChangepoints(
             self._start_ns,
             vehicles,

@@ -9,6 +9,7 @@ confirm it; confirmed changepoints never move again. Single samples far off thei
 """
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.segmentation.features import POSITION_FLOOR, SPEED_FLOOR, without_spikes
 from scenario_gen.method.segmentation.trends import Trends
 from scenario_gen.numerics import Floats
+from scenario_gen.types import Vehicle
 
 UNJUDGED = 2  # samples at the end that may be outliers: nothing after them says
 
@@ -54,11 +56,11 @@ class Changepoint:
 class OnlineSegmenter:
     """Extends a segmentation sample by sample; memory and time per sample do not grow with the samples seen."""
 
-    def __init__(self, vehicles: int, dt: float, config: OnlineConfig = OnlineConfig()) -> None:
-        """Start with no samples of `vehicles` vehicles, `dt` seconds apart."""
+    def __init__(self, vehicles: int | Sequence[Vehicle], dt: float, config: OnlineConfig = OnlineConfig()) -> None:
+        """Start with no samples of so many cars, or of these vehicles, `dt` seconds apart."""
         self._config = config
         self._dt = dt
-        self._vehicles = vehicles
+        self._vehicles = [Vehicle(str(n)) for n in range(vehicles)] if isinstance(vehicles, int) else vehicles
         self._samples: deque[Floats] = deque(maxlen=round(config.window / dt))
         self._count = 0
         self._confirmed: deque[int] = deque(maxlen=2)
@@ -74,9 +76,9 @@ class OnlineSegmenter:
             InputError: the shapes are wrong or a value is not finite.
         """
         row = np.column_stack([np.asarray(position, np.float64), np.asarray(speed, np.float64)])
-        if row.shape != (self._vehicles, 3) or not np.isfinite(row).all():
+        if row.shape != (len(self._vehicles), 3) or not np.isfinite(row).all():
             raise InputError(
-                f"sample {self._count} must hold finite positions (N, 2) and speeds (N,) of {self._vehicles} vehicles"
+                f"sample {self._count} must hold finite positions (N, 2) and speeds (N,) of {len(self._vehicles)} vehicles"
             )
         self._samples.append(row)
         self._count += 1
@@ -91,7 +93,7 @@ class OnlineSegmenter:
         stack = np.array(self._samples).transpose(1, 0, 2)
         position = np.stack([without_spikes(xy, POSITION_FLOOR) for xy in stack[:, :, :2]])
         speed = np.stack([without_spikes(v, SPEED_FLOOR)[:, 0] for v in stack[:, :, 2:]])
-        trends = Trends.of(position[:, :-UNJUDGED], speed[:, :-UNJUDGED], self._dt)
+        trends = Trends.of(position[:, :-UNJUDGED], speed[:, :-UNJUDGED], self._dt, self._vehicles)
         least = trends.threshold(config.significance_level)
         gap = max(2, round(config.min_segment / self._dt))
         fixed = [c - first for c in self._confirmed if c - first >= gap]

@@ -107,7 +107,7 @@ def segment_track(
 
 def on_trends(encounter: Tracks, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
     """Put changepoints (K,) where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
-    trends = Trends.of(encounter.position, encounter.speed, encounter.dt, encounter.present)
+    trends = Trends.of(encounter.position, encounter.speed, encounter.dt, encounter.vehicles, encounter.present)
     chance = config.significance_level
     least, certain = trends.threshold(chance), trends.threshold(chance * chance)
     reach = round(config.settle / encounter.dt)

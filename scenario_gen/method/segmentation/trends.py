@@ -10,6 +10,7 @@ at the changepoints describe speed and course best; changepoints that this descr
 places where the posterior sees some chance of one, and which it does miss, are added.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,12 +20,10 @@ from scipy import special
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, kernel, OUT1
-from scenario_gen.types import ALWAYS, canonical_presence
+from scenario_gen.types import ALWAYS, canonical_presence, Vehicle
 
-SPEED_NOISE = 0.1
 COURSE_NOISE = 0.3
 COURSE_WINDOW = 0.9
-LEAST_SPEED = 1.0
 
 
 @kernel(F2, F2, I1, I, I1, OUT1)
@@ -86,27 +85,28 @@ class Trends:
     _cache: dict[tuple[int, ...], tuple[float, int]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, position: Floats, speed: Floats, dt: float, present: Ints = ALWAYS) -> "Trends":
-        """Take the trends of N vehicles; noise is at least 0.1 m/s in speed and 0.3 m/s across the course.
+    def of(cls, position: Floats, speed: Floats, dt: float, vehicles: Sequence[Vehicle], present: Ints = ALWAYS) -> "Trends":
+        """Take the trends of N vehicles; noise is at least that of its type in speed, and 0.3 m/s across the course.
 
         Args:
             position: (N, T, 2) m.
             speed: (N, T) m/s.
             dt: s.
+            vehicles: N, whose types say what is noise and how slow one is that has no course.
             present: (N, 2) first and last sample of each vehicle; outside of them nothing has weight.
         """
         signals, weights = [], []
         samples = speed.shape[1]
         for i, (first, last) in enumerate(canonical_presence(present, len(speed), samples, "trends").tolist()):
-            xy, v = position[i, first : last + 1], speed[i, first : last + 1]
+            xy, v, kind = position[i, first : last + 1], speed[i, first : last + 1], vehicles[i].kind
             beyond = (first, samples - 1 - last)
             bend = np.diff(v, 2)
-            noise = max(SPEED_NOISE, 1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0)
+            noise = max(kind.speed_noise, 1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0)
             signals.append(np.pad(v, beyond, mode="edge"))
             weights.append(np.pad(np.full(len(v), 1.0 / noise), beyond))
-            angle, pace = course(xy, v, dt)
+            angle, pace = course(xy, v, dt, kind.least_course)
             signals.append(np.pad(angle, beyond, mode="edge"))
-            sure = np.where(pace > LEAST_SPEED, pace / COURSE_NOISE, 0.0)
+            sure = np.where(pace > kind.least_course, pace / COURSE_NOISE, 0.0)
             edge = round(COURSE_WINDOW / dt) // 2
             sure[:edge] = sure[len(sure) - edge :] = 0.0  # half a window has three times the noise
             weights.append(np.pad(sure, beyond))
@@ -192,14 +192,14 @@ class Trends:
             points.insert(best[2], best[1])
 
 
-def course(position: Floats, speed: Floats, dt: float) -> tuple[Floats, Floats]:
-    """Course over ground [rad], unwrapped and held where the vehicle hardly moves, and smoothed speed [m/s], each (T,)."""
+def course(position: Floats, speed: Floats, dt: float, least: float = 1.0) -> tuple[Floats, Floats]:
+    """Course over ground [rad], unwrapped and held where it is slower than `least` [m/s], and smoothed speed [m/s], each (T,)."""
     half = max(1, min(round(COURSE_WINDOW / dt) // 2, (len(speed) - 1) // 2))
     steps = np.arange(-half, half + 1)
     padded = np.pad(position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
     velocity = (sliding_window_view(padded, 2 * half + 1, axis=0) @ steps) / ((steps @ steps) * dt)
     pace = moving_mean(speed, 2 * half + 1)
-    moves = pace > LEAST_SPEED
+    moves = pace > least
     angle = np.arctan2(velocity[:, 1], velocity[:, 0])
     if moves.any():
         last = np.maximum.accumulate(np.where(moves, np.arange(len(speed)), 0))

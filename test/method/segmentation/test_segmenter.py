@@ -13,7 +13,7 @@ import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.segmentation import segment, segment_track, SegmentationConfig
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.encounter import Encounter, Tracks, Vehicle
 
 
 def wait_and_brake(encounter_of) -> Encounter:
@@ -153,3 +153,18 @@ def test_what_is_held_outside_of_a_presence_does_not_count(encounter_of, preset)
     found = segment(replace(whole, present=np.array([[0, 79], [0, 40], [41, 79]])), SegmentationConfig(preset=preset), seed=2)
     assert "has left" in found.descriptions[-1] or len(found.descriptions) == 1
     assert np.isfinite(found.changepoint_probability).all()
+
+
+def test_steps_of_a_pedestrian_are_no_changepoints_and_its_halt_is_seen():
+    """At 1.3 m/s with 0.15 m/s up and down in each step; one halts for 3 s and goes on within a step."""
+    time, rng = np.arange(0.0, 16.0, 0.1), np.random.default_rng(4)
+    steady = 1.3 + 0.15 * np.sin(2.0 * np.pi * 1.9 * time) + rng.normal(0.0, 0.03, len(time))
+    halts = np.where((time > 6.0) & (time < 9.0), 0.0, steady)
+    for speed, changes in ((steady, []), (halts, [6.0, 9.0])):
+        position = np.stack([np.cumsum(speed) * 0.1, 0.0 * time], axis=1)
+        walker, heading = Vehicle("p", 0.5, 0.5, "pedestrian"), 0.0 * speed[None]
+        alone = Tracks("p", (walker,), 0, 100_000_000, position[None], heading, speed[None])
+        found = segment(alone, seed=1)
+        assert all(min(abs(0.1 * found.changepoints - change)) < 0.5 for change in changes)
+        assert len(changes) <= len(found.changepoints) <= 2 * len(changes)
+    assert any("stands" in words for words in found.descriptions) and "walks at 1.3 m/s" in found.descriptions[0]
