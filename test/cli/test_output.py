@@ -134,5 +134,6 @@ def test_a_page_is_opened_where_somebody_looks(monkeypatch, tmp_path):
 def test_no_word_of_a_help_is_cut_at_80_columns(name, monkeypatch):
     monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 80)
     shown = CliRunner().invoke(app, [name, "--help"]).output
-    helps = " ".join(option.help or "" for option in typer.main.get_command(app).commands[name].params).replace("\\[", "[")
+    options = (one for one in typer.main.get_command(app).commands[name].params if not getattr(one, "hidden", False))
+    helps = " ".join(option.help or "" for option in options).replace("\\[", "[")
     assert "Usage" in shown and not [word for word in helps.split() if word not in shown]
