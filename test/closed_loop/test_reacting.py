@@ -111,6 +111,5 @@ def test_a_set_that_hardly_tests_says_so(tmp_path):
 
 
 def test_planners_and_targets_of_earlier_names_are_those_of_today():
-    with pytest.warns(DeprecationWarning, match="Unlooking is now NonReactive"):
-        assert planners.Unlooking is NonReactive
+    assert planners.Unlooking is NonReactive
     assert read_targets("unlooking[2]=..0") == read_targets("baseline_margin[2]=..0")
