@@ -54,7 +54,7 @@ def written(case, folder):
 
 
 def test_every_arm_has_its_row_and_its_account(case):
-    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, UNIFORM, NARROW, REPLAY]
+    assert [row.name for row in case.evaluation.rows] == ["recording", WITH, WITHOUT, UNIFORM, NARROW, REPLAY]
     assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
     accepted = case.evaluation.value(UNIFORM, "acceptance")
     assert accepted == pytest.approx(1.0 - sum(case.references[UNIFORM].refused.values()) / case.references[UNIFORM].candidates)

@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from scenario_gen.base.renaming import warn_renamed
 from scenario_gen.closed_loop.ego import Command, EgoState, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Task
 from scenario_gen.method.evaluation import BRAKING, free_acceleration, PULLS_AWAY, STANDS, wanted_speeds
@@ -137,14 +136,4 @@ class ReferenceFollower:
         return Pose(x, y, float(s.heading[n, k]), float(s.speed[n, k]))
 
 
-def __getattr__(name: str) -> type:
-    """Return a planner by its name of an earlier version, with a warning.
-
-    Raises:
-        AttributeError: there is no such name.
-    """
-    renamed: dict[str, type] = {"Unlooking": NonReactive, "WitnessFollower": ReferenceFollower}
-    if name not in renamed:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warn_renamed(name, renamed[name].__name__)
-    return renamed[name]
+Unlooking, WitnessFollower = NonReactive, ReferenceFollower  # by their names of an earlier version

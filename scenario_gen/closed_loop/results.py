@@ -42,7 +42,7 @@ class Drives:
         planner: its name.
         config: the parameters of the drives.
         trials: that were driven; without them there is no page.
-        broken: the bars that were not kept, and, if it is worse than the planner it is compared with, that.
+        broken: the thresholds that are not met, and, if it is worse than the planner it is compared with, that.
         baseline: drives of the non-reactive baseline.
         comparison: with an earlier planner.
     """
@@ -62,7 +62,7 @@ class Drives:
 
     @property
     def easy(self) -> str:
-        """A sentence if a planner that looks at nobody passes most scenarios, else ""."""
+        """A sentence if the non-reactive baseline passes most scenarios, else ""."""
         return hardly_tests(sum(one.verdict.passed for one in self.baseline), len(self.baseline))
 
     def scores(self) -> dict[str, float]:
@@ -86,9 +86,8 @@ class Drives:
             sets = {name: [one for one in self.baseline if one.origin.encounter == name] for name in encounters}
             each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
             parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
-            messages.append(f"the non-reactive baseline passes {passed_of(self.baseline)}{parts}")
-            if self.easy:
-                messages.append(self.easy)
+            hardly = "these scenarios hardly test a planner: " if self.easy else ""
+            messages.append(f"{hardly}the non-reactive baseline passes {passed_of(self.baseline)}{parts}")
         if self.comparison is not None:
             messages.append(self.comparison.sentence())
         if found := self.scores():

@@ -30,15 +30,7 @@ from scenario_gen.base.folders import scratch
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.stores import below, download, each_fetched, naming_objects, Part, Place, Remote, size_of, temporary
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import (
-    account_of,
-    clean_found,
-    CleanTask,
-    encounter_of,
-    LogTask,
-    read_one_log,
-    tables_of,
-)
+from scenario_gen.corpus.encounters import account_of, clean_found, CleanTask, encounter_of, LogTask, read_one_log, tables_of
 from scenario_gen.corpus.grouping import group_partition, GroupTask, partitions
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
@@ -100,13 +92,7 @@ class Mined:
         return [*lines, *self.notes, *self.failed]
 
 
-def mine(
-    archives: Sequence[Place],
-    out: Place,
-    config: CorpusConfig = CorpusConfig(),
-    *,
-    workers: Workers = Workers(),
-) -> Mined:
+def mine(archives: Sequence[Place], out: Place, config: CorpusConfig = CorpusConfig(), *, workers: Workers = Workers()) -> Mined:
     """Find the encounters of an archive.
 
     Args:

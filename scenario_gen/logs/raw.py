@@ -4,7 +4,9 @@
 """Raw logs, the result of every reader: observations per vehicle, with the places they came from, within bounds."""
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -150,6 +152,18 @@ class RawLog:
 def natural(name: str) -> tuple[int, int, str]:
     """Sort key of names in which whole numbers sort by value, before the rest."""
     return (0, int(name), name) if name.isascii() and name.isdigit() else (1, 0, name)
+
+
+def only_file(paths: Sequence[Path], config: LogConfig) -> Path:
+    """Return the one path of a format whose files have clocks of their own.
+
+    Raises:
+        InputError: there are several, or the file is too large.
+    """
+    if len(paths) != 1:
+        raise InputError(f"{paths[0]} and {len(paths) - 1} more: they have clocks of their own; give one at a time")
+    check_size(str(paths[0]), paths[0].stat().st_size, 0, config)
+    return paths[0]
 
 
 def check_size(where: str, size: int, rows: int, config: LogConfig) -> None:

@@ -105,13 +105,7 @@ def suggest_nearest(error: RefusedError, requested: Chain, cancelled: Cancelled 
 
 
 def answer_refusal(
-    error: RefusedError,
-    encounter: Encounter,
-    road: Road | str,
-    config: PipelineConfig,
-    request: Request,
-    count: int,
-    seed: int,
+    error: RefusedError, encounter: Encounter, road: Road | str, config: PipelineConfig, request: Request, count: int, seed: int
 ) -> RefusedError:
     """Return what a command answers when `pipeline.generate` refused these arguments: with the nearest requests or roads."""
     if road == AUTO:

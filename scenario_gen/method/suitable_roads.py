@@ -10,6 +10,7 @@ from dataclasses import replace
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import drives_about_ring, NoPlaceError, road_and_template, ROADS, ROUNDABOUT
 from scenario_gen.template import refuse_reversing, refuse_too_large
@@ -44,17 +45,18 @@ def on_first_suitable_road(
     """Return what is generated on the first built-in road that takes the template; the result says which it is.
 
     Raises:
-        RefusedError: the encounter is too large, or nothing can be generated on any of them.
+        RefusedError: the encounter is too large, or nothing can be generated on any of them; a TargetError if that is why.
     """
     refuse_too_large(encounter)
     refuse_reversing(encounter)
-    reason = ""
+    refusal = RefusedError(f"{encounter.name}: no built-in road takes this encounter; give the path of a map")
     for name in suitable_roads(encounter, segment(encounter, config.segmentation, seed), config):
         try:
             return _noted(generate(name), name)
         except RefusedError as error:
-            reason = f": on road {name}, {error}"
-    raise RefusedError(f"{encounter.name}: no built-in road takes this encounter{reason}; give the path of a map")
+            kind = TargetError if isinstance(error, TargetError) else RefusedError
+            refusal = kind(f"{encounter.name} on road {name}, the last that takes it: {error}")
+    raise refusal
 
 
 def with_suitable_roads(

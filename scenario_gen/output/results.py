@@ -35,12 +35,7 @@ def report(folder: Path | str, *cases: GenerationResult, title: str = "") -> Pat
 
 
 def write_results(
-    folder: Path,
-    cases: Sequence[GenerationResult],
-    *,
-    title: str,
-    quality: Sequence[str],
-    provenance: Mapping[str, str],
+    folder: Path, cases: Sequence[GenerationResult], *, title: str, quality: Sequence[str], provenance: Mapping[str, str]
 ) -> None:
     """Write bag, report and figures of all cases to `folder`.
 
@@ -107,12 +102,7 @@ def namespaces(count: int) -> list[str]:
 
 
 def provenance_of(
-    logs: Sequence[Path],
-    seed: int,
-    count: int,
-    roads: Sequence[str],
-    config: PipelineConfig,
-    request: Request = Request(),
+    logs: Sequence[Path], seed: int, count: int, roads: Sequence[str], config: PipelineConfig, request: Request = Request()
 ) -> dict[str, str]:
     """Return everything needed to do it again: log hashes, seed, versions, the request and all parameters."""
     facts = {f"log {path.name}": f"sha256 {sha256_of(path)}" for path in logs}

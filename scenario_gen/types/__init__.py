@@ -33,7 +33,7 @@ from scenario_gen.types.road_users import (
     words,
 )
 from scenario_gen.types.route import Route, routes_in_words
-from scenario_gen.types.row_names import NARROW, REPLAY, row_name, TEMPLATE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.row_names import NARROW, RECORDING, REPLAY, row_name, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.sample import Sample
 from scenario_gen.types.scenario import (
     BoundaryStates,
@@ -51,7 +51,7 @@ from scenario_gen.types.target import Pair, Reached, Target, UNITS
 
 __all__ = [
     "ALWAYS", "CAR", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LEVEL", "MIRRORED", "NARROW",
-    "NOT_KEPT", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "REPLAY", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS",
+    "NOT_KEPT", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECORDING", "REPLAY", "SCHEMA", "UNIFORM", "UNITS",
     "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause", "CheckCounts", "Coverage",
     "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult", "Interval",
     "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality", "Reached",

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from scenario_gen.base.documents import COUNT, NUMBER, parse_json
 from scenario_gen.base.errors import printable
-from scenario_gen.types.row_names import FORMERLY_REPLAY, REPLAY, row_name
+from scenario_gen.types.row_names import FORMER, row_name
 from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 
 Better = Literal["lower", "higher", ""]
@@ -264,5 +264,4 @@ def _row(document: Mapping[str, Any]) -> Row:
         key: Interval(*(math.nan if entry[bound] is None else entry[bound] for bound in ("value", "low", "high")))
         for key, entry in document["values"].items()
     }
-    name = REPLAY if document["name"] == FORMERLY_REPLAY else document["name"]
-    return Row(name, document["samples"], values, tuple(document["notes"]))
+    return Row(FORMER.get(document["name"], document["name"]), document["samples"], values, tuple(document["notes"]))

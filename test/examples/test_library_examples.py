@@ -23,7 +23,7 @@ def test_the_script_generates_from_the_bundled_log_without_ros():
     ran = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     assert "synthetic_a on t_intersection: 4 of " in ran.stdout
-    assert "without vehicle 1: 2; its witness is there" in ran.stdout
+    assert "without vehicle 1: 2; its reference drive is there" in ran.stdout
 
 
 @pytest.mark.parametrize(("name", "pictures"), [("tour.ipynb", 2), ("segmentation.ipynb", 0)])

@@ -54,7 +54,7 @@ def test_the_command_takes_all_by_name(python):
     (evaluation,) = json.loads((python.folder / "out" / "evaluation.json").read_text())["cases"]
     assert evaluation["metrics"][-1]["id"] == "mean_speed" and evaluation["road"] == "skew_crossing"
     rows = {row["name"]: row["values"]["mean_speed"] for row in evaluation["rows"]}
-    assert rows["template"]["value"] > 1.0 and rows["with changepoints"]["value"] > 0.5 * rows["template"]["value"]
+    assert rows["recording"]["value"] > 1.0 and rows["with changepoints"]["value"] > 0.5 * rows["recording"]["value"]
 
     python("-m", "scenario_gen", "export", "out/bag", "--to", "csv", "--out", "tables")
     manifest = json.loads((python.folder / "tables" / "export.json").read_text())
@@ -76,7 +76,7 @@ config = PlanningConfig(planner="one_corner", drivable=False)
 routes = plan_routes(road, fit, config, seed=1)
 assert [len(route.points) > 1 for route in routes] == [not fitted.stands.all() for fitted in fit.fitted]
 evaluation = evaluate_scenarios(encounter, {"replay": [replay(encounter, fit)]})
-assert abs(evaluation.value("replay", "mean_speed") / evaluation.value("template", "mean_speed") - 1.0) < 0.1
+assert abs(evaluation.value("replay", "mean_speed") / evaluation.value("recording", "mean_speed") - 1.0) < 0.1
 assert "| **Speed** |" in evaluation.to_markdown()
 """
 

@@ -300,7 +300,7 @@ def test_who_is_of_no_known_type_is_counted_and_some_can_be_left_out(tmp_path):
     tracks_file = folder / "vehicle_tracks_000.csv"
     tracks_file.write_text(tracks_file.read_text() + "98,1,100,tram,0,0,0,1,0,30,2.5\n99,1,100,hovercraft,0,0,0,1,0,30,2.5\n")
     notes = read_log(folder).quality.notes
-    assert "left out: 1 × tram" in notes and "types that are not known, told from the size: 1 × hovercraft" in notes
+    assert "left out: 1 × tram" in notes and "types that are not known, read by size: 1 × hovercraft" in notes
     cars = read_log(folder, LogConfig(types="car"))
     assert [vehicle.type for vehicle in cars.encounters[0].vehicles] == ["car", "car"]
     assert "left out: 1 × hovercraft, 1 × pedestrian/bicycle, 1 × tram" in cars.quality.notes

@@ -11,6 +11,7 @@ from textbook_motions import labelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.method.nearest import answer_refusal
+from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import suitable_roads
 from scenario_gen.pipeline import generate, PipelineConfig
@@ -34,6 +35,11 @@ def test_auto_takes_the_first_road_that_keeps_the_conflict_and_says_so(crossing)
     assert all(
         (a.position == b.position).all() for a, b in zip(plain.generated.scenarios, result.generated.scenarios, strict=True)
     )
+
+
+def test_where_roads_suit_but_the_target_cannot_be_had_that_is_said(crossing):
+    with pytest.raises(TargetError, match=r"on road corridor, the last that takes it: target gap=50\.\.60"):
+        generate(crossing, "auto", count=1, seed=7, request=Request(target="gap=50..60"))
 
 
 def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):

@@ -28,7 +28,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, has_root, read_xml
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, only_file, RawLog, Segment
 
 _SKIPPED = frozenset(("lanelet", "trafficSign", "trafficLight", "intersection", "planningProblem", "staticObstacle"))
 
@@ -44,10 +44,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     Raises:
         InputError: it is broken, has no trajectories, or a state lacks its position or time; names file and line.
     """
-    if len(paths) != 1:
-        raise InputError(f"{paths[0]} and {len(paths) - 1} more: scenarios have clocks of their own; give one at a time")
-    path = paths[0]
-    check_size(str(path), path.stat().st_size, 0, config)
+    path = only_file(paths, config)
     root = read_xml(path, str(path), _SKIPPED)
     if root.tag != "commonRoad":
         raise InputError(f"{root.place}: the root of a CommonRoad file is <commonRoad>")

@@ -26,7 +26,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import read_xml
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.kinds import type_called, usual_size
-from scenario_gen.logs.raw import check_size, RawLog, Segment
+from scenario_gen.logs.raw import check_size, only_file, RawLog, Segment
 from scenario_gen.logs.tables import from_frame, LONGEST
 
 MOVES = 1.0  # m/s
@@ -39,10 +39,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     Raises:
         InputError: it is broken or too large, or an element lacks an attribute; names file and line.
     """
-    if len(paths) != 1:
-        raise InputError(f"{paths[0]} and {len(paths) - 1} more: simulations have clocks of their own; give one at a time")
-    path = paths[0]
-    check_size(str(path), path.stat().st_size, 0, config)
+    path = only_file(paths, config)
     rows: list[tuple[float, str, float, float, float, float, str]] = []
     for step in read_xml(path, str(path)).all("timestep"):
         time = step.number("time")

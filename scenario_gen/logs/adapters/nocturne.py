@@ -26,7 +26,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, only_file, RawLog, Segment
 from scenario_gen.numerics import Floats
 
 STEP_NS = 100_000_000
@@ -48,10 +48,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     Raises:
         InputError: it is broken, has no vehicles, or an object lacks what is needed; names file and object.
     """
-    if len(paths) != 1:
-        raise InputError(f"{paths[0]} and {len(paths) - 1} more: scenarios have clocks of their own; give one at a time")
-    path = paths[0]
-    check_size(str(path), path.stat().st_size, 0, config)
+    path = only_file(paths, config)
     try:
         scene = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:

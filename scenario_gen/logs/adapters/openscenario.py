@@ -28,7 +28,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, has_root, read_xml
 from scenario_gen.logs.adapters.openscenario_values import resolved
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, only_file, RawLog, Segment
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import edge_lengths, place
 from scenario_gen.types import VEHICLE_TYPES
@@ -49,10 +49,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     Raises:
         InputError: it is broken, or no vehicle follows a trajectory that can be read; names file and line.
     """
-    if len(paths) != 1:
-        raise InputError(f"{paths[0]} and {len(paths) - 1} more: scenarios have clocks of their own; give one at a time")
-    path = paths[0]
-    check_size(str(path), path.stat().st_size, 0, config)
+    path = only_file(paths, config)
     root = read_xml(path, str(path))
     if root.tag != "OpenSCENARIO":
         raise InputError(f"{root.place}: the root of an OpenSCENARIO file is <OpenSCENARIO>")

@@ -20,12 +20,12 @@ from scenario_gen.types import (
     Evaluation,
     GenerationResult,
     Interval,
+    RECORDING,
     REPLAY,
     Row,
     row_name,
     Scenario,
     ScenarioSet,
-    TEMPLATE,
 )
 
 MEASURED = 1000
@@ -159,7 +159,7 @@ def _template_row(template: Template) -> Row:
         if resampled
         else ()
     )
-    return Row(TEMPLATE, 1, values, notes)
+    return Row(RECORDING, 1, values, notes)
 
 
 def _row(name: str, size: int, samples: Samples) -> Row:

@@ -98,13 +98,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
 def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:
     """Append where the reference point of vehicle `n` is at instant `k`; without z, the player puts it onto the road."""
     axle = shifted(scenario.position[n, k], scenario.heading[n, k], -rear_axle(scenario.vehicles[n]))
-    add(
-        add(parent, "Position"),
-        "WorldPosition",
-        x=float(axle[0]),
-        y=float(axle[1]),
-        h=float(scenario.heading[n, k]),
-    )
+    add(add(parent, "Position"), "WorldPosition", x=float(axle[0]), y=float(axle[1]), h=float(scenario.heading[n, k]))
 
 
 def _placed(actions: Element, name: str, scenario: Scenario, n: int) -> Element:

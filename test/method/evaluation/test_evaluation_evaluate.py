@@ -36,7 +36,7 @@ def run(**extra):
 
 def test_rows_say_what_happened():
     found = run(checks={"with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1})}, road="cross")
-    assert [row.name for row in found.rows] == ["template", "with changepoints", "without changepoints", "replay"]
+    assert [row.name for row in found.rows] == ["recording", "with changepoints", "without changepoints", "replay"]
     assert found.changepoints == 2 and found.vehicles == ("west", "south")
     assert found.value("replay", "e_position") < 1e-6 and found.value("replay", "min_ade") < 1e-6
     for key in ("e_position", "e_speed", "js_speed", "js_acceleration", "wasserstein_speed"):
@@ -90,7 +90,7 @@ def test_vanished_conflicts_are_counted_for_themselves():
     encounter = crossing()
     away = replace(replayed(encounter, 1), position=replayed(encounter).position + np.array([[[0.0, 0.0]], [[500.0, 0.0]]]))
     found = evaluate_scenarios(encounter, {"x": [replayed(encounter), away]}, changepoints=K, config=QUICK)
-    assert found.value("template", "conflicts") == 1.0
+    assert found.value("recording", "conflicts") == 1.0
     assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
     assert found.value("x", "order_kept") == 1.0  # of those that are there
     assert any("0.5 of the recording's 1 conflict(s) vanish" in note for note in found.row("x").notes)
@@ -150,7 +150,7 @@ def test_another_number_of_vehicles_is_refused():
 def test_a_long_template_is_resampled_and_says_so():
     encounter, config = crossing(), EvaluationConfig(max_steps=60, resamples=20)
     found = evaluate_scenarios(encounter, {"x": [replayed(encounter)]}, changepoints=K, config=config)
-    assert "60 instants" in found.row("template").notes[0] and found.value("x", "e_position") < 1e-6
+    assert "60 instants" in found.row("recording").notes[0] and found.value("x", "e_position") < 1e-6
 
 
 def test_counts_from_sets_and_verdicts():

@@ -46,7 +46,7 @@ def test_names_are_escaped_and_figures_are_there(page):
     for text in ("12 rows dropped", "demo.mcap", "anchor 1 moved by 0.12 m", "the clock was stretched", "lateral acceleration"):
         assert text in page
     assert "There is no such set: no route exists." in page
-    assert "<b>16</b> of 16 scenarios requested, from 26 candidates" in page
+    assert "<b>16</b> of 16 requested scenarios are valid, of 26 candidates" in page
 
 
 def test_the_same_input_gives_the_same_bytes(tmp_path, page):

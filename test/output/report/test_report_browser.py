@@ -94,7 +94,7 @@ def test_scrubbing_moves_the_cars_and_names_the_primitive(tab):
     tab.part("scrub").fill("500")
     assert tab.time() == 6.0
     assert tab.picture("stage") != before
-    assert tab.part("primitive").inner_text() == "2 of 3: west drives on, south drives slowly"
+    assert tab.part("primitive").inner_text() == "segment 2 of 3: west drives on, south drives slowly"
     assert "10.0 m/s" in tab.part("readout").inner_text()
 
 

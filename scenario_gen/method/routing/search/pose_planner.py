@@ -19,14 +19,7 @@ from scenario_gen.method.routing.search.tree_samples import Rules
 from scenario_gen.method.routing.search.two_trees import Search
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
-from scenario_gen.roads import (
-    clearance_in_cells,
-    common_component,
-    component_cells,
-    footprint_fits,
-    to_cells,
-    to_metres,
-)
+from scenario_gen.roads import clearance_in_cells, common_component, component_cells, footprint_fits, to_cells, to_metres
 from scenario_gen.types import Road
 
 PIECE = 0.5  # [m] longest piece of a path

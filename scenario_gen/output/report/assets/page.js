@@ -286,7 +286,7 @@ class Player {
     const time = share * bounds[bounds.length - 1];
     let k = 0;
     while (k < labels.length - 1 && time >= bounds[k + 1]) k += 1;
-    this.find("primitive").textContent = `${k + 1} of ${labels.length}: ${descriptions[k]}`;
+    this.find("primitive").textContent = `segment ${k + 1} of ${labels.length}: ${descriptions[k]}`;
     this.find("primitive").style.borderColor = primitiveColour(labels[k]);
   }
 }
