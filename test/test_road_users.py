@@ -123,7 +123,7 @@ def test_road_users_of_all_types_are_generated_within_their_limits(road, name):
     judge = Recheck(case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size))
     judge.check(made, account)  # pedestrians may be off the lanes, all others not
     assert account.found == {}
-    judge.check([replace(one, position=one.position + (0.0, 12.0)) for one in made], account)
+    judge.check([replace(one, position=np.add(one.position, (0.0, 12.0))) for one in made], account)
     assert account.found["off_road"] >= 5 or road != "corridor"
     assert {tuple(vehicle.type for vehicle in scenario.vehicles) for scenario in made} == {
         tuple(v.type for v in encounter.vehicles)
