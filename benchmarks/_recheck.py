@@ -58,9 +58,8 @@ class Recheck:
 
     def __init__(self, encounter: Encounter, road: Road, asked: BoundaryStates, has_changepoints: bool) -> None:
         self.asked, self.limits = asked, Limits()
-        self.area = _drivable(road)
-        lines = shapely.get_parts(shapely.segmentize(shapely.boundary(self.area), 50.0))
-        self.edges = shapely.STRtree(_segments(lines))
+        walks = np.array([vehicle.type == "pedestrian" for vehicle in encounter.vehicles])
+        self.grounds = [(own, *_ground(road, on_foot)) for on_foot, own in ((False, ~walks), (True, walks)) if own.any()]
         time = encounter.time
         self.template = Scenario(
             encounter.vehicles,
@@ -93,20 +92,10 @@ class Recheck:
         paces = Paces.of(lanes.key, fast + lanes.turning() * reach)
 
         def distance(lane: Ints, time: Floats) -> tuple[Floats, Bools]:
-            gap, open_ = np.zeros(len(lane)), np.arange(len(lane))
-            for room in ROOMS:  # a footprint that is on the road when grown by so much is as far from its edge: quickly asked
-                free = shapely.covers(self.area, lanes.boxes(lane[open_], time[open_], -room))
-                gap[open_[free]] = room
-                open_ = open_[~free]
-            if len(open_):
-                (at, _), left = self.edges.query_nearest(
-                    lanes.boxes(lane[open_], time[open_]), all_matches=False, return_distance=True
-                )
-                gap[open_[at]] = left
-            # an edge may be touched; who starts inside and crosses none stays inside
-            near = (gap <= TOUCH) | (time == lanes.begin[lane])
-            out = np.zeros(len(lane), dtype=np.bool_)
-            out[near] = ~shapely.covers(self.area, lanes.boxes(lane[near], time[near], TOUCH))
+            gap, out = np.zeros(len(lane)), np.zeros(len(lane), dtype=np.bool_)
+            for own, area, edges in self.grounds:
+                rows = np.flatnonzero(own[lane % n])
+                gap[rows], out[rows] = _off_ground(area, edges, lanes, lane[rows], time[rows])
             return gap, out
 
         bad, looked = advance(lanes.begin, lanes.end, paces, distance)
@@ -201,10 +190,37 @@ def _unseen(s: Scenario, end: int) -> tuple[Floats, Floats]:
     return step * s.speed[rows, at], step * np.abs(s.acceleration[rows, at])
 
 
-def _drivable(road: Road) -> Any:
-    """Union of all drivable cells, each run of a row as one rectangle."""
+def _off_ground(area: Any, edges: shapely.STRtree, lanes: Lanes, lane: Ints, time: Floats) -> tuple[Floats, Bools]:
+    """How far [m] footprints are from the edges of an area at least, and whether they are not inside."""
+    gap, open_ = np.zeros(len(lane)), np.arange(len(lane))
+    for room in ROOMS:  # a footprint that is on the road when grown by so much is as far from its edge: quickly asked
+        free = shapely.covers(area, lanes.boxes(lane[open_], time[open_], -room))
+        gap[open_[free]] = room
+        open_ = open_[~free]
+    if len(open_):
+        (at, _), left = edges.query_nearest(lanes.boxes(lane[open_], time[open_]), all_matches=False, return_distance=True)
+        gap[open_[at]] = left
+    # an edge may be touched; who starts inside and crosses none stays inside
+    near = (gap <= TOUCH) | (time == lanes.begin[lane])
+    out = np.zeros(len(lane), dtype=np.bool_)
+    out[near] = ~shapely.covers(area, lanes.boxes(lane[near], time[near], TOUCH))
+    return gap, out
+
+
+def _ground(road: Road, on_foot: bool) -> tuple[Any, shapely.STRtree]:
+    """Where road users may be, and its edges: drivable cells; on foot, on a road with lanes, all cells but obstacles."""
+    cells = road.drivable
+    if on_foot and road.lanes is not None:
+        cells = np.ones_like(cells) if road.obstructed is None else ~road.obstructed
+    area = _union(road, cells)
+    lines = shapely.get_parts(shapely.segmentize(shapely.boundary(area), 50.0))
+    return area, shapely.STRtree(_segments(lines))
+
+
+def _union(road: Road, free: Bools) -> Any:
+    """Union of the cells of a road that are free, each run of a row as one rectangle."""
     boxes = []
-    for row, cells in enumerate(road.drivable):
+    for row, cells in enumerate(free):
         edges = np.flatnonzero(np.diff(np.concatenate(([0], cells.astype(np.int64), [0]))))
         low = road.origin[1] + road.resolution * row
         for a, b in (road.origin[0] + road.resolution * edges.reshape(-1, 2)).tolist():
@@ -294,15 +310,17 @@ def _lead(a: Floats, b: Floats, times: list[Floats], hits: tuple[Ints, Ints], le
 def _waits(encounter: Encounter) -> list[tuple[int, int]]:
     """How often each vehicle of the template stands while it waits, and waits: smoothed over 0.5 s below 0.5 m/s for 1 s or more.
 
+    Pedestrians wait below 0.2 m/s.
+
     It stands if between the first and the last sample of at most 0.1 m/s there is 1 s or more.
     """
     reach = round(0.25 / encounter.dt)
     counts = []
-    for row, (first, last) in zip(encounter.speed, encounter.present, strict=True):
-        speed = row[first : last + 1]
+    for vehicle, row, (first, last) in zip(encounter.vehicles, encounter.speed, encounter.present, strict=True):
+        speed, least = row[first : last + 1], 0.2 if vehicle.type == "pedestrian" else 0.5
         padded = np.pad(speed, reach, mode="edge")
         smooth = np.convolve(padded, np.full(2 * reach + 1, 1.0 / (2 * reach + 1)), mode="valid")
-        slow = np.concatenate([[0], (smooth < 0.5).astype(np.int64), [0]])
+        slow = np.concatenate([[0], (smooth < least).astype(np.int64), [0]])
         begin, end = np.flatnonzero(np.diff(slow) == 1), np.flatnonzero(np.diff(slow) == -1)
         long = [(a, b) for a, b in zip(begin, end, strict=True) if (b - 1 - a) * encounter.dt >= 1.0 - 1e-9]
         still = [np.flatnonzero(speed[a:b] <= 0.1) for a, b in long]

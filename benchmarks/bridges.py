@@ -17,6 +17,7 @@ import time
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from benchmarks._size import sized
 from benchmarks.row import Row
@@ -30,6 +31,7 @@ from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.export import export_bag
 from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.types import VEHICLE_TYPES
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
 
@@ -94,11 +96,27 @@ def _bags(folder: Path, sizes: Sizes) -> Iterator[Path]:
     """Yield a bag of each case: the demo's, recorded ones on roads in turn, and encounters cut out of whole recordings."""
     for case, road in ROADS.items():
         yield from _bag(folder, read_log(bundled(case)).encounters, road, sizes.demo)
+    yield from _bag(folder, read_log(_all_types()).encounters, "corridor", sizes.demo)
     logs = sorted((DATA / "trajectories").glob("*/*.csv"))
     recorded = [read_log(path).encounters[0] for path in logs if path.name.startswith("encounter_")]
     yield from islice(_turns(folder, recorded, sizes.recorded), sizes.cases)
     found = [one for path in logs if path.name.endswith("_all_vehicles.csv") for one in read_log(path).encounters]
     yield from islice(_turns(folder, [found[k] for k in np.random.default_rng(7).permutation(len(found))], 1), sizes.cuts)
+
+
+def _all_types() -> pd.DataFrame:
+    """A bus, a truck and a car in one lane, a bicycle before a motorcycle in the other, and a pedestrian that crosses behind."""
+    t, rows = np.arange(0.0, 12.05, 0.1), []
+    lanes = {"bus": (10.0, 0.0, 0.0, 7.0), "truck": (-15.0, 0.0, 0.0, 7.0), "car": (-36.0, 0.0, 0.0, 7.0)}
+    lanes |= {"motorcycle": (90.0, 3.5, np.pi, 8.0), "bicycle": (60.0, 3.5, np.pi, 4.5)}
+    lanes |= {"pedestrian": (-40.0, -14.5, np.pi / 2.0, 1.3)}
+    for n, (kind, (x, y, yaw, speed)) in enumerate(lanes.items(), start=1):
+        way, size = speed * t + 0.5 * np.sin(t / 2.0 + n), VEHICLE_TYPES[kind]
+        driven = speed + 0.25 * np.cos(t / 2.0 + n)
+        place = {"x": x + way * np.cos(yaw), "y": y + way * np.sin(yaw), "heading": yaw, "speed": driven}
+        fixed = {"id": str(n), "agent_type": kind, "length": size.length, "width": size.width}
+        rows.append(pd.DataFrame({"t": t} | fixed | place))
+    return pd.concat(rows)
 
 
 def _turns(folder: Path, encounters: Sequence[Encounter], count: int) -> Iterator[Path]:

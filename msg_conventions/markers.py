@@ -13,7 +13,7 @@ from scenario_gen.numerics import Floats
 
 TYPE = "visualization_msgs/msg/Marker"
 ARRAY_TYPE = "visualization_msgs/msg/MarkerArray"
-CUBE, LINE_STRIP, LINE_LIST, TEXT = 1, 4, 5, 9  # types; a text faces who looks, its scale's last number is its height
+CUBE, CYLINDER, LINE_STRIP, LINE_LIST, TEXT = 1, 3, 4, 5, 9  # types; a text faces who looks, its scale ends in its height
 ADD, DELETE, DELETE_ALL = 0, 2, 3  # actions
 
 

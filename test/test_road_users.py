@@ -3,6 +3,7 @@
 
 """Trucks, buses, motorcycles, bicycles and pedestrians: read, kept with their types, and generated within their own limits."""
 
+from dataclasses import replace
 import io
 
 import numpy as np
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
+from benchmarks._recheck import Account, Recheck
 from scenario_gen import generate, read_log
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.closed_loop.simulation import ClosedLoop
@@ -118,8 +120,14 @@ def test_road_users_of_all_types_are_generated_within_their_limits(road, name):
     )
     edges = [(encounter.vehicles[one.who].id, encounter.vehicles[one.whom].id, one.kind) for one in reactions_of(encounter).edges]
     assert edge is None or edge in edges
-    made = generate(encounter, road, count=5, seed=1).generated.scenarios
+    case, account = generate(encounter, road, count=5, seed=1), Account()
+    made = case.generated.scenarios
     assert len(made) == 5 and all(proven(scenario) for scenario in made)
+    judge = Recheck(case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size))
+    judge.check(made, account)  # pedestrians may be off the lanes, all others not
+    assert account.found == {}
+    judge.check([replace(one, position=np.add(one.position, (0.0, 12.0))) for one in made], account)
+    assert account.found["off_road"] >= 5 or road != "corridor"
     assert {tuple(vehicle.type for vehicle in scenario.vehicles) for scenario in made} == {
         tuple(v.type for v in encounter.vehicles)
     }

@@ -135,3 +135,14 @@ def test_messages_without_velocities_are_read():
     assert got.position[1, :, 0].tolist() == [0.0, 1.0, 2.0]
     assert (got.speed == 0.0).all()
     assert got.vehicles[0].length == 4.8
+
+
+def test_road_users_look_like_what_they_are():
+    """A cylinder for who walks, boxes for the others, as wide and high as they are; narrow ones are yellow."""
+    users = [Vehicle("c"), Vehicle("b", 1.8, 0.65, "bicycle"), Vehicle("p", 0.5, 0.5, "pedestrian")]
+    users += [Vehicle("u", 12.0, 2.55, "bus")]
+    data = pictures.vehicle_markers(users, np.zeros((4, 4)), np.ones(4, np.bool_), 3, "map", 1)
+    car, bicycle, walker, bus = STORE.deserialize_cdr(data, markers.ARRAY_TYPE).markers[1:]
+    assert [one.type for one in (car, bicycle, walker, bus)] == [1, 1, 3, 1]
+    assert (bicycle.scale.x, bicycle.scale.y, walker.scale.y, bus.scale.z) == (1.8, 0.65, 0.5, 3.2)
+    assert bicycle.color.r == walker.color.r == 1.0 != car.color.r and bus.color.r < 0.1  # the ego's is black

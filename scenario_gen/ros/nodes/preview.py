@@ -16,7 +16,7 @@ from rclpy.clock import Clock, ClockType
 from msg_conventions.fits import decode_fit
 from msg_conventions.frames import encode_frames
 from msg_conventions.markers import CUBE, DELETE_ALL, Marker, TEXT
-from msg_conventions.pictures import COLOURS, encode_markers
+from msg_conventions.pictures import body, COLOURS, encode_markers
 from msg_conventions.scenario_info import ScenarioEntry
 from scenario_gen.bags.recordings.arriving import ArrivingScenarios, TOPICS
 from scenario_gen.base.parameters import parameter, Parameters
@@ -100,9 +100,8 @@ class Preview(StageNode):
         self.outputs.publish(self._tf, encode_frames(poses, children, scenario.frame_id, stamp_ns))
         markers = [Marker("", CUBE, DELETE_ALL)]
         for n, pose, speed in zip(here, poses.tolist(), speeds.tolist(), strict=True):
-            vehicle, colour = scenario.vehicles[n], (*COLOURS[n % len(COLOURS)], 0.9)
-            size = (vehicle.length, vehicle.width, 1.5)
-            markers.append(Marker(f"box_{names[n]}", CUBE, pose=(pose[0], pose[1], pose[2]), scale=size, colour=colour))
+            vehicle = scenario.vehicles[n]
+            markers.append(body(names[n], vehicle, (pose[0], pose[1], pose[2]), COLOURS[n % len(COLOURS)], 0.9))
             words = f"{shown.reactions.get(names[n], names[n])}, {speed:.1f} m/s"
             place = (pose[0], pose[1] + vehicle.length, 0.0)
             markers.append(Marker(f"text_{names[n]}", TEXT, pose=place, scale=(0.0, 0.0, HIGH), text=words))
