@@ -7,7 +7,8 @@ One LINE_LIST draws all borders, the left one of a lane before its right one, la
 points. `text` is a JSON object: `name`, `notes`, and of every lane its `id`, the number of `points` of a border, `successors` and
 `beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Where the map has traffic rules there are also
 `rules`, of each its `id`, `kind`, `lanes`, `over` (places in the list of lanes) and `line` (points of the stop line), and
-`rules_kept`. Where lanes lie above others each has `height` [m] of its points. `origin` is the latitude and longitude of the
+`rules_kept`. Lanes that are not for all that drive name their `users`, and crossings have `crossing` true; those that are closed
+to cars come last. Where lanes lie above others each has `height` [m] of its points. `origin` is the latitude and longitude of the
 frame's origin, where the map has it. Lanes that were drawn with a built-in road have `drawn` true, and those that were drawn
 for a template `drawn_for`: the `frame` of the template (x, y [m], yaw [rad] on the road) and of every vehicle the ids of the
 `lanes` by which it comes and goes. Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. QoS: reliable,
@@ -35,7 +36,7 @@ TAIL = 1  # bytes by which the message ends behind a multiple of 4
 
 def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> bytes:
     """Return the lanes as CDR bytes; None: the road has none."""
-    lanes = () if network is None else network.lanes
+    lanes = () if network is None else network.of_all or network.lanes
     pairs = [border[np.repeat(np.arange(len(border)), 2)[1:-1]] for lane in lanes for border in (lane.left, lane.right)]
     points = np.concatenate(pairs) if pairs else np.zeros((0, 2))
     text = "" if network is None else json.dumps(_document(network), ensure_ascii=False)
@@ -47,9 +48,11 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
     lanes = [
         {"id": lane.id, "points": len(lane.left), "successors": lane.successors, "beside": lane.beside}
         | {"speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit, "junction": lane.junction}
-        for lane in network.lanes
+        | ({"users": sorted(lane.users)} if lane.users else {})
+        | ({"crossing": True} if lane.crossing else {})
+        for lane in network.of_all or network.lanes
     ]
-    for lane, entry in zip(network.lanes, lanes if network.has_levels else (), strict=False):
+    for lane, entry in zip(network.of_all or network.lanes, lanes if network.has_levels else (), strict=False):
         entry["height"] = [None if math.isnan(height) else round(height, 2) for height in lane.height.tolist()]
     rules = [
         {"id": rule.id, "kind": rule.kind, "lanes": rule.lanes, "over": rule.over, "line": rule.line.tolist()}
@@ -86,7 +89,8 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
         kept, drawn = document.get("rules_kept", True) is not False, document.get("drawn", False) is True
         aim = _drawn_for(document["drawn_for"]) if "drawn_for" in document else None
         origin = tuple(map(float, document.get("origin", ())))
-        return frame_id, LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn, aim, origin)
+        network = LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn, aim, origin)
+        return frame_id, network.with_lanes(lanes)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}") from None
 
@@ -116,7 +120,9 @@ def _lanes(documents: list[dict[str, Any]], points: Floats, what: str) -> Iterat
         limit = math.nan if document["speed_limit"] is None else float(document["speed_limit"])
         after, beside = (tuple(int(k) for k in document[key]) for key in ("successors", "beside"))
         height = np.array(document.get("height", ()), dtype=np.float64)
-        yield Lane(str(document["id"]), left, right, after, beside, limit, str(document["junction"]), height)
+        users, crossing = frozenset(map(str, document.get("users", ()))), document.get("crossing", False) is True
+        name, junction = str(document["id"]), str(document["junction"])
+        yield Lane(name, left, right, after, beside, limit, junction, height, users, crossing)
         at += 2 * pairs
     if at != len(points):
         raise InputError(f"{what}: {len(points) - at} points belong to no lane")

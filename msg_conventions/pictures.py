@@ -29,6 +29,7 @@ PAINT = {
     Marking.STOP: (0.5,),
     Marking.GIVE_WAY: (0.4, 0.6, 0.4),
     Marking.ARROW: (0.12,),
+    Marking.ZEBRA: (0.5,),
 }
 """How wide a marking is, and of how many metres its dashes and gaps are."""
 

@@ -5,7 +5,9 @@
 
 from dataclasses import replace
 import io
+import re
 
+from map_builders import write
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,9 +18,11 @@ from scenario_gen import generate, read_log
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.output.report.summary import summary
+from scenario_gen.roads import cells_of, RoadConfig
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Dynamics, VEHICLE_TYPES
 
@@ -168,6 +172,60 @@ def test_a_bus_of_12_m_drives_its_own_curves(road):
     assert (drive.max_curvature, drive.max_acceleration) == (0.125, 3.0)  # a bus as ego turns and speeds up like one
     bend = np.abs(np.diff(made.routes[bus].points[:, 2]) / np.diff(made.routes[bus].length))
     assert bend.max() <= VEHICLE_TYPES["bus"].dynamics.planned.max_curvature and all(map(proven, made.generated.scenarios))
+    across, along = (np.linspace(-0.5, 0.5, count) for count in (9, 41))
+    for scenario in made.generated.scenarios:  # all of its footprint, not its outline alone
+        ahead = np.stack((np.cos(scenario.heading[bus]), np.sin(scenario.heading[bus])), axis=-1)[:, None, None]
+        left = np.stack((-ahead[..., 1], ahead[..., 0]), axis=-1)
+        size = scenario.vehicles[bus]
+        swept = scenario.position[bus][:, None, None] + along[:, None, None] * size.length * ahead
+        assert made.road.drivable_at(swept + across[:, None] * size.width * left).all()
+
+
+@pytest.mark.parametrize("road", ["straight", "t_intersection", "curve"])
+def test_who_walks_makes_no_arm_of_a_road(road):
+    (encounter,) = read_log(WORLDS["a car waits for a pedestrian"][0]).encounters
+    made = generate(encounter, road, PipelineConfig(road=RoadConfig(crossing="zebra")), count=3, seed=1)
+    assert len(made.generated.scenarios) == 3 and all(map(proven, made.generated.scenarios))
+    walked = made.generated.scenarios[0].position[1]
+    assert not made.road.drivable_at(walked[[0, -1]]).any()  # from kerb to kerb, beyond both
+
+
+def overtaken():
+    """A car that passes a bicycle on its right."""
+    bicycle = driven(straight((20.0, -2.4), (300.0, -2.4)), np.full(len(T), 4.5))
+    return log_of(a=("car", driven(straight((0.0, 0.0), (300.0, 0.0)), np.full(len(T), 9.0))), b=("bicycle", bicycle))
+
+
+@pytest.mark.parametrize(
+    ("road", "table"), [("straight", overtaken()), ("four_way", meeting("bicycle", 8.0)), ("t_intersection", overtaken())]
+)
+def test_a_bicycle_is_on_the_cycle_lane_where_there_is_one(road, table):
+    (encounter,) = read_log(table).encounters
+    made = generate(encounter, road, PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=3, seed=1)
+    (n,) = (n for n, vehicle in enumerate(made.encounter.vehicles) if vehicle.type == "bicycle")
+    own = cells_of(made.road, made.road.lanes.others)
+    row, column, _ = made.road.cells(np.concatenate([scenario.position[n] for scenario in made.generated.scenarios]))
+    assert own[row, column].all()
+    row, column, _ = made.road.cells(np.concatenate([scenario.position[1 - n] for scenario in made.generated.scenarios]))
+    assert made.road.drivable[row, column].all() and all(map(proven, made.generated.scenarios))
+
+
+def test_who_follows_a_bicycle_still_does_where_there_is_a_cycle_lane():
+    (encounter,) = read_log(WORLDS["a car follows a bicycle"][0]).encounters
+    made = generate(encounter, "straight", PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=1, seed=1)
+    assert not made.fit.lost and {edge.kind for edge in made.generated.graph.edges} == {"follow"}
+
+
+def test_a_road_too_tight_for_a_bus_says_where_and_what_it_needs(tmp_path):
+    bus = driven(left_turn(6.25, 25.0) * (1.0, -1.0), np.full(len(T), 4.0))
+    table = log_of(u=("bus", bus), c=("car", driven(straight((6.25, 52.0), (6.25, -80.0)), np.full(len(T), 3.5))))
+    (encounter,) = read_log(table).encounters
+    long = PipelineConfig(planning=PlanningConfig(iterations=500), limits=Limits(bus=Dynamics(max_curvature=0.07)))
+    with pytest.raises(RefusedError) as refused:
+        generate(encounter, str(write(tmp_path, ".xodr")), long, count=1)
+    said = str(refused.value)
+    assert "too tight for a bus of 12 m by 2.55 m: at (" in said and "\n" not in said
+    assert re.search(r"bend with 0\.\d+ 1/m \(radius \d+\.\d m\)", said) and "at most 0.063 1/m (15.9 m)" in said
 
 
 def test_a_limit_binds_all_stages_and_a_refusal_names_it():

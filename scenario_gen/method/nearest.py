@@ -21,7 +21,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between
-from scenario_gen.roads import CORRIDOR, draw_route, footprint_fits, nearest_pose_with_room, road_and_template
+from scenario_gen.roads import CORRIDOR, draw_route, footprint_fits, ground_for, nearest_pose_with_room, road_and_template
 from scenario_gen.types import Encounter, ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
 
 BISECTIONS = 7
@@ -54,7 +54,7 @@ def _with_room(road: Road, vehicle: Vehicle, pose: Floats, requested: Floats) ->
     away = (pose - requested)[:2] / np.hypot(*(pose - requested)[:2])
     for margin in _MARGINS:
         tried = np.array([*np.round(pose[:2] + margin * away, 2), requested[2]])
-        if footprint_fits(road, tried[None], vehicle.length, vehicle.width)[0]:
+        if footprint_fits(ground_for(road, vehicle), tried[None], vehicle.length, vehicle.width)[0]:
             return tuple(tried.tolist())
     return tuple(pose.tolist())
 
@@ -192,7 +192,8 @@ class _Search:
             vehicle = self.requested.encounter.vehicles[vehicle_index(self.requested.encounter, name, end)]
             state = request.states(end)[name]
             pose = np.array(state[:3])
-            answer = nearest_pose_with_room(self.requested.road, pose, vehicle.length, vehicle.width, FAR)
+            ground = ground_for(self.requested.road, vehicle)
+            answer = nearest_pose_with_room(ground, pose, vehicle.length, vehicle.width, FAR)
             if answer is not None and answer[1] > 0.0:
                 state = _with_room(self.requested.road, vehicle, answer[0], pose) + state[3:]
             if len(state) == 4:
@@ -222,7 +223,9 @@ class _Search:
         for offset in (sign * step for step in _OFFSETS for sign in (1.0, -1.0)):
             tried = moved(state, np.array(state[:3]) + offset * ahead)
             pose = np.array(tried[:3])
-            fits = footprint_fits(self.requested.road, pose[None], vehicles[n].length, vehicles[n].width)[0]
+            fits = footprint_fits(
+                ground_for(self.requested.road, vehicles[n]), pose[None], vehicles[n].length, vehicles[n].width
+            )[0]
             if fits and gap(pose) >= self.requested.config.fitting.clearance:
                 return with_state(request, end, name, tried)
         return request
@@ -265,7 +268,8 @@ class _Search:
             if requested is None and not self.base:
                 return None
             ends.append(self.base[end][n, :3] if requested is None else np.array(requested[:3]))
-        vehicle, road = self.requested.encounter.vehicles[n], self.requested.road
+        vehicle = self.requested.encounter.vehicles[n]
+        road = ground_for(self.requested.road, vehicle)
         return draw_route(ends[0], ends[1], lambda poses: bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all()))
 
     def _bisected(self, path: Path) -> Request | None:

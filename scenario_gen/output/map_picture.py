@@ -15,15 +15,19 @@ from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
 from scenario_gen.template import clean_tracks, drivers_of
-from scenario_gen.types import Encounter, LaneNetwork, Road
+from scenario_gen.types import DRIVERS, Encounter, LaneNetwork, Road
 from scenario_gen.types.markings import markings
 
 PLACES = 8  # that are shown
 WIDE, HEAD, FOOT = 1200.0, 70.0, 45.0  # pixels, of the sheet, and of the title above and the scale below
 SCALES = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)  # metres
-LEGEND = "green: traffic enters, red: it leaves; arrows: direction of lanes; darker: junctions; red line: stop, orange: give way"
+LEGEND = (
+    "green: traffic enters, red: it leaves; arrows: direction of lanes; darker: junctions; pink: cycle and bus lanes; "
+    "sand: footways; red line: stop, orange: give way"
+)
 COLOURS = ("#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b", "#0e7490", "#7c4a21")
 STYLE = (
+    ".other{fill:#e7c9c5} .walk{fill:#e9e5d6} .paint.zebra{stroke-width:3} "
     "rect.ground{fill:#fff} .lane{fill:#d4d9e2} .turn{fill:#c3cad6} .in{fill:#15803d} .out{fill:#b91c1c} "
     ".box{fill:none;stroke:#0f172a;stroke-dasharray:6 4} .paint{fill:none;stroke:#64748b} .paint.arrow{fill:#64748b} "
     ".paint.lane{stroke-dasharray:9 13} .paint.centre{stroke-dasharray:9 5} .paint.stop{stroke:#b91c1c;stroke-width:3} "
@@ -123,6 +127,8 @@ def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
     corners = np.concatenate([network.box, *(place.box for place in found)])
     sheet = _Sheet(corners.min(axis=0), corners.max(axis=0))
     junctions: dict[str, list[Floats]] = defaultdict(list)
+    for lane in network.others:
+        sheet.shape("polygon", lane.outline, **{"class": "other" if lane.open_to(DRIVERS) else "walk"})
     for lane in sorted(network.lanes, key=lambda lane: not lane.junction):  # an arm's borders lie over the ways' ends
         sheet.shape("polygon", lane.outline, **{"class": "turn" if lane.junction else "lane"})
         if lane.junction and not network.drawn:

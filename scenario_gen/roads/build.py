@@ -8,21 +8,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+from scipy.spatial.distance import cdist
+
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import did_you_mean, InputError, reading, RefusedError
 from scenario_gen.base.registry import Registry
 from scenario_gen.base.stores import local
 from scenario_gen.roads.builtin import draw, draw_corridor, draw_paper, layout_for
-from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, PLAIN_LINE
+from scenario_gen.roads.vector.ground import cells_of
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
 from scenario_gen.template import (
     clean_tracks,
-    drivers_of,
+    driven_tracks,
     main_line,
     mirrored,
     refuse_reversing,
@@ -49,9 +53,8 @@ def build_road(name_or_path: str | Shape, encounter: Encounter | None = None, co
         RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be separated.
     """
     obstacles = read_obstacles(config.obstacles)
-    if not isinstance(name_or_path, str):
-        return with_obstacles(road_of_shape(name_or_path, config), obstacles)
-    return with_obstacles(_bare_road(name_or_path, encounter, config), obstacles)
+    road = _bare_road(name_or_path, encounter, config) if isinstance(name_or_path, str) else road_of_shape(name_or_path, config)
+    return with_obstacles(road, obstacles, cells_of(road, road.lanes.others if road.lanes is not None else ()))
 
 
 def road_and_template(
@@ -128,7 +131,7 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
     if config.paper and name_or_path in BUILT_IN:
         return draw_paper(name_or_path, config)
     if is_vector_map(name_or_path):
-        return vector_road(name_or_path, None if encounter is None else drivers_of(clean_tracks(encounter)), config)
+        return vector_road(name_or_path, None if encounter is None else driven_tracks(encounter), config)
     path = Path(name_or_path)
     if path.suffix.lower() in (".yaml", ".yml"):
         with reading(path):
@@ -143,7 +146,21 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
         road = draw_road(name_or_path, encounter, config)
         if not isinstance(road, Road):
             raise TypeError(f"it returned {type(road).__name__}; it must return a Road")
+        return road if encounter is None or name_or_path not in BUILT_IN else _with_room_to_walk(road, encounter, config)
+
+
+def _with_room_to_walk(road: Road, encounter: Encounter, config: RoadConfig) -> Road:
+    """A road whose grid reaches as far beyond what is paved as people walk away from where somebody drives."""
+    tracks = clean_tracks(encounter)
+    walked = [track.poses[:, :2] for track in tracks if track.vehicle.kind.walks]
+    driven = [track.poses[:, :2] for track in tracks if not track.vehicle.kind.walks]
+    if not walked or not driven:
         return road
+    reach = float(cdist(np.concatenate(walked), np.concatenate(driven)).min(axis=1).max())
+    more = int(np.ceil(reach / road.resolution))
+    height, width = (cells + 2 * more for cells in road.drivable.shape)
+    refuse_too_many_cells(road.name, width, height, config)
+    return replace(road, drivable=np.pad(road.drivable, more), origin=road.origin - more * road.resolution)
 
 
 def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -152,7 +169,7 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
         if name == "curve":
             return draw_along(name, PLAIN_LINE, max(config.lanes, 1), config)
         return draw(name, layout_for(name, None, config), config)
-    tracks = clean_tracks(encounter)
+    tracks = driven_tracks(encounter)
     config = fitting_width(tracks, config)
     try:
         frenet = to_frenet(tracks)

@@ -13,8 +13,8 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import aligned, Arm, draw_lanes, draw_plan, Driven, Plan
-from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
+from scenario_gen.roads.drawn import across, aligned, Arm, draw_lanes, draw_plan, Driven, half_way, Plan
+from scenario_gen.roads.pavement import ARM_COUNT, drivable_beside, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
 from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
 from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road
@@ -29,6 +29,7 @@ _ONCOMING = 20.0  # metres sideways within which oncoming vehicles are on the sa
 _MOST_LANES = 3  # per direction, for oncoming vehicles to be as far apart as they are
 _PLAIN = 60.0  # metres: an arm when there is no template
 _STEP = 0.25  # metres between drawn footprints
+_WIDEST_CROSSING = 60.0  # metres to one side
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def draw(name: str, layout: Layout, config: RoadConfig, tracks: tuple[Track, ...
     ends = [[arm.lane(outermost, config, inward=inward) for inward in (True, False)] for arm in arms[:2] if layout.u_turns]
     turns = ((k, draw_u_turn(entry, leave, layout.main)) for k, (entry, leave) in enumerate(ends))
     driven = [Driven((k, outermost, k, outermost), way, _TURNING[0], _TURNING[1]) for k, way in turns if way is not None]
-    verge = layout.side if config.paper else half + _VERGE
+    verge = layout.side if config.paper else half + config.cycle_lane + _VERGE
     south, north = (layout.side if side in sides else verge for side in SIDE_ARMS)
     low = -half - cell * np.ceil((np.array([layout.main, south]) - half) / cell - 1e-6)  # kerbs on cell edges
     aim = _turned_round(tracks, outermost, config)
@@ -180,8 +181,11 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
 
     Raises:
         InputError: there is no template.
-        RefusedError: its vehicles overlap so far that they cannot be separated, or the grid would be too large.
+        RefusedError: its vehicles overlap so far that they cannot be separated, the grid would be too large, or cycle lanes are
+            requested.
     """
+    if config.cycle_lane:
+        raise RefusedError(f"road {name} is drawn without cycle lanes; unset road.cycle_lane, or choose another road")
     if encounter is None:
         raise InputError(f"road {name} is drawn around a recording; give a log too")
     surface, paths, widths = list[BaseGeometry](), dict[str, Curve](), dict[str, float]()
@@ -199,4 +203,10 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
         )
         for name, names in shared.items()
     ]
-    return draw_lanes(LaneNetwork(name, tuple(lanes), drawn=True), paved(surface, 0.0), config)
+    road = draw_lanes(LaneNetwork(name, tuple(lanes), drawn=True), paved(surface, 0.0), config)
+    if config.crossing == "none" or road.lanes is None:
+        return road
+    line = paths[next(iter(shared))]
+    middle = line.cut(*half_way(line), _STEP)
+    right, left = (float(drivable_beside(road.drivable_at, middle, side, _WIDEST_CROSSING).max()) for side in (-1.0, 1.0))
+    return replace(road, lanes=road.lanes.with_lanes((*lanes, across("crossing 1", line, half_way(line), (right, left)))))

@@ -5,7 +5,7 @@
 
 from dataclasses import dataclass
 
-from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.roads.obstacles import read_obstacles
 
@@ -30,6 +30,8 @@ class RoadConfig(Parameters):
         "signs of a drawn junction: auto: arms of those who yielded give way, and into a roundabout; all_way_stop: all stop",
         choices=("none", "auto", "all_way_stop"),
     )
+    crossing: str = parameter("none", "crossings on all arms of a junction, else in the middle", choices=("none", "zebra"))
+    cycle_lane: float = parameter(0.0, "width of cycle lanes beside the outermost lanes; 0: none", unit="m", low=0.0, high=5.0)
     corridor_margin: float = parameter(
         1.0, "room on each side of the recording's footprints in a corridor", unit="m", low=0.1, high=10.0
     )
@@ -46,6 +48,10 @@ class RoadConfig(Parameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         read_obstacles(self.obstacles)
+        if 0.0 < self.cycle_lane < 1.0:
+            raise InputError(f"road.cycle_lane {self.cycle_lane:g} m; 0 or 1 m and more are drawn")
+        if self.paper and (self.cycle_lane or self.crossing != "none"):
+            raise InputError("road.paper: the paper's roads have no road.crossing and no road.cycle_lane; unset these")
 
 
 def refuse_too_many_cells(name: str, width: int, height: int, config: RoadConfig) -> None:

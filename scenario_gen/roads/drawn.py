@@ -8,7 +8,7 @@ the template drives is the one that the road was drawn for, another one the clot
 wider than a lane, as far as the road is.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, permutations
 
@@ -16,13 +16,14 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, place, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.pavement import drivable_beside, Inside, inside, paved, ring, strip, swept
 from scenario_gen.roads.vector.raster import road_of
-from scenario_gen.roads.ways import draw_route, reverse
+from scenario_gen.roads.ways import draw_route, reverse, TIGHTEST
 from scenario_gen.template import Track
 from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road, RuleKind, TrafficRule
 
@@ -41,6 +42,9 @@ _STRAIGHT_ON = np.radians(10.0)  # a way that turns by less is no wider than its
 _WIDER_M = 1.0  # by which each border of a bent way lies outside at most
 _INNER = 0.1  # of the most by which a bent way is wider, from which on it is looked whether the road is, too
 _BENT = np.radians(0.1)
+_CROSSING_M = (1.0, 5.0)  # least and most before the mouth of an arm
+_CYCLISTS = frozenset(("bicycle",))
+_CYCLISTS_SHARPEST = 0.35  # 1/m
 _RING_ROOM_M = 0.5  # that a roundabout's lane is wider on each side
 
 
@@ -144,10 +148,13 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
         box: (2, 2) [m] lowest and highest x, y of the grid, of which the lowest become 0; None: all and a verge.
 
     Raises:
-        RefusedError: it has more cells than are allowed.
+        RefusedError: it has more cells than are allowed, or cannot have cycle lanes.
     """
+    if config.cycle_lane and (plan.ring or not all(arm.outward for arm in plan.arms)):
+        raise RefusedError(f"road {name} is drawn without cycle lanes; unset road.cycle_lane, or choose another road")
     drawing = _Drawing(plan, config)
     lanes, surface = drawing.drawn()
+    others = drawing.others(lanes)
     network = LaneNetwork(
         name,
         lanes,
@@ -156,9 +163,10 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
         rules_kept=config.traffic_rules == "kept",
         drawn=True,
         drawn_for=plan.drawn_for,
-    )
+    ).with_lanes((*lanes, *others))
     if box is None:
-        box = np.reshape(surface.bounds, (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
+        whole = [surface, *(shapely.MultiPoint(lane.outline) for lane in others)]
+        box = np.reshape(shapely.total_bounds(whole), (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
         box[0] = np.floor(box[0])
     low = box[0]
     return draw_lanes(network.moved(-low), shapely.transform(surface, lambda points: points - low), config, box - low)
@@ -202,7 +210,7 @@ class _Drawing:
         for k, arm in enumerate(arms[: None if self._joined else 1]):
             outward = arm.outward if self._joined else arms[1].inward
             for inward, count in ((True, arm.inward), (False, outward)):
-                borders = self._borders(k, inward=inward, count=count)
+                borders = self._along(k, (self._width * n for n in range(count + 1)), inward=inward)
                 first = len(lanes)
                 for n, (inner, outer) in enumerate(pairwise(borders)):
                     left, right = (inner, outer) if self._sign > 0.0 else (outer, inner)
@@ -239,8 +247,50 @@ class _Drawing:
                 over = [k for k, lane in enumerate(lanes) if lane.junction and not lane.id.startswith(f"{arm + 1}.")]
             ends = [edge for k in into[arm] for edge in (lanes[k].left[-1], lanes[k].right[-1])]
             line = np.stack((ends[0], ends[-1]) if self._sign > 0.0 else (ends[1], ends[-2]))
+            if self._config.crossing != "none":  # who stops does so before it
+                line -= (_CROSSING_M[1] + _BEFORE_M) * unit(float(self._lines[arm].at(np.array([self._mouths[arm]]))[0, 2]))
             kind = RuleKind.STOP if stop else RuleKind.GIVE_WAY
             yield TrafficRule(f"arm {arm + 1}", kind, tuple(into[arm]), () if stop else tuple(over), line)
+
+    def others(self, lanes: Sequence[Lane]) -> list[Lane]:
+        """Cycle lanes and crossings, whose neighbours count behind those of lanes that cars may use."""
+        others, index, arms = list[Lane](), dict[tuple[int, bool], int](), self._plan.arms
+        for k, arm in enumerate(arms[: None if self._joined else 1] if self._config.cycle_lane else ()):
+            counts = arm.inward, arm.outward if self._joined else arms[1].inward
+            for inward, count in zip((True, False), counts, strict=True):
+                edges = count * self._width + np.array([0.0, self._config.cycle_lane])
+                inner, outer = self._along(k, edges, inward=inward)
+                left, right = (inner, outer) if self._sign > 0.0 else (outer, inner)
+                index[k, inward] = len(others)
+                others.append(Lane(lane_id(k, count, inward=inward), left, right, users=_CYCLISTS))
+        for a, b in permutations(range(len(arms)), 2) if index and self._joined else ():
+            way = self._cycle_way(a, b)
+            if way is not None:
+                start, goal = index[a, True], index[b, False]
+                lane = self._way_lane(way, others[start], others[goal], (self._config.cycle_lane - self._width) / 2.0)
+                leads = (*others[start].successors, len(lanes) + len(others))
+                others[start] = replace(others[start], successors=leads)
+                others.append(replace(lane, successors=(len(lanes) + goal,), users=_CYCLISTS))
+        if self._config.crossing != "none":
+            others += [self._crossing(k) for k in range(len(arms) if self._joined else 1)]
+        return others
+
+    def _cycle_way(self, a: int, b: int) -> Curve | None:
+        """The way from the cycle lane into the junction on one arm to that out of it on another; None if nobody could ride it."""
+        counts = self._plan.arms[a].inward, self._plan.arms[b].outward
+        middles = [count * self._width + self._config.cycle_lane / 2.0 for count in counts]
+        if self._plan.axis is not None and max(a, b) < 2 and middles[0] == middles[1]:
+            return self._through(a, middles[0])
+        return self._drawn_way(a, middles[0], b, middles[1], _CYCLISTS_SHARPEST)
+
+    def _crossing(self, k: int) -> Lane:
+        """The crossing of an arm, before its mouth, from the right of its line to the left; of a road through in its middle."""
+        line, arms = self._lines[k], self._plan.arms
+        near, far = (max(self._mouths[k] - metres, 0.0) for metres in _CROSSING_M)
+        stations = (far, near) if self._joined else half_way(line)
+        counts = arms[k].inward, arms[k].outward if self._joined else arms[1].inward
+        right, left = (count * self._width + self._config.cycle_lane for count in (counts if self._sign > 0.0 else counts[::-1]))
+        return across(f"crossing {k + 1}", line, stations, (right, left))
 
     def _pieces(self) -> Iterator[BaseGeometry]:
         """What is paved for certain: the arms, the ring, and where a vehicle drives through the junction."""
@@ -281,11 +331,11 @@ class _Drawing:
                     mouth = min(mouth, float(curve.station[max(int(np.argmax(bent)) - 1, 0)]))
         return max(mouth - _BEFORE_M, _SHORTEST_M)
 
-    def _borders(self, k: int, *, inward: bool, count: int) -> list[Floats]:
-        """The borders of an arm's lanes in or out from the dividing line outwards, in the direction of traffic."""
+    def _along(self, k: int, offsets: Iterable[float], *, inward: bool) -> list[Floats]:
+        """Lines so far [m] outside of an arm's dividing line, on the side of its lanes in or out, in the direction of traffic."""
         line = self._lines[k].cut(0.0, self._mouths[k], _STEP_M)
         side = -self._sign if inward else self._sign
-        borders = [line.beside(line.station, side * self._width * n)[:, :2] for n in range(count + 1)]
+        borders = [line.beside(line.station, side * offset)[:, :2] for offset in offsets]
         return borders if inward else [border[::-1] for border in borders]
 
     def _usual(self) -> list[Way]:
@@ -320,18 +370,26 @@ class _Drawing:
     def _way(self, places: Way) -> Curve | None:
         """The way from the middle of one lane at its mouth to another's; None if no car could drive it."""
         a, i, b, j = places
-        begin, end = self._mouths[a], self._mouths[b]
         if (driven := self._driven.get(places)) is not None:
-            return driven.cut(begin, driven.length - end, _WAY_STEP_M)
-        start = self._lines[a].beside(np.array([begin]), -self._sign * (i + 0.5) * self._width)[0]
-        goal = reverse(self._lines[b].beside(np.array([end]), self._sign * (j + 0.5) * self._width)[0])
+            return driven.cut(self._mouths[a], driven.length - self._mouths[b], _WAY_STEP_M)
         if self._plan.axis is not None and max(a, b) < 2 and i == j:
-            line = self._plan.axis if a == 0 else self._plan.axis.reversed()
-            line = line.cut(begin, line.length - end, _WAY_STEP_M)
-            return Curve(line.beside(line.station, -self._sign * (i + 0.5) * self._width))
+            return self._through(a, (i + 0.5) * self._width)
+        return self._drawn_way(a, (i + 0.5) * self._width, b, (j + 0.5) * self._width)
+
+    def _through(self, a: int, offset: float) -> Curve:
+        """The way from the first arm's mouth to the second one's, or back, so far [m] beside the dividing line."""
+        assert self._plan.axis is not None
+        line = self._plan.axis if a == 0 else self._plan.axis.reversed()
+        line = line.cut(self._mouths[a], line.length - self._mouths[1 - a], _WAY_STEP_M)
+        return Curve(line.beside(line.station, -self._sign * offset))
+
+    def _drawn_way(self, a: int, begins: float, b: int, ends: float, tightest: float = TIGHTEST) -> Curve | None:
+        """The way from one arm's mouth to another's, from and to places so far [m] beside their dividing lines."""
+        start = self._lines[a].beside(np.array([self._mouths[a]]), -self._sign * begins)[0]
+        goal = reverse(self._lines[b].beside(np.array([self._mouths[b]]), self._sign * ends)[0])
         if abs(angle_between(goal[2], start[2])) > _TURN_BACK:
             return None
-        way = draw_route(start, goal)
+        way = draw_route(start, goal, tightest=tightest)
         return None if way is None else way.cut(0.0, way.length, _WAY_STEP_M)
 
     def _wider(self, way: Curve) -> Floats | float:
@@ -353,6 +411,18 @@ class _Drawing:
             edges.append(own + (1.0 - share) * (ends[0] - own[0]) + share * (ends[1] - own[-1]))
             edges[-1][[0, -1]] = ends
         return Lane(f"{start.id}>{goal.id}", edges[0], edges[1], junction="1")
+
+
+def half_way(line: Curve) -> tuple[float, float]:
+    """Stations [m] of a line between which a crossing in its middle lies."""
+    half = (_CROSSING_M[1] - _CROSSING_M[0]) / 2.0
+    return line.length / 2.0 - half, line.length / 2.0 + half
+
+
+def across(name: str, line: Curve, stations: tuple[float, float], reach: tuple[float, float]) -> Lane:
+    """Return the crossing between two stations [m] of a line, so many metres to its right and to its left."""
+    behind, ahead = (line.beside(np.full(2, s), np.array([-reach[0], reach[1]]))[:, :2] for s in stations)
+    return Lane(name, behind, ahead, users=frozenset(("pedestrian",)), crossing=True)
 
 
 def ways_through(road: Road) -> dict[tuple[int, int], Curve]:

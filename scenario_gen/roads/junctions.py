@@ -22,7 +22,7 @@ from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLACK
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route
-from scenario_gen.template import clean_tracks, reactions_of, sharpness_of, Track, turn_of
+from scenario_gen.template import driven_tracks, driver_rows, reactions_of, sharpness_of, Track, turn_of
 from scenario_gen.types import Encounter, Road, YIELD
 
 _RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane where none was recorded
@@ -97,7 +97,7 @@ def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
     Raises:
         RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
     """
-    tracks = clean_tracks(encounter)
+    tracks = driven_tracks(encounter)
     centre = junction_centre(tracks)
     directions = _directions(name, tracks, centre)
     longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
@@ -132,12 +132,13 @@ def _yielding_arms(encounter: Encounter, lane_of: Mapping[tuple[int, bool], tupl
 
     Args:
         encounter: the template.
-        lane_of: arm and lane of the ends of its tracks, by vehicle and whether it comes in.
+        lane_of: arm and lane of the ends of the tracks of those who drive, by vehicle and whether it comes in.
         config: whether priorities are shown.
     """
     came_by = {vehicle: arm for (vehicle, inward), (arm, _) in lane_of.items() if inward}
-    edges = reactions_of(encounter).edges if config.priority == "auto" else ()
-    ways = [(came_by[e.who], came_by[e.whom]) for e in edges if e.kind == YIELD and {e.who, e.whom} <= came_by.keys()]
+    edges, rows = reactions_of(encounter).edges if config.priority == "auto" else (), driver_rows(encounter)
+    yields = [(rows.get(e.who, -1), rows.get(e.whom, -1)) for e in edges if e.kind == YIELD]
+    ways = [(came_by[who], came_by[whom]) for who, whom in yields if {who, whom} <= came_by.keys()]
     pairs = [(arm, other) for arm, other in ways if arm != other]
     return {arm for arm, _ in pairs} - {other for _, other in pairs}
 
@@ -153,7 +154,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     tracks: tuple[Track, ...] = ()
     centre = np.zeros(2)
     if encounter is not None:
-        tracks = clean_tracks(encounter)
+        tracks = driven_tracks(encounter)
         config = fitting_width(tracks, config)
         driven_about = _ring_driven(tracks, config)
         centre = junction_centre(tracks) if driven_about is None else driven_about[0]
@@ -194,7 +195,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
 
 def drives_about_ring(encounter: Encounter, config: RoadConfig) -> bool:
     """Whether somebody in the template drives about the ring of a roundabout."""
-    return _ring_driven(clean_tracks(encounter), config) is not None
+    return _ring_driven(driven_tracks(encounter), config) is not None
 
 
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float] | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.numerics import Bools
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.types import read_numbers, Road, split_pieces
 
@@ -48,8 +49,8 @@ def read_obstacles(text: str, what: str = "obstacles") -> tuple[Obstacle, ...]:
     return tuple(obstacles)
 
 
-def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...]) -> Road:
-    """Return the road with every cell that an obstacle overlaps no longer drivable.
+def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...], others: Bools | bool = False) -> Road:
+    """Return the road with every cell that an obstacle overlaps no longer drivable; `others` (H, W) are so for some types alone.
 
     Raises:
         InputError: an obstacle overlaps no drivable cell, or leaves none; the message names it.
@@ -68,7 +69,7 @@ def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...]) -> Road:
         over = np.zeros_like(blocked)
         own = np.ascontiguousarray(cells[near])
         over[near] = footprint_gaps((half, half), own, size, np.tile(pose, (len(own), 1)))[0] < 0.0
-        if not (over & road.drivable).any():
+        if not (over & (road.drivable | others)).any():
             raise InputError(
                 f"obstacle `{obstacle}` stands nowhere on what is drivable of road {road.name!r}, which lies between "
                 f"({low[0]:.1f}, {low[1]:.1f}) and ({high[0]:.1f}, {high[1]:.1f}) m"
@@ -76,4 +77,4 @@ def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...]) -> Road:
         blocked |= over
     if not (road.drivable & ~blocked).any():
         raise InputError(f"the obstacles leave nothing drivable of road {road.name!r}")
-    return replace(road, drivable=road.drivable & ~blocked, obstructed=road.drivable & blocked)
+    return replace(road, drivable=road.drivable & ~blocked, obstructed=(road.drivable | others) & blocked)

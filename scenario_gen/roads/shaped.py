@@ -17,7 +17,7 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, ROOM, SHORTEST, SIDE_ARMS, SLACK
 from scenario_gen.roads.ways import draw_route, extended
-from scenario_gen.template import clean_tracks, FrenetTracks, MainLine, reactions_of, sharpness_of, to_frenet, Track
+from scenario_gen.template import driven_tracks, driver_rows, FrenetTracks, MainLine, reactions_of, sharpness_of, to_frenet, Track
 from scenario_gen.types import Encounter, Road, YIELD
 
 _RAMP_ANGLE = np.radians(12.0)
@@ -75,7 +75,7 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
     tracks: tuple[Track, ...] = ()
     who, joins = list[int](), np.zeros(3)  # where the template's vehicles join, heading as they do
     if encounter is not None:
-        tracks = clean_tracks(encounter)
+        tracks = driven_tracks(encounter)
         config = fitting_width(tracks, config)
         frenet = to_frenet(tracks)
         who = _merging(tracks, frenet)
@@ -89,7 +89,8 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         approach = join - min(along * float(frenet.station[i][0]) - tracks[i].vehicle.length / 2.0 for i in who)
         fastest = max(float(tracks[i].speed[at]) for i, at in zip(who, joining, strict=True))
         sharpness = min(max(sharpness_of(tracks[i]) for i in who), _RAMP_LATERAL / max(fastest, 1.0) ** 2)
-        yields = any(edge.kind == YIELD and edge.who in who for edge in reactions_of(encounter).edges)
+        rows = driver_rows(encounter)
+        yields = any(edge.kind == YIELD and rows.get(edge.who) in who for edge in reactions_of(encounter).edges)
         joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
         joins[2] += 0.0 if along > 0.0 else np.pi
     reach = [config.arm_length or max(size + ROOM + SLACK, SHORTEST) for size in (before, after, approach)]

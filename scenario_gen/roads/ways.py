@@ -23,17 +23,19 @@ _PARALLEL = np.radians(8.0)
 _BLENDED = np.radians(35.0)  # a turn by up to this is also possible while changing to the line of the exit
 _RAMP = 1.0 / 3.0  # share of a bend's length on which its curvature rises, and falls again
 _SHORT_RAMP = 0.12
-_TIGHTEST = 0.2  # 1/m
+TIGHTEST = 0.2  # 1/m
 _LADDER = (1.0, 0.8, 1.25, 0.64, 1.56, 0.5, 1.95, 2.4)  # times the requested curvature
 _PLAIN = 0.09  # 1/m, where nothing is known of the vehicle
-_LAST = (0.13, 0.155, 0.18, _TIGHTEST)  # 1/m, with short ramps: what a car can just drive
+_LAST = (0.13, 0.155, 0.18, TIGHTEST)  # 1/m, with short ramps: what a car can just drive
 _STEEPEST_SHIFT = 0.05  # 1/m, curvature of a change of lanes on the way
 _WIDEST_SHIFT = 12.0  # metres sideways
 _FLARE = 14.0  # metres, radius of the bends into a roundabout and out of it
 _TIGHTEST_U_TURN = 6.0  # metres
 
 
-def draw_route(entry: Floats, leave: Floats, fits: Fits = lambda _: True, sharpness: float | None = None) -> Curve | None:
+def draw_route(
+    entry: Floats, leave: Floats, fits: Fits = lambda _: True, sharpness: float | None = None, tightest: float = TIGHTEST
+) -> Curve | None:
     """The way from an entry pose (3,) x, y [m], yaw [rad] to an exit pose, or None if `fits` allows none.
 
     Args:
@@ -41,6 +43,7 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits = lambda _: True, sharpn
         leave: where it ends.
         fits: whether poses (M, 3) have room.
         sharpness: curvature [1/m] that its bend should have.
+        tightest: curvature [1/m] that it may have.
 
     Source: clothoid, arc, clothoid, as roads are laid out.
     """
@@ -53,8 +56,9 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits = lambda _: True, sharpn
     along_exit = left / np.sin(turn)  # from the lines' intersection to the exit
     along_entry = ahead - along_exit * np.cos(turn)
     sharp = sharpness or _PLAIN
-    for curvature, ramp in (*((factor * sharp, _RAMP) for factor in _LADDER), *((last, _SHORT_RAMP) for last in _LAST)):
-        if curvature > _TIGHTEST:
+    last = dict.fromkeys((*_LAST, tightest))
+    for curvature, ramp in (*((factor * sharp, _RAMP) for factor in _LADDER), *((curvature, _SHORT_RAMP) for curvature in last)):
+        if curvature > tightest:
             continue
         bend = _bend(round(turn, 9), round(curvature, 9), ramp)
         tangent = float(bend[-1, 1]) / np.sin(turn)

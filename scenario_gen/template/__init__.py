@@ -23,7 +23,7 @@ from scenario_gen.template.separation import least_gap, least_gaps, own_paths, s
 from scenario_gen.template.side import mirrored, traffic_side
 from scenario_gen.template.size import MOST_SAMPLES, MOST_VEHICLES, refuse_reversing, refuse_too_large
 from scenario_gen.template.starts import Equation, solve_starts
-from scenario_gen.template.tracks import clean_tracks, drivers_of, Track
+from scenario_gen.template.tracks import clean_tracks, driven_tracks, driver_rows, drivers_of, Track
 
 __all__ = [
     "MOST_CHANGE",
@@ -43,6 +43,8 @@ __all__ = [
     "conflict_of",
     "conflicts_in",
     "departure",
+    "driven_tracks",
+    "driver_rows",
     "drivers_of",
     "find_conflicts",
     "find_waits",

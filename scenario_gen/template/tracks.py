@@ -110,6 +110,17 @@ def drivers_of(tracks: tuple[Track, ...]) -> tuple[Track, ...]:
     return tuple(track for track in tracks if not track.vehicle.kind.walks) or tracks
 
 
+def driven_tracks(encounter: Encounter) -> tuple[Track, ...]:
+    """Return the clean tracks of those who drive; of everybody, where nobody does."""
+    return drivers_of(clean_tracks(encounter))
+
+
+def driver_rows(encounter: Encounter) -> dict[int, int]:
+    """Return the rows of those who drive, or of everybody where nobody does: among `drivers_of`, by that in the encounter."""
+    drive = [n for n, vehicle in enumerate(encounter.vehicles) if not vehicle.kind.walks] or range(len(encounter.vehicles))
+    return {n: k for k, n in enumerate(drive)}
+
+
 def _clean(encounter: Encounter, i: int) -> Track:
     """Clean one vehicle's motion while it is there."""
     first, last = encounter.present[i].tolist()

@@ -11,7 +11,7 @@ from scenario_gen.types.encounter import Encounter, most_exposed, Tracks, Vehicl
 from scenario_gen.types.evaluation import as_markdown, CheckCounts, Evaluation, formatted, Interval, Metric, Row, SCHEMA
 from scenario_gen.types.fit import Fit, FittedVehicle, Loss
 from scenario_gen.types.generation import ERRORS, GenerationResult
-from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, LEVEL, MIRRORED, RuleKind, TrafficRule
+from scenario_gen.types.lanes import CARS, DrawnFor, DRIVERS, Lane, LaneNetwork, lanes_for, LEVEL, MIRRORED, RuleKind, TrafficRule
 from scenario_gen.types.measures import Measure, Measures
 from scenario_gen.types.names import token, tokens, vehicle_index
 from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
@@ -23,6 +23,7 @@ from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
 from scenario_gen.types.road_users import (
     CAR,
     Dynamics,
+    LANE_USERS,
     OF_CARS,
     ON_THE_SPOT,
     OTHER,
@@ -50,15 +51,16 @@ from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 from scenario_gen.types.target import Pair, Reached, Target, UNITS
 
 __all__ = [
-    "ALWAYS", "CAR", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LEVEL", "MIRRORED", "NARROW",
-    "NOT_KEPT", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECORDING", "REPLAY", "SCHEMA", "UNIFORM", "UNITS",
-    "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause", "CheckCounts", "Coverage",
-    "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult", "Interval",
-    "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality", "Reached",
-    "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario", "ScenarioSet",
-    "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "TypeLimits", "Vehicle", "VehicleType", "Verdict",
-    "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut", "formatted", "height",
-    "join_ego", "join_pieces", "lost_pairs", "mask", "most_exposed", "once_per_object", "reaction_facts", "read_numbers",
-    "read_states", "rear_axle", "routes_in_words", "row_name", "shifted", "split_off", "split_pieces", "together", "token",
+    "ALWAYS", "CAR", "CARS", "COARSEST", "DRIVERS", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LANE_USERS",
+    "LEVEL", "MIRRORED", "NARROW", "NOT_KEPT", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECORDING", "REPLAY", "SCHEMA",
+    "UNIFORM", "UNITS", "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause", "CheckCounts",
+    "Coverage", "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult",
+    "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality",
+    "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario",
+    "ScenarioSet", "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "TypeLimits", "Vehicle",
+    "VehicleType", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut",
+    "formatted", "height", "join_ego", "join_pieces", "lanes_for", "lost_pairs", "mask", "most_exposed", "once_per_object",
+    "reaction_facts", "read_numbers", "read_states", "rear_axle", "routes_in_words", "row_name", "shifted", "split_off",
+    "split_pieces", "together", "token",
     "tokens", "usual_type", "vehicle_index", "with_witness", "words", "yielders_of",
 ]  # fmt: skip

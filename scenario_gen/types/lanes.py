@@ -14,9 +14,13 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
+from scenario_gen.types.derived import once_per_object
+from scenario_gen.types.road_users import CAR, LANE_USERS
 
 LEVEL = 2.5  # metres between the heights of two lanes of which one lies above the other
 MIRRORED = "the recording is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
+DRIVERS = LANE_USERS - {"pedestrian"}
+CARS = frozenset((CAR,))
 _ONCOMING = -0.9  # cosine between directions of traffic
 
 
@@ -33,6 +37,8 @@ class Lane:
         speed_limit: m/s; NaN where the map does not say.
         junction: the junction that it is part of, "" if none.
         height: (M,) metres, of each cross-section; NaN where it is not known, as where none is given.
+        users: who may use it, of `LANE_USERS`; (): all that drive.
+        crossing: it leads people across the lanes of others, as a zebra crossing does.
     """
 
     id: str
@@ -43,16 +49,25 @@ class Lane:
     speed_limit: float = math.nan
     junction: str = ""
     height: Floats = field(default_factory=lambda: np.zeros(0))
+    users: frozenset[str] = frozenset()
+    crossing: bool = False
 
     def __post_init__(self) -> None:
         height = self.height if len(self.height) == len(self.left) else np.full(len(self.left), np.nan)
-        freeze(self, left=frozen(self.left), right=frozen(self.right), height=frozen(height))
+        users = frozenset() if self.users == DRIVERS else self.users
+        freeze(self, left=frozen(self.left), right=frozen(self.right), height=frozen(height), users=users)
+        if not users <= LANE_USERS:
+            raise InputError(f"lane {self.id}: users {', '.join(sorted(users))}; choose of {', '.join(sorted(LANE_USERS))}")
         if self.left.shape != self.right.shape or self.left.ndim != 2 or self.left.shape[1] != 2 or len(self.left) < 2:
             raise InputError(
                 f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed"
             )
         if not (np.isfinite(self.left).all() and np.isfinite(self.right).all()):
             raise InputError(f"lane {self.id}: a border is not finite")
+
+    def open_to(self, users: frozenset[str]) -> bool:
+        """Return whether one of some users may use it."""
+        return not users.isdisjoint(self.users or DRIVERS)
 
     @cached_property
     def centre(self) -> Floats:
@@ -137,6 +152,8 @@ class LaneNetwork:
         drawn: whether it was drawn with its road: it is shown and exported, and nobody is held to it.
         drawn_for: how it was drawn for a template; None: for none, or without a place for it.
         origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map says metres.
+        of_all: the lanes of all users, those of cars first, in the order of `lanes`; their `successors` and `beside` count in
+            here. (): no lane is closed to cars.
     """
 
     name: str
@@ -147,6 +164,7 @@ class LaneNetwork:
     drawn: bool = False
     drawn_for: DrawnFor | None = None
     origin: tuple[float, ...] = ()
+    of_all: tuple[Lane, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.origin) not in (0, 2):
@@ -155,16 +173,48 @@ class LaneNetwork:
         for rule in self.rules:
             if any(not 0 <= k < count for k in (*rule.lanes, *rule.over)):
                 raise InputError(f"traffic rule {rule.id} of {self.name!r} names a lane that is not there")
-        for lane in self.lanes:
-            if any(not 0 <= k < count for k in (*lane.successors, *lane.beside)):
-                raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")
+        for lanes in (self.lanes, self.of_all):
+            for lane in lanes:
+                if any(not 0 <= k < len(lanes) for k in (*lane.successors, *lane.beside)):
+                    raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")
+
+    def with_lanes(self, lanes: Sequence[Lane]) -> "LaneNetwork":
+        """Return the network with these lanes, of all users, in place of its own."""
+        order = sorted(range(len(lanes)), key=lambda k: not lanes[k].open_to(CARS))
+        of_all = _chosen(lanes, order)
+        cars = [k for k, lane in enumerate(of_all) if lane.open_to(CARS)]
+        return replace(self, lanes=_chosen(of_all, cars), of_all=of_all if len(cars) < len(of_all) else ())
+
+    @property
+    def others(self) -> tuple[Lane, ...]:
+        """The lanes that are closed to cars: bus lanes, cycle lanes, footways, crossings."""
+        return self.of_all[len(self.lanes) :]
+
+    @property
+    def whole(self) -> "LaneNetwork":
+        """The network whose lanes are those of all users."""
+        return replace(self, lanes=self.of_all, of_all=()) if self.of_all else self
+
+    def open_to(self, users: frozenset[str]) -> "LaneNetwork":
+        """Return the lanes that one of some users may use; itself if these are its own."""
+        lanes = self.of_all or self.lanes
+        kept = [k for k, lane in enumerate(lanes) if lane.open_to(users)]
+        if kept == list(range(len(self.lanes))):
+            return self
+        index = {k: n for n, k in enumerate(kept)}
+
+        def found(lanes: Sequence[int]) -> tuple[int, ...]:
+            return tuple(index[k] for k in lanes if k in index)
+
+        rules = (replace(rule, lanes=found(rule.lanes), over=found(rule.over)) for rule in self.rules)
+        return replace(self, lanes=_chosen(lanes, kept), rules=tuple(rule for rule in rules if rule.lanes), of_all=())
 
     def moved(self, by: Floats) -> "LaneNetwork":
         """The same lanes (2,) [m] farther."""
-        lanes = (replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.lanes)
+        lanes = [replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.whole.lanes]
         rules = (replace(rule, line=rule.line + by) for rule in self.rules)
         aim = self.drawn_for and replace(self.drawn_for, frame=self.drawn_for.frame + np.array([*by, 0.0]))
-        return replace(self, lanes=tuple(lanes), rules=tuple(rules), drawn_for=aim)
+        return replace(self.with_lanes(lanes), rules=tuple(rules), drawn_for=aim)
 
     @cached_property
     def has_levels(self) -> bool:
@@ -196,7 +246,7 @@ class LaneNetwork:
         """The lanes of each arm of a drawn road, which are named arm.lane; a road through is one arm."""
         arms: dict[str, tuple[int, ...]] = {}
         for k, lane in enumerate(self.lanes):
-            if self.drawn and not lane.junction:
+            if self.drawn and not lane.junction and not lane.crossing:
                 name = lane.id.partition(".")[0]
                 arms[name] = (*arms.get(name, ()), k)
         return arms
@@ -215,6 +265,23 @@ class LaneNetwork:
         """(2, 2) metres: lowest and highest x, y of all borders."""
         points = np.concatenate([lane.outline for lane in self.lanes])
         return frozen(np.stack((points.min(axis=0), points.max(axis=0))))
+
+
+@once_per_object
+def lanes_for(network: LaneNetwork, users: frozenset[str]) -> LaneNetwork:
+    """Return a network with the lanes of cars, the same ones first, and those that one of some users may use."""
+    return network.open_to(users | CARS) if network.of_all else network
+
+
+def _chosen(lanes: Sequence[Lane], kept: Sequence[int]) -> tuple[Lane, ...]:
+    """Return some of the lanes, and of their neighbours those that are among these."""
+    index = {k: n for n, k in enumerate(kept)}
+    chosen = []
+    for lane in (lanes[k] for k in kept):
+        after, beside = (tuple(index[k] for k in names if k in index) for names in (lane.successors, lane.beside))
+        same = (after, beside) == (lane.successors, lane.beside)
+        chosen.append(lane if same else replace(lane, successors=after, beside=beside))
+    return tuple(chosen)
 
 
 def _shared(borders: Sequence[Floats]) -> int:

@@ -15,10 +15,11 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import place
 from scenario_gen.types.derived import once_per_object
-from scenario_gen.types.lanes import LaneNetwork, RuleKind
+from scenario_gen.types.lanes import CARS, DRIVERS, LaneNetwork, RuleKind
 
 _SHARED_M = 0.3  # between the borders of two lanes that are one line
 _STEP_M = 0.2  # before and behind a place on a line by which its direction is seen
+_BARS_M = 1.0  # between the middles of two bars of a crossing
 _SHORTEST_M = 8.0  # of a lane with an arrow
 _ARROW_M = np.array(
     [(-1.6, 0.1), (0.2, 0.1), (0.2, 0.45), (1.6, 0.0), (0.2, -0.45), (0.2, -0.1), (-1.6, -0.1), (-1.6, 0.1)]
@@ -35,17 +36,19 @@ class Marking(StrEnum):
     STOP = "stop"
     GIVE_WAY = "give_way"  # dashed
     ARROW = "arrow"  # a closed shape
+    ZEBRA = "zebra"  # a bar of a crossing; only where there are some
 
 
 @once_per_object
 def markings(network: LaneNetwork) -> Mapping[Marking, tuple[Floats, ...]]:
     """Return the lines (M, 2) [m] of each kind; nothing is painted inside the junction of a drawn road."""
-    lanes = [lane for lane in network.lanes if not (network.drawn and lane.junction)]
+    shown = [lane for lane in network.whole.lanes if not (network.drawn and lane.junction)]
+    lanes = [lane for lane in shown if not lane.crossing]
     painted: dict[Marking, list[Floats]] = {kind: [] for kind in Marking}
     borders = [border for lane in lanes for border in (lane.left, lane.right)]
     beside = _beside(borders)
     for k, border in enumerate(borders):
-        along = beside[k].values()
+        along = [same for n, same in beside[k].items() if lanes[n // 2].open_to(CARS) == lanes[k // 2].open_to(CARS)]
         if not any(other < k and k in beside[other] for other in beside[k]):  # else it is painted already
             painted[Marking.LANE if any(along) else Marking.CENTRE if along else Marking.EDGE].append(border)
     for rule in network.rules:
@@ -53,9 +56,13 @@ def markings(network: LaneNetwork) -> Mapping[Marking, tuple[Floats, ...]]:
             painted[Marking(_PAINTED[rule.kind])].append(rule.line)
     for lane in lanes:
         middle = Curve.through(lane.centre)
-        if middle.length >= _SHORTEST_M and not lane.junction:
-            painted[Marking.ARROW].append(place(middle.at(middle.length / 2.0), *_ARROW_M.T))
-    return {kind: tuple(lines) for kind, lines in painted.items()}
+        if middle.length >= _SHORTEST_M and not lane.junction and lane.open_to(DRIVERS):
+            share = 4.0 if len(shown) > len(lanes) else 2.0  # beside a crossing, not on it
+            painted[Marking.ARROW].append(place(middle.at(middle.length / share), *_ARROW_M.T))
+    for left, right in ((Curve.through(lane.left), Curve.through(lane.right)) for lane in shown if lane.crossing):
+        at = np.arange(_BARS_M / 2.0, min(left.length, right.length), _BARS_M)
+        painted[Marking.ZEBRA].extend(np.stack((left.at(at)[:, :2], right.at(at)[:, :2]), axis=1))
+    return {kind: tuple(lines) for kind, lines in painted.items() if lines or kind != Marking.ZEBRA}
 
 
 def _beside(borders: Sequence[Floats]) -> list[dict[int, bool]]:

@@ -18,6 +18,7 @@ from scenario_gen.base.registry import Registry
 
 CAR, TRUCK, OTHER = "car", "truck", "other"
 TRUCK_LENGTH = 7.0  # m, from which on a vehicle of unknown type counts as a truck
+LANE_USERS = frozenset((CAR, "van", TRUCK, "bus", "motorcycle", "bicycle", "pedestrian"))  # whom lanes can be for
 ON_THE_SPOT = 2.0  # 1/m: who turns on the spot is planned to walk so sharp a curve
 
 
@@ -92,6 +93,12 @@ class VehicleType:
     def walks(self) -> bool:
         """Whether it is on foot."""
         return self.openscenario == "pedestrian"
+
+    @property
+    def lane_user(self) -> frozenset[str]:
+        """As what it may use lanes, one of `LANE_USERS`: a type of a plugin as the one with its category in OpenSCENARIO."""
+        own = {"motorbike": "motorcycle"}.get(self.openscenario, self.openscenario)
+        return frozenset((own if own in LANE_USERS else CAR,))
 
 
 VEHICLE_TYPES = Registry[VehicleType](

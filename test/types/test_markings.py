@@ -41,3 +41,16 @@ def test_markers_have_dashes_of_their_length_and_replace_those_before():
     assert np.hypot(*(dashes[1:-1:2] - dashes[:-2:2])[:, :2].T) == pytest.approx(dash, abs=1e-6)
     assert len(dashes) // 2 == int(np.ceil(120.0 / (dash + gap)))
     assert len(decode(MARKERS, road_markers(None, "map", 5), "road/markings").markers) == 1
+
+
+def test_crossings_are_bars_and_a_cycle_lane_has_a_line_on_each_side():
+    config = RoadConfig(crossing="zebra", cycle_lane=2.0)
+    painted, plain = markings(build_road("straight", None, config).lanes), markings(build_road("straight").lanes)
+    bars = np.stack(painted[Marking.ZEBRA])
+    assert len(bars) == 11 and Marking.ZEBRA not in plain  # a bar a metre, on 7 m of lanes and 4 m of cycle lanes
+    assert np.hypot(*(bars[:, 1] - bars[:, 0]).T) == pytest.approx(4.0) and np.ptp(bars[:, :, 0], axis=0) == pytest.approx(0.0)
+    assert len(painted[Marking.EDGE]) == 4 and not painted[Marking.LANE] and len(painted[Marking.CENTRE]) == 1
+    names = [
+        marker.name for marker in decode(MARKERS, road_markers(build_road("straight", None, config).lanes, "map", 5), "m").markers
+    ]
+    assert names == ["", "edge", "centre", "arrow", "zebra"]

@@ -13,7 +13,7 @@ from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template import in_words, keeps, Track, turn_of, turns_to_keep
 from scenario_gen.template.answers import meetings
-from scenario_gen.types import Loss, Road
+from scenario_gen.types import LaneNetwork, Loss
 
 LOSABLE = {
     "conflict": "vehicles whose paths cross or merge do not meet",
@@ -78,15 +78,15 @@ def refuse_lost(lost: Iterable[Loss], allow: str, road: str) -> None:
         )
 
 
-def find_unused(road: Road, used: Iterable[int]) -> tuple[Loss, ...]:
+def find_unused(network: LaneNetwork, used: Iterable[int]) -> tuple[Loss, ...]:
     """That arms of a drawn junction are not used, given the lanes that vehicles drive on."""
-    arms = road.lanes.arms if road.lanes is not None and road.lanes.drawn else {}
+    arms = network.arms
     of_lane = {k: arm for arm, lanes in arms.items() for k in lanes}
     unused = len(arms) - len({of_lane[k] for k in used if k in of_lane})
     if len(arms) < 3 or not unused:
         return ()
     used_by_nobody = f"{'is' if unused == 1 else 'are'} not used: no recorded vehicle enters or leaves there"
-    return (Loss("arm", (), f"{unused} of the {len(arms)} arms of road {road.name} {used_by_nobody}"),)
+    return (Loss("arm", (), f"{unused} of the {len(arms)} arms of road {network.name} {used_by_nobody}"),)
 
 
 def find_losses(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> tuple[Loss, ...]:

@@ -16,9 +16,9 @@ from scenario_gen.method.fitting.placement import check_scale, max_repair, Place
 from scenario_gen.numerics import frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
-from scenario_gen.roads import Course, placements, tracks_on, ways_through
+from scenario_gen.roads import Course, placements, tracks_on, users_of, ways_through
 from scenario_gen.template import drivers_of, in_words, MOST_CHANGE, to_frenet, Track, turn_of
-from scenario_gen.types import LaneNetwork, Road
+from scenario_gen.types import LaneNetwork, lanes_for, Road
 
 _END_ROOM = 1.0  # metres kept between a footprint and the end of the road
 _ASTRAY = 0.3  # metres that a footprint may be from room on the best place
@@ -33,10 +33,10 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     Raises:
         RefusedError: there is none; the message says what stands against the attempt that came farthest.
     """
-    network = _lanes_of(road)
+    drivers = drivers_of(tracks)
+    network = lanes_for(_lanes_of(road), users_of(drivers))
     own = tracks if network.drawn else ()
     reason, best = "", None
-    drivers = drivers_of(tracks)
     if drivers[0].vehicle.kind.walks:
         raise RefusedError(f"no recorded vehicle drives, so the encounter cannot be laid on the lanes of road {road.name}")
     if network.drawn:
@@ -60,7 +60,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         lost = find_losses(tracks, placement.tracks)
         lacks = len(refused_losses(lost, config.allow)), astray
         if best is None or lacks < best[0]:
-            unused = find_unused(road, (k for course in match.courses for k in course.lanes))
+            unused = find_unused(network, (k for course in match.courses for k in course.lanes))
             best = lacks, replace(placement, unused=unused)
         if not any(lacks):
             break

@@ -90,13 +90,13 @@ def separated(placement: Placement, config: FittingConfig, *, sideways: float, o
 
 def has_room(road: Road, vehicle: Vehicle, poses: Floats) -> bool:
     """Whether a vehicle's footprint has room at all poses (M, 3)."""
-    return bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all())
+    return bool(footprint_fits(ground_for(road, vehicle), poses, vehicle.length, vehicle.width).all())
 
 
 def share_with_room(road: Road, track: Track, every: int = 5) -> Floats:
     """Share (scalar array), 0 to 1, of the track's samples (every n-th and the last) at which its footprint has room."""
     poses = np.concatenate((track.poses[:-1:every], track.poses[-1:]))
-    return np.asarray(footprint_fits(road, poses, track.vehicle.length, track.vehicle.width).mean())
+    return np.asarray(footprint_fits(ground_for(road, track.vehicle), poses, track.vehicle.length, track.vehicle.width).mean())
 
 
 def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:

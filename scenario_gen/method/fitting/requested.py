@@ -10,7 +10,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.roads import footprint_fits
+from scenario_gen.roads import footprint_fits, ground_for
 from scenario_gen.types import Encounter, Fit, Road, TypeLimits
 
 STAND = 0.05  # m/s, a speed below this is met by standing
@@ -33,7 +33,7 @@ def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: F
                 raise RefusedError(
                     f"{what} has {state[3]:g} m/s; at most {max_speed:g} m/s is planned, 8/9 of limits.{vehicle.type}.max_speed"
                 )
-            if not footprint_fits(road, state[None, :3], vehicle.length, vehicle.width)[0]:
+            if not footprint_fits(ground_for(road, vehicle), state[None, :3], vehicle.length, vehicle.width)[0]:
                 raise RefusedError(
                     f"{what} is off the road: a footprint of {vehicle.length:g} m by {vehicle.width:g} m has no room there"
                 )

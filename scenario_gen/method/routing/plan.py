@@ -28,6 +28,7 @@ from scenario_gen.method.routing.search.planner import (  # fmt: skip
 from scenario_gen.method.routing.search.pose_planner import PlansPoses, PoseQuery, Wishes
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, squared_gaps, Targets
+from scenario_gen.method.routing.tight import off_road, too_tight
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
 from scenario_gen.roads import clearance_field, footprint_fits, ground_for, nearest_pose_with_room, own_ground
@@ -125,7 +126,11 @@ def _on_own_lanes(task: _Task) -> Route:
             return _route(replace(task, road=ground))
         except RefusedError:
             pass
-    return _route(task)
+    try:
+        return _route(task)
+    except RefusedError as error:
+        tight = too_tight(task.road, task.vehicle, task.fitted.path, task.max_curvature)
+        raise RefusedError("; ".join(filter(None, (str(error), tight)))) from error
 
 
 def deviations(route: Route, fitted: FittedVehicle) -> Floats:
@@ -370,22 +375,12 @@ def _searched_poses(
             error = RefusedError(
                 f"no drivable route for vehicle {vehicle.id} on road {task.road.name!r} {where}: none with a curvature of at "
                 f"most {limit:.3f} 1/m (limits.{vehicle.type}.max_curvature) was found in {patience * config.iterations} "
-                f"iterations{_off_road(task)}"
+                f"iterations{off_road(task.road, vehicle, task.fitted.path)}"
             )
         except BlockedError as reason:  # of the larger footprint: the anchors themselves have room
             error = RefusedError(f"{task.name(a if reason.end == 'start' else b)} is blocked: {reason}")
     assert error is not None
     raise error
-
-
-def _off_road(task: _Task) -> str:
-    """Where the fitted path of a vehicle leaves the road; what to do where it does not."""
-    path = task.fitted.path
-    off = path[~footprint_fits(task.road, path, task.vehicle.length, task.vehicle.width)]
-    if not len(off):
-        return "; planning.iterations allows more"
-    x, y = off[len(off) // 2, :2]
-    return f"; where the recording was placed its footprint leaves the road, at {x:.2f}, {y:.2f} m: no search mends that"
 
 
 def _sides(config: PlanningConfig, against: float, away: float) -> tuple[float, float]:

@@ -74,7 +74,7 @@ class Checker:
         self._limits = self.limits or Limits()
         self._dynamics_limits: dict[str, Floats] = {}
         if self.road is not None:
-            self._grounds: dict[bool, inside.Ground] = {}
+            self._grounds: dict[frozenset[str], inside.Ground] = {}
         lanes = self.road.lanes if self.road is not None else None
         swapped = self._first != tuple(conflict.first for conflict in self.conflicts or ())
         against = lanes is not None and lanes.drawn and swapped  # the signs of a drawn road say who went first in the template
@@ -324,23 +324,27 @@ class Checker:
                 )
 
     def _ground_of(self, vehicle: Vehicle) -> inside.Ground:
-        """Return where those who walk, or those who drive, may be."""
-        walks = vehicle.kind.walks
-        if walks not in self._grounds:
+        """Return where those of a vehicle's type may be."""
+        users = vehicle.kind.lane_user
+        if users not in self._grounds:
             assert self.road is not None
-            self._grounds[walks] = inside.Ground.of(ground_for(self.road, vehicle))
-        return self._grounds[walks]
+            self._grounds[users] = inside.Ground.of(ground_for(self.road, vehicle))
+        return self._grounds[users]
 
     def _wrong_ways(self, scenario: Scenario) -> Iterator[Violation]:
         """Vehicles that drive against all lanes where they are, at the samples."""
         if self.road is None or self.road.map_lanes is None:
             return
-        against = drives_against(self.road, scenario.position, scenario.heading) & scenario.there
-        drives = np.array([not vehicle.kind.walks for vehicle in scenario.vehicles])
-        for i in np.flatnonzero(against.any(axis=1) & drives).tolist():
-            k = int(np.argmax(against[i]))
+        for i, vehicle in enumerate(scenario.vehicles):
+            if vehicle.kind.walks:
+                continue
+            ground = ground_for(self.road, vehicle)
+            against = drives_against(ground, scenario.position[i], scenario.heading[i]) & scenario.there[i]
+            if not against.any():
+                continue
+            k = int(np.argmax(against))
             x, y = scenario.position[i, k].tolist()
-            message = f"vehicle {i}: drives against its lane near ({x:.2f}, {y:.2f}), {int(against[i].sum())} samples in all"
+            message = f"vehicle {i}: drives against its lane near ({x:.2f}, {y:.2f}), {int(against.sum())} samples in all"
             yield Violation(Cause.WRONG_WAY, float(scenario.time[k]), (i,), message)
 
     def _broken_rules(self, scenario: Scenario) -> Iterator[Violation]:

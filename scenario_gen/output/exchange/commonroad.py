@@ -22,12 +22,13 @@ from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
-from scenario_gen.types import Lane, LaneNetwork, Scenario
+from scenario_gen.types import DRIVERS, Lane, LaneNetwork, Scenario
 
 OBSTACLES, PROBLEM, INTERSECTION, SIGNS = 100_000, 200_000, 300_000, 400_000  # ids from here on; lanelets count from 1
 MAX_SPEED = "274"
 GOAL_TURN = 0.3  # rad by which an ego may be turned at its goal
 AUTHOR = "scenario_gen"
+_FOR_ONE = {"bicycleLane": frozenset(("bicycle",)), "busLane": frozenset(("bus",))}  # types of lanelets of one type of users
 
 
 def benchmark_id(case: Case, exported: Exported) -> str:
@@ -172,12 +173,21 @@ def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -
         for x, y in at_line[0].line[[0, -1]].tolist():
             _point(stop, x, y)
         add(stop, "lineMarking", "solid")
-    add(lanelet, "laneletType", "unknown" if lane_map.is_derived(k) else "urban")
+    add(lanelet, "laneletType", "unknown" if lane_map.is_derived(k) else _lanelet_type(lane))
     if lane_map.turn(k):
         add(lanelet, "laneletType", "intersection")
-    add(lanelet, "userOneWay", "vehicle")
+    for user in sorted(lane.users - {"van"}) or ["vehicle"]:  # the format has no vans
+        add(lanelet, "userOneWay" if lane.open_to(DRIVERS) else "userBidirectional", user)
     for sign in signs:
         add(lanelet, sign.tag, ref=sign.id)
+
+
+def _lanelet_type(lane: Lane) -> str:
+    """Return the type of a lanelet, by its users."""
+    if not lane.open_to(DRIVERS):
+        return "crosswalk" if lane.crossing else "sidewalk"
+    own = [kind for kind, users in _FOR_ONE.items() if lane.users and not lane.open_to(DRIVERS - users)]
+    return own[0] if own else "urban"
 
 
 def _intersection(root: Element, lane_map: LaneMap) -> None:

@@ -42,7 +42,7 @@ def lane_map_of(road: Road | None, scenarios: Sequence[Scenario], lane_width: fl
     if road is None or road.lanes is None:
         return derived_lanes(scenarios, road, lane_width, run_out)
     drawn = road.lanes.drawn
-    network = with_run_out(road.lanes, run_out) if drawn else road.lanes
+    network = with_run_out(road.lanes.whole, run_out) if drawn else road.lanes.whole
     missing = _not_kept(network, scenarios)
     added = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
     origin = f"the true lanes of {network.name}" if drawn else f"the lanes of map {network.name}"

@@ -227,7 +227,7 @@ def refuse_other_map(case: Case, path: Path) -> None:
     Raises:
         InputError: it cannot be read, or more than a tenth of the positions lie on none of its lanes.
     """
-    lanes = area_of(read_network(path))
+    lanes = area_of(read_network(path).whole)
     prepare(lanes)
     places = np.concatenate([one.others.position[one.others.there] for one in case.scenarios])
     share = float(contains_xy(lanes, places).mean())

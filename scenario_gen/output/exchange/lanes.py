@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.types import LaneNetwork, RuleKind
+from scenario_gen.types import CARS, DRIVERS, LaneNetwork, RuleKind
 
 SIGN_IDS = {RuleKind.STOP: "206", RuleKind.GIVE_WAY: "205", RuleKind.PRIORITY: "301"}  # German numbers
 STRAIGHT_ON = 0.52  # rad, 30°: a way through a junction that turns by less goes straight on
@@ -21,7 +21,7 @@ class LaneMap:
     """All lanes of a road; lane k of the network has the id k + 1.
 
     Attributes:
-        network: the lanes.
+        network: the lanes, of all users.
         added: how many at the end are derived: along what is driven, and no lane of the road.
         origin: what the lanes are: true ones of a road, or derived from what; for people.
     """
@@ -42,7 +42,7 @@ class LaneMap:
     @cached_property
     def side(self) -> str:
         """The side of traffic, "right" or "left"."""
-        return self.network.traffic_side or "right"
+        return self.network.open_to(CARS).traffic_side or "right"
 
     def turn(self, k: int) -> str:
         """Where lane k leads through the junction of a drawn road, "left", "straight" or "right"; "" elsewhere."""
@@ -57,7 +57,7 @@ class LaneMap:
     def strips(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
         """The lanes of each arm of a drawn road, in and out, from the middle outwards; of a road through, in both directions.
 
-        Every other lane is alone.
+        Every other lane is alone; crossings are in none.
         """
         lanes, strips = self.network.lanes, dict[int, tuple[tuple[int, ...], tuple[int, ...]]]()
         for arm in self.network.arms.values():
@@ -65,7 +65,7 @@ class LaneMap:
             if inward:
                 strips[inward[0]] = inward, tuple(k for k in arm if k not in inward)
         taken = {k for strip in strips.values() for side in strip for k in side}
-        strips |= {k: ((k,), ()) for k in range(len(lanes)) if k not in taken}
+        strips |= {k: ((k,), ()) for k in range(len(lanes)) if k not in taken and not lanes[k].crossing}
         return tuple(strips[k] for k in sorted(strips))
 
     @cached_property
@@ -92,11 +92,12 @@ def with_run_out(network: LaneNetwork, metres: float) -> LaneNetwork:
     if metres <= 0.0:
         return network
     lanes = list(network.lanes)
-    for k in network.entries:
+    entries, exits = ([k for k in ends if lanes[k].open_to(DRIVERS)] for ends in (network.entries, network.exits))
+    for k in entries:
         lanes[k] = replace(
             lanes[k], left=_longer(lanes[k].left[::-1], metres)[::-1], right=_longer(lanes[k].right[::-1], metres)[::-1]
         )
-    for k in network.exits:
+    for k in exits:
         lanes[k] = replace(lanes[k], left=_longer(lanes[k].left, metres), right=_longer(lanes[k].right, metres))
     return replace(network, lanes=tuple(lanes))
 

@@ -11,8 +11,9 @@ The inertial frame is the scenarios' frame, x east, y north. A straight piece of
 are linear between points. The date is that of the template's stamp.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 import math
 from typing import NamedTuple
@@ -23,15 +24,19 @@ from scipy.sparse.csgraph import connected_components
 
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import angle_between, edge_lengths, unit_left
+from scenario_gen.numerics.plane import ahead_and_left, angle_between, edge_lengths, unit_left
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, serialized
-from scenario_gen.types import Lane, LaneNetwork
+from scenario_gen.types import CARS, DRIVERS, Lane, LaneNetwork
 
 ROADS, JUNCTION = 1, 1000  # ids: of the first road, and of the first junction
 SHORTEST = 1e-6  # metres between two points of a reference line
 STRAIGHT = 1e-7  # rad by which the headings of a straight piece may differ
 GOES_ON = 1e-5  # metres by which a width or an offset may differ from its linear piece
+_LANE_TYPES = {  # and whom they are for, of those that drive
+    "sidewalk": frozenset[str](), "biking": frozenset(("bicycle",)), "bus": frozenset(("bus",)),
+}  # fmt: skip
+_RESTRICTIONS = {"car": "passengerCar", "van": "delivery"}
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # on [-1, 1]
 
 
@@ -114,12 +119,22 @@ def connecting(network: LaneNetwork) -> dict[int, str]:
             del ways[k]
 
 
+def _with_crossings_alone(network: LaneNetwork) -> LaneNetwork:
+    """Return a network in which crossings, that are objects beside the lanes, lead nowhere and nothing leads there."""
+    links = [() if lane.crossing else [k for k in lane.successors if not network.lanes[k].crossing] for lane in network.lanes]
+    return replace(
+        network, lanes=tuple(replace(lane, successors=tuple(own)) for lane, own in zip(network.lanes, links, strict=True))
+    )
+
+
 class _Network:
     """The roads of a lane map, and how their lanes are joined.
 
     Attributes:
         strips: the roads.
         places: of each lane.
+        users: of each lane.
+        crossings: of each road, the lanes that are crossings of it.
         ways: the lanes that are connecting roads, with their junctions.
         ends: of a road's end ("start" or "end") the attributes of its link.
         beyond: of a lane's end (True) or begin the id of the lane that it joins on another road.
@@ -127,7 +142,7 @@ class _Network:
     """
 
     def __init__(self, lane_map: LaneMap) -> None:
-        network = lane_map.network
+        network = _with_crossings_alone(lane_map.network)
         strips = lane_map.strips
         self.strips = [_Strip.of(lane_map, *strip) for strip in strips]
         self.places = {
@@ -136,6 +151,13 @@ class _Network:
             for side, lanes in strip.lanes.items()
             for m, k in enumerate(lanes)
         }
+        self.users = [lane.users for lane in network.lanes]
+        self.crossings: dict[int, list[int]] = defaultdict(list)
+        for k, lane in enumerate(network.lanes):
+            if lane.crossing:
+                middle = lane.outline.mean(axis=0)
+                away = [float(np.hypot(*(strip.reference[:, :2] - middle).T).min()) for strip in self.strips]
+                self.crossings[int(np.argmin(away))].append(k)
         self.ways = connecting(network)
         self.ends: dict[tuple[int, str], dict[str, str | float]] = {}
         self.beyond: dict[tuple[int, bool], int] = {}
@@ -242,18 +264,45 @@ def _road(root: Element, lane_map: LaneMap, network: _Network, n: int) -> None:
             parent, order = add(section, side), range(len(strip.lanes[side]))
             for m in order if side == "right" else order[::-1]:  # from left to right
                 _lane(parent, network, strip.lanes[side][m], _linear(station, strip.widths[side][m]))
+    if network.crossings[n]:
+        _crosswalks(add(road, "objects"), lane_map.network, strip.reference, station, network.crossings[n])
     _signals(road, lane_map.network, strip, station, network.places)
 
 
 def _lane(parent: Element, network: _Network, k: int, widths: Iterable[tuple[float, float, float]]) -> None:
     place = network.places[k]
-    lane = add(parent, "lane", id=place.lane_id, type="driving", level="false")
+    users = network.users[k] or DRIVERS
+    lane = add(parent, "lane", id=place.lane_id, type=_lane_type(users), level="false")
     link = add(lane, "link")
     for tag, end in (("predecessor", not place.along), ("successor", place.along)):
         if (k, end) in network.beyond:
             add(link, tag, id=network.beyond[k, end])
     for s, value, slope in widths:
         add(lane, "width", sOffset=s, a=value, b=slope, c=0.0, d=0.0)
+    if _lane_type(users) == "driving":
+        for user in sorted(DRIVERS - users if users >= CARS else users):
+            add(lane, "access", sOffset=0.0, rule="deny" if users >= CARS else "allow", restriction=_RESTRICTIONS.get(user, user))
+
+
+def _lane_type(users: frozenset[str]) -> str:
+    """Return the type of a lane, by who may use it."""
+    return next((kind for kind, own in _LANE_TYPES.items() if users & DRIVERS <= own), "driving")
+
+
+def _crosswalks(road: Element, network: LaneNetwork, reference: Floats, station: Floats, own: Sequence[int]) -> None:
+    """Append the crossings that lie at a road, as objects with an outline in their own frame."""
+    for k in own:
+        lane = network.lanes[k]
+        n = int(np.argmin(np.hypot(*(reference[:, :2] - lane.outline.mean(axis=0)).T)))
+        ahead, left = ahead_and_left(lane.outline - reference[n, :2], float(reference[n, 2]))
+        t = float(left.mean())
+        walk = add(
+            road, "object", id=k, type="crosswalk", name=lane.id, s=float(station[n]), t=t, zOffset=0.0, orientation="none",
+            hdg=0.0, pitch=0.0, roll=0.0, length=float(np.ptp(ahead)), width=float(np.ptp(left)), height=0.0,
+        )  # fmt: skip
+        outline = add(add(walk, "outlines"), "outline", id=0, closed="true")
+        for u, v in zip(ahead.tolist(), (left - t).tolist(), strict=True):
+            add(outline, "cornerLocal", u=u, v=v, z=0.0, height=0.0)
 
 
 def _signals(road: Element, network: LaneNetwork, strip: _Strip, station: Floats, places: Mapping[int, _Place]) -> None:

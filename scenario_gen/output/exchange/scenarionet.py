@@ -22,7 +22,7 @@ from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
-from scenario_gen.types import height, Scenario, Vehicle
+from scenario_gen.types import DRIVERS, height, Scenario, Vehicle
 
 VERSION = "MetaDrive v0.4.3"  # the description's, not the simulator's
 DATASET = "scenario_gen"
@@ -127,8 +127,10 @@ def _lane(lane_map: LaneMap, k: int) -> dict[str, Any]:
     network, sides = lane_map.network, lane_map.neighbours(k)
     lane = network.lanes[k]
     beside = {side: [str(other + 1)] for side, (other, same) in sides.items() if same}
+    if not lane.open_to(DRIVERS):
+        return {"type": "CROSSWALK" if lane.crossing else "SIDEWALK", "polygon": lane.outline.astype(np.float32)}
     return {
-        "type": "LANE_SURFACE_STREET",
+        "type": "LANE_BIKE_LANE" if lane.users and not lane.open_to(DRIVERS - {"bicycle"}) else "LANE_SURFACE_STREET",
         "polyline": lane.centre.astype(np.float32),
         "polygon": lane.outline.astype(np.float32),
         "entry_lanes": [str(other + 1) for other in sorted(network.predecessors[k])],

@@ -12,7 +12,9 @@ import numpy as np
 
 from scenario_gen.method.evaluation import at_common, at_count, mean_feature
 from scenario_gen.numerics import Bools, Floats
+from scenario_gen.roads import cells_of
 from scenario_gen.types import (
+    DRIVERS,
     Encounter,
     Fit,
     GenerationResult,
@@ -99,11 +101,15 @@ def _short(value: float, digits: int = 3) -> float:
 
 
 def road_data(road: Road) -> dict[str, Any]:
-    """Return the grid with cells merged until its longer side has at most MAX_CELLS; a merged cell is drivable by majority."""
+    """Return the grid with cells merged until its longer side has at most MAX_CELLS; a merged cell is drivable by majority.
+
+    What is drivable for some types alone, as a cycle lane, is drivable.
+    """
     factor = max(1, -(-max(road.drivable.shape) // MAX_CELLS))
     height, width = (-(-side // factor) for side in road.drivable.shape)
     padded = np.zeros((height * factor, width * factor))
-    padded[: road.drivable.shape[0], : road.drivable.shape[1]] = road.drivable
+    others = cells_of(road, (lane for lane in road.lanes.others if lane.open_to(DRIVERS)) if road.lanes is not None else ())
+    padded[: road.drivable.shape[0], : road.drivable.shape[1]] = road.drivable | others
     coarse = padded.reshape(height, factor, width, factor).mean(axis=(1, 3)) >= 0.5
     return {
         "name": road.name,

@@ -6,7 +6,8 @@
 Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -17,15 +18,18 @@ from scenario_gen.base.markup import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_many_lanes, speed_of
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
-from scenario_gen.types import RuleKind
+from scenario_gen.types import CARS, DRIVERS, LANE_USERS, RuleKind
 
 SKIPPED = frozenset(
     ("obstacle", "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem", "scenarioTags")
 )
-_NOT_FOR_CARS = frozenset(
-    ("sidewalk", "crosswalk", "bicycleLane", "busLane", "shoulder", "parking", "border", "railway", "restricted")
-)
-_CARS = frozenset(("vehicle", "car"))  # users of lanelets
+_BY_TYPE = {  # of a lanelet: who may use it, whatever users it names
+    "sidewalk": frozenset(("pedestrian",)), "crosswalk": frozenset(("pedestrian",)), "bicycleLane": frozenset(("bicycle",)),
+    "busLane": frozenset(("bus",)),
+    **dict.fromkeys(("shoulder", "parking", "border", "railway", "restricted"), frozenset[str]()),
+}  # fmt: skip
+_USERS = {"vehicle": DRIVERS, "car": DRIVERS, **{name: frozenset((name,)) for name in LANE_USERS - CARS}}
+_MOTORWAYS = frozenset(("interstate", "highway"))  # types of lanelets on which nobody rides a bicycle
 _MAX_SPEED = ("274", "274.1", "R2-1", "maxSpeed")  # names and national numbers of the sign
 
 
@@ -40,14 +44,11 @@ def lanes_of(root: Element) -> MapLanes:
     refuse_too_many_lanes(len(lanelets), root.file)
     limits = _speed_signs(root, faults)
     junctions = _junctions(root, set(lanelets), faults)
-    for_cars = {
-        name: lanelet
-        for name, lanelet in lanelets.items()
-        if not _texts(lanelet, "laneletType") & _NOT_FOR_CARS and _open_to_cars(lanelet)
-    }
-    both_ways = {name for name, lanelet in for_cars.items() if _texts(lanelet, "userBidirectional") & _CARS}
+    users = {name: own for name, lanelet in lanelets.items() if (own := _users(lanelet))}
+    back = {name: own & _named(lanelets[name], ("userBidirectional",)) & DRIVERS for name, own in users.items()}
+    both_ways = {name for name, own in back.items() if own}
     drafts = []
-    for name, lanelet in for_cars.items():
+    for name, lanelet in ((name, lanelets[name]) for name in users):
         with faults.leaving_out("lanelet", name):
             left, right = (_points(lanelet.one(tag)) for tag in ("leftBound", "rightBound"))
             successors = tuple(after.get("ref") for after in lanelet.all("successor"))
@@ -61,25 +62,40 @@ def lanes_of(root: Element) -> MapLanes:
                 if side.attributes.get("drivingDir") == "same"
             )
             limit, junction = _speed_limit(lanelet, limits), junctions.get(name, "")
-            drafts.append(Draft(name, left, right, successors, beside, limit, junction, lanelet.place))
+            draft = Draft(name, left, right, successors, beside, limit, junction, lanelet.place, users=users[name])
+            drafts.append(replace(draft, crossing="crosswalk" in _texts(lanelet, "laneletType")))
             if name in both_ways:
                 before = tuple(f"{other.get('ref')}r" for other in lanelet.all("predecessor") if other.get("ref") in both_ways)
-                drafts.append(Draft(f"{name}r", right[::-1], left[::-1], before, (), limit, junction, lanelet.place))
+                borders = right[::-1], left[::-1]
+                drafts.append(Draft(f"{name}r", *borders, before, (), limit, junction, lanelet.place, users=back[name]))
     version = root.attributes.get("commonRoadVersion", "?")
     notes = (f"CommonRoad {version}: coordinates as they stand, in metres", *_georeference(root))
-    rules = list(_rules(root, for_cars, faults))
+    rules = list(_rules(root, {name: lanelets[name] for name, own in users.items() if own & CARS}, faults))
     others = [sign for sign in root.all("trafficSign") if not any(map(_means, _sign_names(sign)))]
-    return MapLanes(drafts, notes, len(lanelets) - len(for_cars), faults, rules, len(others))
+    return MapLanes(drafts, notes, len(lanelets) - len(users), faults, rules, len(others))
 
 
 def _texts(lanelet: Element, tag: str) -> set[str]:
     return {child.text.strip() for child in lanelet.all(tag)}
 
 
-def _open_to_cars(lanelet: Element) -> bool:
-    """Whether cars are among those who may use a lanelet; all may where nobody is named, or only who has priority."""
-    users = (_texts(lanelet, "userOneWay") | _texts(lanelet, "userBidirectional")) - {"priorityVehicle"}
-    return not users or bool(users & _CARS)
+def _named(lanelet: Element, tags: Iterable[str]) -> frozenset[str]:
+    """Who is named as a user of a lanelet in elements of some tags; `car` opens it to all that drive, unless others are named."""
+    names = frozenset[str]().union(*(_texts(lanelet, tag) for tag in tags))
+    if "car" in names and names & {"truck", "bus", "motorcycle"}:
+        return frozenset((*CARS, "van")).union(*(_USERS.get(name, frozenset()) for name in names - CARS))
+    return frozenset[str]().union(*(_USERS.get(name, frozenset()) for name in names))
+
+
+def _users(lanelet: Element) -> frozenset[str]:
+    """Who may use a lanelet: as its type says, else who is named; all that drive where nobody is, or only who has priority."""
+    kinds, tags = _texts(lanelet, "laneletType"), ("userOneWay", "userBidirectional")
+    typed = [_BY_TYPE[kind] for kind in kinds if kind in _BY_TYPE]
+    if typed:
+        return frozenset.intersection(*typed)
+    nobody = not (set().union(*(_texts(lanelet, tag) for tag in tags)) - {"priorityVehicle"})
+    users = DRIVERS if nobody else _named(lanelet, tags)
+    return users - {"bicycle"} if kinds & _MOTORWAYS else users
 
 
 def _sign_names(sign: Element) -> list[str]:

@@ -3,15 +3,17 @@
 
 """Nobody drives against a lane: the directions in which each cell may be driven, and a vehicle's own part of the road."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Bools, Floats, sealed, wrap_angle
 from scenario_gen.numerics.plane import angle_between
 from scenario_gen.roads.clearance import clearance_field, footprint_fits
-from scenario_gen.roads.vector.raster import covered
+from scenario_gen.roads.vector.raster import covered, without_slits
 from scenario_gen.types import Lane, once_per_object, Road, Vehicle
 
 _BINS = 16  # of directions
@@ -68,11 +70,42 @@ def drives_against(road: Road, position: Floats, heading: Floats) -> Bools:
 
 
 def ground_for(road: Road, vehicle: Vehicle) -> Road:
-    """Return where a road user may be: who walks also off the lanes, on kerbs and beside the road, but not in obstacles.
+    """Return where a road user may be: on the lanes of its type, and what else is drivable of the road.
 
-    A road without lanes does not tell a kerb from a wall: there all keep to drivable cells.
+    Who walks may be also off the lanes, on kerbs and beside the road, but not in obstacles. A road without lanes does not tell a
+    kerb from a wall: there all keep to drivable cells.
+
+    Raises:
+        RefusedError: all lanes are closed to its type.
     """
-    return _walkable(road) if vehicle.kind.walks and road.lanes is not None else road
+    if road.lanes is None:
+        return road
+    if vehicle.kind.walks:
+        return _walkable(road)
+    return _open_to(road, vehicle.kind.lane_user) or road
+
+
+@once_per_object
+def _open_to(road: Road, users: frozenset[str]) -> Road | None:
+    """The road with the lanes of some users, without those that are closed to them; None: these are its own."""
+    assert road.lanes is not None
+    network = road.lanes.open_to(users)
+    if network is road.lanes:
+        return None
+    if not network.lanes:
+        raise RefusedError(f"all lanes of road {road.name} are closed to a {', '.join(users)}; choose another road")
+    closed = cells_of(road, [lane for lane in road.lanes.lanes if not lane.open_to(users)])
+    drivable = without_slits((road.drivable & ~closed) | cells_of(road, network.lanes))
+    blocked = np.zeros_like(drivable) if road.obstructed is None else road.obstructed
+    return replace(road, drivable=drivable & ~blocked, lanes=network)
+
+
+def cells_of(road: Road, lanes: Iterable[Lane]) -> Bools:
+    """Return (H, W) which cells of a road lie in some lanes."""
+    cells = np.zeros(road.drivable.shape, dtype=np.bool_)
+    for lane in lanes:
+        cells[_cells(road, lane)] = True
+    return cells
 
 
 @once_per_object
@@ -95,9 +128,7 @@ def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
     lanes = road.map_lanes.lanes
     own = {k for k, lane in enumerate(lanes) if on_lane(lane, path, 2)}
     own |= {other for k in own for other in lanes[k].beside}
-    cells = np.zeros(road.drivable.shape, dtype=np.bool_)
-    for k in sorted(own):
-        cells[_cells(road, lanes[k])] = True
+    cells = cells_of(road, (lanes[k] for k in sorted(own)))
     if not cells.any():
         return road
     away = clearance_field(replace(road, drivable=~cells, lanes=None)) if not cells.all() else np.zeros(cells.shape)

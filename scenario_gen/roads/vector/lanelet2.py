@@ -22,9 +22,14 @@ from scenario_gen.logs import local_frame, middle_of
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_long, refuse_too_many_lanes, speed_of
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
-from scenario_gen.types import RuleKind
+from scenario_gen.types import CARS, DRIVERS, LANE_USERS, RuleKind
 
-_FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named
+_BY_SUBTYPE = {  # who may use a lanelet, if no participant is named
+    "road": DRIVERS, "play_street": LANE_USERS, "exit": LANE_USERS, "highway": DRIVERS - {"bicycle"},
+    "bus_lane": frozenset(("bus",)), "bicycle_lane": frozenset(("bicycle",)), "walkway": frozenset(("pedestrian",)),
+    "shared_walkway": frozenset(("bicycle", "pedestrian")), "crosswalk": frozenset(("pedestrian",)),
+    "stairs": frozenset(("pedestrian",)),
+}  # fmt: skip
 _KMH = 1.0 / 3.6
 _LIMITS = {  # m/s by subtype and location, where no sign says: Lanelet2's German traffic rules
     ("road", "urban"): 50.0 * _KMH,
@@ -84,12 +89,13 @@ def lanes_of(root: Element) -> MapLanes:
     )
     tagged = [(relation, _tags(relation)) for relation in relations.values()]
     lanelets = [(relation, tags) for relation, tags in tagged if tags.get("type") == "lanelet"]
-    for_cars = [(relation, tags) for relation, tags in lanelets if _for_cars(tags)]
+    used_by = [(relation, tags) for relation, tags in lanelets if _users(tags)]
+    for_cars = [(relation, tags) for relation, tags in used_by if _users(tags) & CARS]
     if not for_cars:
         raise InputError(f"{root.file}: none of its {len(lanelets)} lanelets is for cars")
-    refuse_too_many_lanes(len(for_cars), root.file)
+    refuse_too_many_lanes(len(used_by), root.file)
     sides: dict[str, list[str]] = {}
-    for relation, _ in for_cars:
+    for relation, _ in used_by:
         with faults.leaving_out("lanelet", relation.get("id")):
             refs = _refs(relation, ways)
             for ref in refs:
@@ -102,17 +108,19 @@ def lanes_of(root: Element) -> MapLanes:
     for ref in dict.fromkeys(chain(*(refs for _, refs in signed))):
         with faults.leaving_out("stop line", ref):
             lines[ref] = _nodes(ways[ref], nodes)
-    all_names = dict.fromkeys(chain(*names.values(), *lines.values()))
-    positions, note, origin = _positions([nodes[name] for name in all_names], root.file, faults)
+    of_cars = {ref for relation, _ in for_cars for ref in sides.get(relation.get("id"), ())}
+    about = dict.fromkeys(chain(*(own for ref, own in names.items() if ref in of_cars), *lines.values()))
+    all_names = about | dict.fromkeys(chain(*names.values()))
+    positions, note, origin = _positions([nodes[name] for name in all_names], len(about), root.file, faults)
     drawn = []
-    for relation, tags in for_cars:
+    for relation, tags in used_by:
         if relation.get("id") not in sides:
             continue
         with faults.leaving_out("lanelet", relation.get("id")):
             borders = [_border(ways[ref], names[ref], positions) for ref in sides[relation.get("id")]]
             lanelet = _lanelet(relation, tags, borders)
             drawn.append(lanelet)
-            if _first(tags, ("one_way:vehicle:car", "one_way:vehicle", "one_way")) in ("no", "false"):
+            if _is_for_both_ways(tags):
                 drawn.append(lanelet.turned())
     limits = {relation.get("id"): _sign_limit(relation, tags, ways) for relation, tags in tagged}
     at = {
@@ -123,7 +131,7 @@ def lanes_of(root: Element) -> MapLanes:
     rules = [replace(rule, line=line) for rule, refs in signed for line in [at[ref] for ref in refs if ref in at] or [rule.line]]
     elements = [(relation, tags) for relation, tags in tagged if tags.get("type") == "regulatory_element"]
     others = [relation for relation, tags in elements if tags.get("subtype") != "speed_limit" and not _kind(relation, tags, ways)]
-    left_out = len(lanelets) - len(for_cars)
+    left_out = len(lanelets) - len(used_by)
     return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), left_out, faults, rules, len(others), origin)
 
 
@@ -194,12 +202,27 @@ def _first(tags: dict[str, str], keys: Sequence[str]) -> str | None:
     return next((tags[key] for key in keys if key in tags), None)
 
 
-def _for_cars(tags: dict[str, str]) -> bool:
-    """Whether cars may use a lanelet: by its participants, or else by its subtype."""
-    named = _first(tags, ("participant:vehicle:car", "participant:vehicle"))
-    if named is not None:
-        return named in ("yes", "true")
-    return not any(key.startswith("participant:") for key in tags) and tags.get("subtype", "road") in _FOR_CARS
+def _users(tags: dict[str, str]) -> frozenset[str]:
+    """Who may use a lanelet: its participants, or else those of its subtype.
+
+    Where vehicles are named and bicycles are not, as in Autoware's maps, these follow the subtype.
+    """
+    usual = _BY_SUBTYPE.get(tags.get("subtype", "road"), frozenset())
+    if not any(key.startswith("participant:") for key in tags):
+        return usual
+    keys: dict[str, tuple[str, ...]] = {
+        user: (f"participant:vehicle:{'car' if user == 'van' else user}", "participant:vehicle") for user in DRIVERS
+    }
+    keys["bicycle"] = ("participant:bicycle", *(("participant:vehicle",) if "bicycle" in usual else ()))
+    keys["pedestrian"] = ("participant:pedestrian",)
+    return frozenset(user for user, own in keys.items() if _first(tags, own) in ("yes", "true"))
+
+
+def _is_for_both_ways(tags: dict[str, str]) -> bool:
+    """Whether those who drive may use a lanelet in both directions."""
+    kinds = ("vehicle:car", "vehicle") if _users(tags) & CARS else ("bicycle",)
+    one_way = _first(tags, (*(f"one_way:{kind}" for kind in kinds), "one_way"))
+    return bool(_users(tags) & DRIVERS) and one_way in ("no", "false")
 
 
 def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
@@ -232,17 +255,18 @@ def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
     return refs
 
 
-def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[str, Floats], str, tuple[float, ...]]:
+def _positions(nodes: list[Element], count: int, file: str, faults: Faults) -> tuple[dict[str, Floats], str, tuple[float, ...]]:
     """Metres (3,) of each node by its id, x, y and its height; a sentence on how they were found; the origin in degrees.
 
-    Local coordinates are taken if most nodes have them; nodes of the other frame are faulty.
+    Local coordinates are taken if most of the first `count` nodes have them, about whose middle the local frame lies else; nodes
+    of the other frame are faulty.
 
     Raises:
         InputError: no node has a position, or the nodes are far apart.
     """
     ids, tags = [node.get("id") for node in nodes], [_tags(node) for node in nodes]
     has_local = [{"local_x", "local_y"} <= own.keys() for own in tags]
-    local = has_local.count(True) * 2 > len(nodes)
+    local = has_local[:count].count(True) * 2 > count
     found: dict[str, Floats] = {}
     for node, name, own, has in zip(nodes, ids, tags, has_local, strict=True):
         with faults.leaving_out("node", name):
@@ -261,7 +285,8 @@ def _positions(nodes: list[Element], file: str, faults: Faults) -> tuple[dict[st
     if local:
         return found, "coordinates are the tags local_x and local_y, in metres", ()
     degrees = np.array(list(found.values()))
-    latitude, longitude = middle_of(degrees[:, :2])
+    about = np.isin(list(found), ids[:count])
+    latitude, longitude = middle_of(degrees[about, :2] if about.any() else degrees[:, :2])
     metres = local_frame(degrees[:, 0], degrees[:, 1], (latitude, longitude))
     size = float(np.hypot(metres[:, 0], metres[:, 1]).max())
     if not size <= _FARTHEST:
@@ -339,6 +364,8 @@ def _drafts(lanelets: list[_Lanelet], limits: dict[str, float]) -> Iterator[Draf
             speed_limit=_speed_limit(lanelet, limits),
             junction=lanelet.tags.get("intersection_area", ""),
             place=lanelet.relation.place,
+            users=_users(lanelet.tags),
+            crossing=lanelet.tags.get("subtype") == "crosswalk",
         )
 
 

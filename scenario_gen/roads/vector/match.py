@@ -8,7 +8,7 @@ their direction, with at most one change of lanes where the map allows one. Alon
 to crossings and between vehicles on one lane (least squares, weighted).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 import math
@@ -30,7 +30,7 @@ from scenario_gen.template import (
     WAIT_SPEED,
 )
 from scenario_gen.template.answers import meetings
-from scenario_gen.types import LaneNetwork, RuleKind
+from scenario_gen.types import CARS, LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
 _HEADING = math.radians(60.0)  # and is turned from it by this at most
@@ -42,6 +42,8 @@ _SAMPLES = 24  # of a path that are compared with a chain
 _CAPPED = 100.0  # m²
 _YAW = 20.0  # m² per unit of 1 - cos
 _OWN_TURN = 40.0  # m² per rad²
+_ANY = ("", "")  # of lanes
+_OWN_LANE = 25.0  # m² by which a lane that is not for cars, but for a vehicle's type, is preferred
 _CHANGING = 4  # chains, the most alike, between which a change of lanes is looked for
 _PRIOR, _CROSSED, _MET, _BEYOND, _FOLLOWED = (
     0.5,
@@ -107,12 +109,14 @@ class Match:
         cost: m², how badly they resemble the template.
         reason: why it cannot be had, or "".
         aside: m/s² of lateral acceleration that the template's speeds at the ends leave no way around (`pressed_aside`).
+        off_own: m², by which places count as worse where somebody does not drive on lanes of its own.
     """
 
     courses: tuple[Course, ...]
     cost: float
     reason: str
     aside: float = 0.0
+    off_own: float = 0.0
 
 
 class Chains:
@@ -126,6 +130,7 @@ class Chains:
         self.height = np.concatenate([lane.height[:-1] for lane in network.lanes])
         self.owner = np.repeat(np.arange(len(network.lanes)), [len(lane.yaw) for lane in network.lanes])
         self._curves: dict[tuple[int, ...], Curve] = {}
+        self._by_users: dict[frozenset[str], tuple[frozenset[int], frozenset[int]]] = {}
 
     def curve(self, chain: tuple[int, ...]) -> Curve:
         """The middle of a chain."""
@@ -137,6 +142,27 @@ class Chains:
         """The lanes that follow a chain and are not in it."""
         return [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
 
+    def closed_to(self, track: Track) -> frozenset[int]:
+        """The lanes that a vehicle may not use."""
+        return self._closed_and_own(track.vehicle.kind.lane_user)[0]
+
+    def own_of(self, track: Track) -> frozenset[int]:
+        """The lanes of a vehicle's own: those that it may use, and cars may not."""
+        return self._closed_and_own(track.vehicle.kind.lane_user)[1]
+
+    def _closed_and_own(self, users: frozenset[str]) -> tuple[frozenset[int], frozenset[int]]:
+        if users not in self._by_users:
+            closed = frozenset(k for k, lane in enumerate(self.network.lanes) if not lane.open_to(users))
+            not_for_cars = frozenset(k for k, lane in enumerate(self.network.lanes) if not lane.open_to(CARS))
+            self._by_users[users] = closed, not_for_cars - closed
+        return self._by_users[users]
+
+    def off_own(self, courses: Sequence[Course], tracks: Sequence[Track]) -> float:
+        """What it counts [m²] that vehicles do not drive on lanes of their own."""
+        own = map(self.own_of, tracks)
+        off = [bool(lanes) and lanes.isdisjoint(course.lanes) for lanes, course in zip(own, courses, strict=True)]
+        return _OWN_LANE * sum(off) / len(tracks)
+
     def near(self, pose: Floats) -> list[int]:
         """Lanes that pass a pose (3,) x, y [m], yaw [rad] nearby, about its way; the nearest first."""
         away = np.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
@@ -147,12 +173,12 @@ class Chains:
             nearest[owner] = min(nearest.get(owner, math.inf), round(float(away[k]), 6))
         return sorted(nearest, key=lambda lane: (nearest[lane], lane))
 
-    def from_lane(self, first: int, travelled: float) -> Iterator[tuple[int, ...]]:
-        """Chains that begin before a lane and go on for what is travelled from it, or until the lanes end."""
+    def from_lane(self, first: int, travelled: float, closed: Collection[int] = ()) -> Iterator[tuple[int, ...]]:
+        """Chains that begin before a lane and go on for what is travelled from it, or until the lanes that are not closed end."""
         before: tuple[int, ...] = ()
         reach, lane = 0.0, first
-        while reach < _FORTH and self.network.predecessors[lane]:
-            lane = self.network.predecessors[lane][0]
+        while reach < _FORTH and (back := [k for k in self.network.predecessors[lane] if k not in closed]):
+            lane = back[0]
             if lane in before or lane == first:
                 break
             before, reach = (lane, *before), reach + self.length[lane]
@@ -161,7 +187,7 @@ class Chains:
             if not open_chains:
                 break
             chain, length = open_chains.pop(0)
-            after = self.after(chain)
+            after = [k for k in self.after(chain) if k not in closed]
             if not after or length > travelled + self.length[first] + _FORTH:
                 yield tuple(k for k in before if k not in chain) + chain
             else:
@@ -179,7 +205,13 @@ def middle(points: Floats) -> Curve:
 
 
 def match(
-    chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.0, ends: Sequence[tuple[str, str]] = ()
+    chains: Chains,
+    tracks: Sequence[Track],
+    spot: Spot,
+    scale: float = 1.0,
+    ends: Sequence[tuple[str, str]] = (),
+    *,
+    own: bool = False,
 ) -> Iterator[Match]:
     """Give every vehicle its course near a placement of the template as one piece.
 
@@ -191,10 +223,12 @@ def match(
         spot: where it lies.
         scale: s of eq 9, of the distances driven.
         ends: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be; (): any for all.
+        own: whether vehicles that have lanes of their own are laid on these, wherever there are some nearby.
     """
     courses = []
-    for track, (first, last) in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
-        course = _course(chains, track, _placed(track, spot), scale, first, last)
+    for track, named in zip(tracks, ends or [_ANY] * len(tracks), strict=True):
+        by = _ANY if own and chains.own_of(track) else named  # other lanes than those by which cars come and go
+        course = _course(chains, track, _placed(track, spot), scale, by, own=own)
         if course is None:
             yield Match((), math.inf, f"no lanes lead along the path of vehicle {track.vehicle.id}, from its start to its end")
             return
@@ -211,23 +245,26 @@ def _placed(track: Track, spot: Spot) -> Floats:
     return np.column_stack((spot.moved(poses[:, :2]), poses[:, 2] + spot.yaw))
 
 
-def _course(chains: Chains, track: Track, poses: Floats, scale: float, enters: str, leaves: str) -> Course | None:
+def _course(chains: Chains, track: Track, poses: Floats, scale: float, ends: tuple[str, str], *, own: bool) -> Course | None:
     """The chain of lanes that resembles a vehicle's path (K, 3) most, of those that come and go by lanes that are named."""
-    lanes, exits = chains.network.lanes, {k for k, lane in enumerate(chains.network.lanes) if not leaves or lane.id == leaves}
-    firsts = [k for k, lane in enumerate(lanes) if lane.id == enters] or chains.near(poses[0])
+    lanes, closed, favoured = chains.network.lanes, chains.closed_to(track), chains.own_of(track) if own else frozenset[int]()
+    exits = {k for k, lane in enumerate(lanes) if not ends[1] or lane.id == ends[1]}
+    firsts = [k for k, lane in enumerate(lanes) if lane.id == ends[0]] or [k for k in chains.near(poses[0]) if k not in closed]
     driven = scale * track.travelled
     tried: dict[tuple[int, ...], tuple[float, Curve, Floats]] = {}
-    candidates = (chain for first in firsts for chain in chains.from_lane(first, driven) if exits.intersection(chain))
+    candidates = (chain for first in firsts for chain in chains.from_lane(first, driven, closed) if exits.intersection(chain))
     for chain in dict.fromkeys(islice(candidates, _MOST_TRIED)):
         curve = _around(chains.curve(chain), poses, driven)
         misses = _misses(curve, poses)
         tried[chain] = (float(misses.mean()) + _turn_cost(curve, poses), curve, misses)
-    ranked = sorted(tried, key=lambda chain: (round(tried[chain][0], 6), chain))
+    length = chains.length
+    on_own = {used: sum(length[k] for k in used if k in favoured) / sum(length[k] for k in used) for used in tried}
+    ranked = sorted(tried, key=lambda chain: (round(tried[chain][0] - _OWN_LANE * on_own[chain], 6), chain))
     if not ranked:
         return None
     cost, curve, _ = tried[ranked[0]]
     used = ranked[0]
-    for before, after in product(ranked[:_CHANGING], repeat=2) if not track.still else ():
+    for before, after in product(ranked[:_CHANGING], repeat=2) if not track.still and not on_own[used] else ():
         change = _change(tried[before][2], tried[after][2])
         if change is not None and change[1] < cost - _WORTH and _beside(chains.network, before, after):
             changed = changed_curve(tried[before][1], tried[after][1], poses[change[0], :2])
@@ -384,7 +421,7 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
         if forced > _NO_GRIP:
             reason = reason or f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
     cost += speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
-    return Match(tuple(courses), cost, reason, max(forced for _, forced in aside))
+    return Match(tuple(courses), cost, reason, max(forced for _, forced in aside), chains.off_own(courses, tracks))
 
 
 def pressed_aside(course: Course, track: Track) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 
 """From borders to lanes: cross-sections, junctions that a map does not name, and the part of a network inside a box."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -20,7 +21,7 @@ from scenario_gen.base.markup import Element
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads.vector.signs import DraftRule, rules_of_pieces, with_rules
-from scenario_gen.types import Lane, LaneNetwork, LEVEL
+from scenario_gen.types import CARS, DRIVERS, Lane, LaneNetwork, LEVEL
 
 _SECTION = 1.0  # metres between cross-sections at most
 _SHORTEST = 0.05  # metres of a border
@@ -86,6 +87,7 @@ class Draft:
         junction: its junction or "".
         place: file and line, for messages.
         paired: left and right are cross-sections already.
+        users, crossing: as of `Lane`.
     """
 
     id: str
@@ -97,6 +99,8 @@ class Draft:
     junction: str
     place: str
     paired: bool = False
+    users: frozenset[str] = frozenset()
+    crossing: bool = False
 
     def __post_init__(self) -> None:
         for names, what in ((self.successors, "follow it"), (self.beside, "lie beside it")):
@@ -109,9 +113,9 @@ class MapLanes:
     """What a reader finds in a file.
 
     Attributes:
-        drafts: its lanes for cars.
+        drafts: its lanes.
         notes: how it was read.
-        left_out: how many lanes for others were passed over.
+        left_out: how many lanes for nobody that is known were passed over.
         faults: what else was left out.
         rules: signs, lights and rights of way.
         other_signs: how many signs and lights mean something else, and are not read.
@@ -179,10 +183,10 @@ def speed_of(text: str, unit: str) -> float:
 
 
 def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
-    """Return the network of what a reader found; neighbours that are no lanes for cars, and faulty lanes, are left out.
+    """Return the network of what a reader found; neighbours that are no lanes, and faulty lanes, are left out.
 
     Raises:
-        InputError: there is no lane; with the first fault, if there is one.
+        InputError: there is no lane for cars; with the first fault, if there is one.
     """
     notes, faults = draft_lanes.notes, draft_lanes.faults
     drawn: dict[str, tuple[Draft, Floats, Floats]] = {}
@@ -200,7 +204,7 @@ def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
             total += max(len(left), math.ceil(longest / _SECTION))
             refuse_too_long(total, f"map {name}")
             drawn[draft.id] = draft, left, right
-    if not drawn:
+    if not any((draft.users or DRIVERS) & CARS for draft, *_ in drawn.values()):
         raise InputError(faults.found[0][2] if faults.found else f"map {name}: no lane that cars may use")
     index = {name: k for k, name in enumerate(drawn)}
     lanes = []
@@ -210,14 +214,21 @@ def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
         )
         height = (left[:, 2] + right[:, 2]) / 2.0 if left.shape[1] == right.shape[1] == 3 else np.full(len(left), np.nan)
         borders = left[:, :2], right[:, :2]
-        lanes.append(Lane(draft.id, *borders, after, beside, draft.speed_limit, draft.junction, height))
+        allowed = draft.users, draft.crossing
+        lanes.append(Lane(draft.id, *borders, after, beside, draft.speed_limit, draft.junction, height, *allowed))
+    network = LaneNetwork(name, (), origin=draft_lanes.origin).with_lanes(lanes)
+    if network.others:
+        counts = Counter(user for lane in network.others for user in lane.users)
+        words = ", ".join(f"{user} {count}" for user, count in sorted(counts.items()))
+        notes += (f"{len(network.others)} lanes are for others than cars: {words}",)
     if draft_lanes.left_out:
-        notes += (f"{draft_lanes.left_out} lanes are for others than cars and were left out",)
+        notes += (f"{draft_lanes.left_out} lanes are for none of the types of road users and were left out",)
     if draft_lanes.other_signs:
         notes += (f"{draft_lanes.other_signs} signs of other kinds than stop, give way, priority and speed limit are not read",)
     notes += faults.notes()
-    network = LaneNetwork(name, tuple(lanes), notes, origin=draft_lanes.origin)
-    return with_rules(network if any(lane.junction for lane in lanes) else with_junctions(network), draft_lanes.rules)
+    network = replace(network, notes=notes)
+    named = any(lane.junction for lane in network.lanes)
+    return with_rules(network if named else with_junctions(network), draft_lanes.rules)
 
 
 def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Floats]:
@@ -251,7 +262,7 @@ def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Flo
 
 
 def with_junctions(network: LaneNetwork) -> LaneNetwork:
-    """Name the junctions of a map that names none: lanes whose middles cross, and those that part from the same lane, are one.
+    """Name the junctions of a map that names none: car lanes whose middles cross, and those that part from the same, are one.
 
     They are numbered 1, 2, … in the order of their first lanes.
     """
@@ -267,9 +278,9 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
     first: dict[int, str] = {}
     named = [
         replace(lane, junction=first.setdefault(int(part[k]), str(len(first) + 1)) if k in joined else "")
-        for k, lane in enumerate(network.lanes)
+        for k, lane in enumerate((network.of_all or network.lanes)[:count])
     ]
-    return replace(network, lanes=tuple(named))
+    return network.with_lanes((*named, *network.others))
 
 
 def crossing_lanes(network: LaneNetwork) -> Iterator[tuple[int, int]]:
@@ -306,11 +317,12 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
     """Return the part of a network inside a box (2, 2) [m]: lanes are cut where their centre lines leave it.
 
     Raises:
-        InputError: no lane is in the box.
+        InputError: no lane for cars is in the box.
     """
     pieces: list[tuple[int, Floats, bool]] = []  # lane, its borders and height, whether its end is there
     begins: dict[int, int] = {}
-    for k, lane in enumerate(network.lanes):
+    of_all = network.of_all or network.lanes
+    for k, lane in enumerate(of_all):
         last = len(lane.left) - 1
         for first, stop in runs(_inside(lane.centre, box)):
             low = max(first - _cut(lane.centre, first, first - 1, box), 0.0)
@@ -323,7 +335,7 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
             if low == 0.0:
                 begins[k] = len(pieces)
             pieces.append((k, cut, high == last))
-    if not pieces:
+    if not any(k < len(network.lanes) for k, *_ in pieces):
         raise InputError(
             f"map {network.name}: no lane in the box {box[0, 0]:g},{box[0, 1]:g},{box[1, 0]:g},{box[1, 1]:g}; {extent(network)}"
         )
@@ -332,13 +344,13 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
         of_lane.setdefault(k, []).append(piece)
     lanes = []
     for k, cut, has_end in pieces:
-        lane = network.lanes[k]
+        lane = of_all[k]
         after = tuple(begins[other] for other in lane.successors if other in begins) if has_end else ()
         beside = tuple(of_lane[other][0] for other in lane.beside if other in of_lane)
         left, right, height = cut[:, :2], cut[:, 2:4], cut[:, 4]
         lanes.append(replace(lane, left=left, right=right, height=height, successors=after, beside=beside))
-    rules = rules_of_pieces(network.rules, of_lane)
-    return replace(network, lanes=tuple(lanes), notes=(*network.notes, note), rules=rules)
+    part = replace(network, rules=()).with_lanes(lanes)
+    return replace(part, notes=(*network.notes, note), rules=rules_of_pieces(network.rules, of_lane))
 
 
 def extent(network: LaneNetwork) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
 from scenario_gen.numerics import Floats
+from scenario_gen.roads.vector.crosswalks import crosswalks
 from scenario_gen.roads.vector.network import (
     by_id,
     Draft,
@@ -31,7 +32,7 @@ from scenario_gen.roads.vector.network import (
 from scenario_gen.roads.vector.plan_view import reference_line
 from scenario_gen.roads.vector.sections import FOR_CARS, Key, LaneSection, OpenDriveRoad, road_of_sections, SectionLane, STEP
 from scenario_gen.roads.vector.signs import DraftRule, is_speed_limit, kind_of_sign
-from scenario_gen.types import RuleKind
+from scenario_gen.types import DRIVERS, RuleKind
 
 _SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 _LINKED = 3.0  # metres between the ends of lanes that are linked, at most
@@ -80,8 +81,10 @@ def lanes_of(root: Element) -> MapLanes:
     signals = [signal for road in roads.values() for group in road.element.all("signals") for signal in group.all("signal")]
     others = [signal for signal in signals if not (_is_read(signal) or _kind_of_signal(signal))]
     lanes_found = [lane for road in roads.values() for section in road.sections for lane in section.lanes.values()]
-    barred = [lane for lane in lanes_found if lane.kind in FOR_CARS and not lane.open_to_cars]
-    return MapLanes(list(_drafts(roads, joints)), notes, len(barred), faults, rules, len(others))
+    barred = [lane for lane in lanes_found if lane.kind in FOR_CARS and not lane.users]
+    drafts = [*_drafts(roads, joints), *(draft for road in roads.values() for draft in crosswalks(road, faults))]
+    refuse_too_many_lanes(len(drafts), root.file)
+    return MapLanes(drafts, notes, len(barred), faults, rules, len(others))
 
 
 def _signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[DraftRule]:
@@ -288,10 +291,10 @@ def _drafts(roads: dict[str, OpenDriveRoad], joints: _Joints) -> Iterator[Draft]
         for section in road.sections:
             for lane in section.lanes.values():
                 wide = float(np.hypot(*(lane.outer - lane.inner).T).max()) >= 0.1
-                if not lane.open_to_cars or not wide:
+                if not lane.users or not wide:
                     continue
                 yield _draft(road, section, lane, joints, along=lane.forth)
-                if lane.both_ways:
+                if lane.both_ways and lane.users & DRIVERS:
                     yield _draft(road, section, lane, joints, along=not lane.forth)
 
 
@@ -329,6 +332,7 @@ def _draft(road: OpenDriveRoad, section: LaneSection, lane: SectionLane, joints:
         junction=road.junction,
         place=lane.element.place,
         paired=True,
+        users=lane.users,
     )
 
 

@@ -6,7 +6,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import combinations, islice
+from itertools import chain, combinations, islice
 import math
 
 import numpy as np
@@ -22,7 +22,7 @@ from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, s
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import conflicts_in, separate, Track
 from scenario_gen.template.answers import meetings
-from scenario_gen.types import LaneNetwork, LEVEL, once_per_object, Scenario
+from scenario_gen.types import LaneNetwork, lanes_for, LEVEL, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
@@ -71,7 +71,8 @@ def placements(
     sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
     search = _Search(chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ())
     found, recorded = False, ""
-    if lanes is None and home.cost <= _HOME:
+    owns = any(map(chains.own_of, tracks))  # who has lanes of its own on a drawn road is not at home on those of cars
+    if lanes is None and home.cost <= _HOME and not (network.drawn and owns):
         own = next(match(chains, tracks, home))
         broken = own.reason or judged.broken(own)
         if not broken:
@@ -122,7 +123,9 @@ class _Search:
             matches = list(along) if scale == 1.0 else []
             for spot in spots:
                 stop_if_cancelled()
-                for placement in match(self.chains, self.tracks, spot, scale, self.ends if spot is self.sized else ()):
+                ends, owns = self.ends if spot is self.sized else (), any(map(self.chains.own_of, self.tracks))
+                variants = (match(self.chains, self.tracks, spot, scale, ends, own=own) for own in (True, False)[not owns :])
+                for placement in chain.from_iterable(variants):
                     far = placement.cost > _WORST and spot is not self.sized
                     if placement.reason or far:
                         reason = placement.reason or "vehicles would be too far from where they are"
@@ -132,13 +135,19 @@ class _Search:
             broken_by = [self.judged.broken(placement) for placement in matches]
             self.failures.extend((False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken)
             matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
-            matches.sort(key=lambda placement: (*self.judged.rank(placement), round(placement.cost, 3)))
+            matches.sort(key=self._order)
             placed = [p for p in matches if p.aside <= _PRESSED and self.judged.rank(p)[0] == 0]
             others += [(p, scale) for p in matches if p not in placed]
             yield from ((placement, scale) for placement in placed)
             if placed:
                 break
         yield from sorted(others, key=lambda other: (other[0].aside > _PRESSED, self.judged.rank(other[0])[0]))
+
+    def _order(self, placement: Match) -> tuple[float, ...]:
+        """What comes first: meetings kept, on a drawn road lanes of one's own, right of way given, resemblance."""
+        lost, unkept = self.judged.rank(placement)
+        off_own = self.chains.network.drawn and placement.off_own > 0.0
+        return lost, off_own, unkept, round(placement.cost + placement.off_own, 3)
 
 
 class _Judged:
@@ -244,6 +253,7 @@ def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int]
     Raises:
         NoPlaceError: there is none.
     """
+    network = lanes_for(network, users_of(tracks))
     reason, found = "", False
     for placement, _ in placements(network, tracks, lanes):
         try:
@@ -261,6 +271,11 @@ def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int]
         yield Place(frozen(box), where, placement.cost, paths)
     if not found:
         raise NoPlaceError(f"the recording fits no place on map {network.name}: {reason}")
+
+
+def users_of(tracks: Sequence[Track]) -> frozenset[str]:
+    """Return as what the vehicles of a template may use lanes."""
+    return frozenset().union(*(track.vehicle.kind.lane_user for track in tracks))
 
 
 def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> tuple[Floats, str]:

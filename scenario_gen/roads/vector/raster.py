@@ -44,7 +44,7 @@ def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig, paved:
     entries, exits = lane_ends(network)
     return Road(
         name=network.name,
-        drivable=_without_slits(drivable),
+        drivable=without_slits(drivable),
         resolution=cell,
         origin=first * cell,
         entries=entries,
@@ -87,7 +87,7 @@ def covered(outline: Floats, cell: float, first: Ints, shape: tuple[int, int]) -
     return low, np.asarray(np.cumsum(winding, axis=1)[:, :columns] != 0)
 
 
-def _without_slits(drivable: Bools) -> Bools:
+def without_slits(drivable: Bools) -> Bools:
     """Fill single cells between two drivable ones: borders of neighbouring lanes need not agree to the millimetre."""
     filled = drivable.copy()
     filled[1:-1] |= drivable[:-2] & drivable[2:]

@@ -9,6 +9,7 @@ Source: ASAM OpenDRIVE 1.8, chapter "Lanes".
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 import math
 
 import numpy as np
@@ -19,13 +20,23 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit_left
 from scenario_gen.roads.vector.network import refuse_too_long, refuse_too_many_lanes
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, ReferenceLine
+from scenario_gen.types import CARS, DRIVERS, LANE_USERS
 
 FOR_CARS = frozenset(
     ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bidirectional", "mwyEntry", "mwyExit", "HOV")
 )
+_BY_KIND = {
+    **dict.fromkeys(FOR_CARS, DRIVERS), "biking": frozenset(("bicycle",)), "bus": frozenset(("bus",)),
+    "sidewalk": frozenset(("pedestrian",)), "walking": frozenset(("pedestrian",)), "shared": frozenset(("bicycle", "pedestrian")),
+}  # fmt: skip
+_MOTORWAYS = frozenset(("entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit", "HOV"))
 STEP = 0.5  # metres between cross-sections
 _SIDES = (("left", 1), ("right", -1))  # and the sign of their lanes' ids
-_NOT_ON_CARS = ("none", "simulator", "autonomousTraffic", "throughTraffic")  # restrictions of access that tell nothing of cars
+_ANYBODY = frozenset(("none", "simulator", "autonomousTraffic", "throughTraffic"))  # restrictions that name no type
+_RESTRICTED = {  # whom a restriction of access names
+    "passengerCar": frozenset(("car", "van")), "delivery": frozenset(("van",)), "trucks": frozenset(("truck",)),
+    **{name: frozenset((name,)) for name in LANE_USERS - CARS - {"van"}},
+}  # fmt: skip
 
 Key = tuple[str, int, int]  # road, section, lane
 
@@ -65,11 +76,10 @@ class SectionLane:
         """Whether it is driven in both directions."""
         return self.kind == "bidirectional" or self.element.attributes.get("direction") == "both"
 
-    @property
-    def open_to_cars(self) -> bool:
-        """Whether cars may use all of it, by its type and its records of access."""
-        if self.kind not in FOR_CARS:
-            return False
+    @cached_property
+    def users(self) -> frozenset[str]:
+        """Who may use all of it, by its type and its records of access."""
+        users = _BY_KIND.get(self.kind, frozenset()) - (frozenset(("bicycle",)) if self.kind in _MOTORWAYS else frozenset())
         records: dict[tuple[str, str], set[str]] = defaultdict(set)  # who may, or may not, from some sOffset on
         for access in self.element.all("access"):
             names = [
@@ -77,10 +87,10 @@ class SectionLane:
                 *(own.attributes.get("type") for own in access.children),
             ]  # before, in 1.8
             records[access.attributes.get("sOffset", "0"), access.attributes.get("rule", "deny")].update(filter(None, names))
-        return all(
-            "passengerCar" not in names if rule == "deny" else not names.isdisjoint(("passengerCar", *_NOT_ON_CARS))
-            for (_, rule), names in records.items()
-        )
+        for (_, rule), restricted in records.items():
+            named = frozenset[str]().union(*(_RESTRICTED.get(name, frozenset()) for name in restricted))
+            users = users - named if rule == "deny" else users if restricted & _ANYBODY else users & named
+        return users
 
     def middle(self, at: int) -> Floats:
         """(2,) [m] its middle at lower s (0) or at higher s (1)."""
@@ -114,10 +124,11 @@ class _Stations:
 
 @dataclass(frozen=True, eq=False)
 class OpenDriveRoad:
-    """A road: its element, id and junction, the side on which one drives, its height along s, its lane sections."""
+    """A road: its element, id, line and junction, the side on which one drives, its height along s, its lane sections."""
 
     element: Element
     id: str
+    line: ReferenceLine
     junction: str
     left_hand: bool
     elevation: Cubics
@@ -144,6 +155,7 @@ def road_of_sections(element: Element, name: str, line: ReferenceLine) -> OpenDr
     road = OpenDriveRoad(
         element,
         name,
+        line,
         "" if junction == "-1" else junction,
         element.attributes.get("rule", "RHT") == "LHT",
         cubics(elevation.all("elevation") if elevation else [], "s"),

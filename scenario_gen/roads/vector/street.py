@@ -92,9 +92,10 @@ def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int
     for frenet in ways:
         for stretch in stretches[:_TRIED]:
             stop_if_cancelled()
-            match = _laid(chains, stretch, tracks, frenet, low)
-            if match is not None:
-                yield match
+            for own in (True, False) if any(map(chains.own_of, tracks)) else (False,):
+                match = _laid(chains, stretch, tracks, (frenet, low), own=own)
+                if match is not None:
+                    yield match
 
 
 def _stretches(chains: Chains, span: float, lanes: Sequence[int] | None) -> Iterator[_Stretch]:
@@ -130,28 +131,35 @@ def _turn_of(chains: Chains, lane: int) -> float:
     return abs(float(np.arctan2(first[0] * last[1] - first[1] * last[0], first[0] * last[0] + first[1] * last[1])))
 
 
-def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: FrenetTracks, low: float) -> Match | None:
+def _laid(
+    chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], along: tuple[FrenetTracks, float], *, own: bool
+) -> Match | None:
     """The template on a stretch of road, None if lanes are missing.
 
     Args:
         chains: of the map.
         stretch: where it goes.
         tracks: the template.
-        frenet: the same in path coordinates.
-        low: station [m] of the template's reference line at which the stretch begins.
+        along: the same in path coordinates, and the station [m] of its reference line at which the stretch begins.
+        own: whether vehicles that have lanes of their own are laid on these.
     """
+    frenet, low = along
     axis = stretch.axis
     ahead = sorted(_sides(chains, stretch, 1), key=lambda side: -side.offset)
     against = sorted(_sides(chains, stretch, -1), key=lambda side: side.offset)
     if ahead and against and against[0].offset < ahead[0].offset:  # traffic keeps left: count from the middle of the road
         ahead, against = ahead[::-1], against[::-1]
-    courses = []
+    courses, offsets = [], {1: list[float](), -1: list[float]()}
     for i, track in enumerate(tracks):
         sign = int(frenet.direction[i])
-        sides = ahead if sign > 0 else against
-        first, last = (int(k) for k in frenet.lane[i])
+        closed, favoured = chains.closed_to(track), chains.own_of(track) if own else frozenset[int]()
+        sides = [side for side in (ahead if sign > 0 else against) if closed.isdisjoint(side.chain)]
+        on_own = [side for side in sides if favoured.issuperset(side.chain)]
+        sides = on_own or sides
+        first, last = (0 if on_own else int(k) for k in frenet.lane[i])
         if max(first, last) >= len(sides):
             return None
+        offsets[sign] += [sides[first].offset, sides[last].offset]
         station = stretch.lead + frenet.station[i] - low
         curve, used = sides[first].curve, sides[first].chain
         if first != last:
@@ -171,15 +179,11 @@ def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: 
             return None
         if abs(courses[-1].turn) > abs(turn_of(track)) + _TURN:
             return None
-    offsets = [
-        [sides[int(k)].offset for k in frenet.lane[frenet.direction == sign].ravel()]
-        for sign, sides in ((1, ahead), (-1, against))
-    ]
-    if any(abs(a - b) < _APART for a in offsets[0] for b in offsets[1]):
+    if any(abs(a - b) < _APART for a in offsets[1] for b in offsets[-1]):
         return None  # one lane for both directions
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
     cost = stretch.bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
-    return Match(tuple(courses), cost, "", max(forced for _, forced in aside))
+    return Match(tuple(courses), cost, "", max(forced for _, forced in aside), chains.off_own(courses, tracks))
 
 
 def _swerving(used: tuple[int, ...], lane: Curve, places: Floats, swerve: Floats) -> Course:

@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 from shapely import box, coverage_union_all, make_valid, Polygon, union_all
 from small_scenarios import moving
+from test_commonroad import case_of
 
+from scenario_gen.output.exchange.commonroad import write_commonroad
+from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import derived_lanes, footprints, lane_map_of
-from scenario_gen.roads import RoadConfig
+from scenario_gen.output.exchange.lanes import LaneMap
+from scenario_gen.output.exchange.opendrive import write_opendrive
+from scenario_gen.output.exchange.scenarionet import description
+from scenario_gen.roads import read_network, RoadConfig
 from scenario_gen.roads.build import build_road
+from scenario_gen.types.lanes import DRIVERS, LaneNetwork
 from scenario_gen.types.lanes import Lane as VectorLane
-from scenario_gen.types.lanes import LaneNetwork
 
 
 def area_of(lanes):
@@ -133,3 +139,48 @@ def test_derived_lanes_hold_every_footprint_and_followers_share_one():
     assert all(lane.successors == () for lane in lanes)
     platoon = moving([[0.0, 0.0, 0.0, 8.0, 0.0, 0.0], [-12.0, 0.0, 0.0, 8.0, 0.0, 0.0]])
     assert len(derived_lanes([platoon], None, 3.5, 60.0).network.lanes) == 1
+
+
+STANDING = moving([[5.0, 5.0, 0.0, 0.0, 0.0, 0.0], [15.0, 5.0, 0.0, 0.0, 0.0, 0.0]])
+
+
+def written(tmp_path, lane_map, ending):
+    """Return the lanes of what is written of a lane map, as they are read again."""
+    path = tmp_path / f"again.{ending}"
+    case = case_of(STANDING, lane_map=lane_map)
+    path.write_bytes(write_opendrive(lane_map, "t", 0) if ending == "xodr" else write_commonroad(*case)[0])
+    return read_network(path)
+
+
+@pytest.mark.parametrize("ending", ["xodr", "xml"])
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("name", ["straight", "t_intersection", "four_way"])
+def test_cycle_lanes_and_crossings_are_read_again_as_they_were_written(tmp_path, name, side, ending):
+    config = RoadConfig(cycle_lane=1.8, crossing="zebra", traffic_side=side)
+    road, lane_map = lanes_on(name, config)
+    again = written(tmp_path, lane_map, ending)
+    for users, crossing in (({"bicycle"}, False), ({"pedestrian"}, True)):
+        own, read = (
+            [x for x in y if x.users == users and x.crossing == crossing] for y in (lane_map.network.lanes, again.others)
+        )
+        assert len(own) == len(read) > 0 and area_of(own).symmetric_difference(area_of(read)).area < 0.02
+        assert sum(len(lane.successors) for lane in own) == sum(len(lane.successors) for lane in read)
+    assert len(again.lanes) == len(road.lanes.lanes) and again.traffic_side == side
+
+
+@pytest.mark.parametrize("ending", ["xodr", "xml"])
+@pytest.mark.parametrize("users", ["bus", "car,van,truck,bus,motorcycle", "pedestrian", "bicycle"])
+def test_users_of_the_lanes_of_a_map_are_read_again(tmp_path, users, ending):
+    line = np.array([[0.0, 0.0], [40.0, 0.0]])
+    lanes = [VectorLane("a", line, line - (0.0, 3.0)), VectorLane("b", line - (0.0, 3.0), line - (0.0, 6.0))]
+    network = LaneNetwork("m", ()).with_lanes([lanes[0], replace(lanes[1], users=frozenset(users.split(",")))])
+    again = written(tmp_path, LaneMap(network.whole, 0, "m"), ending)
+    assert sorted(",".join(sorted(lane.users)) for lane in again.whole.lanes) == ["", ",".join(sorted(users.split(",")))]
+
+
+def test_scenarionet_names_cycle_lanes_and_crossings():
+    _, lane_map = lanes_on("four_way", RoadConfig(cycle_lane=1.8, crossing="zebra"))
+    features = description(*case_of(STANDING, lane_map=lane_map), ExportConfig())["map_features"].values()
+    kinds = [feature["type"] for feature in features]
+    assert {kind: kinds.count(kind) for kind in kinds} == {"LANE_SURFACE_STREET": 20, "LANE_BIKE_LANE": 20, "CROSSWALK": 4}
+    assert sum(lane.open_to(DRIVERS) for lane in lane_map.network.lanes) == 40

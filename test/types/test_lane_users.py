@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Lanes know their users: those of cars stand first, those of other types are chosen with them, and all travel in messages."""
+
+import numpy as np
+import pytest
+
+from msg_conventions.lanes import decode_lanes, encode_lanes
+from scenario_gen.base.errors import InputError
+from scenario_gen.types import Lane, LaneNetwork, lanes_for, RuleKind, TrafficRule, VEHICLE_TYPES
+
+BUS, BICYCLE = (VEHICLE_TYPES[name].lane_user for name in ("bus", "bicycle"))
+
+
+def lane(name, y, after=(), users=(), crossing=False):
+    line = np.array([[0.0, y], [50.0, y]])
+    return Lane(name, line, line - (0.0, 3.0), after, users=frozenset(users), crossing=crossing)
+
+
+def street():
+    """A cycle lane, a car lane that leads into a bus lane and into another one, and a crossing."""
+    lanes = [
+        lane("cycle", 0.0, users=["bicycle"]), lane("in", 3.0, (2, 3)), lane("bus", 6.0, users=["bus"]),
+        lane("motorway", 9.0, users=["car", "bus"]), lane("walk", 12.0, users=["pedestrian"], crossing=True),
+    ]  # fmt: skip
+    network = LaneNetwork("street", ()).with_lanes(lanes)
+    rule = TrafficRule("s", RuleKind.STOP, (1,), (0,), np.array([[40.0, 9.0], [40.0, 6.0]]))
+    return LaneNetwork("street", network.lanes, rules=(rule,), of_all=network.of_all)
+
+
+def led(network):
+    return {lane.id: sorted(network.lanes[k].id for k in lane.successors) for lane in network.lanes}
+
+
+def test_lanes_of_cars_stand_first_and_lead_into_no_others():
+    network = street()
+    assert led(network) == {"in": ["motorway"], "motorway": []}
+    assert [lane.id for lane in network.others] == ["cycle", "bus", "walk"] and len(network.whole.lanes) == 5
+    assert led(lanes_for(network, BUS)) == {"in": ["bus", "motorway"], "motorway": [], "bus": []}
+    assert lanes_for(network, BUS) is lanes_for(network, BUS) and network.open_to(frozenset(("car",))) is network
+
+
+def test_a_bicycle_has_other_lanes_than_a_car_and_the_rules_of_those_it_shares():
+    found = street().open_to(BICYCLE)
+    assert led(found) == {"in": [], "cycle": []} and found.rules == ()
+    assert street().open_to(BUS).rules[0].lanes == (1,)
+
+
+def test_users_travel_in_messages_and_who_is_nobody_is_refused():
+    _, again = decode_lanes(encode_lanes(street(), "map", 0))
+    before = street()
+    for one, other in zip(again.of_all, before.of_all, strict=True):
+        assert (one.id, one.users, one.crossing, one.successors) == (other.id, other.users, other.crossing, other.successors)
+    assert led(again) == led(before) and again.moved(np.ones(2)).others[0].left[0].tolist() == [1.0, 1.0]
+    with pytest.raises(InputError, match="lane x: users tram; choose of bicycle, bus, car"):
+        lane("x", 0.0, users=["tram"])
+
+
+@pytest.mark.parametrize("name", VEHICLE_TYPES.names())
+def test_every_type_uses_lanes_as_one_that_is_known(name):
+    kind = VEHICLE_TYPES[name]
+    (user,) = kind.lane_user
+    assert kind.walks == (user == "pedestrian") and (name not in ("bus", "bicycle", "truck") or user == name)
