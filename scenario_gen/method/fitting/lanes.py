@@ -21,6 +21,7 @@ from scenario_gen.template import drivers_of, in_words, MOST_CHANGE, to_frenet, 
 from scenario_gen.types import LaneNetwork, lanes_for, Road
 
 _END_ROOM = 1.0  # metres kept between a footprint and the end of the road
+_ROUNDING = 1e-3  # metres that a shortened template is shorter than it might be: which side it rounds to depends on the CPU
 _ASTRAY = 0.3  # metres that a footprint may be from room on the best place
 _TRIED, _MORE = 12, 40  # placements that are looked at cell by cell; where something is lost on all of these, more
 
@@ -112,7 +113,7 @@ def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> 
     if high - low <= size - 2.0 * _END_ROOM:
         return 1.0
     cars = max(track.vehicle.length for track in tracks)
-    scale = (size - 2.0 * _END_ROOM - cars) / (high - low - cars)
+    scale = (size - 2.0 * _END_ROOM - _ROUNDING - cars) / (high - low - cars)
     check_scale(scale, f"the recording is {high - low:.0f} m long, road {road.name} {size:.0f} m: it", config)
     return scale
 
