@@ -27,7 +27,7 @@ def pattern_search(costs: Callable[[Floats], Floats], state: Floats, step: Float
     while step[0] > least:
         trials = state + ways * step
         trial_costs = costs(trials)
-        best = int(np.argmin(trial_costs))
+        best = int(np.argmin(np.round(trial_costs, 9)))  # of equal ones the first, on every CPU
         if trial_costs[best] < cost - 1e-9:
             state, cost = trials[best], float(trial_costs[best])
         else:

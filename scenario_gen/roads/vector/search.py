@@ -31,6 +31,7 @@ _AT_ONCE = 20_000  # sections
 _REACH = 4.0  # metres from a lane beyond which a sample counts as off the road
 _BINS = 16  # of directions
 _ALIKE = math.radians(35.0)  # a sample may be turned from its lane by this
+_NUDGE = 1e-6  # cells and bins: a sample on the edge between two is in the same one on every CPU
 _EVERY = 2  # sections of a lane between placements
 _SPACING = 2.0  # metres between a path's samples
 _MOST_SAMPLES = 40  # of a path
@@ -105,11 +106,11 @@ class _Field:
 
     def squared(self, points: Floats, yaws: Floats) -> Floats:
         """Squared distance [m²] of poses (..., 2), (...) from the nearest lane of their direction."""
-        cell = np.floor((points - self.low) / self.cell).astype(np.int64)
+        cell = np.floor((points - self.low) / self.cell + _NUDGE).astype(np.int64)
         inside = ((cell >= 0) & (cell < self.size)).all(axis=-1)
         flat = np.where(inside, cell[..., 1] * self.size[0] + cell[..., 0], 0)
         which = np.where(inside, self.index[flat], len(self.table) - 1)
-        turn: Ints = np.round(yaws / (2.0 * np.pi / _BINS)).astype(np.int64) % _BINS
+        turn: Ints = np.round(yaws / (2.0 * np.pi / _BINS) + _NUDGE).astype(np.int64) % _BINS
         return np.asarray(np.square(self.table[which, turn]))
 
 
@@ -137,7 +138,7 @@ def find_spots(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[
         parts = [placements[k : k + step] for k in range(0, len(placements), step)]
         cost = np.concatenate([_costs(field, poses, weight, part) for part in parts])
         stop_if_cancelled()
-        best = np.argsort(cost, kind="stable")[: 4 * _REFINED]
+        best = np.argsort(np.round(cost, 9), kind="stable")[: 4 * _REFINED]
         spots += [Spot(*row) for row in np.column_stack((cost, placements))[best].tolist()]
     centre = poses[:, :2].mean(axis=0)
     chosen = _distinct(spots, centre, _REFINED)
@@ -230,7 +231,7 @@ def _distinct(spots: list[Spot], centre: Floats, most: int) -> list[Spot]:
     """The best of those that are alike, at most `most`, the best first."""
     kept: list[Spot] = []
     places = np.empty((0, 3))
-    for spot in sorted(spots, key=lambda spot: (round(spot.cost, 6), spot.yaw, spot.x, spot.y)):
+    for spot in sorted(spots, key=lambda spot: (round(spot.cost, 6), round(spot.yaw, 6), round(spot.x, 3), round(spot.y, 3))):
         own = np.array([*spot.moved(centre), spot.yaw])
         off = np.abs(places - own)
         turned = np.abs(wrap_angle(places[:, 2] - own[2]))
