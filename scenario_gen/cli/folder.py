@@ -107,9 +107,11 @@ def generate_folder(
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         unlooking: list[str] = []
         if requested.request.ego:
+            from scenario_gen.closed_loop.config import ClosedLoopConfig
             from scenario_gen.closed_loop.reacting import unlooking_pass
 
-            unlooking = [sentence for case in cases if (sentence := unlooking_pass(case))]
+            drives = ClosedLoopConfig(limits=requested.config.limits)
+            unlooking = [sentence for case in cases if (sentence := unlooking_pass(case, drives))]
         for line in (*faults_of(cases), *unlooking):
             tell(line)
         if record is not None:
