@@ -56,6 +56,11 @@ class Parameters:
 
     replaced: ClassVar[Mapping[str, str]] = {}
 
+    @property
+    def of_plugins(self) -> "Mapping[str, Parameters]":
+        """Configurations nested in it that installed packages add, by name; they are kept in the field `plugins`."""
+        return {}
+
     def __post_init__(self) -> None:
         for entry in fields(self):
             if entry.metadata:
@@ -96,7 +101,13 @@ def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]
             flat |= flatten(value, f"{prefix}{entry.name}.")
         elif entry.metadata:
             flat[prefix + entry.name] = (entry, value)
+    for name, value in _of_plugins(config).items():
+        flat |= flatten(value, f"{prefix}{name}.")
     return flat
+
+
+def _of_plugins(config: Any) -> Mapping[str, Parameters]:
+    return config.of_plugins if isinstance(config, Parameters) else {}
 
 
 def _unknown(config: Any, name: str, prefix: str = "") -> str:
@@ -121,9 +132,11 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     changes: dict[str, Any] = {}
     nested: dict[str, dict[str, Any]] = {}
     known = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
+    inside: dict[str, Any] = {name: part for name in known if is_dataclass(part := getattr(config, name))}
+    inside.update(_of_plugins(config))
     for name, value in values.items():
         head, _, rest = name.partition(".")
-        if head not in known or bool(rest) != is_dataclass(getattr(config, head)):
+        if head not in inside if rest else head in inside or head not in known or not known[head].metadata:
             raise InputError(_unknown(config, name, prefix))
         if rest:
             nested.setdefault(head, {})[rest] = value
@@ -131,7 +144,11 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
             check_value(prefix + head, known[head], value)
             changes[head] = float(value) if isinstance(known[head].default, float) else value
     for head, inner in nested.items():
-        changes[head] = updated(getattr(config, head), inner, f"{prefix}{head}.")
+        part = updated(inside[head], inner, f"{prefix}{head}.")
+        if head in known:
+            changes[head] = part
+        else:
+            changes["plugins"] = (*changes.get("plugins", getattr(config, "plugins", ())), (head, part))
     return replace(config, **changes)  # type: ignore[type-var]
 
 

@@ -107,9 +107,11 @@ def generate_folder(
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         untested: list[str] = []
         if requested.request.ego:
+            from scenario_gen.closed_loop.config import ClosedLoopConfig
             from scenario_gen.closed_loop.reacting import baseline_passes
 
-            untested = [sentence for case in cases if (sentence := baseline_passes(case))]
+            drives = ClosedLoopConfig(limits=requested.config.limits)
+            untested = [sentence for case in cases if (sentence := baseline_passes(case, drives))]
         for line in (*faults_of(cases), *untested):
             tell(line)
         if record is not None:

@@ -26,6 +26,7 @@ from scenario_gen.types import Scenario, tokens, yielders_of
 CELL = 0.1  # seconds of a certified clock that are taken together
 ROOM = 0.05  # metres by which the box of a cell is larger than its ends ask for: what bends between them, and a little distance
 BESIDE_LANE = 0.75  # metres beside the footprints of all that drive which belong to their lanes: 3.4 m of a car's
+PARKED = 1.0  # metres; who drives less stands on no lane of its own
 STANDS = 0.5  # m/s; who is slower at the end of a scenario stands there, who is faster leaves the scene
 
 
@@ -205,7 +206,7 @@ def fill_kerbs(cells: Floats, walks: Bools, cell: float, out: Floats) -> None:
     n, count = cells.shape[0], cells.shape[1]
     for i in range(n):
         for j in range(n):
-            if not walks[i] or walks[j]:
+            if not walks[i] or walks[j] or cells[j, count - 1, 7] < PARKED:
                 continue
             for l in range(count):  # noqa: E741 - the next letter
                 lane = cells[j, l, :7].copy()

@@ -149,7 +149,8 @@ _BUILT_IN = VEHICLE_TYPES.built_in
 class TypeLimits(Parameters):
     """The limits of motion by type: planner, speed profiles, sampler, checker and closed loop read these, and no others.
 
-    A type of a plugin keeps those of its entry.
+    Attributes:
+        plugins: of types of installed packages, what was set, by name; the last one counts. Else they keep those of their entry.
     """
 
     replaced = OF_CARS
@@ -162,6 +163,12 @@ class TypeLimits(Parameters):
     bicycle: Dynamics = _BUILT_IN["bicycle"].dynamics
     pedestrian: Dynamics = _BUILT_IN["pedestrian"].dynamics
     other: Dynamics = _BUILT_IN[OTHER].dynamics
+    plugins: tuple[tuple[str, Dynamics], ...] = ()
+
+    @property
+    def of_plugins(self) -> Mapping[str, Dynamics]:
+        """Those of types of installed packages."""
+        return {name: self.of(name) for name in VEHICLE_TYPES.names() if name not in VEHICLE_TYPES.built_in}
 
     def of(self, name: str) -> Dynamics:
         """Return the limits of a type.
@@ -170,7 +177,7 @@ class TypeLimits(Parameters):
             InputError: there is no type of this name.
         """
         own: Dynamics | None = getattr(self, name, None) if name in VEHICLE_TYPES.built_in else None
-        return own or VEHICLE_TYPES[name].dynamics
+        return own or dict(self.plugins).get(name) or VEHICLE_TYPES[name].dynamics
 
 
 def usual_type(length: float) -> str:

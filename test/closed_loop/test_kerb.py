@@ -80,6 +80,14 @@ def test_a_pedestrian_waits_at_the_kerb_for_a_car_that_cannot_stop_and_goes_on_b
     assert np.diff(drive.motion.speed[1]).min() / PERIOD > -5.1
 
 
+def test_a_pedestrian_that_steps_out_beside_a_parked_car_waits_too():
+    parked = np.stack([3.5 + ZERO, -4.0 + ZERO], axis=1), ZERO, ZERO
+    loop = ClosedLoop(scene(waiting_car(7.0, 16.0), walker(-9.0), parked), 0)
+    drive = loop.drive(KEEPS, lambda state: state.step >= 150)
+    y = drive.motion.position[1, :, 1]
+    assert judge(loop, drive).collision is None and (np.abs(y[drive.motion.speed[1] < 0.5]) > LANE + 0.5).all() and y[-1] > 2.0
+
+
 def test_a_pedestrian_goes_on_before_a_car_that_can_stop():
     scenario = scene(waiting_car(7.0, 16.0), walker(-9.0))
     drive = ClosedLoop(scenario, 0).drive(BRAKES, lambda state: state.step >= 150)

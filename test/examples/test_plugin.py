@@ -101,3 +101,20 @@ print(scooter.type, scooter.length, scooter.kind.dynamics.max_speed)
 
 def test_a_type_of_the_package_is_read(python):
     assert python("-c", TYPES).strip() == "e_scooter 1.2 7.0"
+
+
+LIMITS = """
+from scenario_gen.base.parameters import assigned, flatten
+from scenario_gen.method.config import PipelineConfig
+
+config = PipelineConfig()
+for assignment in ("limits.e_scooter.max_speed=6", "limits.e_scooter.max_curvature=0.5"):
+    config = assigned(config, assignment)
+scooter = config.limits.of("e_scooter")
+print(scooter.max_speed, scooter.max_curvature, PipelineConfig().limits.of("e_scooter").max_speed)
+print(flatten(config)["limits.e_scooter.max_speed"][1])
+"""
+
+
+def test_limits_of_its_type_can_be_set(python):
+    assert python("-c", LIMITS).split() == ["6.0", "0.5", "7.0", "6.0"]

@@ -151,6 +151,17 @@ def omega_prime(folder):
     return path, ("car", "bus", "pedestrian")
 
 
+def pulling(betterosi, kind, trailer):
+    """A class of OSI, of a vehicle that may have a trailer."""
+    number = betterosi.Identifier(value=int(trailer)) if trailer else None
+    return betterosi.MovingObject.VehicleClassification(type=kind, has_trailer=bool(trailer), trailer_id=number)
+
+
+def test_whose_trailer_it_is_is_said(tmp_path):
+    found = read.read_raw([osi(tmp_path)[0]], LogConfig())
+    assert "trailer 7 belongs to 8: read as a road user by itself" in found.notes and len(found.vehicles) == 3
+
+
 def osi(folder):
     """A trace of OSI, written with its own library."""
     betterosi = pytest.importorskip("betterosi")
@@ -171,7 +182,7 @@ def osi(folder):
                             orientation=betterosi.Orientation3d(roll=0.0, pitch=0.0, yaw=heading),
                             velocity=betterosi.Vector3d(x=vx, y=vy, z=0.0),
                         ),
-                        vehicle_classification=betterosi.MovingObject.VehicleClassification(type=kind) if kind else None,
+                        vehicle_classification=kind and pulling(betterosi, kind, "7" if track == "8" else ""),
                     )
                 )
             nanos = round(t * 1e9)

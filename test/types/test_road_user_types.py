@@ -46,7 +46,7 @@ def test_joint_names_say_types_and_older_ones_are_read():
 
 
 def test_each_type_has_limits_of_its_own_to_set():
-    assert [entry.name for entry in fields(TypeLimits)] == list(VEHICLE_TYPES.built_in)
+    assert [entry.name for entry in fields(TypeLimits)] == [*VEHICLE_TYPES.built_in, "plugins"]
     config = assigned(PipelineConfig(), "limits.bus.max_speed=20")
     assert config.limits.of("bus").max_speed == 20.0 and config.limits.of("car") == Dynamics()
     assert Dynamics().planned == Dynamics(40.0, 4.5, 8.0, 5.0, 0.225)

@@ -92,6 +92,9 @@ def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
             notes.append(f"{name} left out: it is no road user with a bounding box in this file or its catalogs")
         else:
             vehicles[name] = vehicle
+            notes += [f"trailer {one.get('name')} of {name} left out: it is part of it" for one in vehicle.all("Trailer/Trailer")]
+            parts = vehicle.all("Trailer/TrailerRef")
+            notes += [f"trailer {one.get('entityRef')} belongs to {name}: read as a road user by itself" for one in parts]
     return vehicles
 
 

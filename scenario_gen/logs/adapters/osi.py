@@ -19,6 +19,8 @@ messages become the columns of omega-prime's table, and are read as it is (`form
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 import math
 from pathlib import Path
 from typing import Any
@@ -48,11 +50,17 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         InputError: it is damaged or too large, has no GroundTruth messages, or an object lacks its number or its position; names
             the file, and the message.
     """
-    return tracks.read(paths, config, name="omega_prime", load=_table)
+    trailers: dict[str, str] = {}
+    log = tracks.read(paths, config, name="omega_prime", load=partial(_table, trailers))
+    notes = (f"trailer {one} belongs to {owner}: read as a road user by itself" for one, owner in trailers.items())
+    return replace(log, notes=(*log.notes, *notes))
 
 
-def _table(path: Path, _: Format, before: int, config: LogConfig) -> pd.DataFrame:
-    """Return the moving objects of all messages as omega-prime's table; without velocities where no object has any."""
+def _table(trailers: dict[str, str], path: Path, _: Format, before: int, config: LogConfig) -> pd.DataFrame:
+    """Return the moving objects of all messages as omega-prime's table; without velocities where no object has any.
+
+    Whose `trailers` there are, by their numbers, is written.
+    """
     rows: list[Row] = []
     offset: Any = None
     for k, message in enumerate(_messages(path, config)):
@@ -61,6 +69,10 @@ def _table(path: Path, _: Format, before: int, config: LogConfig) -> pd.DataFram
         if _offset(message) != offset:
             raise InputError(f"{place}: its proj_frame_offset is another than before; coordinates of one frame are read")
         rows += _rows(message, place)
+        pulling = ((thing, thing.vehicle_classification) for thing in message.moving_object)
+        trailers |= {
+            str(kind.trailer_id.value): str(thing.id.value) for thing, kind in pulling if kind is not None and kind.trailer_id
+        }
         check_size(str(path), 0, before + len(rows), config)
     if not rows:
         raise InputError(f"{path}: no moving object in any of its messages")

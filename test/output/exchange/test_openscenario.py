@@ -102,6 +102,20 @@ def test_what_was_written_is_read_back_and_others_have_no_speeds(tmp_path):
             assert np.allclose(track.speed, scenario.speed[n, there] if ours else [], atol=1e-6)
 
 
+def test_trailers_are_named(tmp_path):
+    """One that is an entity by itself is read, one that is part of its vehicle is not."""
+    data, _ = written(crossing())
+    parts = (b'<TrailerRef entityRef="1"/>', b'<Trailer name="box"><Vehicle/></Trailer>')
+    for part in parts:
+        data = data.replace(b"</Vehicle>", b"<Trailer>" + part + b"</Trailer></Vehicle >", 1)
+    path = tmp_path / "trailers.xosc"
+    path.write_bytes(data)
+    made = observed(path)
+    assert len(made.vehicles) == 2
+    said = [note for note in made.notes if note.startswith("trailer")]
+    assert any("trailer 1 belongs to " in note for note in said) and any("trailer box of " in note for note in said)
+
+
 THEIRS = {  # what others write in place of what we write, and by how many seconds it is later
     "parameters": (b'time="0.5"', b'time="$half"', 0.0),
     "expressions": (b'time="0.5"', b'time="${($half + sqrt(4) * 1.5 - 3) % 2}"', 0.0),
