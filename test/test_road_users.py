@@ -19,7 +19,7 @@ from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.output.results import write_results
-from scenario_gen.roads import cells_of, RoadConfig
+from scenario_gen.roads import build_road, cells_of, RoadConfig
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Dynamics, VEHICLE_TYPES
 
@@ -153,6 +153,15 @@ def test_who_walks_makes_no_arm_of_a_road(road):
     assert len(made.generated.scenarios) == 3 and all(map(proven, made.generated.scenarios))
     walked = made.generated.scenarios[0].position[1]
     assert not made.road.drivable_at(walked[[0, -1]]).any()  # from kerb to kerb, beyond both
+
+
+def test_a_corridor_has_its_crossing_across_the_road_and_no_cycle_lane():
+    (encounter,) = read_log(WORLDS["a car waits for a pedestrian"][0]).encounters
+    (walk,) = build_road("corridor", encounter, RoadConfig(crossing="zebra")).lanes.others
+    width = VEHICLE_TYPES["car"].width + 2.0 * RoadConfig().corridor_margin
+    assert walk.crossing and np.hypot(*(walk.centre[-1] - walk.centre[0])) == pytest.approx(width, abs=0.5)
+    with pytest.raises(RefusedError, match="road corridor is drawn without cycle lanes"):
+        build_road("corridor", encounter, RoadConfig(cycle_lane=1.5))
 
 
 def overtaken():
