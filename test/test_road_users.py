@@ -17,12 +17,14 @@ from benchmarks._recheck import Account, Recheck
 from scenario_gen import generate, read_log
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.closed_loop.simulation import ClosedLoop
+from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.output.report.summary import summary
-from scenario_gen.roads import cells_of, RoadConfig
+from scenario_gen.output.results import write_results
+from scenario_gen.roads import build_road, cells_of, RoadConfig
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Dynamics, VEHICLE_TYPES
 
@@ -190,6 +192,15 @@ def test_who_walks_makes_no_arm_of_a_road(road):
     assert not made.road.drivable_at(walked[[0, -1]]).any()  # from kerb to kerb, beyond both
 
 
+def test_a_corridor_has_its_crossing_across_the_road_and_no_cycle_lane():
+    (encounter,) = read_log(WORLDS["a car waits for a pedestrian"][0]).encounters
+    (walk,) = build_road("corridor", encounter, RoadConfig(crossing="zebra")).lanes.others
+    width = VEHICLE_TYPES["car"].width + 2.0 * RoadConfig().corridor_margin
+    assert walk.crossing and np.hypot(*(walk.centre[-1] - walk.centre[0])) == pytest.approx(width, abs=0.5)
+    with pytest.raises(RefusedError, match="road corridor is drawn without cycle lanes"):
+        build_road("corridor", encounter, RoadConfig(cycle_lane=1.5))
+
+
 def overtaken():
     """A car that passes a bicycle on its right."""
     bicycle = driven(straight((20.0, -2.4), (300.0, -2.4)), np.full(len(T), 4.5))
@@ -199,7 +210,7 @@ def overtaken():
 @pytest.mark.parametrize(
     ("road", "table"), [("straight", overtaken()), ("four_way", meeting("bicycle", 8.0)), ("t_intersection", overtaken())]
 )
-def test_a_bicycle_is_on_the_cycle_lane_where_there_is_one(road, table):
+def test_a_bicycle_is_on_the_cycle_lane_where_there_is_one(tmp_path, road, table):
     (encounter,) = read_log(table).encounters
     made = generate(encounter, road, PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=3, seed=1)
     (n,) = (n for n, vehicle in enumerate(made.encounter.vehicles) if vehicle.type == "bicycle")
@@ -208,6 +219,10 @@ def test_a_bicycle_is_on_the_cycle_lane_where_there_is_one(road, table):
     assert own[row, column].all()
     row, column, _ = made.road.cells(np.concatenate([scenario.position[1 - n] for scenario in made.generated.scenarios]))
     assert made.road.drivable[row, column].all() and all(map(proven, made.generated.scenarios))
+    write_results(tmp_path / "out", [made], title="", quality=(), provenance={})
+    for trial in read_trials(tmp_path / "out" / "bag", encounter.vehicles[n].id):  # as the ego it is on the road there, too
+        loop = ClosedLoop(trial.scenario, trial.ego, trial.road)
+        assert loop.road.drivable_at(trial.scenario.position[loop.ego])[trial.scenario.there[loop.ego]].all()
 
 
 def test_who_follows_a_bicycle_still_does_where_there_is_a_cycle_lane():

@@ -22,6 +22,7 @@ from scenario_gen.closed_loop.driver import Manner
 from scenario_gen.closed_loop.ego import Command, EgoState, misplaced, move, Pose
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
+from scenario_gen.roads import ground_for
 from scenario_gen.types import Dynamics, Road, Scenario, Vehicle
 
 
@@ -69,7 +70,7 @@ class Task:
         start: (4,) x, y [m], yaw [rad], speed [m/s].
         goal: (4,) likewise: where the witness ends.
         route: (M, 3) x, y [m], yaw [rad] of a way from start to goal that can be driven: the witness' path, without its speeds.
-        road: what is drivable, if it is known.
+        road: what is drivable for the ego's type, if it is known.
         step: time between two decisions [s].
         config: the parameters of the drive.
         speed: the witness' highest speed [m/s].
@@ -183,9 +184,9 @@ class ClosedLoop:
         """
         if road is not None and road.frame_id != scenario.frame_id:
             raise InputError(f"scenario {scenario.index} is in frame {scenario.frame_id!r}, its road in {road.frame_id!r}")
-        self.scenario, self.road = scenario, road
-        self.world = world_of(scenario, ego, config.step)
+        self.scenario, self.world = scenario, world_of(scenario, ego, config.step)
         self.ego = self.world.ego
+        self.road = road and ground_for(road, scenario.vehicles[self.ego])
         self.config, self.limits = config, config.limits.of(scenario.vehicles[self.ego].type)
         reactive = config.policy != REPLAY
         self.reactions = np.array(

@@ -110,7 +110,7 @@ def read_trials(bag: Path, ego: str = "", count: int = 0, config: BagConfig = Ba
     """
     trials: list[Trial] = []
     with within(bag):
-        for namespace in read_recording(bag, config, ("map", SCENARIOS, INFO)).namespaces.values():
+        for namespace in read_recording(bag, config, ("map", "road/lanes", "fit/info", SCENARIOS, INFO)).namespaces.values():
             for k in range(len(namespace.hashes)):
                 if count and len(trials) >= count:
                     break

@@ -60,10 +60,10 @@ def _draw_road(axes: "Axes", road: Road) -> None:
     """Draw the drivable cells of a road in grey, and what is painted for others than cars: their lanes, the bars of crossings."""
     height, width = (cells * road.resolution for cells in road.drivable.shape)
     x, y = road.origin
-    shade = np.where(road.drivable, 0.85, 1.0)
+    shade = np.where(road.drivable, 0.85, np.nan)
     axes.imshow(shade, cmap="gray", vmin=0.0, vmax=1.0, origin="lower", extent=(x, x + width, y, y + height), zorder=0)
     for lane in (lane for lane in road.lanes.others if not lane.crossing) if road.lanes is not None else ():
-        axes.fill(*lane.outline.T, color="#d9a9a2" if lane.open_to(DRIVERS) else "#e9e5d6", zorder=0.5, linewidth=0)
+        axes.fill(*lane.outline.T, color="#d9a9a2" if lane.open_to(DRIVERS) else "#e9e5d6", zorder=-0.5, linewidth=0)
     for bar in markings(road.lanes).get(Marking.ZEBRA, ()) if road.lanes is not None else ():
         axes.plot(*bar.T, color="white", linewidth=1.5, zorder=0.6)
 

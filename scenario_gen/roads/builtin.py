@@ -208,5 +208,5 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
         return road
     line = paths[next(iter(shared))]
     middle = line.cut(*half_way(line), _STEP)
-    right, left = (float(drivable_beside(road.drivable_at, middle, side, _WIDEST_CROSSING).max()) for side in (-1.0, 1.0))
+    right, left = (float(np.median(drivable_beside(road.drivable_at, middle, side, _WIDEST_CROSSING))) for side in (-1.0, 1.0))
     return replace(road, lanes=road.lanes.with_lanes((*lanes, across("crossing 1", line, half_way(line), (right, left)))))

@@ -54,11 +54,11 @@ def markings(network: LaneNetwork) -> Mapping[Marking, tuple[Floats, ...]]:
     for rule in network.rules:
         if rule.kind in _PAINTED and len(rule.line):
             painted[Marking(_PAINTED[rule.kind])].append(rule.line)
+    crossed = network.drawn and len(lanes) < len(shown) == len(network.whole.lanes)  # in the middle: there is no junction
     for lane in lanes:
         middle = Curve.through(lane.centre)
         if middle.length >= _SHORTEST_M and not lane.junction and lane.open_to(DRIVERS):
-            share = 4.0 if len(shown) > len(lanes) else 2.0  # beside a crossing, not on it
-            painted[Marking.ARROW].append(place(middle.at(middle.length / share), *_ARROW_M.T))
+            painted[Marking.ARROW].append(place(middle.at(middle.length / (4.0 if crossed else 2.0)), *_ARROW_M.T))
     for left, right in ((Curve.through(lane.left), Curve.through(lane.right)) for lane in shown if lane.crossing):
         at = np.arange(_BARS_M / 2.0, min(left.length, right.length), _BARS_M)
         painted[Marking.ZEBRA].extend(np.stack((left.at(at)[:, :2], right.at(at)[:, :2]), axis=1))

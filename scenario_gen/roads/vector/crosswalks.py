@@ -63,8 +63,7 @@ def _poses(road: OpenDriveRoad, places: Floats) -> Floats:
 def _outline(road: OpenDriveRoad, element: Element, pose: Floats) -> Floats:
     """The corners (P, 2) [m] of an object, whose place has a pose (3,) along the road."""
     own = pose + np.array([0.0, 0.0, element.number("hdg", 0.0)])
-    holders = [element, *element.all("outlines")]
-    outline = next((outline for holder in holders for outline in holder.all("outline")), None)
+    outline = next((outline for holder in (element, *element.all("outlines")) for outline in holder.all("outline")), None)
     if outline is None:
         return np.asarray(corners(own[None], element.number("length"), element.number("width"))[0])
     local = np.array([(corner.number("u"), corner.number("v")) for corner in outline.all("cornerLocal")])
