@@ -110,6 +110,8 @@ def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Ite
         a, b = (tracks[k].vehicle.id for k in pair)
         if pair not in after:
             following = before[pair].following
+            if following and any(tracks[k].vehicle.kind.walks for k in pair):
+                continue
             if following and _in_two_lanes(*(tracks[k] for k in pair)):
                 how = "drive side by side less than a lane apart in the recording, in two lanes on this road"
                 yield Loss("beside", (a, b), f"vehicles {a} and {b} {how}")
@@ -132,7 +134,7 @@ def _in_two_lanes(track: Track, other: Track) -> bool:
 
 def _lost_lanes(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
     """Who drives in whose lane at the start and at the end: what has become of it on the road."""
-    for i, j in permutations(range(len(tracks)), 2):
+    for i, j in permutations((n for n, track in enumerate(tracks) if not track.vehicle.kind.walks), 2):
         before = [_aside(tracks[i], tracks[j], end) for end in (0, 1)]
         after = [_aside(placed[i], placed[j], end) for end in (0, 1)]
         together = [abs(offset) < _IN_LANE for offset in before]

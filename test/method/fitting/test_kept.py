@@ -69,15 +69,15 @@ def test_what_is_kept_or_at_home_is_not_refused(place):
     assert [loss.kind for loss in fit_template(CROSSING, SEGMENTATION, OPEN).losses] == ["conflict"]
 
 
-def along(*offsets, ahead=0.0):
-    """The tracks of two vehicles that drive east at 10 m/s: for each its offsets [m, left] at start, middle and end."""
+def along(*offsets, ahead=0.0, kind="car"):
+    """The tracks of two of a type that go east at 10 m/s: for each its offsets [m, left] at start, middle and end."""
     x = np.arange(0.0, 150.0)
     poses = [
         np.column_stack((x + k * ahead, np.interp(x, [0.0, 50.0, 75.0, 100.0, 149.0], own))) for k, own in enumerate(offsets)
     ]
     position = np.stack(poses)
     heading = np.zeros(position.shape[:2])
-    vehicles = (Vehicle("1"), Vehicle("2"))
+    vehicles = (Vehicle("1", type=kind), Vehicle("2", type=kind))
     return clean_tracks(Encounter("two", vehicles, 0, 100_000_000, position, heading, np.full(heading.shape, 10.0)))
 
 
@@ -97,6 +97,11 @@ SAME, LEFT, INTO = (0.0,) * 5, (3.5,) * 5, (3.5, 3.5, 1.75, 0.0, 0.0)
 def test_who_drives_in_whose_lane_is_kept(template, road, kind):
     assert not find_losses(template, template)
     assert [loss.kind for loss in find_losses(template, road) if loss.kind in LOSABLE] == [kind]
+
+
+def test_who_walks_is_in_no_lane():
+    template, road = (along(SAME, other, ahead=20.0, kind="pedestrian") for other in (SAME, LEFT))
+    assert not [loss.kind for loss in find_losses(template, road) if loss.kind in LOSABLE]
 
 
 def test_who_is_recorded_beside_another_one_in_its_width_does_not_follow_it():
