@@ -91,7 +91,7 @@ def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
     if nearest is None or nearest.apart == math.inf:
         stand = [vehicle.id for n, vehicle in enumerate(encounter.vehicles) if np.all(encounter.speed[n] < WAIT_SPEED)]
         standing = f"; {' and '.join(f'vehicle {name}' for name in stand)} stands throughout" if stand else ""
-        return f"none drives behind another one in its lane, or crosses its way{standing}"
+        return f"none drives behind another one in its lane, or crosses its path{standing}"
     who, whom = (encounter.vehicles[n].id for n in (nearest.who, nearest.whom))
     least = math.floor(10.0 * nearest.apart) / 10.0
     return f"the nearest are vehicle {who} and vehicle {whom}, and they are never within {least:.1f} s of each other"
