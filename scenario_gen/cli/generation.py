@@ -164,10 +164,10 @@ def roads(
 @commands.command()
 def regenerate(
     bag: Annotated[Path, typer.Argument(help="A bag that `generate` or the ROS nodes wrote.")],
-    index: Annotated[int, typer.Argument(help="Index of the scenario, as in scenarios/info.", min=0)],
+    index: Annotated[int, typer.Argument(help="Number of the scenario, as on its page.", min=0)],
     out: Annotated[Path | None, typer.Option(help="Folder for a bag with this scenario, its recording and its road.")] = None,
-    namespace: Annotated[str | None, typer.Option(help="Namespace of the scenario, if several have that index.")] = None,
-    request: Annotated[str | None, typer.Option(help="Id of the request, if several have that index.")] = None,
+    namespace: Annotated[str | None, typer.Option(help="Namespace of the scenario, if several have that number.")] = None,
+    request: Annotated[str | None, typer.Option(help="Id of the request, if several have that number.")] = None,
     log: Annotated[
         Path | None, typer.Option(help="Start from this raw log instead of the bag's tracks and changepoints.")
     ] = None,
