@@ -52,9 +52,8 @@ def main() -> None:
         slot = generate(encounter, road, config, count=1, seed=arguments.seed, request=Request(ego=ego)).generated
         others = slot.scenarios[0]
         left = [vehicle.id for vehicle in others.vehicles]
-        print(
-            f"without vehicle {ego}: {', '.join(left)}; its reference drive is {'there' if others.reference_drive else 'missing'}"
-        )
+        there = "there" if others.reference_drive else "missing"
+        print(f"without vehicle {ego}: {', '.join(left)}; its reference drive is {there}")
 
 
 if __name__ == "__main__":

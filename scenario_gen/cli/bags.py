@@ -103,7 +103,7 @@ def export_scenarios(
     to: Annotated[str, typer.Option(help="commonroad, openscenario (with OpenDRIVE), autoware or scenarionet (MetaDrive).")],
     out: Annotated[Path | None, typer.Option(help="Folder for the files. Default: BAG_commonroad etc. beside the bag.")] = None,
     index: Annotated[
-        list[int] | None, typer.Option(min=0, help="Index of a scenario, as in scenarios/info. Repeatable; default: all.")
+        list[int] | None, typer.Option(min=0, help="Number of a scenario, as on its page. Repeatable; default: all.")
     ] = None,
     namespace: Annotated[str | None, typer.Option(help="Only the scenarios in this namespace.")] = None,
     ego: Annotated[str, typer.Option(help="Id of the vehicle that becomes the ego, e.g. CommonRoad's planning problem.")] = "",

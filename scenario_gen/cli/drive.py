@@ -23,7 +23,7 @@ from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.ros.nodes.traffic_of_trials import drive_trials
 
-PATIENCE = 10.0  # seconds that a planner's node has to end by itself
+END_S = 10.0  # seconds that a planner's node has to end by itself
 LINES = 8  # of what the planner wrote last, that an error shows
 
 
@@ -72,4 +72,4 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, number)
         with suppress(subprocess.TimeoutExpired):
-            process.wait(PATIENCE)
+            process.wait(END_S)

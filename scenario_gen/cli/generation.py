@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from scenario_gen.types import GenerationResult
 
 commands = Commands("Generate scenarios")
-MOST = 100_000  # scenarios of one request
+MAX_COUNT = 100_000  # scenarios of one request
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Generate:
             "draws a map with the places that fit. Repeatable."
         ),
     ]
-    count: Annotated[int, typer.Option(min=1, max=MOST, help="Scenarios per encounter and road.")] = 50
+    count: Annotated[int, typer.Option(min=1, max=MAX_COUNT, help="Scenarios per encounter and road.")] = 50
     seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 0
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/generated")
     encounter: Annotated[list[str] | None, typer.Option(help="Name of an encounter in the log. Repeatable; default: all.")] = None
@@ -164,10 +164,10 @@ def roads(
 @commands.command()
 def regenerate(
     bag: Annotated[Path, typer.Argument(help="A bag that `generate` or the ROS nodes wrote.")],
-    index: Annotated[int, typer.Argument(help="Index of the scenario, as in scenarios/info.", min=0)],
+    index: Annotated[int, typer.Argument(help="Number of the scenario, as on its page.", min=0)],
     out: Annotated[Path | None, typer.Option(help="Folder for a bag with this scenario, its recording and its road.")] = None,
-    namespace: Annotated[str | None, typer.Option(help="Namespace of the scenario, if several have that index.")] = None,
-    request: Annotated[str | None, typer.Option(help="Id of the request, if several have that index.")] = None,
+    namespace: Annotated[str | None, typer.Option(help="Namespace of the scenario, if several have that number.")] = None,
+    request: Annotated[str | None, typer.Option(help="Id of the request, if several have that number.")] = None,
     log: Annotated[
         Path | None, typer.Option(help="Start from this raw log instead of the bag's tracks and changepoints.")
     ] = None,
@@ -190,7 +190,7 @@ def regenerate(
 
 @commands.command()
 def demo(
-    count: Annotated[int, typer.Option(min=1, max=MOST, help="Scenarios per case.")] = 50,
+    count: Annotated[int, typer.Option(min=1, max=MAX_COUNT, help="Scenarios per case.")] = 50,
     seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 7,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo"),
     ros: Annotated[bool, typer.Option("--ros", help="Let the ROS nodes generate the scenarios, over DDS.")] = False,

@@ -51,7 +51,7 @@ class Drive:
     baseline: Annotated[
         bool, typer.Option(help="Also drive the non-reactive baseline, to show how many scenarios need no reaction.")
     ] = True
-    unlooking: Annotated[bool, typer.Option(hidden=True, help="Earlier name of --baseline.")] = True
+    unlooking: Annotated[bool, typer.Option(hidden=True)] = True  # earlier name of --baseline
     out: Annotated[Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")] = Path("out/drives")
     assignments: Annotated[
         list[str] | None,

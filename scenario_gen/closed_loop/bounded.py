@@ -20,7 +20,7 @@ from types import FrameType
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import Observation, Planner, Task
 
-AGAIN = 1.0  # seconds after which a planner that goes on nevertheless is interrupted again
+INTERRUPT_AGAIN_S = 1.0  # seconds after which a planner that goes on nevertheless is interrupted again
 GRACE = 5.0  # seconds beyond the limit after which a process that no interrupt reaches is ended
 
 
@@ -86,7 +86,7 @@ def bounded(seconds: float) -> Iterator[None]:
     before = signal.signal(signal.SIGALRM, end)
     if alone and sys.__stderr__ is not None:
         faulthandler.dump_traceback_later(seconds + GRACE, exit=True, file=sys.__stderr__)
-    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
+    signal.setitimer(signal.ITIMER_REAL, seconds, INTERRUPT_AGAIN_S)
     try:
         yield
     finally:

@@ -26,12 +26,12 @@ KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")
 BESIDE, ALIKE = 2.5, np.radians(30.0)  # m, rad: on the same path
 MOSTLY = 0.7
 TURNS, AGAINST = np.radians(45.0), np.radians(150.0)
-BEYOND = 150.0  # m by which a path goes on at both ends
-STEP = 4.0  # m between the points of a path
-MOVES = 0.5  # m/s below which a heading tells nothing new
+BEYOND_M = 150.0  # m by which a path goes on at both ends
+STEP_M = 4.0  # m between the points of a path
+MOVES_MPS = 0.5  # m/s below which a heading tells nothing new
 PARALLEL = 1e-12  # m²: of two steps of ways that meet nowhere
 MEETS = 1e-6  # of a step: ways that cross in the end of one cross, whatever is rounded
-EVERY = 0.3  # s between the samples that are compared
+EVERY_S = 0.3  # s between the samples that are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
         b: (T,) samples at the same times.
         dt: s between two samples.
     """
-    one, other = (motion.part(slice(None, None, max(round(EVERY / dt), 1))) for motion in (a, b))
+    one, other = (motion.part(slice(None, None, max(round(EVERY_S / dt), 1))) for motion in (a, b))
     path, others = path_of(one), path_of(other)
     quarter = max(len(one.speed) // 4, 1)
     early, late = (
@@ -74,7 +74,7 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
 
 def turned(motion: Motion) -> float:
     """Return how far a vehicle's heading turns in all [rad], left positive, while it moves."""
-    heading = unwrapped(motion.heading[motion.speed > MOVES])
+    heading = unwrapped(motion.heading[motion.speed > MOVES_MPS])
     return float(heading[-1] - heading[0]) if len(heading) else 0.0
 
 
@@ -87,7 +87,7 @@ def path_of(motion: Motion) -> Floats:
     """Return poses (P, 3) x, y [m], yaw [rad] of a path, 4 m apart, with a straight at both ends."""
     moved = np.concatenate([[True], edge_lengths(motion.position) > 0.0])
     curve = Curve(np.column_stack([motion.position[moved], unwrapped(motion.heading[moved])]))
-    return curve.at(np.arange(STEP - BEYOND, curve.length + BEYOND, STEP))
+    return curve.at(np.arange(STEP_M - BEYOND_M, curve.length + BEYOND_M, STEP_M))
 
 
 def _on_path(motion: Motion, path: Floats) -> Bools:
@@ -98,7 +98,7 @@ def _on_path(motion: Motion, path: Floats) -> Bools:
     at = np.arange(len(nearest))
     _, left = ahead_and_left(away[at, nearest], path[nearest, 2])
     alike = np.abs(wrap_angle(motion.heading - path[nearest, 2])) < ALIKE
-    return np.asarray((np.abs(left) < BESIDE) & alike & (squares[at, nearest] < (STEP + BESIDE) ** 2))
+    return np.asarray((np.abs(left) < BESIDE) & alike & (squares[at, nearest] < (STEP_M + BESIDE) ** 2))
 
 
 def _intersect(one: Motion, other: Motion) -> bool:

@@ -49,7 +49,8 @@ from scenario_gen.types import Encounter, FOLLOW, YIELD
 
 LIBRARY = Kind("primitive library")
 NAME, SEGMENTS, PAGE, SUMMARY, REQUEST = "library.json", "segments", "library.html", "summary.json", "request.json"
-SHORTEST = 2.0  # s that a pair must be there together
+SHORTEST_S = 2.0  # s that a pair must be there together
+LEGEND = "Lines are paths, dots their starts; the thick part is the primitive, vehicle 0 is the first of a pair (blue)."
 EXAMPLES = 2
 VERBS = {FOLLOW: "follows", YIELD: "yields"}
 SHARED = replace(DEFAULT, sampler=replace(DEFAULT.sampler, weight=0.1))
@@ -106,7 +107,7 @@ def pair_encounters(encounter: Encounter, interaction: float) -> Iterator[Encoun
     for i, j in combinations(range(len(encounter.vehicles)), 2):
         first = int(max(encounter.present[i, 0], encounter.present[j, 0]))
         last = int(min(encounter.present[i, 1], encounter.present[j, 1]))
-        if (last - first) * encounter.dt < SHORTEST:
+        if (last - first) * encounter.dt < SHORTEST_S:
             continue
         own = slice(first, last + 1)
         gap, when_a, when_b = space_time_gap(encounter.position[i, own], encounter.position[j, own], encounter.dt)
@@ -148,7 +149,7 @@ def build(
     pairs.sort(key=lambda pair: sha256(pair.name.encode()).digest())
     sample = pairs[:most]
     if not sample:
-        raise InputError(f"{corpus} holds no two vehicles that have to do with each other for {SHORTEST:g} s")
+        raise InputError(f"{corpus} holds no two vehicles that have to do with each other for {SHORTEST_S:g} s")
     library, assignments = build_library(sample, config, seed)
     labels = _labels(assignments, sample)
     again = _labels(build_library(sample, config, seed + 1)[1], sample)
@@ -265,12 +266,13 @@ def _write_page(
             f"{len(own)} segments, {100.0 * lasts / total:.1f} % of the time, {lasts * dt / len(own):.1f} s each",
             "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds),
             "; ".join(f"{message} in {n} of them" for message, n in answers),
-            "followed by " + (", ".join(f"{to} ({n} ×)" for n, to in after) or "nothing"),
+            "followed by " + (", ".join(f"primitive {to} ({n} ×)" for n, to in after) or "nothing"),
             *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, _, begin, end in own[:EXAMPLES]),
         ]
         pictures = [sketch(pairs[name], (begin, end)) for name, _, begin, end in own[:EXAMPLES]]
-        cards.append({"title": f"{k}: {library.descriptions[k]}", "lines": lines, "pictures": pictures})
-    write_page(path, "Primitives of pairs of vehicles", built.lines()[0], cards, built.lines()[1:])
+        cards.append({"title": f"primitive {k}: {library.descriptions[k]}", "lines": lines, "pictures": pictures})
+    first, *rest = built.lines()
+    write_page(path, "Primitives of pairs of vehicles", f"{first}. {LEGEND}", cards, rest)
 
 
 def _answers(pair: Encounter) -> set[str]:

@@ -21,8 +21,8 @@ from scenario_gen.base.stores import fetched, Place, workplace
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR, quoted, write_messages
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.corpus.tracks import FASTEST, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
-from scenario_gen.logs import APART, METRES_PER_SECOND_APART, shortest
+from scenario_gen.corpus.tracks import FASTEST_MPS, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
+from scenario_gen.logs import METRES_PER_SECOND_APART, OUT_OF_RANGE_S, shortest
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, named
 
@@ -49,7 +49,7 @@ class HourTask:
 
 def overlap(config: CorpusConfig) -> int:
     """Microseconds before and after an hour that its task sees: an encounter at its longest, with what windows may add."""
-    return round(1e6 * (config.log.max_duration + config.log.min_duration + APART + config.log.longest_gap + 1.0))
+    return round(1e6 * (config.log.max_duration + config.log.min_duration + OUT_OF_RANGE_S + config.log.longest_gap + 1.0))
 
 
 def search_hours(task: HourTask) -> None:
@@ -245,7 +245,7 @@ def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bo
     ).fetchnumpy()
     own = {int(rows["device"][first]): slice(first, last) for first, last in runs_of(rows["device"])}
     steps = int(config.interaction / METRES_PER_SECOND_APART / (BIN * 1e-6)) + 1
-    reach = config.interaction + config.slack + FASTEST * BIN * 0.25e-6
+    reach = config.interaction + config.slack + FASTEST_MPS * BIN * 0.25e-6
     north = rows["lat"] * NORTH
     kept = np.zeros(len(pairs["a"]), dtype=bool)
     for k, (a, b, first, last) in enumerate(zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)):

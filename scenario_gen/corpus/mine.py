@@ -53,6 +53,7 @@ ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
 }
 HEAD = 16_384  # bytes of an object by which its format is recognised
 MOST_DRAWN = 20  # encounters of a kind on the page
+LEGEND = "Lines are paths, dots their starts. Space-time gap: smallest distance of two paths, plus 2 m for each second between."
 MOST_SHOWN = 20  # failures and files that are named; the corpus holds all
 
 
@@ -166,13 +167,14 @@ def _write_gallery(path: Path, tables: _Encounters, made: Mined) -> None:
     for row in tables.drawn:
         encounter = encounter_of(row)
         lines = [
-            f"{row['count']} vehicles, {row['seconds']:.1f} s, nearest {row['distance']:.1f} m, gap {row['gap']:.1f} m",
-            ", ".join(f"{pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()),
+            f"{row['count']} vehicles for {row['seconds']:.1f} s; smallest distance {row['distance']:.1f} m, "
+            f"space-time gap {row['gap']:.1f} m",
+            "; ".join(f"vehicles {pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()),
             *reactions_of(encounter).sentences(encounter.vehicles),
         ]
         cards.append({"title": f"{row['kind']}: {row['name']}", "lines": lines, "pictures": [sketch(encounter)]})
     first, *rest = made.lines()
-    write_page(path, "Encounters mined", first, cards, rest)
+    write_page(path, "Encounters mined", f"{first}. {LEGEND}", cards, rest)
 
 
 Files = tuple[list[Path], list[list[Path]], list[Path]]

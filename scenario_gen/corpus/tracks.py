@@ -11,16 +11,16 @@ import numpy as np
 
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.kinds import kind_of, Motion, unwrapped
-from scenario_gen.logs import APART, metres_per_degree, shortest, space_time_gap, ticks, windows
+from scenario_gen.logs import metres_per_degree, OUT_OF_RANGE_S, shortest, space_time_gap, ticks, windows
 from scenario_gen.numerics import Bools, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
-FASTEST = 35.0  # m/s: what a vehicle drives in a bin widens the cells
+FASTEST_MPS = 35.0  # m/s: what a vehicle drives in a bin widens the cells
 METRES = 110_574.0  # of a degree of latitude, at the least
 NORTH = 111_120.0  # m of one, within 0.5 % of it anywhere
 LONGITUDE = 111_320.0  # m of a degree of longitude at the equator
-MOST = 64  # vehicles that share an id in an hour
-OUTLIER = 15.0  # m from the median of five messages, beyond what is driven meanwhile: further is no position
+MAX_SAME = 64  # vehicles that share an id in an hour
+OUTLIER_M = 15.0  # m from the median of five messages, beyond what is driven meanwhile: further is no position
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def tracks_of(rows: dict[str, Any]) -> dict[int, Track]:
     wide = LONGITUDE * np.cos(rows["lat"] * (np.pi / 180.0))
     for name, metres in (("lat", METRES), ("lon", wide)):
         middle = np.sort([rows[name][index] for index in around], axis=0)[2]
-        good &= np.abs(rows[name] - middle) * metres < OUTLIER + FASTEST * seconds
+        good &= np.abs(rows[name] - middle) * metres < OUTLIER_M + FASTEST_MPS * seconds
     heading = np.pi / 2.0 - rows["heading"].astype(np.float64) * (np.pi / 180.0)
     speed = rows["speed"].astype(np.float64)
     found = {}
@@ -89,7 +89,7 @@ def meetings(a: Track, b: Track, span: tuple[int, int], config: CorpusConfig) ->
     apart = np.hypot(*(one[0].position - other[0].position).T)
     near = one[1] & other[1] & (apart < config.log.proximity)
     found = []
-    for low, high in runs(near, ticks(APART, config.log)):
+    for low, high in runs(near, ticks(OUT_OF_RANGE_S, config.log)):
         for begin, end in _windows(first + low, first + high, config):
             if end - begin < shortest(config.log):
                 continue
@@ -145,7 +145,7 @@ def tell_apart(t: Ints, lat: Floats, lon: Floats, speed: Floats) -> Ints:
     who = np.zeros(len(t), dtype=np.int64)
     wide = np.cos(float(lat.mean()) * np.pi / 180.0) * LONGITUDE
     _tell_apart(
-        np.asarray(t, dtype=np.int64), lat * METRES, lon * wide, np.asarray(speed, dtype=np.float64), np.zeros((MOST, 4)), who
+        np.asarray(t, dtype=np.int64), lat * METRES, lon * wide, np.asarray(speed, dtype=np.float64), np.zeros((MAX_SAME, 4)), who
     )
     return who
 

@@ -10,7 +10,7 @@ from scenario_gen.logs.cleaning import parse_origin
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_time_gap
 from scenario_gen.logs.geodesy import azimuthal, latitude_longitude, local_frame, metres_per_degree, middle_of, reprojected, utm
-from scenario_gen.logs.groups import APART, shortest, ticks, windows
+from scenario_gen.logs.groups import OUT_OF_RANGE_S, shortest, ticks, windows
 from scenario_gen.logs.growing import Growth, Meeting
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
 from scenario_gen.logs.read import (
@@ -30,9 +30,9 @@ from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
-    "APART", "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "OPENSCENARIO_SPEEDS", "Growth", "LogConfig", "LogFormat",
-    "LogResult", "Meeting", "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams", "UnknownFormatError",
-    "azimuthal", "bundled", "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_nocturne", "is_spmd", "is_table",
-    "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log", "read_raw", "reprojected",
-    "shortest", "space_time_gap", "ticks", "utm", "windows",
+    "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "OPENSCENARIO_SPEEDS", "OUT_OF_RANGE_S", "Growth", "LogConfig",
+    "LogFormat", "LogResult", "Meeting", "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams",
+    "UnknownFormatError", "azimuthal", "bundled", "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_nocturne",
+    "is_spmd", "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log",
+    "read_raw", "reprojected", "shortest", "space_time_gap", "ticks", "utm", "windows",
 ]  # fmt: skip

@@ -19,16 +19,16 @@ from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.types import CAR, VEHICLE_TYPES
 
-SLOWEST = 5.0  # s between fixes: a slower source does not show how a vehicle drives, or its unit of time is another one
-FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
+SLOWEST_S = 5.0  # s between fixes: a slower source does not show how a vehicle drives, or its unit of time is another one
+FARTHEST_M = 1e8  # m from the origin of any frame: a quarter of the way to the moon
 UNITS = {"milliseconds": ("ms", 1e-3), "microseconds": ("us", 1e-6), "nanoseconds": ("ns", 1e-9)}
 USUAL = (0.005, 2.0)  # s between fixes of usual sources
-FASTEST = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
-JUMP_SLACK = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
-JUMP_SPEED = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
+FASTEST_MPS = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
+TELEPORT_SLACK_M = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
+TELEPORT_SLACK_MPS = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
 LONGEST_M, WIDEST_M = 100.0, 4.0  # of a vehicle
 SIZES = (("feet", "ft", 0.3048), ("centimetres", "cm", 0.01), ("millimetres", "mm", 0.001))  # that sizes may be in
-MOVES = 1.0  # m/s: above it a vehicle is not where it was
+MOVES_MPS = 1.0  # m/s: above it a vehicle is not where it was
 BORNE_OUT = 0.2  # of a measured speed: what the positions drive at least, in whatever unit it is
 RELOCATED = 5  # fixes in a row that agree with each other and are then a new place, not jumps
 
@@ -97,13 +97,13 @@ def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) ->
         checks.append(("position is (0, 0)", (np.abs(fix) < 1e-6).all(axis=1)))
         checks.append(("position is not on Earth", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0)))
     else:
-        checks.append(("position is not on Earth", (np.abs(fix) > FARTHEST).any(axis=1)))
+        checks.append(("position is not on Earth", (np.abs(fix) > FARTHEST_M).any(axis=1)))
     keep = judge(checks, vehicle.fix_row, drops)
     slow_checks: list[tuple[str, Any]] = [
         ("stamp is out of range", beyond(vehicle.speed_ns)),
         ("speed is not a number", ~np.isfinite(speed)),
         ("speed is negative", speed < 0.0),
-        (f"speed is above {FASTEST:g} m/s", speed > FASTEST),
+        (f"speed is above {FASTEST_MPS:g} m/s", speed > FASTEST_MPS),
     ]
     keep_speed = judge(slow_checks, vehicle.speed_row, drops)
     return select(vehicle, keep, keep_speed)
@@ -254,9 +254,9 @@ def without_held(vehicle: Observations, drops: Drops, *, geographic: bool) -> Ob
         speed = np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed)
         counts = np.diff(np.append(new, len(repeats)))
         goes = rate > BORNE_OUT * (np.add.reduceat(speed, new) / counts)[:-1]
-        moves = speed > MOVES
+        moves = speed > MOVES_MPS
     else:
-        goes = np.minimum(rate, np.insert(rate[:-1], 0, rate[0])) > 2.0 * MOVES
+        goes = np.minimum(rate, np.insert(rate[:-1], 0, rate[0])) > 2.0 * MOVES_MPS
         moves = np.ones(len(repeats), dtype=bool)
     goes = np.append(goes, (goes & (np.diff(new) > 1)).any())  # the last one, if there are others
     held = repeats & moves & goes[np.cumsum(~repeats) - 1]
@@ -288,12 +288,12 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
     if not vehicles:
         return
     typical = float(np.median(np.concatenate([np.diff(vehicle.fix_ns) for vehicle in vehicles]))) * 1e-9
-    if typical > max(SLOWEST, config.longest_gap):
+    if typical > max(SLOWEST_S, config.longest_gap):
         likely = [(name, unit) for name, (unit, factor) in UNITS.items() if USUAL[0] <= typical * factor <= USUAL[1]]
         hint = f"this looks like {likely[0][0]} read as seconds; " if likely else ""
         raise InputError(
-            f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {typical:g} s apart (median), at most {SLOWEST:g} s make a "
-            f"track; {hint}name the unit with the parameter columns, time=<column>:{likely[0][1] if likely else '<unit>'}"
+            f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {typical:g} s apart (median), at most {SLOWEST_S:g} s make "
+            f"a track; {hint}name the unit with the parameter columns, time=<column>:{likely[0][1] if likely else '<unit>'}"
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
     ticks = round(sum(spans) / (config.period * 1e9))
@@ -315,7 +315,7 @@ def without_jumps(vehicle: Observations, drops: Drops, *, geographic: bool) -> O
     step = np.linalg.norm(np.diff(places, axis=0), axis=1)
     seconds = np.diff(vehicle.fix_ns) * 1e-9
     keep = np.ones(len(vehicle.fix_ns), dtype=bool)
-    if (step > JUMP_SLACK + limit[1:] * seconds).any():
+    if (step > TELEPORT_SLACK_M + limit[1:] * seconds).any():
         keep = reachable(vehicle.fix_ns.astype(np.float64) * 1e-9, places, limit)
         drops.add("position jumps", vehicle.fix_row[~keep])
     every = np.ones(len(vehicle.speed_ns), dtype=bool)
@@ -356,8 +356,8 @@ def sized(vehicles: list[Observations], config: LogConfig) -> tuple[list[Observa
 def reach(vehicle: Observations) -> Floats:
     """Return the highest speeds (F,) [m/s] that the vehicle may have had at its fixes."""
     if len(vehicle.speed_ns) < 2:
-        return np.full(len(vehicle.fix_ns), FASTEST)
-    return 1.5 * np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed) + JUMP_SPEED
+        return np.full(len(vehicle.fix_ns), FASTEST_MPS)
+    return 1.5 * np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed) + TELEPORT_SLACK_MPS
 
 
 def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
@@ -371,10 +371,10 @@ def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
     keep = np.ones(len(fix), dtype=bool)
     last, n_doubted = 0, 0
     for i in range(1, len(fix)):
-        if np.linalg.norm(fix[i] - fix[last]) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
+        if np.linalg.norm(fix[i] - fix[last]) <= TELEPORT_SLACK_M + limit[i] * (seconds[i] - seconds[last]):
             last, n_doubted = i, 0
             continue
-        agrees = n_doubted and np.linalg.norm(fix[i] - fix[i - 1]) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
+        agrees = n_doubted and np.linalg.norm(fix[i] - fix[i - 1]) <= TELEPORT_SLACK_M + limit[i] * (seconds[i] - seconds[i - 1])
         n_doubted = n_doubted + 1 if agrees else 1
         keep[i] = False
         if n_doubted >= RELOCATED:

@@ -25,8 +25,8 @@ QUICKEST_S, SOURCE_S = 0.005, (0.02, 2.0)  # s between fixes: less is another un
 LEAST = 2  # rows in the time that is there twice
 SLOW_S = 0.4  # s between fixes: of a slower source a single row counts, if the next follows after a usual step, and so does a
 USUAL, FEW = 1.5, 3  # stamp that stands: a usual step is so many medians at most; stamps of a vehicle that stand, at most
-APART = 3.0  # m between two places at one time: not one vehicle
-ONWARD = 0.5  # share of that distance within which the next row lies, if the vehicle drives on and its clock does not
+APART_M = 3.0  # m between two places at one time: not one vehicle
+ONWARD_SHARE = 0.5  # share of that distance within which the next row lies, if the vehicle drives on and its clock does not
 SAME_NS = 2_000_000_000  # steps of two vehicles this near are one
 
 
@@ -129,7 +129,7 @@ def _own_steps(own: Observations, log: RawLog) -> list[_Step]:
         then = _at(stamps[begin:at], places[begin:at], stamps[again])
         apart = float(np.percentile(np.linalg.norm(places[again] - then, axis=1), 25))
         onward = float(np.linalg.norm(places[at] - places[at - 1]))
-        if apart > APART or (apart > APART / 4.0 and onward < ONWARD * apart):
+        if apart > APART_M or (apart > APART_M / 4.0 and onward < ONWARD_SHARE * apart):
             steps.append(_Step(int(stamps[at - 1]), int(stamps[at]), int(rows[at])))
     return steps
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, JUMP_SPEED, RELOCATED, select, SLOWEST
+from scenario_gen.logs.cleaning import FASTEST_MPS, RELOCATED, select, SLOWEST_S, TELEPORT_SLACK_M, TELEPORT_SLACK_MPS
 from scenario_gen.logs.config import ahead_of_point, LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
@@ -24,7 +24,7 @@ NOISY = 1.6  # times as sharp as others can turn, if that is sharper
 BACKWARDS = np.radians(150.0)  # headings further off the path are those of a vehicle that drives backwards
 REVERSES_MPS = 5.0  # the fastest that cars are driven backwards; above, the axes are mirrored (`remarks_on_units`)
 CONTRADICTS = 1.2  # times the highest speed of its type, from which on it is of another one
-LEVER = 3.0  # m over which the course before and after a stop is measured
+LEVER_M = 3.0  # m over which the course before and after a stop is measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +194,7 @@ def abrupt(seconds: Floats, step: Floats) -> Bools:
     around = (
         np.max([rate[:-4], rate[1:-3], rate[3:-1], rate[4:]], axis=0) if len(step) >= RELOCATED else np.full(len(step), np.inf)
     )
-    far: Bools = step > JUMP_SLACK + np.minimum(1.5 * around + JUMP_SPEED, FASTEST) * seconds
+    far: Bools = step > TELEPORT_SLACK_M + np.minimum(1.5 * around + TELEPORT_SLACK_MPS, FASTEST_MPS) * seconds
     return far
 
 
@@ -207,7 +207,7 @@ def laps(track: Observations, config: LogConfig) -> Bools:
 
 def longest_bridge(seconds: Floats, config: LogConfig) -> float:
     """Return the longest gap [s] that is bridged in a track whose fixes are `seconds` (F-1,) apart."""
-    return max(config.longest_gap, 2.5 * min(float(np.median(seconds)), SLOWEST)) + 1e-6
+    return max(config.longest_gap, 2.5 * min(float(np.median(seconds)), SLOWEST_S)) + 1e-6
 
 
 def reversals(track: Observations, config: LogConfig) -> Bools:
@@ -232,7 +232,7 @@ def departure(fix: Floats) -> Floats | None:
     """Return the unit vector (2,) from the first fix (F, 2) [m] to the first one `LEVER` away, None if there is none."""
     offset = fix - fix[0]
     away = np.hypot(offset[:, 0], offset[:, 1])
-    far = np.flatnonzero(away > LEVER)
+    far = np.flatnonzero(away > LEVER_M)
     return offset[far[0]] / away[far[0]] if len(far) else None
 
 

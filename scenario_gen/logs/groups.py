@@ -23,10 +23,10 @@ from scenario_gen.logs.growing import Group, Growth, Meeting, SHARED, Span
 from scenario_gen.logs.raw import natural
 from scenario_gen.numerics import Floats, runs
 
-MOST = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
-EDGE = 1.0  # s by which a group is shortened so that no vehicle joins late or leaves early
-APART = 1.0  # s that a pair may be out of range within one meeting
-REST = 2.0  # s of a long standstill that belong to the encounter before or after it
+MIN_SHARE = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
+EDGE_S = 1.0  # s by which a group is shortened so that no vehicle joins late or leaves early
+OUT_OF_RANGE_S = 1.0  # s that a pair may be out of range within one meeting
+REST_S = 2.0  # s of a long standstill that belong to the encounter before or after it
 
 
 class _OfPieces(Growth[Meeting]):
@@ -62,7 +62,7 @@ class _OfPieces(Growth[Meeting]):
             elif end > begin:
                 group.notes.append(f"vehicle {name} is left out: {near} (min_presence)")
             return
-        if (end - begin) < MOST * lasts or end - begin < self.shortest:
+        if (end - begin) < MIN_SHARE * lasts or end - begin < self.shortest:
             if end > begin:
                 group.notes.append(f"vehicle {name} is left out: {near} (whole)")
             return
@@ -77,7 +77,7 @@ class _OfPieces(Growth[Meeting]):
     def finish(self, group: Group[Meeting]) -> None:
         """Shorten a group by up to `EDGE` so that its vehicles come and go together; note those that do not."""
         config = self.config
-        edge = ticks(EDGE, config)
+        edge = ticks(EDGE_S, config)
         first = max(begin for begin, _ in group.spans.values() if begin <= group.start + edge)
         last = min(end for _, end in group.spans.values() if end >= group.end - edge)
         if last - first > ticks(config.min_duration, config):
@@ -100,7 +100,7 @@ class _OfPieces(Growth[Meeting]):
             low, high = max(begin, first), min(begin + len(close), last)
             if high > low:
                 flags[low - group.start : high - group.start] |= close[low - begin : high - begin]
-        spans = runs(flags, ticks(APART, self.config))
+        spans = runs(flags, ticks(OUT_OF_RANGE_S, self.config))
         begin, end = max(spans, key=lambda span: span[1] - span[0], default=(0, 0))
         return group.start + begin, group.start + end
 
@@ -136,7 +136,7 @@ def find_meetings(pieces: Sequence[Piece], config: LogConfig, *, small: bool) ->
             if pieces[i].track.id == pieces[j].track.id:
                 continue
             begin = max(pieces[i].first, pieces[j].first)
-            for low, high in runs(distances(pieces[i], pieces[j]) < config.proximity, ticks(APART, config)):
+            for low, high in runs(distances(pieces[i], pieces[j]) < config.proximity, ticks(OUT_OF_RANGE_S, config)):
                 for first, last in windows(begin + low, begin + high, config):
                     if last - first < least:
                         continue
@@ -201,7 +201,7 @@ def split(group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig) -> 
     stands = np.ones(group.end - group.start, dtype=bool)
     for m, (first, last) in group.spans.items():
         stands[first - group.start : last - group.start] &= pieces[m].speed(first, last) < 0.1
-    rest, busy = ticks(REST, config), np.ones(len(stands), dtype=bool)
+    rest, busy = ticks(REST_S, config), np.ones(len(stands), dtype=bool)
     for begin, end in runs(stands):
         if end - begin > ticks(config.standstill, config):
             busy[begin + rest : end - rest] = False

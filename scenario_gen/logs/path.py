@@ -18,20 +18,20 @@ from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 
-KNOT = 1.0  # m between knots
-MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there
-STEP = 0.1  # m between the points of the table from parameter to arc length
+KNOT_M = 1.0  # m between knots
+MARGIN_M = 5.0  # m of path beyond both ends, for fixes that lie there
+STEP_M = 0.1  # m between the points of the table from parameter to arc length
 CURVATURE = 0.1  # 1/m: spectral density of the curvature, about 0.1 1/m over 10 m
 STEERING = 0.002  # 1/m³: spectral density of the curvature's change, about 0.02 1/m² over 5 m
 LATERAL = 12.0  # m²/s³: spectral density of the lateral acceleration, about 2 m/s² over 3 s
 LATERAL_JERK = 1.0  # m²/s⁵: spectral density of the lateral jerk, about 1 m/s³ over 1 s
-CREEP = 0.2  # m: fixes closer together than this share one weight, for their differences are GPS noise
-SAME_HEADING = 1.0  # m: headings closer together than this share one weight, for their error is one
+CREEP_M = 0.2  # m: fixes closer together than this share one weight, for their differences are GPS noise
+SAME_HEADING_M = 1.0  # m: headings closer together than this share one weight, for their error is one
 STANDING_HEADING = 0.02  # the least weight of a heading: a stand of five seconds counts as much as a metre of driving
 HEADING_NOISE = float(np.radians(2.0))  # of a heading sensor at its best, slip included
-NEAR = 5  # samples on either side over which the scatter of headings is taken
+SCATTER_SAMPLES = 5  # samples on either side over which the scatter of headings is taken
 SCATTER = 9.0  # factor from the variance between neighbours to that of errors which they share
-MOVES = 1.0  # m/s: above it a course is known to a few degrees
+MOVES_MPS = 1.0  # m/s: above it a course is known to a few degrees
 JUMP = float(np.radians(15.0))  # between two samples: no heading of a car
 CONTRADICTS = float(np.radians(20.0))  # headings further off the path are ignored: defaults, or of a reversing vehicle
 
@@ -101,12 +101,12 @@ def fit_path(
         speed: (F,) [m/s].
         headings: recorded ones, if there are any.
     """
-    low, high = place.min() - MARGIN, place.max() + MARGIN
-    spans = max(int(np.ceil((high - low) / KNOT)), 4)
+    low, high = place.min() - MARGIN_M, place.max() + MARGIN_M
+    spans = max(int(np.ceil((high - low) / KNOT_M)), 4)
     step = (high - low) / spans
     knots = low + step * np.arange(-3, spans + 4)
     spread = np.abs(np.gradient(place)) if len(place) > 1 else np.ones(1)
-    weight = weight * np.clip(spread / CREEP, 0.005, 1.0) / np.square(noise)
+    weight = weight * np.clip(spread / CREEP_M, 0.005, 1.0) / np.square(noise)
     count = spans + 3
     band = np.zeros((8, 2 * count))  # x and y of each coefficient in turn
     right = np.zeros(2 * count)
@@ -122,7 +122,7 @@ def fit_path(
         slope[:, :-1] -= lower / step
         across = np.column_stack((-np.sin(headings.value), np.cos(headings.value)))
         entries = (slope[:, :, None] * across[:, None, :]).reshape(-1, 8)
-        shared = np.clip(spread / SAME_HEADING, STANDING_HEADING, 1.0)
+        shared = np.clip(spread / SAME_HEADING_M, STANDING_HEADING, 1.0)
         observe(band, right, start, entries, 1, headings.weight * shared, np.zeros(len(place)))
     for order, floor, moving, power in ((2, CURVATURE, LATERAL, 3), (3, STEERING, LATERAL_JERK, 5)):
         centre = low + step * (np.arange(count - order) + (order - 2) / 2.0)
@@ -160,14 +160,14 @@ def differences(count: int, order: int) -> Floats:
 def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
     """Return a straight line through `point` (2,) [m] where the distance driven is (low + high) / 2."""
     direction = np.array([np.cos(heading), np.sin(heading)])
-    ends = np.array([low - MARGIN, high + MARGIN])
+    ends = np.array([low - MARGIN_M, high + MARGIN_M])
     where = point + (ends - (low + high) / 2.0)[:, None] * direction
     return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
 
 
 def tabulate(curve: BSpline, low: float, high: float) -> Path:
     """Measure the curve's arc length."""
-    u = np.linspace(low, high, int(np.ceil((high - low) / STEP)) + 1)
+    u = np.linspace(low, high, int(np.ceil((high - low) / STEP_M)) + 1)
     rate = np.hypot(*curve(u, 1).T)
     length = low + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))])
     return Path(curve, u, length)
@@ -191,14 +191,14 @@ def headings_of(heading: Floats, course: Floats, speed: Floats) -> Headings | No
     value = heading[known]
     turn = wrap_angle(np.diff(value))
     off = np.abs(wrap_angle(value - course[known]))
-    moves = speed[known] > MOVES
+    moves = speed[known] > MOVES_MPS
     weight = np.zeros(len(heading))
     for begin, end in pairwise([0, *(np.flatnonzero(np.abs(turn) > JUMP) + 1).tolist(), len(value)]):
         own = slice(begin, end)
         if moves[own].sum() < 3 or np.median(off[own][moves[own]]) > CONTRADICTS:
             continue
         square = np.pad(np.square(np.diff(turn[begin : end - 1])) / 6.0, 1, mode="edge")
-        scatter = np.maximum(uniform_filter1d(square, 2 * NEAR + 1, mode="nearest"), 0.0)
+        scatter = np.maximum(uniform_filter1d(square, 2 * SCATTER_SAMPLES + 1, mode="nearest"), 0.0)
         noise = np.sqrt(np.square(HEADING_NOISE) + SCATTER * scatter)
         weight[known[own]] = np.minimum(1.0, 2.0 * noise / np.maximum(off[own], 1e-9)) / np.square(noise)  # Huber's
     return Headings(np.where(np.isfinite(heading), heading, 0.0), weight) if weight.any() else None

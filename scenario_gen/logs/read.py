@@ -34,7 +34,7 @@ from scenario_gen.logs.kinds import typed
 from scenario_gen.logs.packed import unpacked, without_packing
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog, UnknownFormatError
-from scenario_gen.logs.smoothing import DOUBTED
+from scenario_gen.logs.smoothing import DOUBTED_MPS
 from scenario_gen.logs.units import remarks_on_units
 from scenario_gen.numerics import runs
 from scenario_gen.types import cut, Encounter, tokens, Vehicle
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
 OSI = (b"net.asam.osi", b"osi3.", b"ground_truth")  # what is near the beginning or the end of a trace of OSI
-NEAR = 65_536  # bytes
+HEAD_BYTES = 65_536  # bytes
 FAR_M = 200_000.0  # from an origin that is given: there distances are 0.02 % too long
 BSM_ENDINGS = (".json", ".jsonl", ".ndjson", ".txt")
 MUCH = 0.02  # of the rows: if more are left out, people are told at once
@@ -181,7 +181,7 @@ def notes_on_vehicles(
     vehicles: Sequence[VehicleQuality], without_positions: list[str], met: set[str], config: LogConfig
 ) -> tuple[str, ...]:
     """Return notes on vehicles that are in no encounter, have no positions, or whose measured speeds are not used."""
-    doubted = [v.id for v in vehicles if v.changed > DOUBTED]
+    doubted = [v.id for v in vehicles if v.changed > DOUBTED_MPS]
     left = [v for v in vehicles if v.id not in met]
     if len(left) > config.max_vehicles:
         notes = [f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"]
@@ -339,9 +339,9 @@ def is_osi(path: Path) -> bool:
     if path.suffix.lower() != ".mcap" or not path.is_file():
         return False
     with path.open("rb") as file:
-        head = file.read(NEAR)
-        file.seek(max(path.stat().st_size - NEAR, 0))
-        tail = file.read(NEAR)
+        head = file.read(HEAD_BYTES)
+        file.seek(max(path.stat().st_size - HEAD_BYTES, 0))
+        tail = file.read(HEAD_BYTES)
     profile = head[17 : 17 + 8]  # after the header's length
     return head.startswith(MCAP) and profile != b"\x04\0\0\0ros2" and any(sign in part for sign in OSI for part in (head, tail))
 
@@ -373,7 +373,7 @@ def is_fcd(path: Path) -> bool:
 def beginning(path: Path) -> bytes:
     """Return the first bytes of a file."""
     with path.open("rb") as file:
-        return file.read(NEAR)
+        return file.read(HEAD_BYTES)
 
 
 def is_table(path: Path) -> bool:

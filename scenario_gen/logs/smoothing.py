@@ -21,20 +21,20 @@ from scipy.ndimage import median_filter
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.path import differences, fit_path, Headings, headings_of, MOVES, observe, Path, straight_path
+from scenario_gen.logs.path import differences, fit_path, Headings, headings_of, MOVES_MPS, observe, Path, straight_path
 from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Bools, Floats, Ints, runs, wrap_angle
 
-STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
-STILL = 0.1  # m/s: below this it is not on its way to or from standing
-SHIFTED = 1.0  # m: if fixes move further while the speed is zero, the speed is wrong
-DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes is not used in the first layout; if most do, none is used
-MOVED = 0.5  # m: a vehicle that moves less has no direction of travel
+STANDS_MPS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
+STILL_MPS = 0.1  # m/s: below this it is not on its way to or from standing
+SHIFTED_M = 1.0  # m: if fixes move further while the speed is zero, the speed is wrong
+DOUBTED_MPS = 3.0  # a speed that differs more from that of the fixes is not used in the first layout; if most do, none is used
+MOVED_M = 0.5  # m: a vehicle that moves less has no direction of travel
 ROUNDS = 3  # of path and motion in turn
 LEAST_NOISE, MOST_NOISE = 0.1, 1.5  # m: of fixes, as estimated
-ENOUGH = 30  # moving fixes from which their noise can be estimated
-SETTLES = 0.3  # s at either end of a stand that are left to the motion: a car comes to rest, and starts, without a step
-STRAIGHT = 3.0  # m: a shorter path has no shape of its own
+MIN_FIXES = 30  # moving fixes from which their noise can be estimated
+SETTLES_S = 0.3  # s at either end of a stand that are left to the motion: a car comes to rest, and starts, without a step
+STRAIGHT_M = 3.0  # m: a shorter path has no shape of its own
 
 
 class UnreconciledError(InputError):
@@ -181,10 +181,10 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
     noise = first_noise = config.position_noise or estimated_noise(piece.fix)
     ticks = dt * np.arange(last - first + 1, dtype=np.float64)
     stands = standing(ticks, fix_t, piece.fix, speed_t, speed)
-    motion = Motion(without_ends(stands, round(SETTLES / dt)), config)
+    motion = Motion(without_ends(stands, round(SETTLES_S / dt)), config)
     differs = speed - np.interp(speed_t, fix_t, raw)
     deviation = config.speed_noise or float(np.clip(white_equivalent(differs), 0.3, 3.0))
-    trusted = len(piece.speed) > 0 and np.median(np.abs(differs)) <= max(DOUBTED, 5.0 * noise)
+    trusted = len(piece.speed) > 0 and np.median(np.abs(differs)) <= max(DOUBTED_MPS, 5.0 * noise)
     measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if trusted else []
     guess = layout(ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t)
     weight = np.ones(len(fix_t))
@@ -200,10 +200,10 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         headings = headings_of(piece.heading, path.pose(guess)[1], np.gradient(guess, fix_t))
     place, published = motion.at_ticks(coefficients)
     position, heading = path.pose(place)
-    if np.ptp(place) < MOVED and not np.isfinite(piece.heading).any():
+    if np.ptp(place) < MOVED_M and not np.isfinite(piece.heading).any():
         heading = np.full(len(place), np.nan)
     known = np.isfinite(piece.heading)
-    rolls = known & (np.gradient(guess, fix_t) > MOVES)
+    rolls = known & (np.gradient(guess, fix_t) > MOVES_MPS)
     return Smooth(
         first=first,
         position=position,
@@ -215,7 +215,7 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         moved=np.hypot(*(piece.fix - path.pose(guess)[0]).T),
         noise=noise,
         turned=wrap_angle(piece.heading[rolls] - np.interp(fix_t[rolls], ticks, heading)),
-        headings=known[known] if np.ptp(place) < STRAIGHT else (headings.weight > 0.0)[known] if headings else ~known[known],
+        headings=known[known] if np.ptp(place) < STRAIGHT_M else (headings.weight > 0.0)[known] if headings else ~known[known],
     )
 
 
@@ -237,7 +237,7 @@ def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Fl
         raw: (T,) of the fixes [m/s].
         seconds: (F,) stamps of the fixes.
     """
-    rate = np.where(stands, 0.0, np.where(np.abs(speed - raw) > DOUBTED, raw, speed))
+    rate = np.where(stands, 0.0, np.where(np.abs(speed - raw) > DOUBTED_MPS, raw, speed))
     driven = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(ticks))])
     guess: Floats = np.interp(seconds, ticks, driven)
     return guess
@@ -255,7 +255,7 @@ def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float, sp
         headings: recorded ones, if there are any.
     """
     low, high = float(guess.min()), float(guess.max())
-    if high - low >= STRAIGHT:
+    if high - low >= STRAIGHT_M:
         return fit_path(guess, piece.fix, weight, noise, speed, headings)
     known = piece.heading[np.isfinite(piece.heading)]
     if len(known):
@@ -302,7 +302,7 @@ def noise_about(guess: float, moves: Bools, aside: Floats, ahead: Floats) -> flo
         aside: (F,) of the fixes from the path [m].
         ahead: (F,) of the fixes from the motion along it [m].
     """
-    if moves.sum() < ENOUGH:
+    if moves.sum() < MIN_FIXES:
         return guess
     seen = max(white_equivalent(aside[moves]), white_equivalent(ahead[moves]))
     return float(np.clip(seen, LEAST_NOISE, min(2.0 * guess, MOST_NOISE)))
@@ -340,12 +340,12 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
     half = round(0.2 / dt)
     smooth = median_filter(np.interp(ticks, speed_t, speed), 2 * half + 1, mode="nearest")
     stands = np.zeros(len(ticks), dtype=bool)
-    for begin, end in runs(smooth < STANDS):
-        still = begin + np.flatnonzero(smooth[begin:end] <= max(STILL, 1.5 * float(np.median(smooth[begin:end]))))
+    for begin, end in runs(smooth < STANDS_MPS):
+        still = begin + np.flatnonzero(smooth[begin:end] <= max(STILL_MPS, 1.5 * float(np.median(smooth[begin:end]))))
         begin, end = int(still[0]), int(still[-1]) + 1  # noqa: PLW2901 - rolling before and after the stop is not standing
         inside = fix[(fix_t >= ticks[begin]) & (fix_t <= ticks[end - 1])]
         k = max(len(inside) // 5, 1)
         if (end - begin) * dt >= 1.0 and len(inside):
             shift = np.median(inside[-k:], axis=0) - np.median(inside[:k], axis=0)
-            stands[begin:end] = np.hypot(*shift) <= SHIFTED
+            stands[begin:end] = np.hypot(*shift) <= SHIFTED_M
     return stands

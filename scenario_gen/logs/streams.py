@@ -22,7 +22,7 @@ from scenario_gen.types import Sample, Vehicle
 
 WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to distinguish a jump from a new place
 FAR_NS = 10_000_000_000  # a stamp this far from the newest one belongs to another time, or is wrong
-MOST = 100  # messages of one kind per vehicle and second that are kept
+MAX_PER_SECOND = 100  # messages of one kind per vehicle and second that are kept
 EVERY = 2  # ticks that are sampled at once, after one cleaning
 
 
@@ -75,14 +75,14 @@ class Streams:
         if self._counts(stamp_ns):
             for rows in self._of(vehicle):
                 rows.fixes.append((stamp_ns, self._count, latitude, longitude, np.nan))
-                del rows.fixes[: -round(MOST * self._config.max_duration)]
+                del rows.fixes[: -round(MAX_PER_SECOND * self._config.max_duration)]
 
     def put_speed(self, vehicle: str, stamp_ns: int, speed: float) -> None:
         """Take a speed in [m/s]."""
         if self._counts(stamp_ns):
             for rows in self._of(vehicle):
                 rows.speeds.append((stamp_ns, self._count, speed))
-                del rows.speeds[: -round(MOST * self._config.max_duration)]
+                del rows.speeds[: -round(MAX_PER_SECOND * self._config.max_duration)]
 
     def _of(self, vehicle: str) -> tuple[Rows, Rows]:
         return self._whole.setdefault(vehicle, Rows()), self._recent.setdefault(vehicle, Rows())

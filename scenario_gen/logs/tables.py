@@ -22,7 +22,7 @@ from scenario_gen.logs.text import layout_of
 from scenario_gen.numerics import Floats, Ints
 
 PARQUET = (".parquet", ".pq")
-LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
+LATEST_S = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 NOW = 3e8, 4e9  # s since 1970: from 1979 to 2096
 FEW_ROWS = 10  # of which each may be of a vehicle of its own
 STILL_M = 0.05  # that no vehicle of an encounter drives
@@ -230,7 +230,7 @@ def check_stamps(values: "pd.Series[Any]", time: "pd.Series[int]", known: "pd.Se
     place = f"{path}, column {column.name!r} (time)"
     if not known.any():
         raise InputError(f"{place}: a stamp is not a number, nor a date such as 2022-08-31T12:00:00.5, but {first!r}")
-    if (time.abs() >= round(LONGEST * 1e9)).mean() > 0.5:
+    if (time.abs() >= round(LATEST_S * 1e9)).mean() > 0.5:
         middle = float(reals(values).abs().median())
         since = [unit for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if NOW[0] < middle * factor < NOW[1]]
         if since and column.factor == 1.0:
@@ -268,15 +268,15 @@ def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int
         factor: of their unit to seconds.
     """
     if pd.api.types.is_integer_dtype(values):
-        inside = (values.astype(float).abs() * factor < LONGEST).astype(bool)
-        return values.where(inside, int(LONGEST / factor)).astype(np.int64) * round(factor * 1e9), values.notna().astype(bool)
+        inside = (values.astype(float).abs() * factor < LATEST_S).astype(bool)
+        return values.where(inside, int(LATEST_S / factor)).astype(np.int64) * round(factor * 1e9), values.notna().astype(bool)
     numbers = reals(values)
     if numbers.isna().all():
         dates = pd.to_datetime(values, errors="coerce", utc=True, format="ISO8601")
         ticks = dates.fillna(pd.Timestamp(0, tz="UTC")).astype(np.int64)
         return nanoseconds(ticks, UNITS["time"][dates.dt.unit])[0], dates.notna()
-    inside = numbers.abs() * factor < LONGEST
-    return (numbers.where(inside, LONGEST / factor) * (factor * 1e9)).round().astype(np.int64), numbers.notna()
+    inside = numbers.abs() * factor < LATEST_S
+    return (numbers.where(inside, LATEST_S / factor) * (factor * 1e9)).round().astype(np.int64), numbers.notna()
 
 
 def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segment, ...], config: LogConfig) -> RawLog:

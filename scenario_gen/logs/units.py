@@ -9,14 +9,14 @@ import numpy as np
 
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
-from scenario_gen.logs.path import CONTRADICTS, MOVES
+from scenario_gen.logs.path import CONTRADICTS, MOVES_MPS
 from scenario_gen.numerics import Floats, wrap_angle
 
 SHARE = 75.0  # per cent of the headings that are no farther off: one vehicle of two may face along an axis
 FITS = np.radians(5.0)  # so far off are headings that fit
-NEAR = 0.03  # of a ratio of speeds
+NEAR_RATIO = 0.03  # of a ratio of speeds
 DIFFERS = 1.2  # a ratio of speeds, or its inverse, that is no error of a sensor
-ENOUGH = 5  # samples of a moving vehicle
+MIN_SAMPLES = 5  # samples of a moving vehicle
 DRIVEN_M = 2.0  # by its measured speeds or its positions: less does not tell a ratio
 RATIOS = {  # of measured speeds to those of the positions, and what makes them
     **{"km/h (name the column speed_kmh)": 3.6, "mph (speed_mph)": 1 / 0.44704, "ft/s (speed_fps)": 1 / 0.3048},
@@ -41,7 +41,7 @@ def remarks_on_units(pieces: Sequence[Piece], origin_ns: int, config: LogConfig)
         ticks = (piece.smooth.first + np.arange(len(piece.smooth.speed))) * config.period
         seconds = (piece.track.fix_ns - origin_ns) * 1e-9
         speed = np.interp(seconds, ticks, piece.smooth.speed)
-        moves = (speed > MOVES) & np.isfinite(piece.track.heading)
+        moves = (speed > MOVES_MPS) & np.isfinite(piece.track.heading)
         recorded.append(piece.track.heading[moves])
         along.append(np.interp(seconds[moves], ticks, piece.smooth.heading))
         stamps = (piece.track.speed_ns - origin_ns) * 1e-9
@@ -51,7 +51,7 @@ def remarks_on_units(pieces: Sequence[Piece], origin_ns: int, config: LogConfig)
             own = np.column_stack([own, np.hypot(*(step * _swapped(piece.track.origin)).T)])
             driven[piece.track.id] = np.concatenate([driven.get(piece.track.id, np.zeros((0, 3))), own])
     geographic = any(piece.track.origin for piece in pieces)
-    least = MOVES * config.period
+    least = MOVES_MPS * config.period
     totals = np.array([_totals(own, least) for own in driven.values() if own.sum(axis=0)[:2].max() > DRIVEN_M]).reshape(-1, 4)
     found = (_of_headings(np.concatenate(recorded), np.concatenate(along), geographic=geographic), _of_speeds(totals, geographic))
     return tuple(sentence for sentence in found if sentence)
@@ -61,7 +61,7 @@ def _totals(steps: Floats, least: float) -> list[float]:
     """Return the sums of steps (T, 3) [m], and the median ratio of the first to the second where that is above `least`."""
     rolls = steps[steps[:, 1] > least]
     by_speed, by_place, swapped = steps.sum(axis=0)
-    ratio = np.median(rolls[:, 0] / rolls[:, 1]) if len(rolls) >= ENOUGH else by_speed / max(by_place, 1e-3)
+    ratio = np.median(rolls[:, 0] / rolls[:, 1]) if len(rolls) >= MIN_SAMPLES else by_speed / max(by_place, 1e-3)
     return [by_speed, by_place, swapped, float(ratio)]
 
 
@@ -109,7 +109,7 @@ def _of_speeds(totals: Floats, geographic: bool) -> str:
     whole = totals[:, 0] / np.maximum(totals[:, 1], 1e-3)
     all_in_all = totals[:, 0].sum() / max(totals[:, 1].sum(), 1e-3)
     known = [_nearest(float(own), geographic) for own in (np.median(ratios), all_in_all, np.median(whole))]
-    far, unit, ratio = next((one for one in known if one[0] < NEAR), known[0])
+    far, unit, ratio = next((one for one in known if one[0] < NEAR_RATIO), known[0])
     swapped = totals[:, 0] / np.maximum(totals[:, 2], 1e-3)
     count = f"{(off > DIFFERS).sum()} of {len(totals)} vehicles"
     said = f"the recorded speeds are {ratio:.2f} times those of the positions in {count}"
@@ -117,7 +117,7 @@ def _of_speeds(totals: Floats, geographic: bool) -> str:
         return f"{said}; they would fit if lat and lon were swapped (log.columns=lat=LON,lon=LAT, each the other column)"
     if max(ratio, 1.0 / max(ratio, 1e-9)) <= DIFFERS:
         return ""
-    return f"{said}; they look like {unit}" if far < NEAR else f"{said}: check the time and the unit of x, y and of the speeds"
+    return f"{said}; they look like {unit}" if far < NEAR_RATIO else f"{said}: check the time and the units of x, y and speeds"
 
 
 def _nearest(ratio: float, geographic: bool) -> tuple[float, str, float]:

@@ -29,7 +29,7 @@ _NAMED = 2  # roads that keep an encounter
 ENOUGH = 10  # valid scenarios by which a request counts as possible, if not fewer are wanted
 _FAR_ENDS = (1.0, 0.75, 0.5, 0.25)  # shares of a way at which a bisection may begin
 _STRETCHES = (0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-FAR = 30.0  # m, how far a pose with room is looked for
+FAR_M = 30.0  # m, how far a pose with room is looked for
 _OFFSETS = (0.25 * np.arange(1, 121)).tolist()  # m, by which an overlapping footprint is moved along its heading
 _MARGINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2)  # m, beyond the nearest pose with room, until a pose in whole centimetres has it
 
@@ -193,7 +193,7 @@ class _Search:
             state = request.states(end)[name]
             pose = np.array(state[:3])
             ground = ground_for(self.requested.road, vehicle)
-            answer = nearest_pose_with_room(ground, pose, vehicle.length, vehicle.width, FAR)
+            answer = nearest_pose_with_room(ground, pose, vehicle.length, vehicle.width, FAR_M)
             if answer is not None and answer[1] > 0.0:
                 state = _with_room(self.requested.road, vehicle, answer[0], pose) + state[3:]
             if len(state) == 4:

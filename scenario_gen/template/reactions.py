@@ -92,7 +92,7 @@ def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
         pairs = zip(encounter.vehicles, encounter.speed, strict=True)
         stand = [vehicle.label for vehicle, speed in pairs if np.all(speed < vehicle.kind.waits_below)]
         standing = f"; {' and '.join(stand)} stands throughout" if stand else ""
-        return f"none drives behind another one in its lane, or crosses its way{standing}"
+        return f"none drives behind another one in its lane, or crosses its path{standing}"
     who, whom = (encounter.vehicles[n].label for n in (nearest.who, nearest.whom))
     least = math.floor(10.0 * nearest.apart) / 10.0
     return f"the nearest are {who} and {whom}, and they are never within {least:.1f} s of each other"

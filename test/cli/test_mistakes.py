@@ -61,7 +61,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ((*DRIVE, "--ego", "zz"), "no vehicle 'zz' to be the ego; it has a, b"),
     (("drive", "made/bag", "--planner", "idm"), "write it as MODULE:CLASS"),
     (("drive", "made/bag", "--planner", PLANNER.replace("Follower", "Folower")), "did you mean IdmFollower?"),
-    (("regenerate", "made/bag", "99"), "no scenario of index 99; there are: "),
+    (("regenerate", "made/bag", "99"), "no scenario 99; there are: "),
     # what is missing
     (("generate",), "Missing argument 'log' (The recording: "),
     (("generate", "my log ü.csv"), "Missing option '--road' (straight, curve, "),

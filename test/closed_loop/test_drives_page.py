@@ -8,8 +8,9 @@ from browser_tab import DESKTOP, PHONE, Tab
 import pytest
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.results import Drives
+from scenario_gen.closed_loop.results import drawings, Drives
 from scenario_gen.closed_loop.trials import run_trials, trials_of
+from scenario_gen.output.report.html import render_page
 
 PLANNER = "scenario_gen.closed_loop.planners:ConstantSpeed"
 
@@ -47,4 +48,21 @@ def test_drives_are_sorted_chosen_and_played(browser, file):
 def test_a_phone_shows_all_of_it(browser, file):
     tab = Tab(browser, file, PHONE)
     assert tab.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    tab.page.close()
+
+
+def test_the_page_of_a_search_without_a_failure_raises_no_error(browser, tmp_path):
+    words = {
+        "planner": PLANNER,
+        "title": "a on straight",
+        "ego": "2",
+        "objective": "at_fault",
+        "sentences": ["no failure in 60 drives"],
+    }
+    scripts = ("scene.js", "drives.js", "tables.js")
+    page = render_page("search.html.j2", scripts, drawings([], [], []), **words, kinds={}, rows=[], parameters={})
+    file = tmp_path / "search.html"
+    file.write_text(page)
+    tab = Tab(browser, file, DESKTOP)
+    assert tab.troubles == [] and "a failure is a collision by its fault" in tab.page.locator("header").inner_text()
     tab.page.close()

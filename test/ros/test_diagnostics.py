@@ -10,7 +10,7 @@ import pytest
 from suite_processes import Client
 
 from msg_conventions.diagnostics import decode_diagnostics, Level, Status, template_of
-from scenario_gen.ros.plumbing.diagnostics import bounded, family, HOLD_S, LARGEST, MOST
+from scenario_gen.ros.plumbing.diagnostics import bounded, family, HOLD_S, LARGEST, MAX_STATUSES
 
 pytestmark = pytest.mark.dds
 NODE = "/reporter"
@@ -111,16 +111,16 @@ def test_a_report_takes_the_place_of_the_one_before(reporter: Reporter):
 
 def test_of_a_storm_few_messages_are_published_and_what_is_wrong_is_kept(reporter: Reporter):
     count = len(reporter.heard())
-    for k in range(2 * MOST):
+    for k in range(2 * MAX_STATUSES):
         reporter.diagnostics.status(Level.ERROR, f"finding {k}", "tracks", {}, log=False)
         reporter.diagnostics.status(Level.OK, "", f"thing_{k}", {}, log=False)
     reporter.until(lambda: "tracks" in reporter.newest(), "the finding")
-    assert len(reporter.heard()) - count < MOST // 4
+    assert len(reporter.heard()) - count < MAX_STATUSES // 4
     found = reporter.newest()
     assert found["tracks"].message.startswith(f"finding {k}; finding {k - 1}; ") and found["tracks"].values["times"] == str(
-        2 * MOST
+        2 * MAX_STATUSES
     )
-    assert len(found) <= MOST
+    assert len(found) <= MAX_STATUSES
 
 
 def test_a_status_is_bounded():

@@ -290,7 +290,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag,
         assert told.exit_code == 0, told.output
     over_dds, in_process = (json.loads((tmp_path / out / "drives.json").read_text()) for out in ("over_dds", "in_process"))
     assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
-    monkeypatch.setattr(traffic_of_trials, "SILENT", 1.0)
+    monkeypatch.setattr(traffic_of_trials, "SILENT_S", 1.0)
     for planner, more, said in (
         (f"{sys.executable} -c 'print(7)'", (), "ended with code 0; its last output: 7"),
         ("no_such_program", (), "No such"),

@@ -13,7 +13,7 @@ from scenario_gen.bags.recordings.scenarios import decode_with_witness, SCENARIO
 from scenario_gen.types import Scenario
 
 TOPICS = (SCENARIOS, INFO, WITNESS)
-MOST = 10_000  # witnesses, and scenarios without theirs, that are remembered; beyond, the oldest are forgotten
+MAX_REMEMBERED = 10_000  # witnesses, and scenarios without theirs, that are remembered; beyond, the oldest are forgotten
 Kept = TypeVar("Kept")
 Arrived = tuple[ScenarioEntry, int, Scenario]  # its entry, the template's stamp [ns], and the scenario with its witness
 
@@ -22,7 +22,7 @@ class ArrivingScenarios:
     """Joins the messages that belong to one scenario."""
 
     def __init__(self) -> None:
-        self._tracker = RequestTracker(MOST)
+        self._tracker = RequestTracker(MAX_REMEMBERED)
         self._entries: dict[str, ScenarioEntry] = {}  # by SHA-256; complete, while the tracker keeps no texts
         self._witnesses: dict[str, bytes] = {}  # by SHA-256
         self._waiting: dict[str, tuple[ScenarioEntry, bytes]] = {}  # by SHA-256 of the witness that has not come
@@ -73,5 +73,5 @@ class ArrivingScenarios:
 
 def _remember(kept: dict[str, Kept], key: str, value: Kept) -> None:
     kept[key] = value
-    while len(kept) > MOST:
+    while len(kept) > MAX_REMEMBERED:
         kept.pop(next(iter(kept)))

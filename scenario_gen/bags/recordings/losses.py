@@ -19,7 +19,7 @@ from msg_conventions.scenarios import digest
 from scenario_gen.bags.recordings.requests import RequestTracker
 from scenario_gen.types import Quality
 
-SETTLED = 5.0  # seconds without news after which what a closed request lacks is missing
+SETTLED_S = 5.0  # seconds without news after which what a closed request lacks is missing
 LATE = "began late"
 LOST = "pace the publisher by its acknowledgements, or give the recorder a faster disk and processor"
 BEGIN = "begin to record before what is to be recorded is published"
@@ -100,7 +100,7 @@ class Losses:
         messages = {topic: text for topic, numbers in self._numbers.items() if (text := numbers.summary())}
         for space, requests in self._requests.items():
             requests.settle()
-            if ended or monotonic() - self._news > SETTLED:
+            if ended or monotonic() - self._news > SETTLED_S:
                 topic = f"{space}scenarios"
                 for request in requests.incomplete(closed=not ended):
                     messages[topic] = "; ".join(filter(None, (messages.get(topic), request.sentence())))

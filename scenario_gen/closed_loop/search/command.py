@@ -163,7 +163,7 @@ class SearchResult:
 
 
 def _share(value: float) -> str:
-    return "–" if math.isnan(value) else f"{100.0 * value:.3g} %"
+    return "–" if math.isnan(value) else f"{100.0 * value if value > 1e-9 else 0.0:.3g} %"
 
 
 def search_failures(

@@ -18,7 +18,7 @@ AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = "at_fault", "collision", "off_ro
 NAMES = (AT_FAULT, COLLISION, OFF_ROAD, GOAL)
 CONTACT = 0.1  # added to the speed of an impact, so that every contact is a failure
 LEAST = 1e-3  # s, margin of a drive in which footprints met at no instant that counts
-FAR = 100.0  # margin where a figure does not exist and nothing says how near it is
+NO_MARGIN = 100.0  # margin where a figure does not exist and nothing says how near it is
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Objective:
         apart = _apart(outcome)
         hit = verdict.collision
         contact = -math.inf if hit is None else -(CONTACT + hit.speed)
-        nearest = min(apart, default=FAR)
+        nearest = min(apart, default=NO_MARGIN)
         if self.name in (AT_FAULT, COLLISION):
             counts = hit is not None and (self.name == COLLISION or verdict.at_fault)
             margin = contact if counts else max(nearest, LEAST)
@@ -65,8 +65,8 @@ class Objective:
             if margin > 0.0:
                 margin += 0.1 * nearest  # many drives have no time to collision: the nearer, the better
         else:
-            margin = FAR + nearest if math.isnan(verdict.min_pet) else verdict.min_pet - self.limit
-        margin = FAR if math.isnan(margin) else float(margin)
+            margin = NO_MARGIN + nearest if math.isnan(verdict.min_pet) else verdict.min_pet - self.limit
+        margin = NO_MARGIN if math.isnan(margin) else float(margin)
         parts = apart if self.name in (AT_FAULT, COLLISION) else ()
         events = ((COLLISION,) if hit is not None else ()) + ((AT_FAULT,) if verdict.at_fault else ())
         return Response(margin, parts, _kind(outcome, self.name) if margin <= 0.0 else "", events)

@@ -12,9 +12,9 @@ from scenario_gen.numerics import Bools, Floats
 LEARNED = 500  # drives that it is fitted to, at most
 RIDGES = (1.0, 10.0, 100.0)  # of which the one with the least error of prediction is taken
 ENOUGH = 60  # natural drives that tell the error
-NEAR = 0.3  # share of the drives, those nearest to failure, by which the error is told
+NEAR_SHARE = 0.3  # share of the drives, those nearest to failure, by which the error is told
 TELLING = 10.0  # a feature may matter so many times as much as a number
-FAR = 0.95  # responses are cut at this quantile: what is farther is all the same
+CUT_QUANTILE = 0.95  # responses are cut at this quantile: what is farther is all the same
 BEYOND = 0.02  # and at so much of it below failure
 
 
@@ -41,7 +41,7 @@ class Surrogate:
 
         `natural` (n,) says which drives are of natural scenarios: by these, if there are enough, the error is told.
         """
-        high = max(float(np.quantile(np.maximum(figure, 0.0), FAR)), 1e-9)
+        high = max(float(np.quantile(np.maximum(figure, 0.0), CUT_QUANTILE)), 1e-9)
         y = np.clip(figure, -BEYOND * high, high)
         order = np.argsort(y, kind="stable")
         chosen = order[np.linspace(0, len(order) - 1, min(len(order), LEARNED)).astype(np.int64)]
@@ -53,7 +53,7 @@ class Surrogate:
         x = (x - mean) / scale
         level = float(y.mean())
         kernel = x @ x.T
-        near = counted[: max(int(NEAR * len(counted)), 1)]  # the rows are in ascending order
+        near = counted[: max(int(NEAR_SHARE * len(counted)), 1)]  # the rows are in ascending order
         fits: list[tuple[float, Floats]] = []
         for ridge in RIDGES:
             inverse = np.linalg.inv(kernel + ridge * np.eye(len(x)))

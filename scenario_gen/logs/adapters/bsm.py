@@ -31,7 +31,7 @@ import pandas as pd
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog, Segment
-from scenario_gen.logs.tables import from_frame, LONGEST
+from scenario_gen.logs.tables import from_frame, LATEST_S
 
 EVENT_S = 100.0  # from the beginning of an event of New York to that of the next
 MINUTE_MS = 60_000
@@ -121,7 +121,7 @@ def _row(core: Any, seconds: float, place: Row, speed: Any, heading: Any) -> Row
     row: Row = {name: math.nan if value is None else float(value) for name, value in values.items()}
     row["heading"] = math.pi / 2.0 - math.radians(row["heading"])
     row |= {name: row[name] * 0.01 or math.nan for name in ("length", "width")}  # 0: unknown
-    known = math.isfinite(seconds) and abs(seconds) < LONGEST
+    known = math.isfinite(seconds) and abs(seconds) < LATEST_S
     return row | {"time": np.int64(round(seconds * 1e9)) if known else np.int64(0), "time_ok": known, "vehicle": str(core["id"])}
 
 

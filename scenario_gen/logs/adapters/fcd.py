@@ -27,7 +27,7 @@ from scenario_gen.base.markup import read_xml
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.kinds import type_called, usual_size
 from scenario_gen.logs.raw import check_size, only_file, RawLog, Segment
-from scenario_gen.logs.tables import from_frame, LONGEST
+from scenario_gen.logs.tables import from_frame, LATEST_S
 
 MOVES = 1.0  # m/s
 TINY = 0.05  # of a step by its speed: a vehicle that drives so little in x and y drives in degrees
@@ -52,7 +52,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         raise InputError(f"{path}: no vehicle in any of its steps")
     frame = pd.DataFrame(rows, columns=pd.Index(["time", "vehicle", "x", "y", "speed", "angle", "kind"]))
     frame["heading"] = math.pi / 2.0 - np.radians(frame.pop("angle"))
-    frame["time"], frame["time_ok"] = (frame["time"].clip(-LONGEST, LONGEST) * 1e9).round().astype(np.int64), True
+    frame["time"], frame["time_ok"] = (frame["time"].clip(-LATEST_S, LATEST_S) * 1e9).round().astype(np.int64), True
     own = frame.groupby("vehicle")
     driven = np.hypot(own["x"].diff(), own["y"].diff()) / (own["time"].diff() * 1e-9)
     moves = frame["speed"] > MOVES

@@ -135,7 +135,7 @@ def read_cases(
     cases = [case for case in cases if case.scenarios]
     if not cases:
         known = sorted({entry.index for _, group in groups for entry in group.scenarios})
-        raise InputError(f"{bag}: no scenario of index {sorted(indices)}; there are {known[0]} to {known[-1]}")
+        raise InputError(f"{bag}: no scenario {', '.join(map(str, sorted(indices)))}; there are {known[0]} to {known[-1]}")
     return tuple(cases)
 
 

@@ -245,10 +245,10 @@ def _find(bag: Path, index: int, namespace: str | None, request: str | None, con
     if not same:
         known = sorted({entry.index for _, entry, _ in own})
         some = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
-        raise InputError(f"{bag}: no scenario of index {index}; there are: {some or 'none in that namespace and request'}")
+        raise InputError(f"{bag}: no scenario {index}; there are: {some or 'none in that namespace and request'}")
     if len(same) > 1:
         places = "; ".join(f"--namespace '{where.name}' --request {entry.request}" for where, entry, _ in same)
-        raise InputError(f"{bag}: {len(same)} scenarios have index {index}; choose one: {places}")
+        raise InputError(f"{bag}: {len(same)} scenarios have number {index}; choose one: {places}")
     ((where, entry, info),) = same
     summary = next((candidate for candidate in reversed(where.summaries) if candidate.request == entry.request), None)
     if summary is None:

@@ -209,7 +209,7 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
         silent = message
         if entry is not None and namespace.without_witness(entry):
             if namespace.strange_witnesses:
-                wrong.append((ALTERED, f"the ego's reference drive is not what was published for index {entry.index}"))
+                wrong.append((ALTERED, f"the ego's reference drive is not what was published for scenario {entry.index}"))
             silent = (*message, NO_WITNESS)
         try:
             stamp, scenario = namespace.scenario(k)
@@ -250,7 +250,7 @@ def kept_gaps(encounter: Encounter, entry: ScenarioEntry | None) -> LaneGaps:
 
 def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:
     """Return the sentence for a message that stands where another one was published."""
-    published = f"index {entry.index} of request {entry.request} was published as {entry.sha256[:12]}…"
+    published = f"scenario {entry.index} of request {entry.request} was published as {entry.sha256[:12]}…"
     return f"message {k} has SHA-256 {sha256[:12]}…, which {INFO} does not know; {published}"
 
 

@@ -24,7 +24,7 @@ from scenario_gen.types import WITH
 
 Entries = Sequence[tuple[bytes, ScenarioEntry]]  # scenarios, each with its entry of `scenarios/info`
 SCENARIOS = ("scenarios", INFO)
-SETTLED = 5.0  # seconds without messages after which a closed request's missing messages are reported
+SETTLED_S = 5.0  # seconds without messages after which a closed request's missing messages are reported
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Evaluator(StageNode):
 
     def _report_missing(self) -> None:
         """Say what has not come of closed requests, once all is quiet."""
-        if monotonic() - self._news < SETTLED or not self.active:
+        if monotonic() - self._news < SETTLED_S or not self.active:
             return
         self._news = math.inf
         for request in self._requests.incomplete(closed=True):

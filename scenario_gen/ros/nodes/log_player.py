@@ -26,7 +26,7 @@ from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.types import Encounter, tokens
 
-HEAD_START = 1.0  # seconds in which listeners find the streams, which are not latched
+HEAD_START_S = 1.0  # seconds in which listeners find the streams, which are not latched
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class LogPlayer(StageNode):
             self.outputs.advertise(topic)
         while min(map(self.count_subscribers, topics)) < config.wait_matching_subscriptions and not cancelled():
             time.sleep(0.05)
-        started = time.monotonic() + HEAD_START
+        started = time.monotonic() + HEAD_START_S
         for k in range(encounter.speed.shape[1]):
             while (ahead := started + k * encounter.dt / config.rate - time.monotonic()) > 0.0 and not cancelled():
                 time.sleep(min(ahead, 0.1))

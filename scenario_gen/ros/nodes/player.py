@@ -38,8 +38,8 @@ from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.topics import message_class, OVERRIDABLE, Pace, publish, qos, unacknowledged
 
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
-PATIENCE = 5.0  # seconds in which listeners have to take the last messages
-TICK = 0.01  # seconds between two clock messages
+PATIENCE_S = 5.0  # seconds in which listeners have to take the last messages
+TICK_S = 0.01  # seconds between two clock messages
 
 
 @dataclass(frozen=True)
@@ -129,10 +129,10 @@ class Player(Node):  # type: ignore[misc]
         """Let `run_nodes` end the node, once who listens has everything."""
         for pace in self._paces.values():
             pace.end()
-        deadline = monotonic() + PATIENCE
+        deadline = monotonic() + PATIENCE_S
         with suppress(InvalidHandle):  # the node is being ended already
             for publisher, _, _ in self._offered.values():
-                while not publisher.wait_for_all_acked(Duration()) and monotonic() < deadline and not self._ended.wait(TICK):
+                while not publisher.wait_for_all_acked(Duration()) and monotonic() < deadline and not self._ended.wait(TICK_S):
                     pass
         self.executor.create_task(self._finish)  # to wake the executor alone would not make it look
 
@@ -178,10 +178,10 @@ class Player(Node):  # type: ignore[misc]
         """Let the bag's time run, at `rate` and unless paused, from `elapsed` to `due` [s]; return where it stands."""
         while elapsed < due and not self._ended.is_set():
             self._at = elapsed
-            self._running.wait(TICK)
+            self._running.wait(TICK_S)
             started = monotonic()
             if self._running.is_set():
-                self._ended.wait(min(TICK, (due - elapsed) / config.rate))
+                self._ended.wait(min(TICK_S, (due - elapsed) / config.rate))
                 elapsed += (monotonic() - started) * config.rate
             self._publish_clock(first_ns + round((min(elapsed, due) - config.start_offset) * 1e9))
         self._running.wait()
@@ -208,5 +208,5 @@ class Player(Node):  # type: ignore[misc]
         self._ended.set()
         self._running.set()
         if self._player is not None:
-            self._player.join(PATIENCE)  # what it still says needs the node
+            self._player.join(PATIENCE_S)  # what it still says needs the node
         super().destroy_node()

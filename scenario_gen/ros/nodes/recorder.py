@@ -34,9 +34,9 @@ from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.topics import adapted_quality, message_class, qos
 
-REST = 30.0  # seconds that are taken at most, at the end, for what has arrived
+REST_S = 30.0  # seconds that are taken at most, at the end, for what has arrived
 AT_ONCE = 50  # messages of a topic, before others have their turn
-HELD = 4.0  # seconds after which what came is written, whole chunk or not
+HELD_S = 4.0  # seconds after which what came is written, whole chunk or not
 OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
 OF_A_SUITE = (
     r"map|road/(entries|exits|info|lanes|markings)|"
@@ -74,7 +74,7 @@ def _disk_errors(advice: str = "; `scenario-gen reindex` saves what is whole in 
 class Recorder(Node):  # type: ignore[misc]
     """Records what matches."""
 
-    ENDING = REST + 5.0  # seconds
+    ENDING = REST_S + 5.0  # seconds
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("recorder", namespace=namespace)
@@ -85,7 +85,7 @@ class Recorder(Node):  # type: ignore[misc]
         offer_trigger(self, "~/start", self._start_now)
         offer_trigger(self, "~/stop", self._stop_now)
         self.create_timer(0.1, self._look_around)
-        self.create_timer(HELD, self._let_go)
+        self.create_timer(HELD_S, self._let_go)
         self._losses = Losses(self.count_publishers)
         self._warned: dict[str, str] = {}
         self.diagnostics = NodeDiagnostics(self, self._report_counts)
@@ -131,7 +131,7 @@ class Recorder(Node):  # type: ignore[misc]
 
     def _take_rest(self) -> None:
         """Record what has arrived and waits to be taken; publishers believe that the recorder has it."""
-        deadline = monotonic() + REST
+        deadline = monotonic() + REST_S
         for topic in list(self._listening):
             while monotonic() < deadline and self._take_more(topic):
                 pass

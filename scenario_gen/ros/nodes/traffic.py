@@ -54,8 +54,8 @@ from scenario_gen.types import tokens
 
 OUTPUTS = ("/clock", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 LOOK_AROUND = 10  # steps between two looks at who commands the ego
-FOLLOWS_ON = 0.5  # seconds of real time from the end of a drive in lock-step to the next one
-LOOK = 0.05  # seconds of real time between two looks at whether a wait is at its end
+FOLLOWS_ON_S = 0.5  # seconds of real time from the end of a drive in lock-step to the next one
+POLL_S = 0.05  # seconds of real time between two looks at whether a wait is at its end
 
 
 class Traffic(Node):  # type: ignore[misc]
@@ -76,7 +76,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._waiting: Future | None = None
         self._until = 0.0  # when that ends, on the steady clock [s]
         self._load_at = math.inf  # when the next scenario begins, on the steady clock [s]
-        self.create_timer(LOOK, self._end_waiting, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(POLL_S, self._end_waiting, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._paused = False
         self._sources: list[str] = []
         self.outcomes: list[Outcome] = []  # of the drives that are over
@@ -239,7 +239,7 @@ class Traffic(Node):  # type: ignore[misc]
             if not self.config.follow_on:
                 self.get_logger().info(f"the next scenario waits for a call of {self.get_fully_qualified_name()}/next")
             elif self.config.lock_step:
-                self._load_at = monotonic() + FOLLOWS_ON
+                self._load_at = monotonic() + FOLLOWS_ON_S
             else:
                 self._load(self._at + 1)
         elif self.config.bag:

@@ -19,11 +19,11 @@ from scenario_gen.ros.nodes.traffic import Traffic
 from scenario_gen.ros.plumbing.driving import INPUTS
 from scenario_gen.ros.plumbing.node_parameters import TrafficParameters
 
-START = 60.0  # seconds that a planner's node may take until it publishes commands
-SETTLE = 1.0  # seconds from its first publisher until it has found the topics that it listens to
-LAST = 1.0  # seconds to wait for a reply to a drive's last state, which would else count as a reply to the next drive's first
-SILENT = 30.0  # seconds without a command after which a planner's node hangs
-AGAIN = 2.0  # seconds without a reply after which a drive's first state is sent again, for a planner that started late
+START_S = 60.0  # seconds that a planner's node may take until it publishes commands
+SETTLE_S = 1.0  # seconds from its first publisher until it has found the topics that it listens to
+LAST_REPLY_S = 1.0  # to wait for a reply to a drive's last state, which would else count as a reply to the next drive's first
+SILENT_S = 30.0  # seconds without a command after which a planner's node hangs
+SEND_AGAIN_S = 2.0  # seconds without a reply after which a drive's first state is sent again, for a planner that started late
 Progress = Callable[[int, int], None]
 
 
@@ -41,7 +41,7 @@ class TrafficOfTrials(Traffic):
         now, state = monotonic(), self._states[-1]
         if state is not self._sent:
             self._sent, self._times_sent = state, 0
-        elif now < self._sent_at + AGAIN:
+        elif now < self._sent_at + SEND_AGAIN_S:
             return
         self._sent_at, self._times_sent = now, self._times_sent + 1
         super()._publish_state()
@@ -53,24 +53,24 @@ class TrafficOfTrials(Traffic):
             loop, began = self._loop, monotonic()
             await self._wait_for_command(self._states[-1], self.config.patience)
             if self._times_sent > 1:
-                until = monotonic() + LAST  # each copy may get a reply, of which the last one counts
+                until = monotonic() + LAST_REPLY_S  # each copy may get a reply, of which the last one counts
                 while monotonic() < until:
                     await self._next_command(until)
             while loop is not None and not self._verdict:
                 await self._step_once(loop)
                 self._refuse_hanging(self._trials[number], began)
             self._progress(number + 1, len(self._trials))
-            await self._wait_for_command(self._states[-1], LAST)
+            await self._wait_for_command(self._states[-1], LAST_REPLY_S)
 
     def _refuse_hanging(self, trial: Trial, began: float) -> None:
         """Raise InputError if a drive that `began` then takes too long, or nothing has come of the planner for too long."""
         now = monotonic()
         if now - began > self.config.drive.drive_time:
             raise too_long(trial, self.config.drive)
-        if now - max(began, self._heard_at) > SILENT:
+        if now - max(began, self._heard_at) > SILENT_S:
             raise InputError(
-                f"scenario {trial.name}: the planner's node has sent no command for {SILENT:.0f} s: it hangs, or does not answer "
-                "each odometry of the ego with one command"
+                f"scenario {trial.name}: the planner's node has sent no command for {SILENT_S:.0f} s: it hangs, or does not "
+                "answer each odometry of the ego with one command"
             )
 
 
@@ -94,16 +94,16 @@ def drive_trials(
         node, executor = TrafficOfTrials(trials, config, progress), SingleThreadedExecutor()
         executor.add_node(node)
         try:
-            until = monotonic() + START
+            until = monotonic() + START_S
             while not node.commanding():
                 check()
                 if monotonic() > until:
                     raise InputError(
-                        f"--planner {planner}: no command from it in {START:.0f} s; it must publish one of {', '.join(INPUTS)} "
+                        f"--planner {planner}: no command from it in {START_S:.0f} s; it must publish one of {', '.join(INPUTS)} "
                         "(docs/closed_loop.md)"
                     )
                 executor.spin_once(timeout_sec=0.05)
-            until = monotonic() + SETTLE
+            until = monotonic() + SETTLE_S
             while monotonic() < until:
                 executor.spin_once(timeout_sec=0.05)
             with saying_what_was_before(node.outcomes):

@@ -26,7 +26,7 @@ from scenario_gen.ros.plumbing.topics import create_publisher, others_on, own_to
 TICK_S = 0.25  # seconds of real time after which what has changed is published
 TICKS = 4  # after so many all is published, changed or not
 HOLD_S = 3.0  # seconds for which a finding is shown at least
-MOST = 100  # statuses of a node
+MAX_STATUSES = 100  # statuses of a node
 LARGEST = 65_536  # characters of the values of one status
 
 
@@ -153,7 +153,7 @@ class NodeDiagnostics:
                     status = replace(status, message=old.status.message if known else f"{status.message}; {old.status.message}")
             self._fresh.add(status.name)
         self._entries[status.name] = _Entry(bounded(status), monotonic(), times)
-        while len(self._entries) > MOST:  # at first what is well
+        while len(self._entries) > MAX_STATUSES:  # at first what is well
             first = next(iter(self._entries))
             self._entries.pop(next((name for name, entry in self._entries.items() if not entry.bad), first))
 

@@ -23,8 +23,8 @@ from scenario_gen.ros.plumbing.sampling_requests import Code, OpenRequest, OpenR
 from scenario_gen.ros.plumbing.services import REQUESTS
 
 NAME = "~/generate_scenarios"
-PERIOD = 0.1  # seconds between two feedbacks
-KEPT = 900  # seconds for which a result can be fetched
+FEEDBACK_S = 0.1  # seconds between two feedbacks
+KEPT_S = 900  # seconds for which a result can be fetched
 
 
 @dataclass
@@ -53,9 +53,9 @@ class Goals:
             result_service_qos_profile=REQUESTS,
             cancel_service_qos_profile=REQUESTS,
             feedback_pub_qos_profile=QoSProfile(depth=100),
-            result_timeout=KEPT,
+            result_timeout=KEPT_S,
         )
-        self._timer = node.create_timer(PERIOD, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(FEEDBACK_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def destroy(self) -> None:
         """Withdraw the action."""

@@ -20,7 +20,7 @@ from scenario_gen.ros.plumbing.topics import adapted_quality
 from scenario_gen.template import MOST_VEHICLES
 from scenario_gen.types import Sample, token
 
-CHECK_PERIOD = 0.2  # seconds between two checks for new streams, and for silence
+CHECK_S = 0.2  # seconds between two checks for new streams, and for silence
 TYPES = {"fix": FIX_TYPE, "speed": TWIST_TYPE}
 
 
@@ -55,7 +55,7 @@ class LiveStreams:
         self._last_message = monotonic()
         self._topics: dict[str, tuple[str, str]] = {}  # by full name: vehicle, kind
         self._left_out: set[str] = set()  # topics that are not subscribed to, with the reason on /diagnostics
-        self._timer = node.create_timer(CHECK_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(CHECK_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _look(self) -> None:
         """Subscribe to new streams, forget ended ones that were left out, and end the log after silence."""

@@ -44,7 +44,7 @@ from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Reques
 
 SHOWN = 20  # waiting requests that are named
 LOG_S = 5.0  # seconds between two lines on the terminal that say how far a request is
-LOOK = 0.1  # seconds between two looks whether those that wait can be served
+POLL_S = 0.1  # seconds between two looks whether those that wait can be served
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 Answer = tuple[GenerationResult, RequestSummary]  # the result of a request, whose scenarios are published by then
 
@@ -124,7 +124,7 @@ class OpenRequests:
         self._numbers = count(1)
         self._lock = threading.Lock()
         self._waiters: list[tuple[Future, Callable[[], bool]]] = []
-        self._timer = node.create_timer(LOOK, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(POLL_S, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         node.create_service(SetParametersAtomically, "~/generate", self._generate, qos_profile=REQUESTS)
         node.create_service(Trigger, "~/wait_until_ready", self._wait_until_ready, qos_profile=REQUESTS)
         node.create_service(SetParametersAtomically, "~/cancel_request", self._cancel_request, qos_profile=REQUESTS)

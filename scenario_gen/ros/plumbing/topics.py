@@ -33,8 +33,8 @@ OWN_QUALITY = ("/diagnostics", "/tf")  # as others expect them
 SHARED = ("/diagnostics", "/rosout", "/parameter_events", "/tf", "/tf_static", "/clock", "/footprint", "/transition_event")
 """How the names of topics end that many nodes publish."""
 DEPTH = 1000  # messages that a subscription holds at least
-TICK = 0.002  # seconds between two looks for acknowledgements
-SLOWLY = 0.001  # seconds for each message while a subscriber is not waited for: for the sake of the others
+POLL_S = 0.002  # seconds between two looks for acknowledgements
+PER_MESSAGE_S = 0.001  # seconds for each message while a subscriber is not waited for: for the sake of the others
 
 
 def message_class(kind: str) -> Any:
@@ -247,10 +247,10 @@ class Pace:
             elif self._patience and monotonic() >= deadline:
                 self._go_on()
             else:
-                sleep(TICK)
+                sleep(POLL_S)
         if self._alone:
             self._unacknowledged += 1
-            sleep(SLOWLY)
+            sleep(PER_MESSAGE_S)
         self._open += 1
 
     def end(self) -> None:
@@ -305,7 +305,7 @@ def let_others_take(executor: Executor | None, stop: Callable[[], bool]) -> None
         return
     turned = threading.Event()
     executor.create_task(turned.set)
-    while not turned.wait(TICK) and not stop():
+    while not turned.wait(POLL_S) and not stop():
         pass
 
 

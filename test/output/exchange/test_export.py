@@ -95,7 +95,7 @@ def test_round_trips_close(small_bag, tmp_path):
     [
         (["--to", "lanelet2"], "choose one of commonroad, openscenario, osi, autoware, scenarionet"),
         (["--to", "commonroad", "--ego", "9"], "has no vehicle '9' to be the ego; there are: 1, 2"),
-        (["--to", "commonroad", "--index", "77"], "no scenario of index"),
+        (["--to", "commonroad", "--index", "77"], "no scenario 77; there are"),
         (["--to", "commonroad", "--namespace", "x"], "no scenarios in namespace 'x'"),
         (["--to", "commonroad", "--set", "run_out=-1"], "run_out"),
     ],

@@ -141,7 +141,7 @@ def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_
         return encode_scenario(replace(scenario, vehicles=vehicles, **arrays), run.encounter.start_ns)
 
     (found,) = validate_bag(rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "ego", swapped, ("info",)))
-    unknown = ("sha256: there is no entry on scenarios/info", "boundary_state: it is not known what was asked")
+    unknown = ("sha256: there is no entry on scenarios/info", "boundary_state: the requested states are not known")
     assert found.found == {} and found.left_out == dict.fromkeys(unknown, 4)
 
 
@@ -158,7 +158,7 @@ def test_scenarios_that_are_not_as_published_are_named(run, tmp_path):
     assert (found.found[ALTERED].count, found.found[ALTERED].scenario) == (1, 2)
     index = run.generated.scenarios[2].index
     assert f"message 2 has SHA-256 {digest(encode_scenario(other, run.encounter.start_ns))[:12]}" in found.found[ALTERED].message
-    assert f"index {index} of request 1 was published as" in found.found[ALTERED].message
+    assert f"scenario {index} of request 1 was published as" in found.found[ALTERED].message
     answer = CliRunner().invoke(app, ["validate", str(changed)])
     assert answer.exit_code == 1 and ALTERED in answer.output
 
@@ -243,7 +243,7 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
     assert (lost.found, lost.left_out) == ({}, {NO_WITNESS: 3})
     (altered,) = validate_bag(bag_with("altered", lambda data: data[:-8] + bytes(8)))
     assert altered.found[ALTERED].count == 3
-    with pytest.raises(InputError, match="the witness with SHA-256"):
+    with pytest.raises(InputError, match="the reference drive with SHA-256"):
         regenerate_scenario(tmp_path / "lost", slot.generated.scenarios[0].index)
     with pytest.raises(InputError, match="whose reference drive is not in the bag"):
         read_trials(tmp_path / "lost")

@@ -101,9 +101,9 @@ def test_a_bag_of_its_own(bag, name, tmp_path):
 
 
 def test_what_is_ambiguous_or_missing_is_said(bag, tmp_path):
-    with pytest.raises(InputError, match="3 scenarios have index 0; choose one: --namespace '/ego' --request 1; "):
+    with pytest.raises(InputError, match="3 scenarios have number 0; choose one: --namespace '/ego' --request 1; "):
         regenerate_scenario(bag, 0)
-    with pytest.raises(InputError, match="no scenario of index 77; there are: 0, 1, 2"):
+    with pytest.raises(InputError, match="no scenario 77; there are: 0, 1, 2"):
         regenerate_scenario(bag, 77)
     with pytest.raises(InputError, match="has no fit, vehicle_2/route with"):
         bare = copied(bag, tmp_path / "bare", lambda m: None if m.topic.endswith(("/fit", "/vehicle_2/route")) else m.data)

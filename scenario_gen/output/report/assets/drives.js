@@ -108,13 +108,13 @@ function toggle() {
   if (playing) requestAnimationFrame(tick);
 }
 
-byId("play").addEventListener("click", toggle);
+byId("play")?.addEventListener("click", toggle);
 document.addEventListener("keydown", (event) => {
   if (event.key !== " " || event.target.closest("button, input, select, summary")) return;
   event.preventDefault();
   toggle();
 });
-byId("time").addEventListener("input", draw);
+byId("time")?.addEventListener("input", draw);
 document.querySelectorAll("tr[data-show]").forEach((row) => row.addEventListener("click", () => show(Number(row.dataset.show))));
 window.addEventListener("resize", draw);
 show(0);
