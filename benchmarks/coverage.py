@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._coverage_nulls import at_precision, jitters, joint_gain, speed_spread
 from benchmarks._size import sized
 from benchmarks.naturalness import DATA
 from benchmarks.row import Row
@@ -28,7 +29,7 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.population import in_words, Population, population_of
+from scenario_gen.method.evaluation.population import APART, in_words, Members, members_of
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import road_and_template
@@ -37,9 +38,10 @@ from scenario_gen.types import Encounter, Scenario
 PAIRS = Path(__file__).with_name("_coverage_pairs.json")
 SEED = 3
 COUNT, MOST = sized((50, None), (3, 12))
-TEMPLATES = sized((5, 10, 20), (1,))
+TEMPLATES, MIDDLE = sized((5, 10, 20), (1,)), sized(10, 1)
 SHIFT_S, PACE = 1.0, 0.06
 TARGETS = {5: 0.48, 10: 0.65, 20: 0.78}
+OF_RECORDED = 0.95  # precision of the generated over that of the recorded, at least
 
 
 @dataclass(frozen=True)
@@ -62,30 +64,45 @@ def run() -> list[Row]:
         rng = np.random.default_rng(1)
         shifted = [(name, Set(one.encounter, tuple(_shifted(one.encounter, rng) for _ in one.members))) for name, one in made]
         mixed = [(name, Set(one.encounter, _mixed(one.members, rng))) for name, one in made]
-        nulls = {"shifted": shifted, "mixed": mixed}
-        found, beside = _population(made), {name: _population(sets) for name, sets in nulls.items()}
-        rows.append(Row(f"{variety}: encounters", sum(found.encounters.values()), "", "higher"))
-        rows += _curve(variety, found, beside)
+        found, *nulls = (members_of(sets) for sets in (made, shifted, mixed))  # type: ignore[arg-type]
+        rows.append(Row(f"{variety}: encounters", len(found.recorded), "", "higher"))
+        lost = {member.template for member in found.made if member.kind == APART}
+        rows.append(Row(f"{variety}: sets that lose the shared area", len(lost), "", "lower", 0.0))
+        rows += _curve(variety, found)
+        rows += _beside(variety, found, dict(zip(("shifted", "mixed"), nulls, strict=True)), rng)
     return rows
 
 
-def _curve(variety: str, found: Population, beside: Mapping[str, Population]) -> Iterator[Row]:
+def _curve(variety: str, found: Members) -> Iterator[Row]:
     """Yield the rows of the numbers of templates."""
-    for k, point in enumerate(found.curve):
-        n = point.templates
-        others = "; ".join(
-            f"{name} {sets.curve[k].generated.value:.2f} at precision {sets.curve[k].precision.value:.2f}"
-            for name, sets in beside.items()
-        )
-        peer = f"{in_words(point.generated)}; templates alone {in_words(point.alone)}; {others}"
-        yield Row(f"{variety}: coverage with {n}", point.generated.value, "", "higher", TARGETS.get(n), peer)
-        recorded = f"of the recorded {in_words(point.recorded)}"
-        yield Row(f"{variety}: precision with {n}", point.precision.value, "", "higher", None, recorded)
-        yield Row(f"{variety}: multiplier with {n} (inf: more than there are)", point.multiplier, "", "higher", 10.0)
+    for point in found.curve(TEMPLATES):
+        n, multiplier = point.templates, point.multiplier
+        alone = f"{in_words(point.generated)}; templates alone {in_words(point.alone)}"
+        yield Row(f"{variety}: coverage with {n}", point.generated.value, "", "higher", TARGETS.get(n), alone)
+        recorded, least = f"of the recorded {in_words(point.recorded)}", OF_RECORDED * point.recorded.value
+        yield Row(f"{variety}: precision with {n}", point.precision.value, "", "higher", least, recorded)
+        name = f"{variety}: multiplier with {n} (inf: more than there are)"
+        yield Row(name, multiplier.value, "", "higher", 10.0, f"[{multiplier.low:.1f}, {multiplier.high:.1f}] over draws")
 
 
-def _population(sets: Sequence[tuple[str, Set]]) -> Population:
-    return population_of(sets, TEMPLATES)  # type: ignore[arg-type]
+def _beside(variety: str, found: Members, nulls: Mapping[str, Members], rng: np.random.Generator) -> Iterator[Row]:
+    """Yield what the nulls have, as they are and at the precision of the generated ones."""
+    _, coverage, precision, _ = found.shares(MIDDLE)
+    best: tuple[float, str] = (0.0, "")
+    for name, null in (*nulls.items(), *jitters(found, rng)):
+        plain, equal = null.shares(MIDDLE), at_precision(null, precision.value, MIDDLE)
+        message = f"{name} {equal[0].value:.2f} at {equal[1].value:.2f}; as it is {plain[1].value:.2f} at {plain[2].value:.2f}"
+        if name in nulls:
+            gain = coverage.value - equal[0].value
+            yield Row(f"{variety}: coverage with {MIDDLE} over {name} at equal precision", gain, "", "higher", 0.12, message)
+        else:
+            best = max(best, (equal[0].value, message))
+    gain = coverage.value - best[0]
+    yield Row(f"{variety}: coverage with {MIDDLE} over the best jitter at equal precision", gain, "", "higher", 0.25, best[1])
+    for kind, joint in joint_gain(found, nulls["mixed"], MIDDLE).items():
+        target = 0.1 if kind == "following" else 0.05
+        yield Row(f"{variety}: precision of joint features over mixed, {kind}", joint, "", "higher", target)
+    yield Row(f"{variety}: spread of speeds within a set over the recorded", speed_spread(found), "", "higher", 0.4)
 
 
 def _generated(
