@@ -18,7 +18,7 @@ from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, 
 from scenario_gen.types import Cause, Request, Scenario
 
 POPULATION = PipelineConfig(sampling=SamplingConfig(variety="population"))
-SPEED = FEATURES.index("speed at conflict of the first")
+APPROACH = FEATURES.index("approach")
 KIND = "crossing, rolls"
 
 
@@ -75,19 +75,28 @@ def test_the_template_counts_once_whether_it_is_named_or_not(encounters):
     assert named(scenario) == pytest.approx(unnamed(scenario))
 
 
+def test_encounters_are_told_apart_by_what_they_are_and_not_by_their_names(encounters):
+    scenario = as_scenario(encounters[1])
+    others, copies = [replace(one, name="log") for one in encounters[1:]], 5 * [encounters[0]]
+    named, alike, copied = (
+        measures_in("population", encounters[0], given).rarity(scenario) for given in (encounters[1:], others, copies)
+    )
+    assert alike == pytest.approx(named)
+    assert copied == pytest.approx(measures_in("population", encounters[0]).rarity(scenario))
+
+
 def test_vehicles_that_share_no_area_are_in_no_population(encounters):
     position = encounters[0].position.copy()
     position[0] += 1000.0
     assert measures_in("population", encounters[0]).rarity(as_scenario(replace(encounters[0], position=position))) == np.inf
 
 
-def test_speeds_of_a_set_spread_towards_those_of_the_population(sets, encounters):
+def test_approaches_of_a_set_spread_towards_those_of_the_population(sets, encounters):
     def spread(motions):
-        return np.std([member_of(motion, "", 0).features[SPEED] for motion in motions])
+        return np.std([member_of(motion, "", 0).features[APPROACH] for motion in motions])
 
     population, wide = map(spread, sets)
-    recorded = spread(encounters)
-    assert wide < population < recorded and population > 1.2 * wide
+    assert 1.2 * wide < population < spread(encounters)
 
 
 def test_scenarios_say_their_rarity_and_the_others_are_counted(sets):
