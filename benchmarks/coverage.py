@@ -1,20 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much unseen traffic a few recordings stand for: coverage and precision of what is generated, beside two nulls.
+"""How much unseen traffic a few recordings stand for: coverage and precision of what is generated, beside nulls.
 
 Recorded encounters of two vehicles (SCENARIO_GEN_DATA), each on its own road, with default settings and with
 `sampling.variety=population` (of the template and the shipped law alone: encounters that are to be reached say nothing); without
 data the drawn motions of test/worlds. `_coverage_pairs.json` lists 105: pairs within 4 s at the shared area or 15 m, of four
 kinds, whose road keeps the kind. Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no
 generator: *shifted* moves each vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another one of
-the set.
+the set; jitters are noise on the features of the templates. `_coverage_nulls` compares them at equal precision.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 import json
+import math
 from pathlib import Path
 import sys
 from typing import Any
@@ -79,7 +80,8 @@ def _curve(variety: str, found: Members) -> Iterator[Row]:
         n, multiplier = point.templates, point.multiplier
         alone = f"{in_words(point.generated)}; templates alone {in_words(point.alone)}"
         yield Row(f"{variety}: coverage with {n}", point.generated.value, "", "higher", TARGETS.get(n), alone)
-        recorded, least = f"of the recorded {in_words(point.recorded)}", OF_RECORDED * point.recorded.value
+        recorded = f"of the recorded {in_words(point.recorded)}"
+        least = OF_RECORDED * point.recorded.value if math.isfinite(point.recorded.value) else None
         yield Row(f"{variety}: precision with {n}", point.precision.value, "", "higher", least, recorded)
         name = f"{variety}: multiplier with {n} (inf: more than there are)"
         yield Row(name, multiplier.value, "", "higher", 10.0, f"[{multiplier.low:.1f}, {multiplier.high:.1f}] over draws")
@@ -123,7 +125,7 @@ def _encounters() -> Iterator[tuple[str, Encounter]]:
     if not (DATA / "trajectories").is_dir():
         sys.path.append(str(Path(__file__).resolve().parents[1] / "test" / "worlds"))
         drawn = import_module("textbook_motions")
-        yield from ((f"drawn {seed}", drawn.labelled(kind, seed).encounter) for seed in range(3) for kind in drawn.REACTIONS)
+        yield from ((f"drawn {seed}", drawn.labelled(kind, seed).encounter) for kind in drawn.REACTIONS for seed in range(3))
         return
     for row in json.loads(PAIRS.read_text()):
         config = LogConfig(vehicles=",".join(row["vehicles"]), start=row["start"], end=row["end"])
