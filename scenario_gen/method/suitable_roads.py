@@ -6,6 +6,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from itertools import islice
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.config import PipelineConfig
@@ -13,10 +14,11 @@ from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import drives_about_ring, NoPlaceError, road_and_template, ROADS, ROUNDABOUT
-from scenario_gen.template import refuse_reversing, refuse_too_large
-from scenario_gen.types import Encounter, GenerationResult, Road, Segmentation
+from scenario_gen.template import conflict_of, conflicts_in, refuse_reversing, refuse_too_large
+from scenario_gen.types import Encounter, GenerationResult, join_ego, Road, Segmentation
 
 AUTO = "auto"
+LOOKED_AT = 50  # scenarios of a set, whether they keep the areas that vehicles share
 
 
 def takes(road: Road | str, encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> bool:
@@ -52,7 +54,7 @@ def on_first_suitable_road(
     refusal = RefusedError(f"{encounter.name}: no built-in road takes this encounter; give the path of a map")
     for name in suitable_roads(encounter, segment(encounter, config.segmentation, seed), config):
         try:
-            return _noted(generate(name), name)
+            return _noted(_refuse_lost(generate(name)), name)
         except RefusedError as error:
             kind = TargetError if isinstance(error, TargetError) else RefusedError
             refusal = kind(f"{encounter.name} on road {name}, the last that takes it: {error}")
@@ -70,6 +72,23 @@ def with_suitable_roads(
             names = ", ".join(suitable_roads(encounter, segmentation, config))
             return RefusedError(f"{error}. Roads that take it: {names}" if names else str(error))
     return error
+
+
+def _refuse_lost(result: GenerationResult) -> GenerationResult:
+    """Return a result whose vehicles share the areas that they share in the template.
+
+    Raises:
+        RefusedError: two of them do not in one of its scenarios.
+    """
+    encounter = result.encounter
+    for conflict in conflicts_in(encounter):
+        names = tuple(encounter.vehicles[n].id for n in conflict.pair)
+        for scenario in map(join_ego, islice(result, LOOKED_AT)):
+            ids = [vehicle.id for vehicle in scenario.vehicles]
+            a, b = sorted(map(ids.index, names))
+            if conflict_of(scenario, a, b) is None:
+                raise RefusedError(f"vehicles {names[0]} and {names[1]} share no area there in scenario {scenario.index}")
+    return result
 
 
 def _noted(result: GenerationResult, name: str) -> GenerationResult:

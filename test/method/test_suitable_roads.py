@@ -3,8 +3,10 @@
 
 """Which built-in roads take a template: `road="auto"`, and what a refusal names."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from textbook_motions import labelled
 
@@ -13,7 +15,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
-from scenario_gen.method.suitable_roads import suitable_roads
+from scenario_gen.method.suitable_roads import on_first_suitable_road, suitable_roads
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types.request import Request
 
@@ -40,6 +42,23 @@ def test_auto_takes_the_first_road_that_keeps_the_conflict_and_says_so(crossing)
 def test_where_roads_suit_but_the_target_cannot_be_had_that_is_said(crossing):
     with pytest.raises(TargetError, match=r"on road corridor, the last that takes it: target gap=50\.\.60"):
         generate(crossing, "auto", count=1, seed=7, request=Request(target="gap=50..60"))
+
+
+def test_auto_leaves_out_a_road_on_which_vehicles_share_no_area_any_more(crossing):
+    made = generate(crossing, "four_way", count=2, seed=7)
+
+    def on(name):
+        off = np.array([[[1000.0, 0.0]], [[0.0, 0.0]]]) if name == "four_way" else 0.0
+        (one, other) = made.generated.scenarios
+        apart = replace(other, position=other.position + off)
+        return replace(made, generated=replace(made.generated, scenarios=(one, apart)))
+
+    result = on_first_suitable_road(on, crossing, PipelineConfig(), 7)
+    assert "road auto: four_way" not in result.generated.adaptations[0]
+    with pytest.raises(
+        RefusedError, match=r"on road corridor, the last that takes it: vehicles .* and .* share no area there in scenario"
+    ):
+        on_first_suitable_road(lambda _: on("four_way"), crossing, PipelineConfig(), 7)
 
 
 def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):

@@ -76,11 +76,15 @@ def rarity_in(encounter: Encounter, population: Sequence[Encounter] = ()) -> Cal
 
     Args:
         encounter: the template; it counts once, whether it is in the population or not.
-        population: recorded encounters.
+        population: recorded encounters; those of the same features are one, whatever they are called.
     """
-    members = [_member(one) for one in ({one.name: one for one in population} | {encounter.name: encounter}).values()]
+    members = [_member(encounter)]
+    for member in map(_member, population):
+        if not any(member.kind == other.kind and np.allclose(member.features, other.features) for other in members):
+            members.append(member)
     laws = {kind: Law.of(kind, [member.features for member in members if member.kind == kind]) for kind in _shipped()}
 
+    @once_per_object
     def rarity(scenario: Scenario) -> float:
         member = generated_member(scenario, _member(encounter), encounter)
         return laws[member.kind].distance(member.features) / USUAL if member.kind in laws else math.inf

@@ -66,7 +66,8 @@ class Point:
         alone: coverage by the templates.
         generated: coverage by templates and generated.
         precision: of the generated; `recorded`: of the templates themselves.
-        multiplier: recordings that cover alone as much, over `templates`; inf: more than there are.
+        multiplier: recordings that cover alone as much (with the quantiles of `generated`), over `templates`; inf: more than
+            there are.
     """
 
     templates: int
@@ -74,7 +75,7 @@ class Point:
     generated: Interval
     precision: Interval
     recorded: Interval
-    multiplier: float
+    multiplier: Interval
 
 
 @dataclass(frozen=True)
@@ -117,9 +118,8 @@ class Population:
         columns = ("templates", "coverage alone", "with generated", "precision", "of the recorded", "stand for")
         rows = []
         for point in self.curve:
-            stands = f"{point.multiplier * point.templates:.0f}" if math.isfinite(point.multiplier) else "more than there are"
             shares = (point.alone, point.generated, point.precision, point.recorded)
-            rows.append((str(point.templates), *map(in_words, shares), stands))
+            rows.append((str(point.templates), *map(in_words, shares), _stands_for(point)))
         return columns, rows
 
     def remarks(self) -> list[str]:
@@ -131,6 +131,15 @@ class Population:
             farthest = f"the farthest is {worst.encounter} ({worst.kind}): {worst.feature}"
             lines.append(f"{len(self.unreached)} encounters are never reached; {farthest}")
         return lines
+
+
+def _stands_for(point: Point) -> str:
+    """How many recordings, with the quantiles."""
+
+    def words(multiplier: float) -> str:
+        return f"{multiplier * point.templates:.0f}" if math.isfinite(multiplier) else "more than there are"
+
+    return f"{words(point.multiplier.value)} [{words(point.multiplier.low)}, {words(point.multiplier.high)}]"
 
 
 def in_words(share: Interval) -> str:
@@ -232,6 +241,55 @@ def population_of(
     Raises:
         InputError: fewer than two recordings, or none whose vehicles share an area.
     """
+    found = members_of(results)
+    if len({member.recording for member in found.recorded}) < 2:
+        raise InputError("encounters of at least two recordings are needed; give results of more logs")
+    drawn = [n for n in sorted(set(counts)) if n <= CHOSEN * len(found.recorded)]
+    if not drawn:
+        known, most = len(found.recorded), int(CHOSEN * len(found.recorded))
+        raise InputError(
+            f"{known} encounters share an area: at most {most} templates can be drawn; ask for fewer, or give more logs"
+        )
+    near, points = _Near.of(found.recorded, found.made), found.curve(drawn, draws=draws, seed=seed)
+    counted, generated = (dict(Counter(member.kind for member in members)) for members in (found.recorded, found.made))
+    return Population(counted, generated, points, tuple(near.unreached(found.names)), _needed(points))
+
+
+@dataclass(frozen=True, eq=False)
+class Members:
+    """Recorded encounters whose vehicles share an area, their names, and what is generated from them."""
+
+    recorded: Sequence[Member]
+    made: Sequence[Member]
+    names: Sequence[str] = ()
+
+    def shares(self, count: int, *, draws: int = 200, seed: int = 0) -> tuple[Interval, Interval, Interval, Interval]:
+        """Return coverage alone and with what is generated, and precision of the generated and of the templates, as `Point` has.
+
+        Arguments as of `population_of`.
+        """
+        near, rng = _Near.of(self.recorded, self.made), np.random.default_rng(seed)
+        alone, generated, precision, recorded = zip(*(near.judged(near.chosen(rng, count)) for _ in range(draws)), strict=True)
+        return _over_draws(alone), _over_draws(generated), _over_draws(precision), _over_draws(recorded)
+
+    def curve(self, counts: Sequence[int], *, draws: int = 200, seed: int = 0) -> tuple[Point, ...]:
+        """Return what so many templates cover, and what they stand for; arguments as of `population_of`."""
+        near, rng = _Near.of(self.recorded, self.made), np.random.default_rng(seed)
+        alone = {n: _over_draws(near.alone(near.chosen(rng, n)) for _ in range(draws)) for n in range(1, len(self.recorded))}
+
+        def stands_for(coverage: float) -> float:
+            return next((m for m, share in alone.items() if share.value >= coverage), math.inf)
+
+        points = []
+        for n in counts:
+            shares = self.shares(n, draws=draws, seed=seed)
+            equal = [stands_for(coverage) / n for coverage in (shares[1].value, shares[1].low, shares[1].high)]
+            points.append(Point(n, *shares, Interval(*equal)))
+        return tuple(points)
+
+
+def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
+    """Return the members of recordings and of the sets generated from them; arguments as of `population_of`."""
     recorded: list[Member] = []
     made: list[Member] = []
     names: list[str] = []
@@ -241,25 +299,7 @@ def population_of(
             recorded.append(own)
             names.append(result.encounter.name)
             made += [generated_member(join_ego(scenario), own, result.encounter) for scenario in result]
-    if len({member.recording for member in recorded}) < 2:
-        raise InputError("encounters of at least two recordings are needed; give results of more logs")
-    drawn = [n for n in sorted(set(counts)) if n <= CHOSEN * len(recorded)]
-    if not drawn:
-        most = int(CHOSEN * len(recorded))
-        raise InputError(
-            f"{len(recorded)} encounters share an area: at most {most} templates can be drawn; ask for fewer, or give more logs"
-        )
-    near, rng = _Near.of(recorded, made), np.random.default_rng(seed)
-    alone = {n: _over_draws(near.alone(near.chosen(rng, n)) for _ in range(draws)) for n in range(1, len(recorded))}
-    points = []
-    for n in drawn:
-        by_templates, covered, precision, own_precision = (
-            _over_draws(values) for values in zip(*(near.judged(near.chosen(rng, n)) for _ in range(draws)), strict=True)
-        )
-        equal = next((m for m, share in alone.items() if share.value >= covered.value), math.inf)
-        points.append(Point(n, by_templates, covered, precision, own_precision, equal / n))
-    counted, generated = (dict(Counter(member.kind for member in members)) for members in (recorded, made))
-    return Population(counted, generated, tuple(points), tuple(near.unreached(names)), _needed(points))
+    return Members(recorded, made, names)
 
 
 def _needed(points: Sequence[Point]) -> float:

@@ -18,6 +18,7 @@ from scenario_gen.method.sampling.freedom import Freedom, onward, seconds_onward
 from scenario_gen.method.sampling.path import BasePath, ClockRead, Displaced, SpeedDrawn, states
 from scenario_gen.method.sampling.speed_profile.model import SpeedModel
 from scenario_gen.method.sampling.time_warp import Clock, DT, template_times
+from scenario_gen.method.sampling.window import Window
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.types import Scenario, Vehicle
 
@@ -147,10 +148,13 @@ class Batch:
     feasible: Bools
 
     @classmethod
-    def of(cls, models: tuple[VehicleModel, ...], drawn: Sequence[_Drawn]) -> "Batch":
+    def of(
+        cls, models: tuple[VehicleModel, ...], drawn: Sequence[_Drawn], window: tuple[Window, Floats] | None = None
+    ) -> "Batch":
         """Join what is drawn: a scenario is the stretch in which all are there who are there throughout the template.
 
         Who stands at an end of the template goes on standing; who is free there and drives goes straight on, while there is road.
+        With a window, and its numbers (S, 2), a part of that stretch is left out.
         """
         ends = np.stack([
             one.clock.time[:, nearest_cell(one.clock, model.speed.spline.breaks[[0, -1]])]
@@ -172,6 +176,10 @@ class Batch:
                         reach[:, n, end] += sign * seconds_onward(at_ends[n, :, -end], float(model.freedom.ahead[end]), sign)
         begin = np.maximum(reach[:, there[:, 0], 0].max(axis=1, initial=-np.inf), ends[..., 0].min(axis=1))
         end = np.minimum(reach[:, there[:, 1], 1].min(axis=1, initial=np.inf), ends[..., 1].max(axis=1))
+        if window is not None:
+            kept = np.stack([one.clock.time[:, nearest_cell(one.clock, window[0].between)] for one in drawn])
+            span = np.column_stack([begin, end])
+            begin, end = window[0].cut(window[1], np.column_stack([kept[..., 0].min(axis=0), kept[..., 1].max(axis=0)]), span).T
         ends_shown = ends.copy()
         ends_shown[:, there[:, 0], 0], ends_shown[:, there[:, 1], 1] = begin[:, None], end[:, None]
         count = np.floor((end - begin) / DT + 1e-6).astype(np.int64) + 1

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.types import OF_CARS, VehicleType
 
-POPULATION = {"arrival_sigma": 2.0, "pace_sigma": 0.2, "wait_sigma": 2.0, "end_speed_sigma": 1.0}
-"""Standard deviations of `population`, at least: as wide as encounters differ; which scenarios remain, the population decides."""
+POPULATION = {"arrival_sigma": 2.0, "pace_sigma": 0.12, "wait_sigma": 2.0, "end_speed_sigma": 0.8, "leave_out": 0.9}
+"""What `population` frees, at least: as wide as encounters differ; which scenarios remain, the population decides."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,12 @@ class SamplingConfig(Parameters):
     pace_sigma: float = parameter(0.06, "wide: standard deviation of each vehicle's own pace, as a share", low=0.0, high=0.2)
     wait_sigma: float = parameter(1.0, "wide: standard deviation of the length of each wait", unit="s", low=0.0, high=10.0)
     end_speed_sigma: float = parameter(0.4, "wide: standard deviation of start and end speeds", unit="m/s", low=0.0, high=5.0)
+    leave_out: float = parameter(
+        0.0,
+        "wide: share of the time before the first conflict, and of that after the last, that a scenario leaves out at most",
+        low=0.0,
+        high=1.0,
+    )
     place_sigma: float = parameter(0.2, "wide: standard deviation of the place in the lane", unit="m", low=0.0, high=2.0)
     sizes: str = parameter(
         "catalogue", "wide: sizes of cars, from the catalogue of eight or as recorded", choices=("catalogue", "recorded")

@@ -18,6 +18,7 @@ from scipy import special
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.time_warp import Clock, LONGEST_SHARE, SHORTEST_SHARE
+from scenario_gen.method.sampling.window import seconds_left_out
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import BoundaryStates, CAR, Encounter, Request, Vehicle
 
@@ -63,17 +64,20 @@ def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: Samp
     bound = config.freedom
     seconds = 2.0 * bound * (config.arrival_sigma + 0.5 * length * config.pace_sigma) + bound * config.wait_sigma
     seconds += config.duration_tolerance * length
+    free = (seconds + seconds_left_out(encounter, config.leave_out)).tolist()
     slowest = 1.0 / SHORTEST_SHARE
-    steps = max(int(np.ceil(slowest * seconds / encounter.dt)), 1)
+    steps = [max(int(np.ceil(slowest * each / encounter.dt)), 1) for each in free]
     across = config.freedom * config.place_sigma
     for n, (first, last) in enumerate(encounter.present.tolist()):
         speed = encounter.speed[n, first : last + 1]
-        for end, (near, state) in enumerate(((speed[: steps + 1], requested.start[n]), (speed[-steps - 1 :], requested.end[n]))):
+        for end, (near, state) in enumerate(
+            ((speed[: steps[0] + 1], requested.start[n]), (speed[-steps[1] - 1 :], requested.end[n]))
+        ):
             if own[end][n]:
                 continue
             top, there = max(float(near.max()), float(state[3])), float(state[3])
             faster = config.freedom * config.of(encounter.vehicles[n].kind).end_speed_sigma
-            along = 0.0 if tied[end] else slowest * seconds * (top + faster)
+            along = 0.0 if tied[end] else slowest * free[end] * (top + faster)
             off = 0.0 if tied[end] else max(slowest * top - there, there - float(near.min()))
             relaxed[n, end] = along + across, off + faster + _FASTEST
     return replace(requested, relaxed=np.ceil(1000.0 * relaxed) / 1000.0)

@@ -10,6 +10,7 @@ import numpy as np
 from scenario_gen.method.sampling.candidates import Batch, Scale, VehicleModel
 from scenario_gen.method.sampling.joint import Mixing
 from scenario_gen.method.sampling.time_warp import TimeWarp
+from scenario_gen.method.sampling.window import Window
 from scenario_gen.numerics import Floats
 from scenario_gen.types import ReactionGraph
 
@@ -23,25 +24,32 @@ class CandidateModel:
     Source: paper III-C.
     """
 
-    def __init__(self, vehicles: tuple[VehicleModel, ...], warp: TimeWarp, reactions: ReactionGraph = NOBODY) -> None:
-        self.vehicles, self.warp, self.reactions = vehicles, warp, reactions
+    def __init__(
+        self,
+        vehicles: tuple[VehicleModel, ...],
+        warp: TimeWarp,
+        reactions: ReactionGraph = NOBODY,
+        window: Window | None = None,
+    ) -> None:
+        self.vehicles, self.warp, self.reactions, self.window = vehicles, warp, reactions, window
         self._parts = np.cumsum([warp.size] + [v.size for v in vehicles]).tolist()
         self._mixings: dict[Scale, Mixing] = {}
 
     @property
     def size(self) -> int:
         """Standard normal numbers needed per candidate."""
-        return int(self._parts[-1])
+        return int(self._parts[-1]) + (0 if self.window is None else 2)
 
     def draw(self, eps: Floats, scale: Scale) -> Batch:
         """Candidates from independent numbers eps (S, size), their standard deviations multiplied by `scale`."""
+        eps, of_window = eps[:, : self._parts[-1]], eps[:, self._parts[-1] :]
         z = self._mixing(scale).mixed(eps) if self.reactions.edges else eps
         clock = self.warp.sample(z[:, : self.warp.size], scale.time)
         drawn = [
             v.draw(z[:, a:b], scale, clock, self.warp.nominal)
             for v, (a, b) in zip(self.vehicles, pairwise(self._parts), strict=True)
         ]
-        return Batch.of(self.vehicles, drawn)
+        return Batch.of(self.vehicles, drawn, None if self.window is None else (self.window, of_window))
 
     def _mixing(self, scale: Scale) -> Mixing:
         """The mixing at a scale, made once."""

@@ -27,6 +27,7 @@ from scenario_gen.method.sampling.speed_profile.mean import Bounds, Motion
 from scenario_gen.method.sampling.speed_profile.model import speed_model
 from scenario_gen.method.sampling.speed_profile.stops import least_shares, standing_part
 from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
+from scenario_gen.method.sampling.window import window_of
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import ground_for
 from scenario_gen.template import least_gaps, reactions_of
@@ -92,7 +93,7 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
         sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints")
     warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
     vehicles = [_model(routed, road, *mean, config, sentences) for routed, mean in zip(routed_vehicles, feasible, strict=True)]
-    reactions = kept_reactions(encounter, config, order)
+    reactions, window = kept_reactions(encounter, config, order), None
     if config.variety == "wide":
         answers = {edge.who for edge in reactions.edges}
         tied, gaps = (requested.relaxed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
@@ -100,7 +101,8 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
             replace(v, freedom=_freedom(routed, n in answers, warp.nominal, requested.relaxed[n], tied, road, gaps[n], config))
             for n, (v, routed) in enumerate(zip(vehicles, routed_vehicles, strict=True))
         ]
-    return Prepared(CandidateModel(tuple(vehicles), warp, reactions), tuple(sentences))
+        window = window_of(encounter, config.leave_out, tied)
+    return Prepared(CandidateModel(tuple(vehicles), warp, reactions, window), tuple(sentences))
 
 
 def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "keep") -> ReactionGraph:

@@ -4,7 +4,7 @@
 """Which valid candidates `sampling.variety=population` keeps: those that are usual among recorded encounters of the kind.
 
 A template may be unusual itself, and then nothing generated from it is usual. So kept is what has a rarity of at most 1, or the
-quarter of the valid candidates that is least rare. The bound is found with the first candidates, and is the same for all.
+three quarters of the valid candidates that are least rare. The bound is found with the first candidates, and is the same for all.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ from scenario_gen.method.sampling.sampler import BLOCK, LEVELS, Sampler
 from scenario_gen.types import Scenario
 
 PILOT = 2 * BLOCK  # candidates by which a level is judged
-LEAST_RARE = 0.25  # share of the valid candidates that is kept at least
+LEAST_RARE = 0.75  # share of the valid candidates that is kept at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Usual:
     @property
     def valid_each(self) -> int:
         """Valid candidates of which one is kept, in the worst case."""
-        return 1 if self.rarity is None else round(1.0 / LEAST_RARE)
+        return 1 if self.rarity is None else math.ceil(1.0 / LEAST_RARE)
 
     def notes(self) -> tuple[str, ...]:
         """Return what is to be said of the bound: nothing where what is kept is usual."""

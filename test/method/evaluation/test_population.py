@@ -59,7 +59,7 @@ def test_kinds_are_those_of_the_drawn_motions():
 
 def test_copies_of_the_templates_cover_no_more_than_these_and_are_as_precise(encounters):
     (point,) = population_of(results(encounters, lambda _, own: (own, own)), (8,), draws=60).curve
-    assert point.generated == point.alone and point.precision == point.recorded and point.multiplier <= 1.0
+    assert point.generated == point.alone and point.precision == point.recorded and point.multiplier.value <= 1.0
 
 
 def test_what_reaches_other_recordings_covers_more_and_what_is_like_nothing_is_imprecise(encounters):
@@ -70,7 +70,7 @@ def test_what_reaches_other_recordings_covers_more_and_what_is_like_nothing_is_i
         return (replace(own, speed=own.speed * 6.0),) * 3
 
     wide, wild = (population_of(results(encounters, made), (5,), draws=60).curve[0] for made in (others, slower))
-    assert wide.generated.value > wide.alone.value + 0.2 and wide.precision.value > 0.9 and wide.multiplier > 1.5
+    assert wide.generated.value > wide.alone.value + 0.2 and wide.precision.value > 0.9 and wide.multiplier.value > 1.5
     assert wild.precision.value < 0.1 and wild.generated.value <= wild.alone.value + 0.1
 
 

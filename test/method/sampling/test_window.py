@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What scenarios leave out before the first conflict and after the last one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from textbook_motions import labelled
+
+from scenario_gen import generate, PipelineConfig
+from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.sampling.window import AFTER_S, Window, window_of
+from scenario_gen.template import conflict_of, conflicts_in
+from scenario_gen.types import Request
+
+FREE = np.zeros(2, dtype=np.bool_)
+
+
+@pytest.fixture(scope="module")
+def encounter():
+    return labelled("crossing, rolls", 3).encounter
+
+
+def drawn(encounter, leave_out, request=Request()):
+    config = PipelineConfig(sampling=SamplingConfig(leave_out=leave_out))
+    return generate(encounter, "corridor", config, count=30, seed=2, request=request)
+
+
+def before_and_after(scenarios):
+    """Seconds before the first entry of the conflict, and after the second one's (S, 2)."""
+    found = [conflict_of(scenario, 0, 1) for scenario in scenarios]
+    return np.array([[own.entry_first, one.time[-1] - own.entry_second] for own, one in zip(found, scenarios, strict=True)])
+
+
+def test_scenarios_begin_nearer_to_the_conflict_and_end_sooner_behind_it(encounter):
+    whole, cut = (before_and_after(drawn(encounter, share)) for share in (0.0, 0.8))
+    assert (cut.mean(axis=0) < 0.85 * whole.mean(axis=0)).all()
+    assert (cut.std(axis=0) > whole.std(axis=0)).all()
+    assert (cut > 0.0).all()
+
+
+def test_where_an_ego_slot_keeps_its_states_nothing_is_left_out(encounter):
+    request = Request(ego=encounter.vehicles[0].id)
+    whole, cut = (drawn(encounter, share, request) for share in (0.0, 0.8))
+    assert all(one.position.tobytes() == other.position.tobytes() for one, other in zip(whole, cut, strict=True))
+
+
+def test_what_stays_is_the_conflict_and_a_second(encounter):
+    (conflict,) = conflicts_in(encounter)
+    window = window_of(encounter, 0.5, FREE)
+    assert window.between[0] == min(conflict.entry_first, conflict.entry_second)
+    assert window.between[1] >= max(conflict.entry_second, conflict.exit_first) + AFTER_S
+    assert window_of(encounter, 0.0, FREE) is None and window_of(encounter, 0.5, ~FREE) is None
+    position = encounter.position.copy()
+    position[0] += 1000.0
+    assert window_of(replace(encounter, position=position), 0.5, FREE) is None
+
+
+def test_the_largest_numbers_leave_out_the_whole_share_and_no_room_is_not_widened():
+    window = Window(np.array([4.0, 8.0]), np.array([0.5, 1.0]))
+    kept, span = np.array([[4.0, 8.0], [1.0, 9.0]]), np.array([[0.0, 10.0], [2.0, 8.0]])
+    np.testing.assert_allclose(window.cut(np.full((2, 2), 9.0), kept, span), [[2.0, 8.0], [2.0, 8.0]])
+    np.testing.assert_allclose(window.cut(np.full((2, 2), -9.0), kept, span), span, atol=1e-9)
