@@ -25,6 +25,7 @@ from benchmarks._planning_obstructed import CAR, dubins_length, first_path, obst
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.routing.search.ompl.solve import Options, PLANNERS, solve
 from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, path_length, plan_with_retry, Query
@@ -36,7 +37,6 @@ from scenario_gen.roads.connectivity import common_component, component_at, comp
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.road import Road
-from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import BoundaryStates
 
 SEEDS = sized(20, quick=1)

@@ -14,11 +14,11 @@ import pytest
 
 from benchmarks._recheck import Account, Recheck
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.road_users import Dynamics
 from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.row_names import WITHOUT
 
 ROADS = ("corridor", "four_way", "t_intersection", "straight")

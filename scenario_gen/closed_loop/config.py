@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.types import TypeLimits
+from scenario_gen.base.road_users import TypeLimits
 
 REPLAY, REACTIVE, COMMITTED = "replay", "reactive", "committed"
 FORESIGHT = {REACTIVE: 5.0, COMMITTED: 0.5}

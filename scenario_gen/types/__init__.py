@@ -3,6 +3,19 @@
 
 """What passes from stage to stage: frozen, no stage imported."""
 
+from scenario_gen.base.road_users import (
+    CAR,
+    Dynamics,
+    LANE_USERS,
+    OF_CARS,
+    ON_THE_SPOT,
+    OTHER,
+    TypeLimits,
+    usual_type,
+    VEHICLE_TYPES,
+    VehicleType,
+    words,
+)
 from scenario_gen.types.body import height, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
 from scenario_gen.types.derived import once_per_object
@@ -20,19 +33,6 @@ from scenario_gen.types.qos import Quality
 from scenario_gen.types.reaction import FOLLOW, lost_pairs, NOT_KEPT, Reaction, reaction_facts, ReactionGraph, YIELD, yielders_of
 from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
 from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
-from scenario_gen.types.road_users import (
-    CAR,
-    Dynamics,
-    LANE_USERS,
-    OF_CARS,
-    ON_THE_SPOT,
-    OTHER,
-    TypeLimits,
-    usual_type,
-    VEHICLE_TYPES,
-    VehicleType,
-    words,
-)
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.row_names import NARROW, RECORDING, REPLAY, row_name, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.sample import Sample

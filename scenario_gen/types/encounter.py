@@ -11,9 +11,9 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.road_users import CAR, OTHER, usual_type, VEHICLE_TYPES, VehicleType
 from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
-from scenario_gen.types.road_users import CAR, OTHER, usual_type, VEHICLE_TYPES, VehicleType
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,10 +12,10 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.road_users import CAR, LANE_USERS
 from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
 from scenario_gen.types.derived import once_per_object
-from scenario_gen.types.road_users import CAR, LANE_USERS
 
 LEVEL = 2.5  # metres between the heights of two lanes of which one lies above the other
 MIRRORED = "the recording is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.nearest import ImpossibleError
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.arrays import wrap_angle
 from scenario_gen.types.request import Request
-from scenario_gen.types.road_users import Dynamics
 
 COUNT = 5 if LONG else 1
 pytestmark = pytest.mark.spread

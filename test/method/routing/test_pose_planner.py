@@ -13,6 +13,7 @@ import shapely
 from benchmarks._planning_maps import road_of
 from benchmarks._planning_obstructed import obstructed
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.routing import plan, plan_routes, PlanningConfig
 from scenario_gen.method.routing.distance import farthest
 from scenario_gen.method.routing.search.dubins import Pose, shortest_curve
@@ -22,7 +23,6 @@ from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import BoundaryStates
 

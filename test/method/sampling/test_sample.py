@@ -11,6 +11,7 @@ from sampling_scenes import CLOCK, route, scene, TIME, turn
 
 from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.road_users import Dynamics, TypeLimits
 from scenario_gen.method.sampling import Callbacks, draw_scenarios, Plan, regenerate, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.prepare import prepare
@@ -19,7 +20,6 @@ from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import wrap_angle
 from scenario_gen.template.interaction import find_waits, Wait
 from scenario_gen.types.road import Road
-from scenario_gen.types.road_users import Dynamics, TypeLimits
 from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation
 
 PLAIN = SamplingConfig(variety="narrow", bend_acceleration=5.0)

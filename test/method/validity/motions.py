@@ -5,10 +5,10 @@
 
 import numpy as np
 
+from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Limits
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
-from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import Scenario
 
 _UNLIMITED = Dynamics(1e6, 1e6, 1e6, 1e6, 1e6)

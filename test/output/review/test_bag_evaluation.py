@@ -24,6 +24,7 @@ from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.road_users import Dynamics
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.chain import Chain
@@ -34,7 +35,6 @@ from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.review.evaluation import bag_results
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.types.road_users import Dynamics
 from scenario_gen.types.scenario import Cause, ScenarioSet
 
 QUICK = EvaluationConfig(resamples=50)
