@@ -228,7 +228,7 @@ def test_a_bicycle_is_on_the_cycle_lane_where_there_is_one(tmp_path, road, table
 def test_who_follows_a_bicycle_still_does_where_there_is_a_cycle_lane():
     (encounter,) = read_log(WORLDS["a car follows a bicycle"][0]).encounters
     made = generate(encounter, "straight", PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=1, seed=1)
-    assert not made.fit.lost and {edge.kind for edge in made.generated.graph.edges} == {"follow"}
+    assert not made.fit.losses and {edge.kind for edge in made.generated.graph.edges} == {"follow"}
 
 
 def test_a_road_too_tight_for_a_bus_says_where_and_what_it_needs(tmp_path):

@@ -36,7 +36,7 @@ def test_a_bag_is_evaluated_to_a_page_figures_and_a_table(results, run, tmp_path
     assert run("evaluate", results / "seed_1" / "bag", "--out", out)[0] == 0
     assert sorted(path.name for path in out.iterdir()) == [MARKER, "evaluation.json", "evaluation.md", "report.html"]
     page = (out / "report.html").read_text()
-    assert page.startswith("<!doctype html>") and "<b>2</b> of 2 scenarios requested" in page
+    assert page.startswith("<!doctype html>") and "<b>2</b> of 2 requested scenarios" in page
     made = json.loads((results / "seed_1" / "evaluation.json").read_text())["cases"][0]
     again = json.loads((out / "evaluation.json").read_text())["cases"][0]
     (expected,) = [row["values"] for row in made["rows"] if row["name"] == "with changepoints"]

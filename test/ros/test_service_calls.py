@@ -102,9 +102,9 @@ def differences(answer: Any, wanted: Any, where: str = "") -> list[str]:
     return [] if answer == wanted else [f"{where}: {answer!r} is not {wanted!r}"]
 
 
-def test_every_service_of_the_table_is_called():
-    table = TEXT.partition("## Services")[2].partition("\n\n## ")[0]
-    listed = {name for row in re.findall(r"^\| (`.*?) \|", table, re.MULTILINE) for name in re.findall(r"`([\w/]+)`", row)}
+def test_every_service_of_the_list_is_called():
+    services = TEXT.partition("## Services\n\n")[2].partition("\n\n")[0]
+    listed = {name for row in re.findall(r"^- (`.*?) \(", services, re.MULTILINE) for name in re.findall(r"`([\w/]+)`", row)}
     assert len(listed) > 10
     assert {call.name.lstrip("/") for call in calls()} == listed
     for call in calls():
