@@ -36,7 +36,7 @@ TAIL = 1  # bytes by which the message ends behind a multiple of 4
 
 def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> bytes:
     """Return the lanes as CDR bytes; None: the road has none."""
-    lanes = () if network is None else network.of_all or network.lanes
+    lanes = () if network is None else network.every_lane
     pairs = [border[np.repeat(np.arange(len(border)), 2)[1:-1]] for lane in lanes for border in (lane.left, lane.right)]
     points = np.concatenate(pairs) if pairs else np.zeros((0, 2))
     text = "" if network is None else json.dumps(_document(network), ensure_ascii=False)
@@ -50,9 +50,9 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
         | {"speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit, "junction": lane.junction}
         | ({"users": sorted(lane.users)} if lane.users else {})
         | ({"crossing": True} if lane.crossing else {})
-        for lane in network.of_all or network.lanes
+        for lane in network.every_lane
     ]
-    for lane, entry in zip(network.of_all or network.lanes, lanes if network.has_levels else (), strict=False):
+    for lane, entry in zip(network.every_lane, lanes if network.has_levels else (), strict=False):
         entry["height"] = [None if math.isnan(height) else round(height, 2) for height in lane.height.tolist()]
     rules = [
         {"id": rule.id, "kind": rule.kind, "lanes": rule.lanes, "over": rule.over, "line": rule.line.tolist()}

@@ -186,6 +186,11 @@ class LaneNetwork:
         return replace(self, lanes=_chosen(of_all, cars), of_all=of_all if len(cars) < len(of_all) else ())
 
     @property
+    def every_lane(self) -> tuple[Lane, ...]:
+        """The lanes of all users, those of cars first."""
+        return self.of_all or self.lanes
+
+    @property
     def others(self) -> tuple[Lane, ...]:
         """The lanes that are closed to cars: bus lanes, cycle lanes, footways, crossings."""
         return self.of_all[len(self.lanes) :]
@@ -197,7 +202,7 @@ class LaneNetwork:
 
     def open_to(self, users: frozenset[str]) -> "LaneNetwork":
         """Return the lanes that one of some users may use; itself if these are its own."""
-        lanes = self.of_all or self.lanes
+        lanes = self.every_lane
         kept = [k for k, lane in enumerate(lanes) if lane.open_to(users)]
         if kept == list(range(len(self.lanes))):
             return self
@@ -211,7 +216,7 @@ class LaneNetwork:
 
     def moved(self, by: Floats) -> "LaneNetwork":
         """The same lanes (2,) [m] farther."""
-        lanes = [replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.whole.lanes]
+        lanes = [replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.every_lane]
         rules = (replace(rule, line=rule.line + by) for rule in self.rules)
         aim = self.drawn_for and replace(self.drawn_for, frame=self.drawn_for.frame + np.array([*by, 0.0]))
         return replace(self.with_lanes(lanes), rules=tuple(rules), drawn_for=aim)

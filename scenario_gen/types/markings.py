@@ -42,7 +42,7 @@ class Marking(StrEnum):
 @once_per_object
 def markings(network: LaneNetwork) -> Mapping[Marking, tuple[Floats, ...]]:
     """Return the lines (M, 2) [m] of each kind; nothing is painted inside the junction of a drawn road."""
-    shown = [lane for lane in network.whole.lanes if not (network.drawn and lane.junction)]
+    shown = [lane for lane in network.every_lane if not (network.drawn and lane.junction)]
     lanes = [lane for lane in shown if not lane.crossing]
     painted: dict[Marking, list[Floats]] = {kind: [] for kind in Marking}
     borders = [border for lane in lanes for border in (lane.left, lane.right)]
@@ -54,7 +54,7 @@ def markings(network: LaneNetwork) -> Mapping[Marking, tuple[Floats, ...]]:
     for rule in network.rules:
         if rule.kind in _PAINTED and len(rule.line):
             painted[Marking(_PAINTED[rule.kind])].append(rule.line)
-    crossed = network.drawn and len(lanes) < len(shown) == len(network.whole.lanes)  # in the middle: there is no junction
+    crossed = network.drawn and len(lanes) < len(shown) == len(network.every_lane)  # in the middle: there is no junction
     for lane in lanes:
         middle = Curve.through(lane.centre)
         if middle.length >= _SHORTEST_M and not lane.junction and lane.open_to(DRIVERS):

@@ -6,7 +6,7 @@
 Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 import math
 
@@ -45,7 +45,7 @@ def lanes_of(root: Element) -> MapLanes:
     limits = _speed_signs(root, faults)
     junctions = _junctions(root, set(lanelets), faults)
     users = {name: own for name, lanelet in lanelets.items() if (own := _users(lanelet))}
-    back = {name: own & _named(lanelets[name], ("userBidirectional",)) & DRIVERS for name, own in users.items()}
+    back = {name: own & _named(_texts(lanelets[name], "userBidirectional")) & DRIVERS for name, own in users.items()}
     both_ways = {name for name, own in back.items() if own}
     drafts = []
     for name, lanelet in ((name, lanelets[name]) for name in users):
@@ -79,22 +79,20 @@ def _texts(lanelet: Element, tag: str) -> set[str]:
     return {child.text.strip() for child in lanelet.all(tag)}
 
 
-def _named(lanelet: Element, tags: Iterable[str]) -> frozenset[str]:
-    """Who is named as a user of a lanelet in elements of some tags; `car` opens it to all that drive, unless others are named."""
-    names = frozenset[str]().union(*(_texts(lanelet, tag) for tag in tags))
-    if "car" in names and names & {"truck", "bus", "motorcycle"}:
-        return frozenset((*CARS, "van")).union(*(_USERS.get(name, frozenset()) for name in names - CARS))
-    return frozenset[str]().union(*(_USERS.get(name, frozenset()) for name in names))
+def _named(names: set[str]) -> frozenset[str]:
+    """Who may use a lanelet whose users have some names; `car` opens it to all that drive, unless others are named."""
+    alone = "car" in names and names & {"truck", "bus", "motorcycle"}
+    own, others = (frozenset((*CARS, "van")), names - CARS) if alone else (frozenset[str](), names)
+    return own.union(*(_USERS.get(name, frozenset()) for name in others))
 
 
 def _users(lanelet: Element) -> frozenset[str]:
     """Who may use a lanelet: as its type says, else who is named; all that drive where nobody is, or only who has priority."""
-    kinds, tags = _texts(lanelet, "laneletType"), ("userOneWay", "userBidirectional")
+    kinds, names = _texts(lanelet, "laneletType"), _texts(lanelet, "userOneWay") | _texts(lanelet, "userBidirectional")
     typed = [_BY_TYPE[kind] for kind in kinds if kind in _BY_TYPE]
     if typed:
         return frozenset.intersection(*typed)
-    nobody = not (set().union(*(_texts(lanelet, tag) for tag in tags)) - {"priorityVehicle"})
-    users = DRIVERS if nobody else _named(lanelet, tags)
+    users = _named(names) if names - {"priorityVehicle"} else DRIVERS
     return users - {"bicycle"} if kinds & _MOTORWAYS else users
 
 

@@ -278,7 +278,7 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
     first: dict[int, str] = {}
     named = [
         replace(lane, junction=first.setdefault(int(part[k]), str(len(first) + 1)) if k in joined else "")
-        for k, lane in enumerate((network.of_all or network.lanes)[:count])
+        for k, lane in enumerate(network.every_lane[:count])
     ]
     return network.with_lanes((*named, *network.others))
 
@@ -321,8 +321,7 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
     """
     pieces: list[tuple[int, Floats, bool]] = []  # lane, its borders and height, whether its end is there
     begins: dict[int, int] = {}
-    of_all = network.of_all or network.lanes
-    for k, lane in enumerate(of_all):
+    for k, lane in enumerate(network.every_lane):
         last = len(lane.left) - 1
         for first, stop in runs(_inside(lane.centre, box)):
             low = max(first - _cut(lane.centre, first, first - 1, box), 0.0)
@@ -344,7 +343,7 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
         of_lane.setdefault(k, []).append(piece)
     lanes = []
     for k, cut, has_end in pieces:
-        lane = of_all[k]
+        lane = network.every_lane[k]
         after = tuple(begins[other] for other in lane.successors if other in begins) if has_end else ()
         beside = tuple(of_lane[other][0] for other in lane.beside if other in of_lane)
         left, right, height = cut[:, :2], cut[:, 2:4], cut[:, 4]
