@@ -73,25 +73,21 @@ def deviations(found: Members, kind: str) -> Floats:
 
 def joint_gain(found: Members, mixed: Members, count: int) -> dict[str, float]:
     """Return by kind: precision in JOINT, over that of mixed pairs."""
-    columns = [FEATURES.index(name) for name in JOINT]
     gains = {}
     for kind in KINDS:
-        numbers = {n: k for k, n in enumerate(n for n, own in enumerate(found.recorded) if own.kind == kind)}
-        if kind == APART or len({found.recorded[n].recording for n in numbers}) < 2:
+        of_kind = [sets.of_kind(kind) for sets in (found, mixed)]
+        if kind == APART or len({member.recording for member in of_kind[0].recorded}) < 2:
             continue
-
-        def of_kind(members: Sequence[Member], numbers: dict[int, int] = numbers) -> list[Member]:
-            return [
-                replace(member, features=member.features[columns], template=numbers[member.template])
-                for member in members
-                if member.template in numbers
-            ]
-
-        recorded = of_kind(found.recorded)
-        most = max(min(count, len(recorded) // 2), 1)
-        precision = [Members(recorded, of_kind(sets.made)).shares(most)[2].value for sets in (found, mixed)]
+        most = max(min(count, len(of_kind[0].recorded) // 2), 1)
+        precision = [Members(_joint(sets.recorded), _joint(sets.made)).shares(most)[2].value for sets in of_kind]
         gains[kind] = precision[0] - precision[1]
     return gains
+
+
+def _joint(members: Sequence[Member]) -> list[Member]:
+    """Return members with JOINT features alone."""
+    columns = [FEATURES.index(name) for name in JOINT]
+    return [replace(member, features=member.features[columns]) for member in members]
 
 
 def speed_spread(found: Members) -> float:

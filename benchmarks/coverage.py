@@ -4,11 +4,12 @@
 """How much unseen traffic a few recordings stand for: coverage and precision of what is generated, beside nulls.
 
 Recorded encounters of two vehicles (SCENARIO_GEN_DATA), each on its own road, with default settings and with
-`sampling.variety=population` (of the template and the shipped law alone: encounters that are to be reached say nothing); without
-data the drawn motions of test/worlds. `_coverage_pairs.json` lists 105: pairs within 4 s at the shared area or 15 m, of four
-kinds, whose road keeps the kind. Definitions: `scenario_gen.method.evaluation.population`. The nulls have as many members and no
-generator: *shifted* moves each vehicle's record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another one of
-the set; jitters are noise on the features of the templates. `_coverage_nulls` compares them at equal precision.
+`sampling.variety=population` (of the template and the shipped law alone: encounters that are to be reached say nothing), and with
+what is generated from their recombinations, too; without data the drawn motions of test/worlds. `_coverage_pairs.json` lists 105:
+pairs within 4 s at the shared area or 15 m, of four kinds, whose road keeps the kind. Definitions:
+`scenario_gen.method.evaluation.population`. The nulls have as many members and no generator: *shifted* moves each vehicle's
+record in time (1 s) and paces it (6 %); *mixed* takes each vehicle from another one of the set; jitters are noise on the features
+of the templates. `_coverage_nulls` compares them at equal precision.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,7 +31,8 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.population import APART, in_words, Members, members_of
+from scenario_gen.method.evaluation.population import APART, in_words, KINDS, Members, members_of
+from scenario_gen.method.recombination import recombinations
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import road_and_template
@@ -58,20 +60,46 @@ class Set:
 
 def run() -> list[Row]:
     """Measure."""
-    encounters = list(_encounters())[:MOST]
+    encounters = [(name, replace(encounter, name=str(k))) for k, (name, encounter) in enumerate(list(_encounters())[:MOST])]
+    recombined = recombinations([encounter for _, encounter in encounters], len(encounters) ** 2)[0]
     rows: list[Row] = []
     for variety in ("wide", "population"):
-        made = [(name, Set(encounter, members)) for name, encounter, members in _generated(encounters, variety)]
-        rng = np.random.default_rng(1)
-        shifted = [(name, Set(one.encounter, tuple(_shifted(one.encounter, rng) for _ in one.members))) for name, one in made]
-        mixed = [(name, Set(one.encounter, _mixed(one.members, rng))) for name, one in made]
-        found, *nulls = (members_of(sets) for sets in (made, shifted, mixed))  # type: ignore[arg-type]
-        rows.append(Row(f"{variety}: encounters", len(found.recorded), "", "higher"))
-        lost = {member.template for member in found.made if member.kind == APART}
-        rows.append(Row(f"{variety}: sets that lose the shared area", len(lost), "", "lower", 0.0))
-        rows += _curve(variety, found)
-        rows += _beside(variety, found, dict(zip(("shifted", "mixed"), nulls, strict=True)), rng)
+        made = list(_generated(encounters, variety, COUNT))
+        more = list(_generated([("recombined", encounter) for encounter in recombined], variety, COUNT // 5))
+        for setting, sets in ((variety, made), (f"{variety}, recombined", made + more)):
+            rows += _measured(setting, sets, np.random.default_rng(1))
     return rows
+
+
+def _measured(
+    setting: str, made: Sequence[tuple[str, Encounter, tuple[Scenario, ...]]], rng: np.random.Generator
+) -> Iterator[Row]:
+    """Yield all rows of a setting."""
+    sets = [(name, Set(encounter, members)) for name, encounter, members in made]
+    shifted = [(name, Set(one.encounter, tuple(_shifted(one.encounter, rng) for _ in one.members))) for name, one in sets]
+    mixed = [(name, Set(one.encounter, _mixed(one.members, rng))) for name, one in sets]
+    found, *nulls = (members_of(own) for own in (sets, shifted, mixed))  # type: ignore[arg-type]
+    yield Row(f"{setting}: encounters", len(found.recorded), "", "higher")
+    yield Row(f"{setting}: scenarios", len(found.made), "", "higher")
+    lost = {(member.template, member.other) for member in found.made if member.kind == APART}
+    yield Row(f"{setting}: sets that lose the shared area", len(lost), "", "lower", 0.0)
+    yield from _curve(setting, found)
+    yield from _by_kind(setting, found)
+    yield from _beside(setting, found, dict(zip(("shifted", "mixed"), nulls, strict=True)), rng)
+
+
+def _by_kind(setting: str, found: Members) -> Iterator[Row]:
+    """Yield coverage and precision with templates of one kind, the mean over kinds by their numbers of encounters."""
+    kinds = [own for own in map(found.of_kind, KINDS) if len({member.recording for member in own.recorded}) > 1]
+    for n in TEMPLATES:
+        enough = [own for own in kinds if len(own.recorded) >= 2 * n]
+        if enough:
+            shares = np.array([[share.value for share in own.shares(n)] for own in enough])
+            alone, generated, precision, recorded = np.average(shares, axis=0, weights=[len(own.recorded) for own in enough])
+            message = f"{len(enough)} kinds; templates alone {alone:.2f}"
+            yield Row(f"{setting}: coverage with {n} of a kind", generated, "", "higher", TARGETS.get(n), message)
+            message = f"of the recorded {recorded:.2f}"
+            yield Row(f"{setting}: precision with {n} of a kind", precision, "", "higher", OF_RECORDED * recorded, message)
 
 
 def _curve(variety: str, found: Members) -> Iterator[Row]:
@@ -108,14 +136,14 @@ def _beside(variety: str, found: Members, nulls: Mapping[str, Members], rng: np.
 
 
 def _generated(
-    encounters: Sequence[tuple[str, Encounter]], variety: str
+    encounters: Sequence[tuple[str, Encounter]], variety: str, count: int
 ) -> Iterator[tuple[str, Encounter, tuple[Scenario, ...]]]:
     """Yield recording, encounter and scenarios."""
     config = PipelineConfig(sampling=SamplingConfig(variety=variety))
     for name, encounter in encounters:
         try:
             road, template = road_and_template("corridor", encounter, config.road)
-            chain = Chain(template, segment(template, config.segmentation, SEED), road, config, count=COUNT, seed=SEED)
+            chain = Chain(template, segment(template, config.segmentation, SEED), road, config, count=count, seed=SEED)
             yield name, encounter, tuple(chain.run())
         except ScenarioGenError as error:
             print(f"{encounter.name}: {error}", file=sys.stderr)

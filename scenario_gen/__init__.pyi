@@ -21,6 +21,7 @@ from scenario_gen.method.evaluation import (
     EvaluationConfig as EvaluationConfig,
 )
 from scenario_gen.method.fitting import fit_template as fit_template, FittingConfig as FittingConfig
+from scenario_gen.method.recombination import recombinations as recombinations, recombined as recombined
 from scenario_gen.method.routing import plan_routes as plan_routes, PlanningConfig as PlanningConfig
 from scenario_gen.method.sampling import sample_scenarios as sample_scenarios, SamplingConfig as SamplingConfig
 from scenario_gen.method.segmentation import (

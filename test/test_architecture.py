@@ -28,6 +28,7 @@ STAGES = (
     "validity",
     "sampling",
     "evaluation",
+    "recombination",
     "config",
     "chain",
     "reference_sets",

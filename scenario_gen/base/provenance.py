@@ -15,6 +15,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten, updated
 
 Config = TypeVar("Config")
+RECORDING = "recording"  # the name of the recording that a template is of; of a recombined one of both
 
 
 def versions() -> dict[str, str]:

@@ -3,6 +3,7 @@
 
 """A folder of results from logs: scenarios of every encounter on every road, with bag, report and figures."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -11,8 +12,10 @@ from typing import TYPE_CHECKING
 
 from scenario_gen.base.errors import did_you_mean, InputError, RefusedError
 from scenario_gen.base.folders import replaced_folder
+from scenario_gen.base.provenance import RECORDING
 from scenario_gen.logs import LogResult, NoEncounterError, read_log
 from scenario_gen.method.nearest import answer_refusal
+from scenario_gen.method.recombination import parents_of, recombinations
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import FAULTY
@@ -45,6 +48,7 @@ class FolderRequest:
         encounters: names of those to take; all by default.
         request: a vehicle to be left out, and start and end states.
         for_testing: scenarios in which the ego has to react.
+        recombine: encounters to recombine of those that were recorded, at most.
         also_read: what else is read, so that the folder may not hold it: maps, a parameter file.
     """
 
@@ -57,6 +61,7 @@ class FolderRequest:
     request: Request = Request()
     also_read: Sequence[Path] = ()
     for_testing: bool = False
+    recombine: int = 0
 
     @property
     def logs(self) -> list[Path]:
@@ -67,6 +72,15 @@ class FolderRequest:
     def roads(self) -> list[str]:
         """The roads of all jobs."""
         return [road for _, names in self.jobs for road in names]
+
+
+@dataclass(frozen=True)
+class Source:
+    """An encounter, the roads that it is to drive on, and the name of the recording, or of both, that it is of."""
+
+    encounter: Encounter
+    roads: Sequence[str]
+    recording: str
 
 
 def generate_folder(
@@ -95,14 +109,16 @@ def generate_folder(
     """
     with replaced_folder(out, GENERATED, [*requested.logs, *map(Path, requested.roads), *requested.also_read]) as folder:
         readings = read_logs(requested, progress, tell)
-        pairs = [
-            (encounter, road)
-            for log, roads in readings
-            for encounter in chosen(log.encounters, requested.encounters)
-            for road in roads
-        ]
+        sources = sources_of(readings)
+        taken = chosen([source.encounter for source in sources.values()], requested.encounters)
+        if requested.recombine:
+            taken += recombine(taken, sources, requested, tell)
+        pairs = [(encounter, road) for encounter in taken for road in sources[encounter.name].roads]
         with progress() as advance:
             cases, refusals = generate_all(pairs, requested, advance)
+        cases = [
+            replace(case, provenance={**case.provenance, RECORDING: sources[case.encounter.name].recording}) for case in cases
+        ]
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         untested: list[str] = []
@@ -127,6 +143,34 @@ def generate_folder(
             ),
         )
     return cases, refusals
+
+
+def sources_of(readings: Sequence[tuple[LogResult, Sequence[str]]]) -> dict[str, Source]:
+    """Return all encounters by name; of logs of one name the further ones are numbered, and so are their encounters."""
+    sources: dict[str, Source] = {}
+    seen: Counter[str] = Counter()
+    for log, roads in readings:
+        seen[log.quality.name] += 1
+        number = f" ({seen[log.quality.name]})" if seen[log.quality.name] > 1 else ""
+        for encounter in log.encounters:
+            own = replace(encounter, name=encounter.name + number) if number else encounter
+            sources[own.name] = Source(own, roads, log.quality.name + number)
+    return sources
+
+
+def recombine(
+    recorded: Sequence[Encounter], sources: dict[str, Source], requested: FolderRequest, tell: Callable[[str], None]
+) -> list[Encounter]:
+    """Return encounters recombined of recorded ones, which are put among the sources; tell how many, and why not more."""
+    made, refused = recombinations(recorded, requested.recombine, requested.seed)
+    for encounter in made:
+        one, other = (sources[name] for name in parents_of(encounter))
+        both = ", ".join(dict.fromkeys((one.recording, other.recording)))
+        sources[encounter.name] = Source(encounter, one.roads, both)
+    why = "; ".join(f"{count} × {cause}" for cause, count in refused.most_common())
+    why = f" ({why or 'no two recorded encounters are alike; --recording adds some'})" if len(made) < requested.recombine else ""
+    tell(f"recombined encounters: {len(made)} of {requested.recombine}{why}")
+    return made
 
 
 def read_logs(
@@ -170,7 +214,7 @@ def generate_all(
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
     config, count, seed, request = requested.config, requested.count, requested.seed, requested.request
-    population = [encounter for encounter, _ in pairs]
+    population = [encounter for encounter, _ in pairs if not parents_of(encounter)]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:

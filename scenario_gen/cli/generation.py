@@ -40,6 +40,17 @@ class Generate:
     seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 0
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/generated")
     encounter: Annotated[list[str] | None, typer.Option(help="Name of an encounter in the log. Repeatable; default: all.")] = None
+    recording: Annotated[
+        list[Path] | None, typer.Option(help="A further recording, on a clock of its own, for the same roads. Repeatable.")
+    ] = None
+    recombine: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=MAX_COUNT,
+            help="So many new encounters at most: one vehicle of a recorded encounter with one of another that is alike.",
+        ),
+    ] = 0
     ego: Annotated[
         str,
         typer.Option(
@@ -110,7 +121,7 @@ def generate(options: Generate) -> None:
     config = updated(config, {"road.obstacles": join_pieces(filter(None, [config.road.obstacles, *(options.obstacle or [])]))})
     starts, goals, targets = (join_pieces(texts or []) for texts in (options.start, options.goal, options.target))
     request = FolderRequest(
-        jobs=[(options.log, options.road)],
+        jobs=[(files, options.road) for files in (options.log, *([path] for path in options.recording or []))],
         config=config,
         count=options.count,
         seed=options.seed,
@@ -118,6 +129,7 @@ def generate(options: Generate) -> None:
         request=Request(options.ego, starts, goals, targets, options.choose, options.order),
         also_read=[options.parameter_file] if options.parameter_file else [],
         for_testing=options.for_testing,
+        recombine=options.recombine,
     )
     conclude(*generate_folder(options.out, request, progress=bars, tell=say), options.out)
 

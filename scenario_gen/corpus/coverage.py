@@ -4,9 +4,11 @@
 """`coverage`: what recordings and the scenarios generated from them stand for, from bags, and its page."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from scenario_gen.bags.recordings.read import read_recording, result_in
+from scenario_gen.base.provenance import RECORDING
 from scenario_gen.corpus.page import curve, sketch, write_page
 from scenario_gen.method.evaluation.population import Population
 from scenario_gen.types import GenerationResult
@@ -25,7 +27,12 @@ def results_of(bags: Sequence[Path]) -> list[tuple[str, GenerationResult]]:
     for bag in bags:
         recording = read_recording(bag)
         logs = ", ".join(sorted(key.removeprefix(LOG) for key in recording.provenance if key.startswith(LOG)))
-        results += [(logs or str(bag), result_in(recording, name)) for name in recording.results or [""]]
+        for name in recording.results or [""]:
+            result, namespace = result_in(recording, name), recording.namespaces[name]
+            own = namespace.summaries[-1].provenance.get(RECORDING, "")
+            called = next((entry.status.values.get("template", "") for entry in namespace.entries), "")
+            encounter = replace(result.encounter, name=called or result.encounter.name)
+            results.append((" of ".join(filter(None, (own, logs))) or str(bag), replace(result, encounter=encounter)))
     return results
 
 

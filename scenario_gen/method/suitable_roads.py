@@ -54,7 +54,7 @@ def on_first_suitable_road(
     refusal = RefusedError(f"{encounter.name}: no built-in road takes this encounter; give the path of a map")
     for name in suitable_roads(encounter, segment(encounter, config.segmentation, seed), config):
         try:
-            return _noted(_refuse_lost(generate(name)), name)
+            return _refuse_lost(generate(name)).noted(f"road auto: {name}, the first built-in road that keeps the encounter")
         except RefusedError as error:
             kind = TargetError if isinstance(error, TargetError) else RefusedError
             refusal = kind(f"{encounter.name} on road {name}, the last that takes it: {error}")
@@ -89,9 +89,3 @@ def _refuse_lost(result: GenerationResult) -> GenerationResult:
             if conflict_of(scenario, a, b) is None:
                 raise RefusedError(f"vehicles {names[0]} and {names[1]} share no area there in scenario {scenario.index}")
     return result
-
-
-def _noted(result: GenerationResult, name: str) -> GenerationResult:
-    """Return a result that says which road was chosen."""
-    note = f"road auto: {name}, the first built-in road that keeps the encounter"
-    return replace(result, generated=replace(result.generated, adaptations=(note, *result.generated.adaptations)))

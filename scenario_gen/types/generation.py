@@ -4,7 +4,7 @@
 """What one generation came to."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 import math
 from pathlib import Path
@@ -89,6 +89,10 @@ class GenerationResult:
 
     def __getitem__(self, k: int) -> Scenario:
         return self.generated[k]
+
+    def noted(self, note: str) -> "GenerationResult":
+        """Return the result with a note in front of the others."""
+        return replace(self, generated=replace(self.generated, adaptations=(note, *self.generated.adaptations)))
 
     def to_dataframe(self) -> "DataFrame":
         """Return all scenarios as one table: a row for each scenario, vehicle and instant; columns as `Scenario.to_dataframe`."""

@@ -7,8 +7,9 @@ from dataclasses import replace
 import json
 
 import pytest
+from textbook_motions import labelled
 
-from scenario_gen import bundled, generate, read_log
+from scenario_gen import bundled, generate, load, read_log
 from scenario_gen.base.folders import MARKER
 
 
@@ -60,3 +61,22 @@ def test_coverage_measures_recordings_and_their_sets_and_draws_a_page(run, tmp_p
     (tmp_path / "mine.html").write_text("my own notes")
     assert run("coverage", *bags, "--templates", 1, "--out", "mine.html")[0] == 2
     assert (tmp_path / "mine.html").read_text() == "my own notes"
+
+
+def test_recordings_are_recombined_and_what_is_generated_from_them_counts_for_both(run, tmp_path):
+    logs = []
+    for kind, seed in (("crossing, stops", 0), ("crossing, stops", 1), ("follows", 0)):
+        logs.append(tmp_path / f"{kind[:7]}{seed}" / "log.csv")
+        logs[-1].parent.mkdir()
+        labelled(kind, seed).encounter.to_dataframe().to_csv(logs[-1], index=False)
+    more = [option for log in logs[1:] for option in ("--recording", log)]
+    code, said = run("generate", logs[0], *more, "--road", "corridor", "--count", 2, "--recombine", 9, "--out", tmp_path / "out")
+    assert code == 0 and "recombined encounters: 2 of 9" in said
+    flat = " ".join(said.split())
+    assert "log + log (2) on corridor" in flat and "log (2) + log on corridor" in flat
+    made = [load(tmp_path / "out" / "bag", name) for name in ("/case_4", "/case_5")]
+    assert all("was not recorded" in " ".join(case.generated.adaptations) for case in made)
+    code, said = run("coverage", tmp_path / "out" / "bag", "--templates", 1)
+    assert code == 0 and "3 encounters whose vehicles share an area (2 crossing, 1 following), 10 scenarios" in said
+    code, said = run("generate", logs[2], "--road", "corridor", "--count", 2, "--recombine", 9, "--out", tmp_path / "one")
+    assert code == 0 and "recombined encounters: 0 of 9 (no two recorded encounters are alike; --recording adds some)" in said

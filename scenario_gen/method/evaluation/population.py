@@ -14,7 +14,7 @@ an encounter to its nearest in other recordings.
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -34,25 +34,38 @@ KINDS = ("crossing", "turn", "merge", "following", APART)
 EACH = ("first speed", "least speed before", "speed at conflict", "braking", "acceleration", "standing time")
 COMMON = ("gap", "arrival gap", "distance", "time to collision", "closing speed", "approach")
 FEATURES = (*COMMON, *(f"{name} of the {who}" for who in ("first", "second") for name in EACH))
+DISTANCE = FEATURES.index("distance")
 TURNS, BESIDE_M = math.radians(45.0), 2.0
 LONGEST_S, FARTHEST_M = 10.0, 30.0  # gaps and times above, distances above, are as good as this
 SECOND = round(1.0 / PERIOD)  # samples
 STANDS_MPS = 0.5
 SMALLEST_R = 0.05  # standard deviations: the same encounter in two files makes no smaller ball
 SMALLEST_SHARE = 0.05  # of the largest standard deviation: a feature in which nobody differs does not count for all
+RECOMBINED = " + "  # between the names of the encounters that a recombined one has its vehicles of
 CHOSEN = 0.5  # share of the encounters that are drawn at most; those of other recordings are unseen
 WANTED = 0.9  # coverage
+FARTHEST_TOLD = 100.0  # times the largest number of templates that was measured
 
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """An encounter, recorded or generated: kind, features (F,), recording, place of its template in a list, and its pair."""
+    """An encounter, recorded or generated.
+
+    Attributes:
+        kind: of KINDS.
+        features: (F,).
+        recording: its name; of a generated one that of its template.
+        template: place of its template among the recorded.
+        pair: its vehicles that count, None if no two share an area.
+        other: place of the recorded encounter whose second vehicle it has, too, if it is of a recombined one; else -1.
+    """
 
     kind: str
     features: Floats
     recording: str
     template: int
     pair: Pair | None
+    other: int = -1
 
 
 @dataclass(frozen=True)
@@ -95,7 +108,8 @@ class Population:
     Attributes:
         encounters: recorded, by kind.
         scenarios: generated from them, by kind.
-        curve: coverage by number of templates.
+        curve: coverage by number of templates, drawn of all kinds.
+        by_kind: the same by kind, of templates that are all of that kind; without kinds that hold too few.
         unreached: encounters that no other recording's set reaches, the farthest first.
         needed: recordings that would cover 0.9 by the curve's extrapolation, inf where it does not rise.
     """
@@ -103,6 +117,7 @@ class Population:
     encounters: dict[str, int]
     scenarios: dict[str, int]
     curve: tuple[Point, ...]
+    by_kind: dict[str, tuple[Point, ...]]
     unreached: tuple[Unreached, ...]
     needed: float
 
@@ -114,12 +129,13 @@ class Population:
         return f"{recorded} encounters whose vehicles share an area ({kinds}), {made} scenarios"
 
     def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return the columns and the rows of the curve as texts; in brackets the 5 and 95 % quantiles over draws."""
-        columns = ("templates", "coverage alone", "with generated", "precision", "of the recorded", "stand for")
+        """Return the columns and the rows of the curves as texts; in brackets the 5 and 95 % quantiles over draws."""
+        columns = ("of", "templates", "coverage alone", "with generated", "precision", "of the recorded", "stand for")
         rows = []
-        for point in self.curve:
-            shares = (point.alone, point.generated, point.precision, point.recorded)
-            rows.append((str(point.templates), *map(in_words, shares), _stands_for(point)))
+        for kind, curve in {"all kinds": self.curve, **self.by_kind}.items():
+            for point in curve:
+                shares = (point.alone, point.generated, point.precision, point.recorded)
+                rows.append((kind, str(point.templates), *map(in_words, shares), _stands_for(point)))
         return columns, rows
 
     def remarks(self) -> list[str]:
@@ -252,7 +268,13 @@ def population_of(
         )
     near, points = _Near.of(found.recorded, found.made), found.curve(drawn, draws=draws, seed=seed)
     counted, generated = (dict(Counter(member.kind for member in members)) for members in (found.recorded, found.made))
-    return Population(counted, generated, points, tuple(near.unreached(found.names)), _needed(points))
+    by_kind = {}
+    for kind in KINDS:
+        own = found.of_kind(kind)
+        few = [n for n in drawn if n <= CHOSEN * len(own.recorded)]
+        if few and len({member.recording for member in own.recorded}) > 1:
+            by_kind[kind] = own.curve(few, draws=draws, seed=seed)
+    return Population(counted, generated, points, by_kind, tuple(near.unreached(found.names)), _needed(points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,6 +284,19 @@ class Members:
     recorded: Sequence[Member]
     made: Sequence[Member]
     names: Sequence[str] = ()
+
+    def of_kind(self, kind: str) -> "Members":
+        """Return the recorded of a kind, and what is generated from them, of whatever kind that is."""
+        places = {n: k for k, n in enumerate(n for n, own in enumerate(self.recorded) if own.kind == kind)} | {-1: -1}
+
+        def own(members: Sequence[Member]) -> list[Member]:
+            return [
+                replace(member, template=places[member.template], other=places[member.other])
+                for member in members
+                if member.template in places
+            ]
+
+        return Members(own(self.recorded), own(self.made), [self.names[n] for n in places if 0 <= n < len(self.names)])
 
     def shares(self, count: int, *, draws: int = 200, seed: int = 0) -> tuple[Interval, Interval, Interval, Interval]:
         """Return coverage alone and with what is generated, and precision of the generated and of the templates, as `Point` has.
@@ -289,26 +324,43 @@ class Members:
 
 
 def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
-    """Return the members of recordings and of the sets generated from them; arguments as of `population_of`."""
+    """Return the members of recordings and of the sets generated from them; arguments as of `population_of`.
+
+    An encounter that is called as two others are together, "A + B", is recombined of these: it is no recorded one, and what is
+    generated from it is of both. It is left out where one of these is not among the results.
+    """
     recorded: list[Member] = []
     made: list[Member] = []
     names: list[str] = []
+    recombined: list[tuple[str, list[Member]]] = []
     for recording, result in results:
+        name = result.encounter.name
         own = member_of(result.encounter, recording, len(recorded))
-        if own.kind != APART:
+        if own.kind == APART:
+            continue
+        generated = [generated_member(join_ego(scenario), own, result.encounter) for scenario in result]
+        if RECOMBINED in name:
+            recombined.append((name, generated))
+        else:
             recorded.append(own)
-            names.append(result.encounter.name)
-            made += [generated_member(join_ego(scenario), own, result.encounter) for scenario in result]
+            names.append(name)
+            made += generated
+    for name, generated in recombined:
+        one, _, other = name.partition(RECOMBINED)
+        if one in names and other in names:
+            first, second = recorded[names.index(one)], names.index(other)
+            made += [replace(member, recording=first.recording, template=first.template, other=second) for member in generated]
     return Members(recorded, made, names)
 
 
 def _needed(points: Sequence[Point]) -> float:
-    """Templates at which what is not covered, as a power of their number, falls to 0.1; inf where it does not fall."""
+    """Templates at which what is not covered, as a power of their number, falls to 0.1; inf where that is too far to be told."""
     missed = np.array([1.0 - point.generated.value for point in points])
     if len(points) < 2 or missed.min() <= 0.0:
         return math.inf
     slope, level = np.polyfit(np.log([point.templates for point in points]), np.log(missed), 1)
-    return math.ceil(math.exp((math.log(1.0 - WANTED) - level) / slope)) if slope < 0.0 else math.inf
+    needed = (math.log(1.0 - WANTED) - level) / slope if slope < 0.0 else math.inf
+    return math.ceil(math.exp(needed)) if needed < math.log(FARTHEST_TOLD * points[-1].templates) else math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +370,7 @@ class _Near:
     Attributes:
         members: recorded ones.
         recording: (R,) number of each one's recording.
-        template: (M,) index of each generated member's template.
+        template: (M, 2) indices of each generated member's templates, twice the same but for recombined ones.
         scaled: (R + M, F) features in standard deviations of the kind, recorded ones first.
         apart: (R + M, R) distances to recorded members in units of r, inf between kinds.
     """
@@ -347,7 +399,8 @@ class _Near:
             known = nearest[np.isfinite(nearest)]
             if len(known):
                 apart[np.ix_(rows, columns)] = between / max(float(np.median(known)), SMALLEST_R)
-        return cls(recorded, recording, np.array([member.template for member in made], dtype=np.int64), scaled, apart)
+        template = [(member.template, member.template if member.other < 0 else member.other) for member in made]
+        return cls(recorded, recording, np.array(template, dtype=np.int64).reshape(-1, 2), scaled, apart)
 
     def chosen(self, rng: np.random.Generator, count: int) -> Ints:
         """Draw `count` templates, recording by recording in a random order."""
@@ -365,13 +418,13 @@ class _Near:
         unseen = self._unseen(chosen)
         if not unseen.any():
             return (math.nan,) * 4
-        members = len(self.recording) + np.flatnonzero(np.isin(self.template, chosen))
+        members = len(self.recording) + np.flatnonzero(np.isin(self.template, chosen).all(axis=1))
         own = self.recording[self.template[members - len(self.recording)]]
         return (
             self._covered(chosen, unseen),
             self._covered(np.concatenate([chosen, members]), unseen),
             self._precision(members, own),
-            self._precision(chosen, self.recording[chosen]),
+            self._precision(chosen, self.recording[chosen, None]),
         )
 
     def _unseen(self, chosen: Ints) -> Bools:
@@ -383,16 +436,16 @@ class _Near:
         return float((self.apart[members][:, unseen].min(axis=0) <= 1.0).mean()) if unseen.any() else math.nan
 
     def _precision(self, members: Ints, own: Ints) -> float:
-        """The share of members within r of an encounter of another recording than their own."""
-        there = np.where(own[:, None] == self.recording, math.inf, self.apart[members])
+        """The share of members within r of an encounter of another recording than their own (K, 1 or 2)."""
+        there = np.where((own[..., None] == self.recording).any(axis=1), math.inf, self.apart[members])
         return float((there.min(axis=1) <= 1.0).mean()) if len(members) else math.nan
 
     def unreached(self, names: Sequence[str]) -> list[Unreached]:
         """Return the recorded encounters that nothing from other recordings is near, the farthest first."""
-        source = np.concatenate([self.recording, self.recording[self.template]])
+        source = np.concatenate([np.repeat(self.recording[:, None], 2, axis=1), self.recording[self.template]])
         found = []
         for n, member in enumerate(self.members):
-            far = np.where(source == self.recording[n], math.inf, self.apart[:, n])
+            far = np.where((source == self.recording[n]).any(axis=1), math.inf, self.apart[:, n])
             nearest = int(far.argmin())
             if far[nearest] > 1.0:
                 differs = int(np.abs(self.scaled[nearest] - self.scaled[n]).argmax())

@@ -30,7 +30,8 @@ class Judge:
 
     Attributes:
         check: the validity checker.
-        absent: conflicts of the template that the undisturbed drive leaves out; where clocks are free none may lose more.
+        absent: conflicts of the template that candidates may leave out, where clocks are free: as many as the undisturbed drive
+            does, or, where that leaves some out, as the best quarter of the first candidates.
         enough: share of valid candidates from which on a level of standard deviations is good enough.
         lost: reactions of the template, by their vehicles, that the undisturbed drive does not keep on this road, with what is
             said of each; no candidate is refused for them.
@@ -49,7 +50,11 @@ class Judge:
             return cls(check, ANY, enough)
         (verdict,) = check([undisturbed])
         lost = {violation.vehicles: violation.message for violation in verdict.violations if violation.cause == Cause.REACTION}
-        return cls(check, verdict.not_applicable if sampler.free else ANY, enough, lost)
+        if not sampler.free:
+            return cls(check, ANY, enough, lost)
+        first = [one for one in sampler.scenarios(0, 0) if one is not None] if verdict.not_applicable else []
+        left_out = sorted(own.not_applicable for own in check(first)) if first else [ANY]
+        return cls(check, min(verdict.not_applicable, left_out[len(left_out) // 4]), enough, lost)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""

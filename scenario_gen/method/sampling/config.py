@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.types import OF_CARS, VehicleType
 
-POPULATION = {"arrival_sigma": 2.0, "pace_sigma": 0.12, "wait_sigma": 2.0, "end_speed_sigma": 0.8, "leave_out": 0.9}
+POPULATION = {"arrival_sigma": 2.0, "pace_sigma": 0.18, "wait_sigma": 2.0, "end_speed_sigma": 1.2, "leave_out": 0.9}
 """What `population` frees, at least: as wide as encounters differ; which scenarios remain, the population decides."""
 
 

@@ -77,6 +77,11 @@ class Sampler:
         first = index_of(level, number * BLOCK)
         return self.model.draw(self.numbers(level, number), self._scale(level)), list(range(first, first + BLOCK))
 
+    def scenarios(self, level: int, number: int) -> list[Scenario | None]:
+        """Those candidates; None for one without a speed profile."""
+        batch, index = self.block(level, number)
+        return batch.scenarios(self.seed, index, self.frame_id)
+
     def scenario(self, index: int) -> Scenario | None:
         """The candidate with this index, to rounding as in a whole set; None if it has no speed profile."""
         level, candidate = place_of(index)

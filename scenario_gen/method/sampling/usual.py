@@ -4,7 +4,7 @@
 """Which valid candidates `sampling.variety=population` keeps: those that are usual among recorded encounters of the kind.
 
 A template may be unusual itself, and then nothing generated from it is usual. So kept is what has a rarity of at most 1, or the
-three quarters of the valid candidates that are least rare. The bound is found with the first candidates, and is the same for all.
+two fifths of the valid candidates that are least rare. The bound is found with the first candidates, and is the same for all.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ from scenario_gen.method.sampling.sampler import BLOCK, LEVELS, Sampler
 from scenario_gen.types import Scenario
 
 PILOT = 2 * BLOCK  # candidates by which a level is judged
-LEAST_RARE = 0.75  # share of the valid candidates that is kept at least
+LEAST_RARE = 0.4  # share of the valid candidates that is kept at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,15 +59,10 @@ def pilot(sampler: Sampler, judge: Judge) -> tuple[int, list[Scenario]]:
     """Return the first level of which enough candidates are valid, or the best, and its valid candidates."""
     levels: list[list[Scenario]] = []
     for level in range(len(LEVELS)):
-        drawn = [scenario for k in range(PILOT // BLOCK) for scenario in _scenarios(sampler, level, k) if scenario is not None]
+        drawn = [scenario for k in range(PILOT // BLOCK) for scenario in sampler.scenarios(level, k) if scenario is not None]
         causes = judge(drawn) if drawn else []
         levels.append([scenario for scenario, cause in zip(drawn, causes, strict=True) if cause is None])
         if len(levels[-1]) >= judge.enough * PILOT:
             break
     best = max(range(len(levels)), key=lambda level: len(levels[level]))
     return best, levels[best]
-
-
-def _scenarios(sampler: Sampler, level: int, number: int) -> list[Scenario | None]:
-    batch, index = sampler.block(level, number)
-    return batch.scenarios(sampler.seed, index, sampler.frame_id)

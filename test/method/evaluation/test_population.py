@@ -11,7 +11,7 @@ import pytest
 from textbook_motions import labelled
 
 from scenario_gen import InputError
-from scenario_gen.method.evaluation.population import member_of, population_of
+from scenario_gen.method.evaluation.population import member_of, members_of, population_of
 from scenario_gen.types import Encounter, Scenario
 
 KINDS = ("crossing, stops", "crossing, rolls", "follows", "stops behind a stopping leader", "merges")
@@ -95,3 +95,33 @@ def test_what_cannot_be_measured_is_refused_with_a_remedy(encounters):
         population_of([("one", Made(own)) for own in encounters])
     with pytest.raises(InputError, match=r"at most 15 templates"):
         population_of(results(encounters, lambda _, own: ()), (16,))
+
+
+def test_what_is_recombined_counts_where_both_are_drawn_and_is_no_recorded_encounter(encounters):
+    known = [(f"recording {k}", Made(replace(own, name=f"e{k}"))) for k, own in enumerate(encounters)]
+    kinds = [member_of(own, "", 0).kind for own in encounters]
+    pairs = [(i, j) for i, a in enumerate(kinds) for j, b in enumerate(kinds) if i != j and a == b]
+    # a copy of a third one stands for what is recombined of two
+    more = [
+        ("both", Made(replace(encounters[i], name=f"e{i} + e{j}"), (encounters[(j + len(KINDS)) % len(encounters)],)))
+        for i, j in pairs
+    ]
+    plain, found = (members_of(own) for own in (known, [*more, *known]))
+    assert len(found.recorded) == len(plain.recorded) == len(known) and len(found.made) == len(pairs)
+    for member in found.made:
+        assert member.template != member.other and found.recorded[member.template].recording == member.recording
+    both = [population_of(own, (3, 12), draws=60).curve for own in (known, [*more, *known])]
+    gains = [with_more.generated.value - without.generated.value for without, with_more in zip(*both, strict=True)]
+    assert gains[0] < 0.1 < gains[1], "of 3 drawn ones hardly two are of one kind, of 12 many are"
+    (without_parent,) = [members_of([own for own in [*more, *known] if own[1].encounter.name != "e0"])]
+    assert len(without_parent.made) == sum(0 not in pair for pair in pairs)
+
+
+def test_curves_of_each_kind_are_of_its_own_templates(encounters):
+    found = population_of(results(encounters, lambda _, own: (own,)), (2, 8), draws=30)
+    assert set(found.by_kind) <= set(found.encounters) and "crossing" in found.by_kind
+    assert all(point.templates <= found.encounters[kind] / 2 for kind, curve in found.by_kind.items() for point in curve)
+    columns, rows = found.table()
+    assert len(rows) == len(found.curve) + sum(map(len, found.by_kind.values())) and all(len(row) == len(columns) for row in rows)
+    alone = {kind: curve[0].alone.value for kind, curve in found.by_kind.items()}
+    assert alone["crossing"] > found.curve[0].alone.value, "two of a kind cover more of it than two of any kind cover of all"

@@ -1,0 +1,260 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""New encounters out of recorded ones: how one drove, met by how somebody else drove elsewhere.
+
+In two encounters of one kind, with the same reactions, somebody goes first and somebody second. A new encounter has the first of
+the one and the second of the other:
+
+- One that crosses, turns or merges keeps its way and its speeds, and is moved: in space such that both firsts take the same pose
+  where the paths meet, in time such that they clear it at the same instant, which is what the second waits for.
+- One that follows keeps how it follows (Newell 2002): it is where its leader was a time gap τ before, less a distance,
+  s(t) = s_leader(t − τ) − δ(t), with τ and δ as behind its own leader. In time it is moved to where the leaders' speeds are most
+  alike.
+
+Nothing is made up in between, so joints are as smooth as the recordings. What comes out must be of the same kind with the same
+reactions, without an overlap, within the limits of its type, and hardly more unusual (`evaluation.law`) than the recorded ones.
+It is a template like any other: what is generated from it is checked as always.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+import math
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.evaluation.law import Law
+from scenario_gen.method.evaluation.population import APART, DISTANCE, Member, member_of, RECOMBINED
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.plane import ahead_and_left, place
+from scenario_gen.template import clean_tracks, Conflict, conflict_of, reactions_of, time_gaps
+from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, YIELD
+
+LEAST_S = 5.0  # that a new encounter lasts
+TRIES = 10  # pairs that are tried for each encounter wanted
+RARER = 1.2  # times as far from the middle of the law of the kind as the rarer of the two, at most
+_GAPS_S = (0.5, 1.2, 2.5)  # least time gap τ, that of who never drives in the leader's lane, and greatest
+_OVERLAP_S, _OVERLAP_COST = 8.0, 1.5  # that recordings of leaders overlap, if they are so long; m/s that none of it is worth
+_STEP = 2  # samples by which one is moved against the other
+_ASIDE_M = 2.2  # of the follower's path, within which the leader is on it
+_BACKWARDS = -0.5  # m/s: who would drive backwards faster than this does not follow
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """The two of an encounter that have most to do with each other.
+
+    Attributes:
+        encounter: with all its vehicles.
+        kind: of `scenario_gen.method.evaluation.population`; `features` (F,), too.
+        conflict: of the two.
+        reactions: of one of them to the other.
+    """
+
+    encounter: Encounter
+    kind: str
+    features: Floats
+    conflict: Conflict
+    reactions: tuple[Reaction, ...]
+
+    @property
+    def graph(self) -> frozenset[tuple[bool, str]]:
+        """Who reacts, the second one or not, and how."""
+        return frozenset((edge.who == self.conflict.second, edge.kind) for edge in self.reactions)
+
+    @property
+    def follows(self) -> bool:
+        """Whether the second drives behind the first, and does not give way to it before."""
+        return self.conflict.following and (not self.reactions or (True, FOLLOW) in self.graph)
+
+    @property
+    def clears(self) -> float:
+        """When [s] the first one has cleared what the second one waits for; of a follower when the first one comes there."""
+        given = [edge.clears for edge in self.reactions if edge.kind == YIELD and math.isfinite(edge.gap)]
+        return given[0] if given else self.conflict.entry_first if self.conflict.following else self.conflict.exit_first
+
+    @property
+    def meeting(self) -> Floats:
+        """(3,) the first one's pose where the paths meet."""
+        entry, leaves = self.conflict.entry_first, min(self.conflict.exit_first, self.encounter.duration)
+        return self.motion(self.conflict.first, np.array([entry if self.conflict.following else (entry + leaves) / 2.0]))[0, :3]
+
+    def motion(self, n: int, at: Floats) -> Floats:
+        """(T, 4) pose and speed of a vehicle at times (T,) [s]."""
+        own = self.encounter
+        columns = (*own.position[n].T, own.heading[n], own.speed[n])
+        return np.column_stack([np.interp(at, own.time, column) for column in columns])
+
+    def there(self, n: int) -> Floats:
+        """(2,) when [s] a vehicle comes and goes."""
+        return np.asarray(self.encounter.present[n] * self.encounter.dt)
+
+
+@once_per_object
+def pair_of(encounter: Encounter) -> Pair | None:
+    """Return the pair of an encounter; None if no two of it share an area."""
+    member: Member = member_of(encounter, "", 0)
+    if member.kind == APART or member.pair is None:
+        return None
+    conflict = conflict_of(encounter, *member.pair)
+    assert conflict is not None
+    edges = tuple(edge for edge in reactions_of(encounter).edges if {edge.who, edge.whom} == set(member.pair))
+    return Pair(encounter, member.kind, member.features, conflict, edges)
+
+
+def name_of(one: Encounter, other: Encounter) -> str:
+    """Return what a recombined encounter is called."""
+    return f"{one.name}{RECOMBINED}{other.name}"
+
+
+def parents_of(encounter: Encounter) -> tuple[str, ...]:
+    """Return the names of the two encounters that one is recombined of; none of one that was recorded."""
+    one, _, other = encounter.name.partition(RECOMBINED)
+    return (one, other) if other else ()
+
+
+def recombined(one: Encounter, other: Encounter) -> Encounter:
+    """Return the first vehicle of one encounter with the second vehicle of another, on the clock and in the frame of `one`.
+
+    Of more than two vehicles the two that have most to do with each other count.
+
+    Raises:
+        RefusedError: they are not of one kind with the same reactions, or what comes out is not; the message says which.
+    """
+    a, b = pair_of(one), pair_of(other)
+    if a is None or b is None or a.kind != b.kind:
+        raise RefusedError("they are of different kinds")
+    if a.graph != b.graph:
+        raise RefusedError("their drivers react differently")
+    begin, motion = _following(a, b) if a.follows else _meeting(a, b)
+    first, second = one.vehicles[a.conflict.first], other.vehicles[b.conflict.second]
+    second = replace(second, id=f"{second.id}_2") if second.id == first.id else second
+    rows = np.stack([a.motion(a.conflict.first, begin + one.time[: len(motion)]), motion])
+    start = one.start_ns + round(begin / one.dt) * one.dt_ns
+    made = Encounter(name_of(one, other), (first, second), start, one.dt_ns, rows[..., :2], rows[..., 2], rows[..., 3])
+    found, change = pair_of(made), np.diff(made.speed[1]) / made.dt
+    if found is None or found.kind != a.kind or found.conflict.second != 1:
+        raise RefusedError("together they are of another kind")
+    if found.graph != a.graph:
+        raise RefusedError("together they react differently")
+    if found.features[DISTANCE] <= 0.0:
+        raise RefusedError("together they overlap")
+    law = Law.of(a.kind, [a.features, b.features])
+    if law.distance(found.features) > RARER * max(law.distance(a.features), law.distance(b.features)):
+        raise RefusedError("together they are more unusual than each of the recorded")
+    if change.max() > second.kind.dynamics.max_acceleration or -change.min() > second.kind.dynamics.max_deceleration:
+        raise RefusedError("the second one would brake or accelerate too hard")
+    return made
+
+
+def recombinations(encounters: Sequence[Encounter], most: int, seed: int = 0) -> tuple[list[Encounter], Counter[str]]:
+    """Return new encounters of pairs of recorded ones that are of one kind with the same reactions, and why pairs gave none.
+
+    Pairs are tried in a random order, ten for each encounter wanted at most.
+
+    Args:
+        encounters: recorded ones.
+        most: new ones wanted.
+        seed: of the order.
+    """
+    alike: dict[tuple[str, frozenset[tuple[bool, str]]], list[Encounter]] = {}
+    for encounter in encounters:
+        if (pair := pair_of(encounter)) is not None:
+            alike.setdefault((pair.kind, pair.graph), []).append(encounter)
+    groups = [group for group in alike.values() if len(group) > 1]
+    ends = np.cumsum([len(group) * (len(group) - 1) for group in groups])
+    total, made, refused = int(ends[-1]) if groups else 0, list[Encounter](), Counter[str]()
+    for number in np.random.default_rng(seed).choice(total, min(TRIES * most, total), replace=False).tolist() if total else ():
+        k = int(np.searchsorted(ends, number, side="right"))
+        i, j = divmod(number - (int(ends[k - 1]) if k else 0), len(groups[k]) - 1)
+        try:
+            made.append(recombined(groups[k][i], groups[k][j + (j >= i)]))
+        except RefusedError as error:
+            refused[str(error)] += 1
+        if len(made) == most:
+            break
+    return made, refused
+
+
+def _meeting(a: Pair, b: Pair) -> tuple[float, Floats]:
+    """When the two begin [s], and the motion (T, 4) of the second of `b`, moved to the first of `a`."""
+    second, later = b.conflict.second, a.clears - b.clears
+    at = _common(a, a.there(a.conflict.first), b.there(second) + later)
+    motion = b.motion(second, at - later)
+    here, there = a.meeting, b.meeting
+    ahead, left = ahead_and_left(motion[:, :2] - there[:2], there[2])
+    motion[:, :2] = place(here[None], ahead, left)[:, :2]
+    motion[:, 2] += here[2] - there[2]
+    return float(at[0]), motion
+
+
+def _following(a: Pair, b: Pair) -> tuple[float, Floats]:
+    """When the two begin [s], and the motion (T, 4) of the second of `b` behind the first of `a`."""
+    gaps = time_gaps(b.encounter, b.conflict.second, b.conflict.first)
+    least, usual, most = _GAPS_S
+    tau = min(max(float(np.median(gaps)) if len(gaps) else usual, least), most)
+    later = _alike(a, b)
+    own, led = b.there(b.conflict.second) + later, b.there(b.conflict.first) + later + tau
+    span = np.array([max(own[0], led[0]), min(own[1], led[1])])
+    at = _common(a, a.there(a.conflict.first) + np.array([tau, 0.0]), span)
+    leader, follower = clean_tracks(b.encounter)[b.conflict.first], clean_tracks(b.encounter)[b.conflict.second]
+    track = clean_tracks(a.encounter)[a.conflict.first]
+    theirs, ours = b.encounter.time, a.encounter.time
+    speed = np.interp(at - tau, ours, track.speed) - np.interp(at - later - tau, theirs, leader.speed)
+    speed += np.interp(at - later, theirs, follower.speed)
+    if speed.min() < _BACKWARDS:
+        raise RefusedError("the second one would drive backwards")
+    behind = np.interp(at - later - tau, theirs, _on_path(b)) - np.interp(at - later, theirs, follower.progress)
+    driven = np.maximum.accumulate(np.interp(at - tau, ours, _on_path(a)) - behind)
+    return float(at[0]), np.column_stack([_way(a, driven), np.maximum(speed, 0.0)])
+
+
+def _common(a: Pair, own: Floats, moved: Floats) -> Floats:
+    """(T,) the instants of a's clock between the later begin and the earlier end of two spans (2,) [s]."""
+    dt = a.encounter.dt
+    first, last = math.ceil(max(own[0], moved[0]) / dt - 1e-6), math.floor(min(own[1], moved[1]) / dt + 1e-6)
+    if (last - first) * dt < LEAST_S:
+        raise RefusedError(f"together they last less than {LEAST_S:g} s")
+    return np.arange(first, last + 1) * dt
+
+
+def _alike(a: Pair, b: Pair) -> float:
+    """By how much [s] b's clock is moved, such that the leaders' speeds are most alike for a long time."""
+    dt = a.encounter.dt
+    ours, theirs = (_led(pair, dt) for pair in (a, b))
+    shorter = min(len(ours), len(theirs))
+    least = min(round(_OVERLAP_S / dt), shorter)
+    best = (math.inf, 0)
+    for move in range(least - len(theirs), len(ours) - least + 1, _STEP):
+        begin, end = max(0, move), min(len(ours), len(theirs) + move)
+        off = float(np.sqrt(np.square(ours[begin:end] - theirs[begin - move : end - move]).mean()))
+        best = min(best, (off + _OVERLAP_COST * (1.0 - (end - begin) / shorter), move))
+    return best[1] * dt + float(a.there(a.conflict.first)[0] - b.there(b.conflict.first)[0])
+
+
+def _led(pair: Pair, dt: float) -> Floats:
+    """(T,) the speeds [m/s] of the first one, every dt [s] from when it comes until it goes."""
+    comes, goes = pair.there(pair.conflict.first).tolist()
+    return pair.motion(pair.conflict.first, comes + dt * np.arange(int((goes - comes) / dt + 1e-6) + 1))[:, 3]
+
+
+def _way(pair: Pair, station: Floats) -> Floats:
+    """(T, 3) the poses at distances (T,) on the path of the second one, beyond its end beside that of the first."""
+    ahead, own = (clean_tracks(pair.encounter)[n].curve for n in (pair.conflict.first, pair.conflict.second))
+    poses, over = own.at(station), station - own.length
+    join, aside = (float(value[0]) for value in ahead.project(own.points[-1:, :2]))
+    beyond = (over > 0.0) & (abs(aside) < _ASIDE_M)
+    poses[beyond] = ahead.beside(join + over[beyond], aside)
+    return poses
+
+
+def _on_path(pair: Pair) -> Floats:
+    """(T,) how far [m] the first one is on the path of the second, at the samples of their encounter."""
+    curve, track = clean_tracks(pair.encounter)[pair.conflict.second].curve, clean_tracks(pair.encounter)[pair.conflict.first]
+    station, aside = curve.project(pair.encounter.position[pair.conflict.first])
+    on = track.there & (station > 0.0) & (station < curve.length) & (np.abs(aside) < _ASIDE_M)
+    if not on.any():
+        raise RefusedError("the first one is never on the second one's path")
+    return np.asarray(track.progress + np.median((station - track.progress)[on]))
