@@ -33,8 +33,8 @@ class Judge:
         absent: conflicts of the template that candidates may leave out, where clocks are free: as many as the undisturbed drive
             does, or, where that leaves some out, as the best quarter of the first candidates.
         enough: share of valid candidates from which on a level of standard deviations is good enough.
-        lost: reactions of the template, by their vehicles, that the undisturbed drive does not keep on this road, with what is
-            said of each; no candidate is refused for them.
+        lost: reactions of the template, by their vehicles, that the undisturbed drive does not keep on this road, nor those of
+            these candidates that leave out no more, with what is said of each; no candidate is refused for them.
     """
 
     check: Check
@@ -49,12 +49,14 @@ class Judge:
         if undisturbed is None:
             return cls(check, ANY, enough)
         (verdict,) = check([undisturbed])
-        lost = {violation.vehicles: violation.message for violation in verdict.violations if violation.cause == Cause.REACTION}
-        if not sampler.free:
-            return cls(check, ANY, enough, lost)
-        first = [one for one in sampler.scenarios(0, 0) if one is not None] if verdict.not_applicable else []
-        left_out = sorted(own.not_applicable for own in check(first)) if first else [ANY]
-        return cls(check, min(verdict.not_applicable, left_out[len(left_out) // 4]), enough, lost)
+        lost, absent = _reactions_lost(verdict), verdict.not_applicable if sampler.free else ANY
+        first = [one for one in sampler.scenarios(0, 0) if one is not None] if 0 < absent < ANY else []
+        if first:
+            verdicts = sorted(check(first), key=lambda own: own.not_applicable)
+            absent = min(absent, verdicts[len(verdicts) // 4].not_applicable)
+            keep = [_reactions_lost(own) for own in verdicts if own.not_applicable <= absent]
+            lost = {pair: message for pair, message in lost.items() if all(pair in own for own in keep)}
+        return cls(check, absent, enough, lost)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""
@@ -65,6 +67,11 @@ class Judge:
             if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
                 return violation.cause
         return Cause.CONFLICT_LOST if verdict.not_applicable > self.absent else None
+
+
+def _reactions_lost(verdict: Verdict) -> dict[tuple[int, ...], str]:
+    """Return the reactions that a drive does not keep, by their vehicles, and what is said of each."""
+    return {own.vehicles: own.message for own in verdict.violations if own.cause == Cause.REACTION}
 
 
 def aim_of(encounter: Encounter, request: Request, measures: Measures | None) -> Aim | None:

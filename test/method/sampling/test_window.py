@@ -4,6 +4,7 @@
 """What scenarios leave out before the first conflict and after the last one."""
 
 from dataclasses import replace
+import math
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from scenario_gen import generate, PipelineConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.window import AFTER_S, Window, window_of
 from scenario_gen.template import conflict_of, conflicts_in
-from scenario_gen.types import Request
+from scenario_gen.types import ALWAYS, Request
 
 FREE = np.zeros(2, dtype=np.bool_)
 
@@ -63,3 +64,15 @@ def test_the_largest_numbers_leave_out_the_whole_share_and_no_room_is_not_widene
     kept, span = np.array([[4.0, 8.0], [1.0, 9.0]]), np.array([[0.0, 10.0], [2.0, 8.0]])
     np.testing.assert_allclose(window.cut(np.full((2, 2), 9.0), kept, span), [[2.0, 8.0], [2.0, 8.0]])
     np.testing.assert_allclose(window.cut(np.full((2, 2), -9.0), kept, span), span, atol=1e-9)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("crossing, stops", 3), ("crossing, rolls", 2)])
+@pytest.mark.parametrize("variety", ["wide", "population"])
+def test_what_a_recording_holds_by_its_last_sample_is_kept(kind, seed, variety):
+    """The record ends as the second one enters, and the drive without deviations ends before."""
+    whole = labelled(kind, seed).encounter
+    last = math.ceil(conflict_of(whole, 0, 1).entry_second / whole.dt) + 1
+    cut = replace(whole, **{name: getattr(whole, name)[:, :last] for name in ("position", "heading", "speed")}, present=ALWAYS)
+    made = generate(cut, "corridor", PipelineConfig(sampling=SamplingConfig(variety=variety)), count=10, seed=1)
+    assert len(made) == 10 and all(conflict_of(scenario, 0, 1) is not None for scenario in made)
+    assert not made.lost_reactions and made.generated.reactions
