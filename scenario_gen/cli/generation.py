@@ -48,7 +48,7 @@ class Generate:
         typer.Option(
             min=0,
             max=MAX_COUNT,
-            help="So many new encounters at most: one vehicle of a recorded encounter with one of another that is alike.",
+            help="So many new encounters at most: one vehicle of a recorded encounter with one of another of its kind.",
         ),
     ] = 0
     ego: Annotated[

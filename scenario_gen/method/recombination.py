@@ -3,8 +3,8 @@
 
 """New encounters out of recorded ones: how one drove, met by how somebody else drove elsewhere.
 
-In two encounters of one kind, with the same reactions, somebody goes first and somebody second. A new encounter has the first of
-the one and the second of the other:
+In two encounters of one kind somebody goes first and somebody second. A new encounter has the first of the one and the second of
+the other:
 
 - One that crosses, turns or merges keeps its way and its speeds, and is moved: in space such that both firsts take the same pose
   where the paths meet, in time such that they clear it at the same instant, which is what the second waits for.
@@ -12,9 +12,9 @@ the one and the second of the other:
   s(t) = s_leader(t − τ) − δ(t), with τ and δ as behind its own leader. In time it is moved to where the leaders' speeds are most
   alike.
 
-Nothing is made up in between, so joints are as smooth as the recordings. What comes out must be of the same kind with the same
-reactions, without an overlap, within the limits of its type, and hardly more unusual (`evaluation.law`) than the recorded ones.
-It is a template like any other: what is generated from it is checked as always.
+Nothing is made up in between, so joints are as smooth as the recordings. What comes out must be of the same kind, each driver
+reacting as in its own recording, without an overlap, within the limits of its type, and hardly more unusual (`evaluation.law`)
+than the recorded ones. It is a template like any other: what is generated from it is checked as always.
 """
 
 from collections import Counter
@@ -121,14 +121,12 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
     Of more than two vehicles the two that have most to do with each other count.
 
     Raises:
-        RefusedError: they are not of one kind with the same reactions, or what comes out is not; the message says which.
+        RefusedError: they are not of one kind, or what comes out is not, or reacts differently; the message says why.
     """
     a, b = pair_of(one), pair_of(other)
     if a is None or b is None or a.kind != b.kind:
         raise RefusedError("they are of different kinds")
-    if a.graph != b.graph:
-        raise RefusedError("their drivers react differently")
-    begin, motion = _following(a, b) if a.follows else _meeting(a, b)
+    begin, motion = _following(a, b) if b.follows else _meeting(a, b)
     first, second = one.vehicles[a.conflict.first], other.vehicles[b.conflict.second]
     second = replace(second, id=f"{second.id}_2") if second.id == first.id else second
     rows = np.stack([a.motion(a.conflict.first, begin + one.time[: len(motion)]), motion])
@@ -137,7 +135,7 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
     found, change = pair_of(made), np.diff(made.speed[1]) / made.dt
     if found is None or found.kind != a.kind or found.conflict.second != 1:
         raise RefusedError("together they are of another kind")
-    if found.graph != a.graph:
+    if found.graph != {own for own in a.graph if not own[0]} | {own for own in b.graph if own[0]}:
         raise RefusedError("together they react differently")
     if found.features[DISTANCE] <= 0.0:
         raise RefusedError("together they overlap")
@@ -150,7 +148,7 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
 
 
 def recombinations(encounters: Sequence[Encounter], most: int, seed: int = 0) -> tuple[list[Encounter], Counter[str]]:
-    """Return new encounters of pairs of recorded ones that are of one kind with the same reactions, and why pairs gave none.
+    """Return new encounters of pairs of recorded ones that are of one kind, and why pairs gave none.
 
     Pairs are tried in a random order, ten for each encounter wanted at most.
 
@@ -159,10 +157,10 @@ def recombinations(encounters: Sequence[Encounter], most: int, seed: int = 0) ->
         most: new ones wanted.
         seed: of the order.
     """
-    alike: dict[tuple[str, frozenset[tuple[bool, str]]], list[Encounter]] = {}
+    alike: dict[str, list[Encounter]] = {}
     for encounter in encounters:
         if (pair := pair_of(encounter)) is not None:
-            alike.setdefault((pair.kind, pair.graph), []).append(encounter)
+            alike.setdefault(pair.kind, []).append(encounter)
     groups = [group for group in alike.values() if len(group) > 1]
     ends = np.cumsum([len(group) * (len(group) - 1) for group in groups])
     total, made, refused = int(ends[-1]) if groups else 0, list[Encounter](), Counter[str]()

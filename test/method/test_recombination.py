@@ -53,7 +53,7 @@ def test_who_waits_stands_as_long_and_passes_as_long_behind_as_it_did_for_anothe
         assert stands(made, 1) == pytest.approx(stands(other, second), abs=0.2)
         behind = conflict_of(other, 0, 1).encroachment
         assert conflict_of(made, 0, 1).encroachment == pytest.approx(behind, abs=0.6), "the shared area differs by its edges"
-        assert [edge.kind for edge in pair_of(made).reactions] == [YIELD]
+        assert pair_of(made).graph == pair_of(other).graph
     assert tried >= 3
 
 
@@ -75,14 +75,25 @@ def test_who_follows_keeps_its_own_distance_behind_another_leader():
 
 
 def test_what_is_not_alike_is_refused_and_says_why():
-    (waits,), (follows,), (rolls,) = recorded(WAITS, 1), recorded(FOLLOWS, 1), recorded("crossing, long after", 1)
+    (waits,), (follows,) = recorded(WAITS, 1), recorded(FOLLOWS, 1)
     with pytest.raises(RefusedError, match="different kinds"):
         recombined(waits, follows)
-    with pytest.raises(RefusedError, match="react differently"):
-        recombined(waits, rolls)
     far = replace(waits, position=waits.position + np.array([1000.0, 0.0]) * np.arange(2)[:, None, None])
     with pytest.raises(RefusedError, match="different kinds"):
         recombined(far, far)
+    late = replace(waits, speed=waits.speed * np.where(np.arange(2) == pair_of(waits).conflict.second, 9.0, 1.0)[:, None])
+    with pytest.raises(RefusedError, match=r"too hard|unusual|kind"):
+        recombined(waits, late)
+
+
+def test_each_reacts_as_in_its_own_recording():
+    waits, free = recorded(WAITS, *range(5)), recorded("crossing, by chance", *range(12))
+    free = [encounter for encounter in free if not pair_of(encounter).graph][:5]
+    made = [*recombinations([*waits, *free], 90)[0]]
+    of_both = [[name.startswith(WAITS) for name in parents_of(encounter)] for encounter in made]
+    for second in (True, False):
+        found = [pair_of(own).graph for own, names in zip(made, of_both, strict=True) if names == [not second, second]]
+        assert len(found) >= 3 and all(graph == ({(True, YIELD)} if second else set()) for graph in found)
 
 
 def test_pairs_are_drawn_by_the_seed_and_those_that_give_none_are_counted():
