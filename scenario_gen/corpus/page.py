@@ -13,15 +13,15 @@ import numpy as np
 from scenario_gen.base.folders import write_text
 from scenario_gen.method.evaluation.population import Population
 from scenario_gen.output.report.html import render_page
-from scenario_gen.types import Encounter
+from scenario_gen.types import Encounter, Scenario
 
 WIDTH, HEIGHT, BORDER = 240.0, 160.0, 12.0  # px
 COLOURS = ("#1f6feb", "#d1242f", "#1a7f37", "#9a6700", "#8250df", "#bf3989")
 POINTS = 60  # of a drawn track
 
 
-def sketch(encounter: Encounter, span: tuple[int, int] | None = None) -> Markup:
-    """Return a drawing of an encounter: a line for each vehicle, a dot where it begins; in `span` (samples) it is thick."""
+def sketch(encounter: Encounter | Scenario, span: tuple[int, int] | None = None) -> Markup:
+    """Return a drawing of a motion: a line for each vehicle, a dot where it begins; in `span` (samples) it is thick."""
     there = encounter.there
     places = encounter.position[there]
     low, high = places.min(axis=0), places.max(axis=0)

@@ -26,14 +26,14 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.evaluation.law import Law
-from scenario_gen.method.evaluation.population import APART, DISTANCE, Member, member_of, RECOMBINED
+from scenario_gen.method.evaluation.population import APART, DISTANCE, member_of, RECOMBINED
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.template import clean_tracks, Conflict, conflict_of, reactions_of, time_gaps
 from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, YIELD
 
 LEAST_S = 5.0  # that a new encounter lasts
-TRIES = 10  # pairs that are tried for each encounter wanted
+TRIES = 40  # pairs that are looked at for each encounter wanted
 RARER = 1.2  # times as far from the middle of the law of the kind as the rarer of the two, at most
 _GAPS_S = (0.5, 1.2, 2.5)  # least time gap τ, that of who never drives in the leader's lane, and greatest
 _OVERLAP_S, _OVERLAP_COST = 8.0, 1.5  # that recordings of leaders overlap, if they are so long; m/s that none of it is worth
@@ -78,8 +78,9 @@ class Pair:
     @property
     def meeting(self) -> Floats:
         """(3,) the first one's pose where the paths meet."""
-        entry, leaves = self.conflict.entry_first, min(self.conflict.exit_first, self.encounter.duration)
-        return self.motion(self.conflict.first, np.array([entry if self.conflict.following else (entry + leaves) / 2.0]))[0, :3]
+        own, end = self.conflict, self.encounter.duration
+        at = own.entry_first if own.following else (own.entry_first + min(own.exit_first, end)) / 2.0
+        return self.motion(own.first, np.array([at]))[0, :3]
 
     def motion(self, n: int, at: Floats) -> Floats:
         """(T, 4) pose and speed of a vehicle at times (T,) [s]."""
@@ -95,18 +96,13 @@ class Pair:
 @once_per_object
 def pair_of(encounter: Encounter) -> Pair | None:
     """Return the pair of an encounter; None if no two of it share an area."""
-    member: Member = member_of(encounter, "", 0)
+    member = member_of(encounter, "", 0)
     if member.kind == APART or member.pair is None:
         return None
     conflict = conflict_of(encounter, *member.pair)
     assert conflict is not None
     edges = tuple(edge for edge in reactions_of(encounter).edges if {edge.who, edge.whom} == set(member.pair))
     return Pair(encounter, member.kind, member.features, conflict, edges)
-
-
-def name_of(one: Encounter, other: Encounter) -> str:
-    """Return what a recombined encounter is called."""
-    return f"{one.name}{RECOMBINED}{other.name}"
 
 
 def parents_of(encounter: Encounter) -> tuple[str, ...]:
@@ -131,7 +127,9 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
     second = replace(second, id=f"{second.id}_2") if second.id == first.id else second
     rows = np.stack([a.motion(a.conflict.first, begin + one.time[: len(motion)]), motion])
     start = one.start_ns + round(begin / one.dt) * one.dt_ns
-    made = Encounter(name_of(one, other), (first, second), start, one.dt_ns, rows[..., :2], rows[..., 2], rows[..., 3])
+    made = Encounter(
+        f"{one.name}{RECOMBINED}{other.name}", (first, second), start, one.dt_ns, rows[..., :2], rows[..., 2], rows[..., 3]
+    )
     found, change = pair_of(made), np.diff(made.speed[1]) / made.dt
     if found is None or found.kind != a.kind or found.conflict.second != 1:
         raise RefusedError("together they are of another kind")
@@ -150,29 +148,23 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
 def recombinations(encounters: Sequence[Encounter], most: int, seed: int = 0) -> tuple[list[Encounter], Counter[str]]:
     """Return new encounters of pairs of recorded ones that are of one kind, and why pairs gave none.
 
-    Pairs are tried in a random order, ten for each encounter wanted at most.
+    Pairs of all are tried in a random order, forty for each encounter wanted at most.
 
     Args:
         encounters: recorded ones.
         most: new ones wanted.
         seed: of the order.
     """
-    alike: dict[str, list[Encounter]] = {}
-    for encounter in encounters:
-        if (pair := pair_of(encounter)) is not None:
-            alike.setdefault(pair.kind, []).append(encounter)
-    groups = [group for group in alike.values() if len(group) > 1]
-    ends = np.cumsum([len(group) * (len(group) - 1) for group in groups])
-    total, made, refused = int(ends[-1]) if groups else 0, list[Encounter](), Counter[str]()
-    for number in np.random.default_rng(seed).choice(total, min(TRIES * most, total), replace=False).tolist() if total else ():
-        k = int(np.searchsorted(ends, number, side="right"))
-        i, j = divmod(number - (int(ends[k - 1]) if k else 0), len(groups[k]) - 1)
+    count, made, refused = len(encounters), list[Encounter](), Counter[str]()
+    kinds = [pair.kind if (pair := pair_of(encounter)) else encounter.name for encounter in encounters]
+    for number in np.random.default_rng(seed).choice(count**2, min(count**2, TRIES * most), replace=False).tolist():
+        i, j = divmod(number, count)
+        if i == j or kinds[i] != kinds[j] or len(made) == most:
+            continue
         try:
-            made.append(recombined(groups[k][i], groups[k][j + (j >= i)]))
+            made.append(recombined(encounters[i], encounters[j]))
         except RefusedError as error:
             refused[str(error)] += 1
-        if len(made) == most:
-            break
     return made, refused
 
 

@@ -43,6 +43,7 @@ SMALLEST_R = 0.05  # standard deviations: the same encounter in two files makes 
 SMALLEST_SHARE = 0.05  # of the largest standard deviation: a feature in which nobody differs does not count for all
 RECOMBINED = " + "  # between the names of the encounters that a recombined one has its vehicles of
 CHOSEN = 0.5  # share of the encounters that are drawn at most; those of other recordings are unseen
+SHOWN = 10  # scenarios that are like nothing recorded
 WANTED = 0.9  # coverage
 FARTHEST_TOLD = 100.0  # times the largest number of templates that was measured
 
@@ -58,6 +59,7 @@ class Member:
         template: place of its template among the recorded.
         pair: its vehicles that count, None if no two share an area.
         other: place of the recorded encounter whose second vehicle it has, too, if it is of a recombined one; else -1.
+        scenario: its number, -1 of a recorded one.
     """
 
     kind: str
@@ -66,6 +68,7 @@ class Member:
     template: int
     pair: Pair | None
     other: int = -1
+    scenario: int = -1
 
 
 @dataclass(frozen=True)
@@ -93,12 +96,21 @@ class Point:
 
 @dataclass(frozen=True)
 class Unreached:
-    """A recorded encounter that nothing of other recordings comes near: how far in units of r, and in which feature most."""
+    """A recorded encounter that nothing of other recordings comes near, or a scenario that is near no recorded encounter.
+
+    Attributes:
+        encounter: its name; of a scenario that of its template.
+        kind: of KINDS.
+        distance: to the nearest, in units of r.
+        feature: in which they differ most.
+        scenario: number of the scenario, -1 of an encounter.
+    """
 
     encounter: str
     kind: str
     distance: float
     feature: str
+    scenario: int = -1
 
 
 @dataclass(frozen=True)
@@ -111,6 +123,7 @@ class Population:
         curve: coverage by number of templates, drawn of all kinds.
         by_kind: the same by kind, of templates that are all of that kind; without kinds that hold too few.
         unreached: encounters that no other recording's set reaches, the farthest first.
+        farthest: scenarios that are farthest from all recorded encounters, at most ten.
         needed: recordings that would cover 0.9 by the curve's extrapolation, inf where it does not rise.
     """
 
@@ -119,6 +132,7 @@ class Population:
     curve: tuple[Point, ...]
     by_kind: dict[str, tuple[Point, ...]]
     unreached: tuple[Unreached, ...]
+    farthest: tuple[Unreached, ...]
     needed: float
 
     @property
@@ -208,7 +222,7 @@ def generated_member(scenario: Scenario, template: Member, encounter: Encounter)
     """The member that a scenario is, by the pair of its template, whose vehicles may stand in another order."""
     ids = [vehicle.id for vehicle in scenario.vehicles]
     a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
-    return member_of(scenario, template.recording, template.template, (a, b))
+    return replace(member_of(scenario, template.recording, template.template, (a, b)), scenario=scenario.index)
 
 
 def _kind(motion: Motion, conflict: Conflict) -> str:
@@ -274,7 +288,9 @@ def population_of(
         few = [n for n in drawn if n <= CHOSEN * len(own.recorded)]
         if few and len({member.recording for member in own.recorded}) > 1:
             by_kind[kind] = own.curve(few, draws=draws, seed=seed)
-    return Population(counted, generated, points, by_kind, tuple(near.unreached(found.names)), _needed(points))
+    return Population(
+        counted, generated, points, by_kind, tuple(near.unreached(found.names)), near.farthest(found), _needed(points)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,6 +300,10 @@ class Members:
     recorded: Sequence[Member]
     made: Sequence[Member]
     names: Sequence[str] = ()
+
+    def name_of(self, member: Member) -> str:
+        """Return the name of a member's template."""
+        return self.names[member.template] + (RECOMBINED + self.names[member.other] if member.other >= 0 else "")
 
     def of_kind(self, kind: str) -> "Members":
         """Return the recorded of a kind, and what is generated from them, of whatever kind that is."""
@@ -448,7 +468,23 @@ class _Near:
             far = np.where((source == self.recording[n]).any(axis=1), math.inf, self.apart[:, n])
             nearest = int(far.argmin())
             if far[nearest] > 1.0:
-                differs = int(np.abs(self.scaled[nearest] - self.scaled[n]).argmax())
-                feature = FEATURES[differs] if math.isfinite(far[nearest]) else "no other of its kind"
-                found.append(Unreached(names[n], member.kind, float(far[nearest]), feature))
+                found.append(Unreached(names[n], member.kind, float(far[nearest]), self._differ(nearest, n, far[nearest])))
         return sorted(found, key=lambda one: -one.distance)
+
+    def farthest(self, found: Members) -> tuple[Unreached, ...]:
+        """Return the generated members that are farthest from all recorded ones."""
+        away = self.apart[len(self.members) :]
+        nearest = away.min(axis=1, initial=math.inf)
+        return tuple(
+            Unreached(
+                found.name_of(own := found.made[n]), own.kind, float(nearest[n]),
+                self._differ(len(self.members) + n, int(away[n].argmin()), nearest[n]), own.scenario,
+            )
+            for n in np.argsort(-nearest, kind="stable")[:SHOWN].tolist()
+        )  # fmt: skip
+
+    def _differ(self, n: int, recorded: int, apart: float) -> str:
+        """In which feature a member differs most from a recorded one, which is so far apart."""
+        if not math.isfinite(apart):
+            return "no other of its kind"
+        return FEATURES[int(np.abs(self.scaled[n] - self.scaled[recorded]).argmax())]

@@ -117,6 +117,19 @@ def test_what_is_recombined_counts_where_both_are_drawn_and_is_no_recorded_encou
     assert len(without_parent.made) == sum(0 not in pair for pair in pairs)
 
 
+def test_the_scenarios_that_are_like_nothing_recorded_are_named(encounters):
+    def two(k, own):
+        return (own, replace(own, speed=own.speed * 5.0)) if k == 7 else (own,)
+
+    known = [
+        (recording, Made(replace(one.encounter, name=f"e{k}"), one.made))
+        for k, (recording, one) in enumerate(results(encounters, two))
+    ]
+    farthest = population_of(known, (5,), draws=10).farthest
+    assert len(farthest) == 10 and farthest[0].encounter == "e7" and farthest[0].distance > 2.0 > farthest[1].distance
+    assert set(farthest[0].feature.split()) & {"speed", "acceleration", "braking", "gap", "time"}
+
+
 def test_curves_of_each_kind_are_of_its_own_templates(encounters):
     found = population_of(results(encounters, lambda _, own: (own,)), (2, 8), draws=30)
     assert set(found.by_kind) <= set(found.encounters) and "crossing" in found.by_kind
