@@ -15,6 +15,7 @@ of the templates. `_coverage_nulls` compares them at equal precision.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
+import itertools
 import json
 import math
 from pathlib import Path
@@ -65,20 +66,26 @@ def run() -> list[Row]:
     rows: list[Row] = []
     for variety in ("wide", "population"):
         made = list(_generated(encounters, variety, COUNT))
-        more = list(_generated([("recombined", encounter) for encounter in recombined], variety, COUNT // 5))
-        for setting, sets in ((variety, made), (f"{variety}, recombined", made + more)):
-            rows += _measured(setting, sets, np.random.default_rng(1))
+        more = list(_generated([("recombined", encounter) for encounter in recombined], variety, max(COUNT // 5, 1)))
+        for setting, beside in ((variety, []), (f"{variety}, recombined", more)):
+            rows += _measured(setting, made, beside, np.random.default_rng(1))
     return rows
 
 
-def _measured(
-    setting: str, made: Sequence[tuple[str, Encounter, tuple[Scenario, ...]]], rng: np.random.Generator
-) -> Iterator[Row]:
-    """Yield all rows of a setting."""
-    sets = [(name, Set(encounter, members)) for name, encounter, members in made]
-    shifted = [(name, Set(one.encounter, tuple(_shifted(one.encounter, rng) for _ in one.members))) for name, one in sets]
-    mixed = [(name, Set(one.encounter, _mixed(one.members, rng))) for name, one in sets]
-    found, *nulls = (members_of(own) for own in (sets, shifted, mixed))  # type: ignore[arg-type]
+Made = tuple[str, Encounter, tuple[Scenario, ...]]
+"""Recording, encounter and scenarios."""
+
+
+def _measured(setting: str, made: Sequence[Made], recombined: Sequence[Made], rng: np.random.Generator) -> Iterator[Row]:
+    """Yield all rows of a setting; its nulls, of recorded encounters alone, have as many members."""
+    plain, more = (sum(len(members) for _, _, members in sets) for sets in (made, recombined))
+    times = round(1.0 + more / plain)
+    shifted = [(name, own, tuple(_shifted(own, rng) for _ in range(times * len(members)))) for name, own, members in made]
+    mixed = [(name, own, tuple(itertools.chain(*(_mixed(members, rng) for _ in range(times))))) for name, own, members in made]
+    found, *nulls = (
+        members_of([(name, Set(own, members)) for name, own, members in sets])  # type: ignore[misc]
+        for sets in ([*made, *recombined], shifted, mixed)
+    )
     yield Row(f"{setting}: encounters", len(found.recorded), "", "higher")
     yield Row(f"{setting}: scenarios", len(found.made), "", "higher")
     lost = {(member.template, member.other) for member in found.made if member.kind == APART}
@@ -135,10 +142,8 @@ def _beside(variety: str, found: Members, nulls: Mapping[str, Members], rng: np.
     yield Row(f"{variety}: spread of speeds within a set over the recorded", speed_spread(found), "", "higher", 0.4)
 
 
-def _generated(
-    encounters: Sequence[tuple[str, Encounter]], variety: str, count: int
-) -> Iterator[tuple[str, Encounter, tuple[Scenario, ...]]]:
-    """Yield recording, encounter and scenarios."""
+def _generated(encounters: Sequence[tuple[str, Encounter]], variety: str, count: int) -> Iterator[Made]:
+    """Yield what is generated from each encounter."""
     config = PipelineConfig(sampling=SamplingConfig(variety=variety))
     for name, encounter in encounters:
         try:

@@ -146,7 +146,7 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
 
 
 def recombinations(encounters: Sequence[Encounter], most: int, seed: int = 0) -> tuple[list[Encounter], Counter[str]]:
-    """Return new encounters of pairs of recorded ones that are of one kind, and why pairs gave none.
+    """Return new encounters of pairs of recorded ones that are of one kind and not the same, and why pairs gave none.
 
     Pairs of all are tried in a random order, forty for each encounter wanted at most.
 
@@ -156,13 +156,13 @@ def recombinations(encounters: Sequence[Encounter], most: int, seed: int = 0) ->
         seed: of the order.
     """
     count, made, refused = len(encounters), list[Encounter](), Counter[str]()
-    kinds = [pair.kind if (pair := pair_of(encounter)) else encounter.name for encounter in encounters]
+    pairs = [pair_of(encounter) for encounter in encounters]
     for number in np.random.default_rng(seed).choice(count**2, min(count**2, TRIES * most), replace=False).tolist():
-        i, j = divmod(number, count)
-        if i == j or kinds[i] != kinds[j] or len(made) == most:
+        a, b = (pairs[k] for k in divmod(number, count))
+        if not (a and b) or a.kind != b.kind or np.array_equal(a.features, b.features) or len(made) == most:
             continue
         try:
-            made.append(recombined(encounters[i], encounters[j]))
+            made.append(recombined(a.encounter, b.encounter))
         except RefusedError as error:
             refused[str(error)] += 1
     return made, refused

@@ -107,7 +107,8 @@ def test_pairs_are_drawn_by_the_seed_and_those_that_give_none_are_counted():
     few, again = (recombinations(known, 3, seed=5)[0] for _ in range(2))
     assert [encounter.name for encounter in few] == [encounter.name for encounter in again] and len(few) == 3
     np.testing.assert_array_equal(few[0].position, again[0].position)
-    assert recombinations(known[:1], 5) == ([], {}) and parents_of(known[0]) == ()
+    assert recombinations(known[:1], 5) == recombinations([], 5) == ([], {}) and parents_of(known[0]) == ()
+    assert recombinations([known[0], replace(known[0], name="the same again")], 5) == ([], {})
 
 
 def test_recombined_encounters_are_like_recorded_ones_and_new():

@@ -50,7 +50,7 @@ class Judge:
             return cls(check, ANY, enough)
         (verdict,) = check([undisturbed])
         lost, absent = _reactions_lost(verdict), verdict.not_applicable if sampler.free else ANY
-        first = [one for one in sampler.scenarios(0, 0) if one is not None] if 0 < absent < ANY else []
+        first = [one for one in sampler.block(0, 0)[1] if one is not None] if 0 < absent < ANY else []
         if first:
             verdicts = sorted(check(first), key=lambda own: own.not_applicable)
             absent = min(absent, verdicts[len(verdicts) // 4].not_applicable)
@@ -195,9 +195,9 @@ def _stage(
     numbers: list[int] = []
     causes: dict[int, Cause | None] = {}
     for number in blocks:
-        batch, index = sampler.block(level, number)
+        index, scenarios = sampler.block(level, number)
         numbers += index
-        drawn += batch.scenarios(sampler.seed, index, sampler.frame_id)
+        drawn += scenarios
     seen.add(aim, z, sampler.proposal, drawn, unit)
     checked = good = 0
     nearest = [k for k in np.argsort(seen.distance[-1], kind="stable").tolist() if drawn[k] is not None]

@@ -14,7 +14,6 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.sampling.adapt import adapted, aim_of, Check, Judge, label_of
-from scenario_gen.method.sampling.candidates import Batch
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.directed import Aim, estimated, reachable, STAGE, TargetError
 from scenario_gen.method.sampling.diverse import POOL_SHARE, spread_out
@@ -29,7 +28,7 @@ from scenario_gen.method.sampling.sampler import (
     place_of,
     Sampler,
 )
-from scenario_gen.method.sampling.usual import PILOT, pilot, Usual
+from scenario_gen.method.sampling.usual import FEW, PILOT, pilot, Usual
 from scenario_gen.types import Cause, EgoSlot, Measures, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
 
 KEPT = 1000  # scenarios up to which a set stays in memory
@@ -87,7 +86,7 @@ def draw_scenarios(
         loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.requested, slot))
         loop.aim, loop.measures = aim, measures
         if measures is not None and measures.rarity is not None:
-            loop.usual = Usual.among(measures.rarity, pilot(sampler, judge)[1])
+            loop.usual = Usual.among(measures.rarity, pilot(sampler, judge, FEW)[1])
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
         lost = [f"{NOT_KEPT}: {message}" for message in judge.lost.values()]
         notes = (*prepared.adaptations, *lost, *loop.usual.notes(), *loop.adaptations)
@@ -282,16 +281,15 @@ class _Loop:
     def _done(self, budget: int) -> bool:
         return len(self.index) >= self.count or self.candidates >= budget or self.callbacks.cancelled()
 
-    def _blocks(self, level: int) -> Iterator[tuple[Batch, list[int]]]:
+    def _blocks(self, level: int) -> Iterator[tuple[list[int], list[Scenario | None]]]:
         for number in itertools.count():
             yield self.sampler.block(level, number)
 
-    def _spend(self, blocks: Iterator[tuple[Batch, list[int]]], most: int) -> tuple[int, int]:
+    def _spend(self, blocks: Iterator[tuple[list[int], list[Scenario | None]]], most: int) -> tuple[int, int]:
         """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many were valid, usual or not."""
         seen = good = 0
         while seen < most and len(self.index) < self.count and not self.callbacks.cancelled():
-            batch, index = next(blocks)
-            drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
+            index, drawn = next(blocks)
             aimed = [scenario is not None and self._in_range(scenario) for scenario in drawn]
             causes = iter(self.judge([s for s, ok in zip(drawn, aimed, strict=True) if ok and s is not None]))
             for number, scenario, ok in zip(index, drawn, aimed, strict=True):

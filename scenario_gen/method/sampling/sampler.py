@@ -10,7 +10,7 @@ import hashlib
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.sampling.candidates import Batch, Scale
+from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.directed import Proposal
 from scenario_gen.method.sampling.model import CandidateModel
 from scenario_gen.numerics import Floats
@@ -72,15 +72,12 @@ class Sampler:
     label: Label = lambda _: {}  # facts of a candidate of all vehicles
     weighted: bool = True  # whether the candidates of a proposal say their weights
 
-    def block(self, level: int, number: int) -> tuple[Batch, list[int]]:
-        """Candidates number·BLOCK … of a level, and their indices."""
+    def block(self, level: int, number: int) -> tuple[list[int], list[Scenario | None]]:
+        """The indices of candidates number·BLOCK … of a level, and these; None for one without a speed profile."""
         first = index_of(level, number * BLOCK)
-        return self.model.draw(self.numbers(level, number), self._scale(level)), list(range(first, first + BLOCK))
-
-    def scenarios(self, level: int, number: int) -> list[Scenario | None]:
-        """Those candidates; None for one without a speed profile."""
-        batch, index = self.block(level, number)
-        return batch.scenarios(self.seed, index, self.frame_id)
+        index = list(range(first, first + BLOCK))
+        drawn = self.model.draw(self.numbers(level, number), self._scale(level))
+        return index, drawn.scenarios(self.seed, index, self.frame_id)
 
     def scenario(self, index: int) -> Scenario | None:
         """The candidate with this index, to rounding as in a whole set; None if it has no speed profile."""
@@ -104,8 +101,7 @@ class Sampler:
     def redraw(self, index: Sequence[int]) -> list[Scenario]:
         """The scenarios of indices that are of one block, to rounding as in a whole set."""
         level, candidate = place_of(index[0])
-        batch, own = self.block(level, candidate // BLOCK)
-        drawn = batch.scenarios(self.seed, own, self.frame_id)
+        own, drawn = self.block(level, candidate // BLOCK)
         return [self.published(whole) for whole in (drawn[number - own[0]] for number in index) if whole is not None]
 
     def published(self, whole: Scenario) -> Scenario:

@@ -15,7 +15,11 @@ from scenario_gen.method.sampling.adapt import Judge
 from scenario_gen.method.sampling.sampler import BLOCK, LEVELS, Sampler
 from scenario_gen.types import Scenario
 
-PILOT = 2 * BLOCK  # candidates by which a level is judged
+PILOT, LONGEST = (
+    2 * BLOCK,
+    10 * BLOCK,
+)  # candidates by which a level is judged; and by which the bound is found where FEW are valid
+FEW = 20
 LEAST_RARE = 0.4  # share of the valid candidates that is kept at least
 
 
@@ -55,14 +59,20 @@ class Usual:
         return (f"the recording is unusual among recorded encounters (rarity 1): scenarios up to {self.most:.2f} are kept",)
 
 
-def pilot(sampler: Sampler, judge: Judge) -> tuple[int, list[Scenario]]:
-    """Return the first level of which enough candidates are valid, or the best, and its valid candidates."""
-    levels: list[list[Scenario]] = []
+def pilot(sampler: Sampler, judge: Judge, few: int = 0) -> tuple[int, list[Scenario]]:
+    """Return the first level of which enough candidates are valid, or the best, and its first valid candidates.
+
+    Where these are fewer than `few`, five times as many candidates are drawn.
+    """
+
+    def valid(level: int, blocks: range) -> list[Scenario]:
+        drawn = [scenario for k in blocks for scenario in sampler.block(level, k)[1] if scenario is not None]
+        return [scenario for scenario, cause in zip(drawn, judge(drawn) if drawn else [], strict=True) if cause is None]
+
+    found: dict[int, list[Scenario]] = {}
     for level in range(len(LEVELS)):
-        drawn = [scenario for k in range(PILOT // BLOCK) for scenario in sampler.scenarios(level, k) if scenario is not None]
-        causes = judge(drawn) if drawn else []
-        levels.append([scenario for scenario, cause in zip(drawn, causes, strict=True) if cause is None])
-        if len(levels[-1]) >= judge.enough * PILOT:
+        found[level] = valid(level, range(PILOT // BLOCK))
+        if len(found[level]) >= judge.enough * PILOT:
             break
-    best = max(range(len(levels)), key=lambda level: len(levels[level]))
-    return best, levels[best]
+    best = max(found, key=lambda level: len(found[level]))
+    return best, found[best] if len(found[best]) >= few else valid(best, range(5 * PILOT // BLOCK))
