@@ -168,7 +168,7 @@ def recombine(
         both = ", ".join(dict.fromkeys((one.recording, other.recording)))
         sources[encounter.name] = Source(encounter, one.roads, both)
     why = "; ".join(f"{count} × {cause}" for cause, count in refused.most_common())
-    why = f" ({why or 'no two encounters are of one kind; --recording adds some'})" if len(made) < requested.recombine else ""
+    why = f" ({why or 'no more pairs are of one kind; --recording adds some'})" if len(made) < requested.recombine else ""
     tell(f"recombined encounters: {len(made)} of {requested.recombine}{why}")
     return made
 

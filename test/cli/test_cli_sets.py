@@ -78,4 +78,4 @@ def test_recordings_are_recombined_and_what_is_generated_from_them_counts_for_bo
     code, said = run("coverage", tmp_path / "out" / "bag", "--templates", 1)
     assert code == 0 and "3 encounters whose vehicles share an area (2 crossing, 1 following), 10 scenarios" in said
     code, said = run("generate", logs[2], "--road", "corridor", "--count", 2, "--recombine", 9, "--out", tmp_path / "one")
-    assert code == 0 and "recombined encounters: 0 of 9 (no two encounters are of one kind; --recording adds some)" in said
+    assert code == 0 and "recombined encounters: 0 of 9 (no more pairs are of one kind; --recording adds some)" in said
