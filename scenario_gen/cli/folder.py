@@ -138,7 +138,8 @@ def generate_folder(
             cases,
             title=requested.title or ", ".join(path.stem for path in requested.logs),
             quality=[*quality, *refusals, *untested],
-            provenance=provenance_of(
+            provenance=({"recombine": str(requested.recombine)} if requested.recombine else {})
+            | provenance_of(
                 requested.logs, requested.seed, requested.count, requested.roads, requested.config, requested.request
             ),
         )
@@ -165,8 +166,7 @@ def recombine(
     made, refused = recombinations(recorded, requested.recombine, requested.seed)
     for encounter in made:
         one, other = (sources[name] for name in parents_of(encounter))
-        both = ", ".join(dict.fromkeys((one.recording, other.recording)))
-        sources[encounter.name] = Source(encounter, one.roads, both)
+        sources[encounter.name] = Source(encounter, one.roads, ", ".join(dict.fromkeys((one.recording, other.recording))))
     why = "; ".join(f"{count} × {cause}" for cause, count in refused.most_common())
     why = f" ({why or 'no more pairs are of one kind; --recording adds some'})" if len(made) < requested.recombine else ""
     tell(f"recombined encounters: {len(made)} of {requested.recombine}{why}")

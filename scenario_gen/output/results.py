@@ -105,6 +105,7 @@ def provenance_of(
     logs: Sequence[Path], seed: int, count: int, roads: Sequence[str], config: PipelineConfig, request: Request = Request()
 ) -> dict[str, str]:
     """Return everything needed to do it again: log hashes, seed, versions, the request and all parameters."""
-    facts = {f"log {path.name}": f"sha256 {sha256_of(path)}" for path in logs}
+    names = [path.name for path in logs]
+    facts = {f"log {path if names.count(path.name) > 1 else path.name}": f"sha256 {sha256_of(path)}" for path in logs}
     facts |= {"roads": ", ".join(roads), "seed": str(seed), "count": str(count)}
     return facts | what_makes_it_again(config, request)

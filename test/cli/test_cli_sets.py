@@ -75,6 +75,8 @@ def test_recordings_are_recombined_and_what_is_generated_from_them_counts_for_bo
     assert "log + log (2) on corridor" in flat and "log (2) + log on corridor" in flat
     made = [load(tmp_path / "out" / "bag", name) for name in ("/case_4", "/case_5")]
     assert all("was not recorded" in " ".join(case.generated.adaptations) for case in made)
+    provenance = json.loads((tmp_path / "out" / "evaluation.json").read_text())["provenance"]
+    assert provenance["recombine"] == "9" and sum(key.startswith("log ") for key in provenance) == 3
     code, said = run("coverage", tmp_path / "out" / "bag", "--templates", 1)
     assert code == 0 and "3 encounters whose vehicles share an area (2 crossing, 1 following), 10 scenarios" in said
     code, said = run("generate", logs[2], "--road", "corridor", "--count", 2, "--recombine", 9, "--out", tmp_path / "one")
