@@ -97,10 +97,8 @@ class Pair:
 def pair_of(encounter: Encounter) -> Pair | None:
     """Return the pair of an encounter; None if no two of it share an area."""
     member = member_of(encounter, "", 0)
-    if member.kind == APART or member.pair is None:
+    if member.kind == APART or member.pair is None or (conflict := conflict_of(encounter, *member.pair)) is None:
         return None
-    conflict = conflict_of(encounter, *member.pair)
-    assert conflict is not None
     edges = tuple(edge for edge in reactions_of(encounter).edges if {edge.who, edge.whom} == set(member.pair))
     return Pair(encounter, member.kind, member.features, conflict, edges)
 
@@ -220,7 +218,7 @@ def _alike(a: Pair, b: Pair) -> float:
     for move in range(least - len(theirs), len(ours) - least + 1, _STEP):
         begin, end = max(0, move), min(len(ours), len(theirs) + move)
         off = float(np.sqrt(np.square(ours[begin:end] - theirs[begin - move : end - move]).mean()))
-        best = min(best, (off + _OVERLAP_COST * (1.0 - (end - begin) / shorter), move))
+        best = min(best, (round(off + _OVERLAP_COST * (1.0 - (end - begin) / shorter), 6), move))  # ties on any CPU
     return best[1] * dt + float(a.there(a.conflict.first)[0] - b.there(b.conflict.first)[0])
 
 
