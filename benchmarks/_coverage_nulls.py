@@ -76,7 +76,7 @@ def joint_gain(found: Members, mixed: Members, count: int) -> dict[str, float]:
     gains = {}
     for kind in KINDS:
         of_kind = [sets.of_kind(kind) for sets in (found, mixed)]
-        if kind == APART or len({member.recording for member in of_kind[0].recorded}) < 2:
+        if kind == APART or of_kind[0].recordings < 2:
             continue
         most = max(min(count, len(of_kind[0].recorded) // 2), 1)
         precision = [Members(_joint(sets.recorded), _joint(sets.made)).shares(most)[2].value for sets in of_kind]

@@ -97,7 +97,7 @@ def _measured(setting: str, made: Sequence[Made], recombined: Sequence[Made], rn
 
 def _by_kind(setting: str, found: Members) -> Iterator[Row]:
     """Yield coverage and precision with templates of one kind, the mean over kinds by their numbers of encounters."""
-    kinds = [own for own in map(found.of_kind, KINDS) if len({member.recording for member in own.recorded}) > 1]
+    kinds = [own for own in map(found.of_kind, KINDS) if own.recordings > 1]
     for n in TEMPLATES:
         enough = [own for own in kinds if len(own.recorded) >= 2 * n]
         if enough:

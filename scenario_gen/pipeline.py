@@ -12,7 +12,6 @@ from scenario_gen.base.provenance import what_makes_it_again
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, replay
-from scenario_gen.method.recombination import parents_of
 from scenario_gen.method.reference_sets import with_references
 from scenario_gen.method.sampling import Callbacks, Progress
 from scenario_gen.method.segmentation import segment
@@ -66,7 +65,7 @@ def generate(
         causes = ", ".join(f"{count} × {cause}" for cause, count in causes_in_words(result.generated.refused))
         why = "; ".join((causes or "none was drawn", *result.generated.adaptations))
         raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {why}")
-    if parents := parents_of(encounter):
+    if parents := encounter.parents:
         result = result.noted(f"recombined of {parents[0]} and {parents[1]}: this encounter was not recorded")
     if config.evaluation.compare:
         result = with_references(result, config, request, population)

@@ -15,7 +15,7 @@ from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.provenance import RECORDING
 from scenario_gen.logs import LogResult, NoEncounterError, read_log
 from scenario_gen.method.nearest import answer_refusal
-from scenario_gen.method.recombination import parents_of, recombinations
+from scenario_gen.method.recombination import recombinations
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import FAULTY
@@ -165,7 +165,7 @@ def recombine(
     """Return encounters recombined of recorded ones, which are put among the sources; tell how many, and why not more."""
     made, refused = recombinations(recorded, requested.recombine, requested.seed)
     for encounter in made:
-        one, other = (sources[name] for name in parents_of(encounter))
+        one, other = (sources[name] for name in encounter.parents)
         sources[encounter.name] = Source(encounter, one.roads, ", ".join(dict.fromkeys((one.recording, other.recording))))
     why = "; ".join(f"{count} × {cause}" for cause, count in refused.most_common())
     why = f" ({why or 'no more pairs are of one kind; --recording adds some'})" if len(made) < requested.recombine else ""
@@ -214,7 +214,7 @@ def generate_all(
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
     config, count, seed, request = requested.config, requested.count, requested.seed, requested.request
-    population = [encounter for encounter, _ in pairs if not parents_of(encounter)]
+    population = [encounter for encounter, _ in pairs if not encounter.parents]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:

@@ -26,11 +26,11 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.evaluation.law import Law
-from scenario_gen.method.evaluation.population import APART, DISTANCE, member_of, RECOMBINED
+from scenario_gen.method.evaluation.population import APART, DISTANCE, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.template import clean_tracks, Conflict, conflict_of, reactions_of, time_gaps
-from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, YIELD
+from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, RECOMBINED, YIELD
 
 LEAST_S = 5.0  # that a new encounter lasts
 TRIES = 40  # pairs that are looked at for each encounter wanted
@@ -66,7 +66,7 @@ class Pair:
 
     @property
     def follows(self) -> bool:
-        """Whether the second drives behind the first, and does not give way to it before."""
+        """Whether the second drives behind the first, and reacts to that or to nothing."""
         return self.conflict.following and (not self.reactions or (True, FOLLOW) in self.graph)
 
     @property
@@ -101,12 +101,6 @@ def pair_of(encounter: Encounter) -> Pair | None:
         return None
     edges = tuple(edge for edge in reactions_of(encounter).edges if {edge.who, edge.whom} == set(member.pair))
     return Pair(encounter, member.kind, member.features, conflict, edges)
-
-
-def parents_of(encounter: Encounter) -> tuple[str, ...]:
-    """Return the names of the two encounters that one is recombined of; none of one that was recorded."""
-    one, _, other = encounter.name.partition(RECOMBINED)
-    return (one, other) if other else ()
 
 
 def recombined(one: Encounter, other: Encounter) -> Encounter:

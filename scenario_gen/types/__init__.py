@@ -20,7 +20,7 @@ from scenario_gen.types.body import height, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
 from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.ego import join_ego, split_off, with_witness
-from scenario_gen.types.encounter import Encounter, most_exposed, Tracks, Vehicle
+from scenario_gen.types.encounter import Encounter, most_exposed, RECOMBINED, Tracks, Vehicle
 from scenario_gen.types.evaluation import as_markdown, CheckCounts, Evaluation, formatted, Interval, Metric, Row, SCHEMA
 from scenario_gen.types.fit import Fit, FittedVehicle, Loss
 from scenario_gen.types.generation import ERRORS, GenerationResult
@@ -52,11 +52,11 @@ from scenario_gen.types.target import Pair, Reached, Target, UNITS
 
 __all__ = [
     "ALWAYS", "CAR", "CARS", "COARSEST", "DRIVERS", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LANE_USERS",
-    "LEVEL", "MIRRORED", "NARROW", "NOT_KEPT", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECORDING", "REPLAY", "SCHEMA",
-    "UNIFORM", "UNITS", "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause", "CheckCounts",
-    "Coverage", "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult",
-    "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality",
-    "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario",
+    "LEVEL", "MIRRORED", "NARROW", "NOT_KEPT", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECOMBINED", "RECORDING", "REPLAY",
+    "SCHEMA", "UNIFORM", "UNITS", "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause",
+    "CheckCounts", "Coverage", "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle",
+    "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair",
+    "Quality", "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario",
     "ScenarioSet", "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "TypeLimits", "Vehicle",
     "VehicleType", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut",
     "formatted", "height", "join_ego", "join_pieces", "lanes_for", "lost_pairs", "mask", "most_exposed", "once_per_object",

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
 
+RECOMBINED = " + "  # between the names of the two encounters that a recombined one has its vehicles of
+
 
 @dataclass(frozen=True)
 class Vehicle:
@@ -173,6 +175,12 @@ class Encounter(Tracks):
         if n < 2 or t < 2:
             raise InputError(f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed")
         super().__post_init__()
+
+    @property
+    def parents(self) -> tuple[str, ...]:
+        """The names of the two encounters that it is recombined of; none if it was recorded."""
+        one, _, other = self.name.partition(RECOMBINED)
+        return (one, other) if other else ()
 
 
 def columns_of(motion: Any) -> dict[str, Any]:

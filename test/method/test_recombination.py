@@ -12,7 +12,7 @@ from textbook_motions import labelled
 
 from scenario_gen import generate, recombined, RefusedError
 from scenario_gen.method.evaluation.population import member_of
-from scenario_gen.method.recombination import pair_of, parents_of, recombinations
+from scenario_gen.method.recombination import pair_of, recombinations
 from scenario_gen.template import conflict_of, time_gaps
 from scenario_gen.types import FOLLOW, YIELD
 
@@ -90,7 +90,7 @@ def test_each_reacts_as_in_its_own_recording():
     waits, free = recorded(WAITS, *range(5)), recorded("crossing, by chance", *range(12))
     free = [encounter for encounter in free if not pair_of(encounter).graph][:5]
     made = [*recombinations([*waits, *free], 90)[0]]
-    of_both = [[name.startswith(WAITS) for name in parents_of(encounter)] for encounter in made]
+    of_both = [[name.startswith(WAITS) for name in encounter.parents] for encounter in made]
     for second in (True, False):
         found = [pair_of(own).graph for own, names in zip(made, of_both, strict=True) if names == [not second, second]]
         assert len(found) >= 3 and all(graph == ({(True, YIELD)} if second else set()) for graph in found)
@@ -101,13 +101,11 @@ def test_pairs_are_drawn_by_the_seed_and_those_that_give_none_are_counted():
     made, refused = recombinations(known, 100)
     assert 8 <= len(made) <= 24 and len(made) + sum(refused.values()) == 24, "ordered pairs of four, of two kinds"
     assert len({encounter.name for encounter in made}) == len(made)
-    assert all(
-        len(parents_of(encounter)) == 2 and parents_of(encounter)[0][:8] == parents_of(encounter)[1][:8] for encounter in made
-    )
+    assert all(len(encounter.parents) == 2 and encounter.parents[0][:8] == encounter.parents[1][:8] for encounter in made)
     few, again = (recombinations(known, 3, seed=5)[0] for _ in range(2))
     assert [encounter.name for encounter in few] == [encounter.name for encounter in again] and len(few) == 3
     np.testing.assert_array_equal(few[0].position, again[0].position)
-    assert recombinations(known[:1], 5) == recombinations([], 5) == ([], {}) and parents_of(known[0]) == ()
+    assert recombinations(known[:1], 5) == recombinations([], 5) == ([], {}) and known[0].parents == ()
     assert recombinations([known[0], replace(known[0], name="the same again")], 5) == ([], {})
 
 
@@ -123,7 +121,7 @@ def test_recombined_encounters_are_like_recorded_ones_and_new():
         nearest, to_parents = [], []
         for encounter in recombinations(own, 40, seed=1)[0]:
             away = np.sqrt(np.square((member_of(encounter, "", 0).features - features) / spread).mean(axis=-1))
-            parents = [names.index(name) for name in parents_of(encounter)]
+            parents = [names.index(name) for name in encounter.parents]
             to_parents.append(away[parents].min())
             away[parents] = math.inf
             nearest.append(away.min())

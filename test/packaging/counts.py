@@ -26,7 +26,7 @@ MARKS = ("<!-- counts -->\n", "<!-- end of counts -->\n")
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 MAX_PARAMETERS, MAX_LINES = 8, 60
 CROWDED, LONG = f"functions of more than {MAX_PARAMETERS} parameters", f"functions of more than {MAX_LINES} lines"
-BUDGET = {"code lines": 41_265, CROWDED: 1, LONG: 0}  # a change that needs more deletes something, or says why
+BUDGET = {"code lines": 41_264, CROWDED: 1, LONG: 0}  # a change that needs more deletes something, or says why
 BEFORE = {"code lines": 42_330, "report lines": 1_348, "test lines": 35_837, CROWDED: 42, LONG: 13}  # of commit f376887
 
 

@@ -15,6 +15,7 @@ an encounter to its nearest in other recordings.
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 
 import numpy as np
@@ -27,7 +28,7 @@ from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template import Conflict, conflict_of
-from scenario_gen.types import Encounter, GenerationResult, Interval, join_ego, Pair, Scenario
+from scenario_gen.types import Encounter, GenerationResult, Interval, join_ego, Pair, RECOMBINED, Scenario
 
 APART = "apart"  # a scenario whose pair shares no area any more: it is near nothing
 KINDS = ("crossing", "turn", "merge", "following", APART)
@@ -41,7 +42,6 @@ SECOND = round(1.0 / PERIOD)  # samples
 STANDS_MPS = 0.5
 SMALLEST_R = 0.05  # standard deviations: the same encounter in two files makes no smaller ball
 SMALLEST_SHARE = 0.05  # of the largest standard deviation: a feature in which nobody differs does not count for all
-RECOMBINED = " + "  # between the names of the encounters that a recombined one has its vehicles of
 CHOSEN = 0.5  # share of the encounters that are drawn at most; those of other recordings are unseen
 SHOWN = 10  # scenarios that are like nothing recorded
 WANTED = 0.9  # coverage
@@ -272,7 +272,7 @@ def population_of(
         InputError: fewer than two recordings, or none whose vehicles share an area.
     """
     found = members_of(results)
-    if len({member.recording for member in found.recorded}) < 2:
+    if found.recordings < 2:
         raise InputError("encounters of at least two recordings are needed; give results of more logs")
     drawn = [n for n in sorted(set(counts)) if n <= CHOSEN * len(found.recorded)]
     if not drawn:
@@ -280,13 +280,13 @@ def population_of(
         raise InputError(
             f"{known} encounters share an area: at most {most} templates can be drawn; ask for fewer, or give more logs"
         )
-    near, points = _Near.of(found.recorded, found.made), found.curve(drawn, draws=draws, seed=seed)
+    near, points = found.near, found.curve(drawn, draws=draws, seed=seed)
     counted, generated = (dict(Counter(member.kind for member in members)) for members in (found.recorded, found.made))
     by_kind = {}
     for kind in KINDS:
         own = found.of_kind(kind)
         few = [n for n in drawn if n <= CHOSEN * len(own.recorded)]
-        if few and len({member.recording for member in own.recorded}) > 1:
+        if few and own.recordings > 1:
             by_kind[kind] = own.curve(few, draws=draws, seed=seed)
     return Population(
         counted, generated, points, by_kind, tuple(near.unreached(found.names)), near.farthest(found), _needed(points)
@@ -300,6 +300,16 @@ class Members:
     recorded: Sequence[Member]
     made: Sequence[Member]
     names: Sequence[str] = ()
+
+    @cached_property
+    def near(self) -> "_Near":
+        """How near they are to each other."""
+        return _Near.of(self.recorded, self.made)
+
+    @property
+    def recordings(self) -> int:
+        """Number of recordings."""
+        return len({member.recording for member in self.recorded})
 
     def name_of(self, member: Member) -> str:
         """Return the name of a member's template."""
@@ -323,13 +333,13 @@ class Members:
 
         Arguments as of `population_of`.
         """
-        near, rng = _Near.of(self.recorded, self.made), np.random.default_rng(seed)
+        near, rng = self.near, np.random.default_rng(seed)
         alone, generated, precision, recorded = zip(*(near.judged(near.chosen(rng, count)) for _ in range(draws)), strict=True)
         return _over_draws(alone), _over_draws(generated), _over_draws(precision), _over_draws(recorded)
 
     def curve(self, counts: Sequence[int], *, draws: int = 200, seed: int = 0) -> tuple[Point, ...]:
         """Return what so many templates cover, and what they stand for; arguments as of `population_of`."""
-        near, rng = _Near.of(self.recorded, self.made), np.random.default_rng(seed)
+        near, rng = self.near, np.random.default_rng(seed)
         alone = {n: _over_draws(near.alone(near.chosen(rng, n)) for _ in range(draws)) for n in range(1, len(self.recorded))}
 
         def stands_for(coverage: float) -> float:
@@ -352,21 +362,19 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     recorded: list[Member] = []
     made: list[Member] = []
     names: list[str] = []
-    recombined: list[tuple[str, list[Member]]] = []
+    recombined: list[tuple[tuple[str, ...], list[Member]]] = []
     for recording, result in results:
-        name = result.encounter.name
         own = member_of(result.encounter, recording, len(recorded))
         if own.kind == APART:
             continue
         generated = [generated_member(join_ego(scenario), own, result.encounter) for scenario in result]
-        if RECOMBINED in name:
-            recombined.append((name, generated))
+        if parents := result.encounter.parents:
+            recombined.append((parents, generated))
         else:
             recorded.append(own)
-            names.append(name)
+            names.append(result.encounter.name)
             made += generated
-    for name, generated in recombined:
-        one, _, other = name.partition(RECOMBINED)
+    for (one, other), generated in recombined:
         if one in names and other in names:
             first, second = recorded[names.index(one)], names.index(other)
             made += [replace(member, recording=first.recording, template=first.template, other=second) for member in generated]

@@ -49,8 +49,10 @@ class Judge:
         if undisturbed is None:
             return cls(check, ANY, enough)
         (verdict,) = check([undisturbed])
-        lost, absent = _reactions_lost(verdict), verdict.not_applicable if sampler.free else ANY
-        first = [one for one in sampler.block(0, 0)[1] if one is not None] if 0 < absent < ANY else []
+        lost, absent = _reactions_lost(verdict), verdict.not_applicable
+        if not sampler.free:
+            return cls(check, ANY, enough, lost)
+        first = [one for one in sampler.block(0, 0)[1] if one is not None] if absent else []
         if first:
             verdicts = sorted(check(first), key=lambda own: own.not_applicable)
             absent = min(absent, verdicts[len(verdicts) // 4].not_applicable)

@@ -11,7 +11,7 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.sampling.sampler import ENOUGH, LEVELS, Sampler, searched_index
-from scenario_gen.method.sampling.usual import PILOT, pilot, Usual
+from scenario_gen.method.sampling.usual import FEW, PILOT, pilot, Usual
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Measures, Scenario
 
@@ -46,10 +46,10 @@ class NaturalScenarios:
             raise RefusedError(prepared.refusal)
         sampler = Sampler(prepared.model, seed, plan.road.frame_id)
         judge = Judge.of(sampler, check, ENOUGH[config.drawn.variety])
-        level, valid = pilot(sampler, judge)
+        rarity = None if measures is None else measures.rarity
+        level, valid = pilot(sampler, judge, 0 if rarity is None else FEW)
         if not valid:
             raise RefusedError(f"none of {PILOT * len(LEVELS)} candidates is valid; there is nothing to search in")
-        rarity = None if measures is None else measures.rarity
         return cls(sampler, judge, level, Usual() if rarity is None else Usual.among(rarity, valid))
 
     @property

@@ -20,14 +20,7 @@ from scenario_gen.method.sampling.diverse import POOL_SHARE, spread_out
 from scenario_gen.method.sampling.lazy import LazyScenarios
 from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import prepare
-from scenario_gen.method.sampling.sampler import (
-    BLOCK,
-    DIRECTED,
-    ENOUGH,
-    LEVELS,
-    place_of,
-    Sampler,
-)
+from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, ENOUGH, LEVELS, place_of, Sampler
 from scenario_gen.method.sampling.usual import FEW, PILOT, pilot, Usual
 from scenario_gen.types import Cause, EgoSlot, Measures, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
 

@@ -15,11 +15,8 @@ from scenario_gen.method.sampling.adapt import Judge
 from scenario_gen.method.sampling.sampler import BLOCK, LEVELS, Sampler
 from scenario_gen.types import Scenario
 
-PILOT, LONGEST = (
-    2 * BLOCK,
-    10 * BLOCK,
-)  # candidates by which a level is judged; and by which the bound is found where FEW are valid
-FEW = 20
+PILOT = 2 * BLOCK  # candidates by which a level is judged
+FEW = 20  # valid candidates that are too few to find the bound by
 LEAST_RARE = 0.4  # share of the valid candidates that is kept at least
 
 
@@ -62,7 +59,7 @@ class Usual:
 def pilot(sampler: Sampler, judge: Judge, few: int = 0) -> tuple[int, list[Scenario]]:
     """Return the first level of which enough candidates are valid, or the best, and its first valid candidates.
 
-    Where these are fewer than `few`, five times as many candidates are drawn.
+    Where these are fewer than `few`, candidates are drawn until there are five times as many.
     """
 
     def valid(level: int, blocks: range) -> list[Scenario]:
@@ -75,4 +72,6 @@ def pilot(sampler: Sampler, judge: Judge, few: int = 0) -> tuple[int, list[Scena
         if len(found[level]) >= judge.enough * PILOT:
             break
     best = max(found, key=lambda level: len(found[level]))
-    return best, found[best] if len(found[best]) >= few else valid(best, range(5 * PILOT // BLOCK))
+    if len(found[best]) < few:
+        found[best] += valid(best, range(PILOT // BLOCK, 5 * PILOT // BLOCK))
+    return best, found[best]
