@@ -29,7 +29,12 @@ NODES = (
 def needed(name: str) -> dict[str, list[str]]:
     """Return what a list of requirements asks for at run time, by the heading above it."""
     found: dict[str, list[str]] = {}
-    for line in Path("requirements", name).read_text(encoding="utf-8").partition("# to build")[0].splitlines():
+    for line in (
+        Path("requirements", name)
+        .read_text(encoding="utf-8")
+        .partition("# to build")[0]
+        .splitlines()
+    ):
         if line.startswith("#"):
             heading = line.removeprefix("# ").removeprefix("extra ")
         elif line:
@@ -65,14 +70,24 @@ setup(
     python_requires=">=3.11,<3.14",
     packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
     package_data={
-        NAME: ["py.typed", "*.pyi", "resources/*", "resources/**/*", "output/report/assets/*", "corpus/*.sql"],
+        NAME: [
+            "py.typed",
+            "*.pyi",
+            "resources/*",
+            "resources/**/*",
+            "output/report/assets/*",
+            "corpus/*.sql",
+        ],
         "msg_conventions": ["py.typed"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", [str(path) for path in sorted(Path("config").glob("*.*"))]),
-        (f"share/{NAME}/launch", [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]),
+        (
+            f"share/{NAME}/launch",
+            [str(path) for path in sorted(Path("launch").glob("*.launch.py"))],
+        ),
         (f"share/{NAME}/examples", [str(path) for path in sorted(Path("examples").glob("*.*"))]),
     ],
     install_requires=CORE,

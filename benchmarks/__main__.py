@@ -5,7 +5,9 @@
 
 import os
 
-THREADS = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1")
+THREADS = dict.fromkeys(
+    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
+)
 os.environ |= THREADS  # of ours, of every peer and of their processes; libraries read it once, as they are imported
 
 # ruff: noqa: E402
@@ -69,7 +71,9 @@ def table(rows: list[Row]) -> str:
         sign = "≥" if one.better == "higher" else "≤"
         target = "" if one.target is None else f"{sign} {one.target:g}"
         met = {None: "", True: "yes", False: "NO"}[one.met]
-        lines.append(f"{one.id:<58} {one.value:>12.4g} {one.unit:<10} {target:>12}  {met:<4} {one.peer or ''}")
+        lines.append(
+            f"{one.id:<58} {one.value:>12.4g} {one.unit:<10} {target:>12}  {met:<4} {one.peer or ''}"
+        )
     return "\n".join(lines)
 
 
@@ -78,15 +82,41 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("name", nargs="?", help="a benchmark, or all")
     parser.add_argument("--list", action="store_true", help="name the benchmarks")
-    parser.add_argument("--json", action="store_true", help="end with one JSON object on the last line")
-    parser.add_argument("--count", type=int, help="how many, where a benchmark counts something (scenarios to re-check)")
-    parser.add_argument("--cases", type=int, help="naturalness: the first encounters alone, on the corridor, for a look")
-    parser.add_argument("--roads", help="naturalness: names of roads, separated by commas; map: the recording's own")
-    parser.add_argument("--held-out", action="store_true", default=None, help="naturalness: the encounters that are kept apart")
-    parser.add_argument("--details", help="naturalness: a file for the figures of every case, a line of JSON each")
-    parser.add_argument("--pictures", help="naturalness: a folder for pictures of the first ten cases")
-    parser.add_argument("--checkout", help="naturalness: the folder of another checkout to be measured")
-    parser.add_argument("--variety", help="naturalness: the sampler's preset, wide (default) or narrow")
+    parser.add_argument(
+        "--json", action="store_true", help="end with one JSON object on the last line"
+    )
+    parser.add_argument(
+        "--count",
+        type=int,
+        help="how many, where a benchmark counts something (scenarios to re-check)",
+    )
+    parser.add_argument(
+        "--cases",
+        type=int,
+        help="naturalness: the first encounters alone, on the corridor, for a look",
+    )
+    parser.add_argument(
+        "--roads",
+        help="naturalness: names of roads, separated by commas; map: the recording's own",
+    )
+    parser.add_argument(
+        "--held-out",
+        action="store_true",
+        default=None,
+        help="naturalness: the encounters that are kept apart",
+    )
+    parser.add_argument(
+        "--details", help="naturalness: a file for the figures of every case, a line of JSON each"
+    )
+    parser.add_argument(
+        "--pictures", help="naturalness: a folder for pictures of the first ten cases"
+    )
+    parser.add_argument(
+        "--checkout", help="naturalness: the folder of another checkout to be measured"
+    )
+    parser.add_argument(
+        "--variety", help="naturalness: the sampler's preset, wide (default) or narrow"
+    )
     parser.add_argument(
         "--full",
         action="store_true",
@@ -94,13 +124,24 @@ def main() -> int:
         help="bridges: all of the demo's scenarios, and every file before every judge",
     )
     parser.add_argument("--out", help="paper: the folder of the page")
-    parser.add_argument("--log", action="append", help="paper: a file of a log instead of the bundled cases; repeatable")
+    parser.add_argument(
+        "--log",
+        action="append",
+        help="paper: a file of a log instead of the bundled cases; repeatable",
+    )
     parser.add_argument("--seed", type=int, help="paper: same seed, same page")
     parser.add_argument(
-        "--part", help="corpus: mine, memory, store, recorded, batch, kills, library, peers; kills: a victim; that alone"
+        "--part",
+        help="corpus: mine, memory, store, recorded, batch, kills, library, peers; kills: a victim; that alone",
     )
-    parser.add_argument("--rows", help="a file that gets each row as it is measured, a line of JSON each")
-    parser.add_argument("--quick", action="store_true", help="next to nothing of each, to see that it runs; figures say nothing")
+    parser.add_argument(
+        "--rows", help="a file that gets each row as it is measured, a line of JSON each"
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="next to nothing of each, to see that it runs; figures say nothing",
+    )
     arguments = parser.parse_args()
     known = names()
     signal.signal(signal.SIGTERM, stop)
@@ -108,7 +149,10 @@ def main() -> int:
         print("\n".join(known))
         return 0
     if arguments.name != "all" and arguments.name not in known:
-        print(f"unknown benchmark {arguments.name!r}; choose one of: all, {', '.join(known)}", file=sys.stderr)
+        print(
+            f"unknown benchmark {arguments.name!r}; choose one of: all, {', '.join(known)}",
+            file=sys.stderr,
+        )
         return 2
     if arguments.quick:
         os.environ[QUICK] = "1"  # before the benchmarks are imported
@@ -119,7 +163,9 @@ def main() -> int:
         row.FILE = arguments.rows
         stopped, rows = "", list[Row]()
         try:
-            rows = run(**{key: given[key] for key in inspect.signature(run).parameters if key in given})
+            rows = run(
+                **{key: given[key] for key in inspect.signature(run).parameters if key in given}
+            )
         except BaseException as error:
             stopped, rows = f"{type(error).__name__}: {error}".rstrip(": "), MADE
             raise
@@ -131,8 +177,16 @@ def main() -> int:
 def report(name: str, rows: list[Row], stopped: str, arguments: argparse.Namespace) -> None:
     """Print the rows of a benchmark; of one that was stopped, those that were measured, and why it was."""
     if arguments.json:
-        document = {"benchmark": name, "quick": arguments.quick, "rows": [one.document() for one in rows], "machine": machine()}
-        print(json.dumps(document | ({"stopped": stopped} if stopped else {}), allow_nan=False), flush=True)
+        document = {
+            "benchmark": name,
+            "quick": arguments.quick,
+            "rows": [one.document() for one in rows],
+            "machine": machine(),
+        }
+        print(
+            json.dumps(document | ({"stopped": stopped} if stopped else {}), allow_nan=False),
+            flush=True,
+        )
     else:
         print(f"{name}{f' (stopped: {stopped})' if stopped else ''}\n{table(rows)}\n", flush=True)
 

@@ -26,7 +26,11 @@ class Planted:
 def write_archive(folder: Path, seed: int = 0, **settings: float) -> Path:
     """Write an archive with settings of `ArchiveConfig` (test/worlds/archives.py); return its folder."""
     words = [f"--{name.replace('_', '-')}={value}" for name, value in settings.items()]
-    subprocess.run([sys.executable, str(SCRIPT), str(folder), f"--seed={seed}", *words], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, str(SCRIPT), str(folder), f"--seed={seed}", *words],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return folder
 
 

@@ -12,7 +12,9 @@ import sys
 import time
 
 
-def killed_batch(words: list[str], out: Path, wanted: int, workers_first: float = 0.5) -> tuple[int, int]:
+def killed_batch(
+    words: list[str], out: Path, wanted: int, workers_first: float = 0.5
+) -> tuple[int, int]:
     """Run a batch to its end through `wanted` SIGKILLs; return how many hit a worker, and how many the run.
 
     Args:

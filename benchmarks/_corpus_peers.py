@@ -27,7 +27,11 @@ from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import ScenarioSet
 
 PEERS = ("jax_moseq", "ompl", "sklearn")
-ACROSS, SPEED, NOISE = (0.5, 20.0), (1.0, 3.0), 0.1  # (standard deviation [m, m/s], length [m, s]); m or m/s
+ACROSS, SPEED, NOISE = (
+    (0.5, 20.0),
+    (1.0, 3.0),
+    0.1,
+)  # (standard deviation [m, m/s], length [m, s]); m or m/s
 
 
 def missing() -> list[str]:
@@ -50,7 +54,14 @@ def costs(encounter: Encounter, name: str, count: int, seed: int) -> dict[str, f
     config = PipelineConfig()
     begun = process_time()
     road = build_road(name, encounter, config.road)
-    made = Chain(encounter, segment(encounter, config.segmentation, seed), road, config, count=count, seed=seed).run()
+    made = Chain(
+        encounter,
+        segment(encounter, config.segmentation, seed),
+        road,
+        config,
+        count=count,
+        seed=seed,
+    ).run()
     found = {"ours": process_time() - begun}
     features, posterior = posterior_of(encounter, config.segmentation, seed)
     jitter = 1e-6 * np.random.default_rng(0).standard_normal(features.shape)
@@ -85,13 +96,22 @@ def _sample(generated: ScenarioSet, routes: Sequence[Route], count: int) -> None
 
     scenario = generated.scenarios[0]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # its sampler complains of a covariance that is not quite positive
+        warnings.simplefilter(
+            "ignore"
+        )  # its sampler complains of a covariance that is not quite positive
         for route, speed in zip(routes, scenario.speed, strict=True):
             across = np.zeros(len(route.length))
             for x, y, at, (sigma, length) in (
-                (route.length, across, np.linspace(0.0, route.length[-1], len(scenario.time)), ACROSS),
+                (
+                    route.length,
+                    across,
+                    np.linspace(0.0, route.length[-1], len(scenario.time)),
+                    ACROSS,
+                ),
                 (scenario.time, speed, scenario.time, SPEED),
             ):
                 kernel = ConstantKernel(sigma**2, "fixed") * RBF(length, "fixed")
-                fitted = GaussianProcessRegressor(kernel, alpha=NOISE**2, optimizer=None).fit(np.asarray(x)[:, None], y)
+                fitted = GaussianProcessRegressor(kernel, alpha=NOISE**2, optimizer=None).fit(
+                    np.asarray(x)[:, None], y
+                )
                 fitted.sample_y(np.asarray(at)[:, None], count)

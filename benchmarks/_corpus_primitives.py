@@ -9,7 +9,9 @@ from scenario_gen.numerics.arrays import Ints
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 DT = 0.1
-PRIMITIVES = np.array([[0, 0], [-1.6, 0], [0, -1.6], [1.4, 0], [0, 1.4], [-1.5, -1.5], [1.3, 1.3], [-1.5, 1.4]])  # m/s² of each
+PRIMITIVES = np.array(
+    [[0, 0], [-1.6, 0], [0, -1.6], [1.4, 0], [0, 1.4], [-1.5, -1.5], [1.3, 1.3], [-1.5, 1.4]]
+)  # m/s² of each
 FAST, SLOW = 16.0, 5.0  # m/s: a vehicle that would leave these does something else
 
 
@@ -22,7 +24,11 @@ def planted_encounter(random: np.random.Generator, name: str) -> tuple[Encounter
     while len(labels) < 150 + 100 * random.random():
         steps = int(random.uniform(20, 45))
         ends = speed + PRIMITIVES * steps * DT
-        able = [k for k in range(len(PRIMITIVES)) if k != last and (ends[k] < FAST).all() and (ends[k] > SLOW).all()]
+        able = [
+            k
+            for k in range(len(PRIMITIVES))
+            if k != last and (ends[k] < FAST).all() and (ends[k] > SLOW).all()
+        ]
         last = int(random.choice(able)) if able else 0
         labels += [last] * steps
         accelerations += [PRIMITIVES[last]] * steps
@@ -33,10 +39,21 @@ def planted_encounter(random: np.random.Generator, name: str) -> tuple[Encounter
     speeds = start + np.cumsum(driven, axis=1) * DT - driven * DT
     noisy = np.maximum(speeds + 0.03 * random.standard_normal(speeds.shape), 0.0)
     ways = np.cumsum(speeds, axis=1) * DT
-    position = np.stack([np.stack([ways[0], np.zeros(len(found))], 1), np.stack([-ways[1] + 100.0, np.full(len(found), 3.5)], 1)])
+    position = np.stack(
+        [
+            np.stack([ways[0], np.zeros(len(found))], 1),
+            np.stack([-ways[1] + 100.0, np.full(len(found), 3.5)], 1),
+        ]
+    )
     heading = np.repeat(np.array([[0.0], [np.pi]]), len(found), axis=1)
     points = np.flatnonzero(np.diff(found)) + 1
-    return Encounter(name, (Vehicle("a"), Vehicle("b")), 0, round(DT * 1e9), position, heading, noisy), points, found
+    return (
+        Encounter(
+            name, (Vehicle("a"), Vehicle("b")), 0, round(DT * 1e9), position, heading, noisy
+        ),
+        points,
+        found,
+    )
 
 
 def f1(found: Ints, true: Ints, tolerance: int = 5) -> tuple[int, int, int]:

@@ -14,7 +14,11 @@ import time
 from urllib.error import HTTPError, URLError
 from urllib.request import urlopen
 
-KEYS = {"AWS_ACCESS_KEY_ID": "any", "AWS_SECRET_ACCESS_KEY": "any", "AWS_DEFAULT_REGION": "us-east-1"}
+KEYS = {
+    "AWS_ACCESS_KEY_ID": "any",
+    "AWS_SECRET_ACCESS_KEY": "any",
+    "AWS_DEFAULT_REGION": "us-east-1",
+}
 START = "from scenario_gen.base.stores import place; import scenario_gen.corpus.mine, sys; place(sys.argv[1]).exists()"
 
 
@@ -31,7 +35,9 @@ def bucket_with(archive: Path) -> Iterator[tuple[str, dict[str, str]]]:
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
         try:
             _wait(address, server)
-            client = boto3.client("s3", endpoint_url=address, aws_access_key_id="any", aws_secret_access_key="any")
+            client = boto3.client(
+                "s3", endpoint_url=address, aws_access_key_id="any", aws_secret_access_key="any"
+            )
             client.create_bucket(Bucket="bench")
             for path in sorted(archive.glob("*.csv")):
                 client.upload_file(str(path), "bench", f"archive/{path.name}")
@@ -60,6 +66,13 @@ def _wait(address: str, server: "subprocess.Popen[bytes]") -> None:
 def spent(words: list[str], environment: dict[str, str]) -> float:
     """Return CPU seconds of a Python command and of the processes that it waits for; a server that runs does not count."""
     before = os.times()
-    subprocess.run([sys.executable, *words], env={**os.environ, **environment}, check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, *words],
+        env={**os.environ, **environment},
+        check=True,
+        capture_output=True,
+    )
     after = os.times()
-    return after.children_user + after.children_system - before.children_user - before.children_system
+    return (
+        after.children_user + after.children_system - before.children_user - before.children_system
+    )

@@ -16,7 +16,13 @@ from scenario_gen.method.evaluation.population import APART, FEATURES, KINDS, Me
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import Interval
 
-JOINT = ("gap", "arrival gap", "distance", "time to collision", "closing speed")  # how one answers the other
+JOINT = (
+    "gap",
+    "arrival gap",
+    "distance",
+    "time to collision",
+    "closing speed",
+)  # how one answers the other
 MOST_TIMES, STEPS = 4.0, 9  # the largest such number, and halvings by which it is found
 DRAWS = 60  # of templates, while it is looked for
 
@@ -59,7 +65,9 @@ def jitters(found: Members, rng: np.random.Generator) -> Iterator[tuple[str, Mem
         made = []
         for member in found.made:
             own_member = found.recorded[member.template]
-            moved = own_member.features + roots[own_member.kind] @ rng.standard_normal(len(FEATURES))
+            moved = own_member.features + roots[own_member.kind] @ rng.standard_normal(
+                len(FEATURES)
+            )
             made.append(replace(member, kind=own_member.kind, features=moved))
         yield name, replace(found, made=made)
 
@@ -67,7 +75,9 @@ def jitters(found: Members, rng: np.random.Generator) -> Iterator[tuple[str, Mem
 def deviations(found: Members, kind: str) -> Floats:
     """Return by how much members of a kind differ from their templates (S, F); a row of zeros where there are none."""
     pairs = [(member, found.recorded[member.template]) for member in found.made]
-    off = [member.features - own.features for member, own in pairs if member.kind == own.kind == kind]
+    off = [
+        member.features - own.features for member, own in pairs if member.kind == own.kind == kind
+    ]
     return np.array(off).reshape(-1, len(FEATURES)) if off else np.zeros((1, len(FEATURES)))
 
 
@@ -79,7 +89,10 @@ def joint_gain(found: Members, mixed: Members, count: int) -> dict[str, float]:
         if kind == APART or of_kind[0].recordings < 2:
             continue
         most = max(min(count, len(of_kind[0].recorded) // 2), 1)
-        precision = [Members(_joint(sets.recorded), _joint(sets.made)).shares(most)[2].value for sets in of_kind]
+        precision = [
+            Members(_joint(sets.recorded), _joint(sets.made)).shares(most)[2].value
+            for sets in of_kind
+        ]
         gains[kind] = precision[0] - precision[1]
     return gains
 
@@ -95,12 +108,21 @@ def speed_spread(found: Members) -> float:
     speeds: Bools = np.array(["speed" in name and "closing" not in name for name in FEATURES])
     shares: list[float] = []
     for kind in {own.kind for own in found.recorded}:
-        recorded = np.array([own.features for own in found.recorded if own.kind == kind])[:, speeds].std(axis=0)
+        recorded = np.array([own.features for own in found.recorded if own.kind == kind])[
+            :, speeds
+        ].std(axis=0)
         sets = [
             np.array(rows)[:, speeds].std(axis=0)
             for n, own in enumerate(found.recorded)
             if own.kind == kind
-            and len(rows := [member.features for member in found.made if member.template == n and member.kind == kind]) > 1
+            and len(
+                rows := [
+                    member.features
+                    for member in found.made
+                    if member.template == n and member.kind == kind
+                ]
+            )
+            > 1
         ]
         if sets and recorded.min() > 0.0:
             shares += (np.mean(sets, axis=0) / recorded).tolist()

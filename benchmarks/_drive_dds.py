@@ -44,7 +44,14 @@ def real_time(made: GenerationResult, periods: int) -> float:
     with tempfile.TemporaryDirectory() as name, free_domain() as domain:
         bag = write_recording(Path(name) / "bag", made)
         os.environ.update(environment(domain))
-        parameters = ["-p", f"bag:={bag}", "-p", "wait_for_ego:=false", "-p", "drive.overtime:=10.0"]
+        parameters = [
+            "-p",
+            f"bag:={bag}",
+            "-p",
+            "wait_for_ego:=false",
+            "-p",
+            "drive.overtime:=10.0",
+        ]
         with nodes(Path(name), domain, {"traffic": parameters}):
             return _periods(domain, periods)
 
@@ -56,7 +63,10 @@ def _calls(domain: int, steps: int, pid: int) -> tuple[float, float]:
     from scenario_gen.ros.plumbing.topics import create_publisher
 
     def work(node: Any, spin: Callable[[Any], None]) -> tuple[float, float]:
-        publisher, client = create_publisher(node, "ego/cmd_vel"), node.create_client(Trigger, "/traffic/step")
+        publisher, client = (
+            create_publisher(node, "ego/cmd_vel"),
+            node.create_client(Trigger, "/traffic/step"),
+        )
         client.wait_for_service(60.0)
         while publisher.get_subscription_count() < 1:
             time.sleep(0.05)

@@ -50,7 +50,10 @@ def _line(outcome: Outcome) -> str:
     vehicles = [
         {
             "size": [motion.vehicles[n].length, motion.vehicles[n].width],
-            "poses": [pose if here else None for pose, here in zip(poses[n].tolist(), drive.here[n].tolist(), strict=True)],
+            "poses": [
+                pose if here else None
+                for pose, here in zip(poses[n].tolist(), drive.here[n].tolist(), strict=True)
+            ],
         }
         for n in order
     ]
@@ -68,7 +71,13 @@ class Recorded:
         x, y, yaw, speed = track[-1]
         steps = range(1, int(on / max(speed, SLOW) / STEP) + 2 if on else 1)
         ahead = [max(speed, SLOW) * STEP * k for k in steps]
-        self.track = [*track, *((x + way * math.cos(yaw), y + way * math.sin(yaw), yaw, max(speed, SLOW)) for way in ahead)]
+        self.track = [
+            *track,
+            *(
+                (x + way * math.cos(yaw), y + way * math.sin(yaw), yaw, max(speed, SLOW))
+                for way in ahead
+            ),
+        ]
 
     def ended(self, state: State) -> bool:
         """Whether the track is at its end."""
@@ -107,7 +116,9 @@ def reactive_planner(trials: Sequence[Trial], bad: Callable[[], Sequence[Outcome
         for problem, trial in names.items():
             file = (folder / problem).with_suffix(".track.json")
             if file.is_file():
-                loop = ClosedLoop(trial.scenario, trial.ego, trial.road, ClosedLoopConfig(policy=REPLAY))
+                loop = ClosedLoop(
+                    trial.scenario, trial.ego, trial.road, ClosedLoopConfig(policy=REPLAY)
+                )
                 on = GOAL if found["outcomes"][problem][0] == "reached" else 0.0
                 planner = Recorded(json.loads(file.read_text()), on)
                 drive = loop.drive(planner, planner.ended)
@@ -120,7 +131,14 @@ def reactive_planner(trials: Sequence[Trial], bad: Callable[[], Sequence[Outcome
     )
     good = rates(outcomes)
     rows = [
-        Row(f"reactive planner: {what}", rate.share.value, "", "lower" if what != "goals" else "higher", None, f"{rate}; {said}")
+        Row(
+            f"reactive planner: {what}",
+            rate.share.value,
+            "",
+            "lower" if what != "goals" else "higher",
+            None,
+            f"{rate}; {said}",
+        )
         for what, rate in good.items()
     ]
     worst = rates(bad())["collisions"]
@@ -137,8 +155,17 @@ def _write_problem(path: Path, trial: Trial) -> None:
     """
     scenario, export = trial.scenario, ExportConfig()
     ids = [vehicle.id for vehicle in scenario.vehicles]
-    others, ego = split_off(scenario, trial.ego if isinstance(trial.ego, int) else ids.index(trial.ego))
-    one = Exported(scenario.index, scenario.seed, "0" * 64, replace(others, reference_drive=None), ego, driven=True)
+    others, ego = split_off(
+        scenario, trial.ego if isinstance(trial.ego, int) else ids.index(trial.ego)
+    )
+    one = Exported(
+        scenario.index,
+        scenario.seed,
+        "0" * 64,
+        replace(others, reference_drive=None),
+        ego,
+        driven=True,
+    )
     lanes = lane_map_of(trial.road, [scenario], RoadConfig.lane_width, export.run_out)
     path.write_bytes(write_commonroad(Case(1, "", "road", 0, (one,), lanes), one, export)[0])
     (vehicle,) = ego.vehicles

@@ -30,12 +30,17 @@ def braking_jerks(scenario: Scenario, drive: Drive) -> Floats:
     for i in range(len(drive.motion.vehicles)):
         if i == drive.ego:
             continue
-        speed, certified = drive.motion.speed[i], np.interp(drive.clock[i], scenario.time, scenario.speed[i])
+        speed, certified = (
+            drive.motion.speed[i],
+            np.interp(drive.clock[i], scenario.time, scenario.speed[i]),
+        )
         rate = np.divide(speed, certified, out=np.ones_like(speed), where=certified > 0.0)
         acceleration, own = np.diff(speed) / step, rate[:-1] * np.diff(certified) / step
         jerk = np.minimum(-np.diff(acceleration), -np.diff(acceleration - own)) / step
         here = drive.here[i][:-2] & drive.here[i][1:-1] & drive.here[i][2:]
-        found.append(jerk[here & (acceleration[1:] < -0.1) & (np.abs(acceleration - own)[1:] > 0.1)])
+        found.append(
+            jerk[here & (acceleration[1:] < -0.1) & (np.abs(acceleration - own)[1:] > 0.1)]
+        )
     return np.concatenate([np.empty(0), *found])
 
 
@@ -44,7 +49,10 @@ def behind(speed: float, gap: float, seed: int) -> Scenario:
     time = np.arange(150) * PERIOD
     zero, v = np.zeros_like(time), np.full_like(time, speed)
     ways = [start + speed * time for start in (0.0, gap + 4.25)]
-    return replace(as_scenario([(np.stack([way, zero], axis=1), zero, v) for way in ways], len(time)), seed=seed)
+    return replace(
+        as_scenario([(np.stack([way, zero], axis=1), zero, v) for way in ways], len(time)),
+        seed=seed,
+    )
 
 
 def runs_into(scenario: Scenario, braking: float, config: ClosedLoopConfig) -> bool:
@@ -65,10 +73,17 @@ def rear_ends() -> list[Row]:
         for gap in GAPS:
             count = {}
             for reaction in (0.0, ClosedLoopConfig().reaction):
-                config, speeds = ClosedLoopConfig(reaction=reaction), np.linspace(5.0, 20.0, DRIVES).tolist()
-                count[reaction] = sum(runs_into(behind(v, v * gap, k), braking, config) for k, v in enumerate(speeds))
+                config, speeds = (
+                    ClosedLoopConfig(reaction=reaction),
+                    np.linspace(5.0, 20.0, DRIVES).tolist(),
+                )
+                count[reaction] = sum(
+                    runs_into(behind(v, v * gap, k), braking, config) for k, v in enumerate(speeds)
+                )
             first, second = count.values()
             said = f"{second} of {DRIVES} at 5 to 20 m/s; without reaction time {first}"
-            name = f"follower {gap:g} s behind an ego that brakes by {braking:g} m/s²: runs into it"
+            name = (
+                f"follower {gap:g} s behind an ego that brakes by {braking:g} m/s²: runs into it"
+            )
             rows.append(Row(name, 100.0 * second / DRIVES, "%", "lower", None, said))
     return rows

@@ -27,7 +27,12 @@ def highway_env(vehicles: int) -> list[Row]:
         print(f"highway-env is not measured: {error}", file=sys.stderr)
         return []
     gymnasium.register_envs(highway_env)
-    config = {"vehicles_count": vehicles - 1, "simulation_frequency": 10, "policy_frequency": 10, "duration": 10_000}
+    config = {
+        "vehicles_count": vehicles - 1,
+        "simulation_frequency": 10,
+        "policy_frequency": 10,
+        "duration": 10_000,
+    }
     env = gymnasium.make("highway-v0", config=config)
     best = 0.0
     for seed in range(3):
@@ -41,7 +46,16 @@ def highway_env(vehicles: int) -> list[Row]:
                 env.reset()
         best = max(best, done / (process_time() - began))
     env.close()
-    return [Row(f"highway-env, {vehicles} vehicles", best, "vehicle-steps/s", "higher", None, "highway-v0, kinematics observed")]
+    return [
+        Row(
+            f"highway-env, {vehicles} vehicles",
+            best,
+            "vehicle-steps/s",
+            "higher",
+            None,
+            "highway-v0, kinematics observed",
+        )
+    ]
 
 
 def sumo(vehicles: int) -> list[Row]:
@@ -53,7 +67,8 @@ def sumo(vehicles: int) -> list[Row]:
         return []
     ids = [f"v{k}" for k in range(vehicles)]
     cars = [
-        f'<vehicle id="{name}" route="r" depart="0" departPos="{20 + 30 * k}" departSpeed="10"/>' for k, name in enumerate(ids)
+        f'<vehicle id="{name}" route="r" depart="0" departPos="{20 + 30 * k}" departSpeed="10"/>'
+        for k, name in enumerate(ids)
     ]
     best = 0.0
     with TemporaryDirectory() as folder:
@@ -62,14 +77,29 @@ def sumo(vehicles: int) -> list[Row]:
         routes.write_text(f'<routes><route id="r" edges="e"/>{"".join(cars)}</routes>')
         quiet = ["--no-step-log", "true", "--no-warnings", "true", "--collision.action", "none"]
         for _ in range(3):
-            libsumo.start(["sumo", "-n", str(net), "-r", str(routes), "--step-length", "0.1", *quiet])
+            libsumo.start(
+                ["sumo", "-n", str(net), "-r", str(routes), "--step-length", "0.1", *quiet]
+            )
             libsumo.simulationStep()
             began = process_time()
             for step in range(10 * STEPS):
                 libsumo.vehicle.moveToXY("v0", "e", 0, 20.0 + step, 0.0, 90.0, 2)
                 libsumo.simulationStep()
                 for name in ids:
-                    libsumo.vehicle.getPosition(name), libsumo.vehicle.getSpeed(name), libsumo.vehicle.getAngle(name)
+                    (
+                        libsumo.vehicle.getPosition(name),
+                        libsumo.vehicle.getSpeed(name),
+                        libsumo.vehicle.getAngle(name),
+                    )
             best = max(best, 10 * STEPS * vehicles / (process_time() - began))
             libsumo.close()
-    return [Row(f"SUMO, {vehicles} vehicles", best, "vehicle-steps/s", "higher", None, "libsumo, the ego moved by moveToXY")]
+    return [
+        Row(
+            f"SUMO, {vehicles} vehicles",
+            best,
+            "vehicle-steps/s",
+            "higher",
+            None,
+            "libsumo, the ego moved by moveToXY",
+        )
+    ]

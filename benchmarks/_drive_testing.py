@@ -10,7 +10,12 @@ from benchmarks.row import Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, NonReactive, ReferenceFollower
+from scenario_gen.closed_loop.planners import (
+    ConstantSpeed,
+    IdmFollower,
+    NonReactive,
+    ReferenceFollower,
+)
 from scenario_gen.closed_loop.reacting import needs_reaction
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Planner
 from scenario_gen.closed_loop.verdict import judge
@@ -26,9 +31,13 @@ class FullThrottle(ConstantSpeed):
 
 def discriminating(trials: Sequence[Trial]) -> list[Row]:
     """Measure on those of the trials that need a reaction; the speeds are not those that chose them."""
-    loops = [ClosedLoop(trial.scenario, trial.ego, trial.road, ClosedLoopConfig()) for trial in trials]
+    loops = [
+        ClosedLoop(trial.scenario, trial.ego, trial.road, ClosedLoopConfig()) for trial in trials
+    ]
     kept = [loop for loop in loops if needs_reaction(loop)]
-    planners: dict[str, tuple[Callable[[ClosedLoop], Planner], float, Literal["higher", "lower"]]] = {
+    planners: dict[
+        str, tuple[Callable[[ClosedLoop], Planner], float, Literal["higher", "lower"]]
+    ] = {
         "non-reactive baseline": (lambda _: NonReactive(), 0.9, "higher"),
         "7 m/s, looks at nobody": (lambda _: ConstantSpeed(speed=7.0), 0.6, "higher"),
         "full throttle, looks at nobody": (lambda _: FullThrottle(), 0.6, "higher"),
@@ -39,5 +48,14 @@ def discriminating(trials: Sequence[Trial]) -> list[Row]:
     for name, (planner, asked, better) in planners.items():
         failed = len([loop for loop in kept if not judge(loop, loop.drive(planner(loop))).passed])
         said = f"{failed} of {len(kept)} scenarios that need a reaction, of {len(trials)} natural ones"
-        rows.append(Row(f"for testing, {name}: share failed", failed / max(len(kept), 1), "", better, asked, said))
+        rows.append(
+            Row(
+                f"for testing, {name}: share failed",
+                failed / max(len(kept), 1),
+                "",
+                better,
+                asked,
+                said,
+            )
+        )
     return rows

@@ -39,14 +39,19 @@ def vehicle_motion(rng: np.random.Generator, steps: int, lane: Lane | None) -> M
         yaw0, bend, start = lane
         start = start - float(rng.uniform(0.0, 60.0))
     else:
-        yaw0, bend = float(rng.uniform(-np.pi, np.pi)), float(rng.choice([0.0, rng.uniform(-0.03, 0.03)]))
+        yaw0, bend = (
+            float(rng.uniform(-np.pi, np.pi)),
+            float(rng.choice([0.0, rng.uniform(-0.03, 0.03)])),
+        )
         start = -float(rng.uniform(0.2, 0.8) * way[-1])
     s = start + way
     yaw = yaw0 + bend * s
     if bend == 0.0:
         xy = np.stack([s * np.cos(yaw0), s * np.sin(yaw0)], axis=1)
     else:
-        xy = np.stack([(np.sin(yaw) - np.sin(yaw0)) / bend, (np.cos(yaw0) - np.cos(yaw)) / bend], axis=1)
+        xy = np.stack(
+            [(np.sin(yaw) - np.sin(yaw0)) / bend, (np.cos(yaw0) - np.cos(yaw)) / bend], axis=1
+        )
     return xy, yaw, v
 
 
@@ -72,7 +77,15 @@ def as_scenario(motions: Sequence[Motion], steps: int, seed: int = 0) -> Scenari
     """Put motions (xy, yaw, speed) on one clock."""
     xy, yaw, v = (np.stack(each) for each in zip(*motions, strict=True))
     ids = tuple(Vehicle(f"v{k}", 4.0 + 0.5 * (k % 3), 1.8) for k in range(len(motions)))
-    return Scenario(ids, np.arange(steps, dtype=np.float64) * PERIOD, xy, yaw, v, np.gradient(v, PERIOD, axis=1), seed=seed)
+    return Scenario(
+        ids,
+        np.arange(steps, dtype=np.float64) * PERIOD,
+        xy,
+        yaw,
+        v,
+        np.gradient(v, PERIOD, axis=1),
+        seed=seed,
+    )
 
 
 class Witness:
@@ -120,9 +133,19 @@ class Anything:
             return Pose(x, y, yaw, 8.0)
         if self.kind == 3 and len(seen.ids):  # into the way of one of the others
             x, y, yaw, _ = seen.others[int(seen.time) % len(seen.ids)].tolist()
-            return Pose(x + 7.0 * np.cos(yaw), y + 7.0 * np.sin(yaw), yaw + float(rng.uniform(-1.0, 1.0)), 0.0)
+            return Pose(
+                x + 7.0 * np.cos(yaw),
+                y + 7.0 * np.sin(yaw),
+                yaw + float(rng.uniform(-1.0, 1.0)),
+                0.0,
+            )
         if self.kind == 4:
             k = int(rng.integers(4))
-            return (None, Command(float("nan"), 0.0), Pose(ego.x, float("inf"), 0.0, 0.0), self.held)[k]
+            return (
+                None,
+                Command(float("nan"), 0.0),
+                Pose(ego.x, float("inf"), 0.0, 0.0),
+                self.held,
+            )[k]
         x, y, yaw = (rng.uniform(-1.0, 1.0, 3) * (40.0, 40.0, 3.0)).tolist()
         return self.held if rng.random() < 0.5 else Pose(x, y, yaw, 5.0)

@@ -55,7 +55,9 @@ class Measured:
 def encounters(data: Path) -> Iterator[tuple[Encounter, list[str]]]:
     """Yield encounters with the roads that are their own: the corridor, and the map they were recorded on."""
     bundled = sorted(
-        Path(str(path)) for path in (files("scenario_gen") / "resources").iterdir() if path.name.startswith("synthetic")
+        Path(str(path))
+        for path in (files("scenario_gen") / "resources").iterdir()
+        if path.name.startswith("synthetic")
     )
     for path in [*bundled, *sorted(data.glob("trajectories/*/encounter_*.csv"))][:LOGS]:
         place = re.search(r"(Lanker|Peach)-\d+_\d+", path.name)
@@ -70,7 +72,10 @@ def measure(data: Path, say: Callable[[str], None]) -> Iterator[Measured]:
         segmentation = segment(encounter, config.segmentation, SEEDS[0])
         for name in own:
             yield from _measure(encounter, segmentation, name, config, say, own_road=True)
-        others = (_measure(encounter, segmentation, name, config, say, own_road=False) for name in OTHER_ROADS)
+        others = (
+            _measure(encounter, segmentation, name, config, say, own_road=False)
+            for name in OTHER_ROADS
+        )
         yield from next((found for found in others if found), ())
 
 
@@ -86,7 +91,10 @@ def _measure(
     """One case with every seed of planning and sampling; none where the segmenter's arm is refused."""
     try:
         road = build_road(name, encounter, config.road)
-        made = {seed: Chain(encounter, segmentation, road, config, count=COUNT, seed=seed).run() for seed in SEEDS}
+        made = {
+            seed: Chain(encounter, segmentation, road, config, count=COUNT, seed=seed).run()
+            for seed in SEEDS
+        }
     except (InputError, RefusedError) as error:
         say(f"{encounter.name} on {Path(name).stem}: {error}")
         return []
@@ -100,23 +108,40 @@ def _measure(
         arms = {WITH: arm}
         for name_of, reference in references.items():
             try:
-                arms[name_of] = Chain(encounter, reference, road, config, count=COUNT, seed=seed, waits=()).run()
+                arms[name_of] = Chain(
+                    encounter, reference, road, config, count=COUNT, seed=seed, waits=()
+                ).run()
             except RefusedError as error:
                 say(f"{encounter.name} on {road.name}, seed {seed}, {name_of}: {error}")
         found.append(_evaluated(encounter, arms, road, own_road=own_road, seed=seed))
         values = found[-1].value
-        figures = (f"{arm} {values(arm, 'e_position'):.4f} / {values(arm, 'e_speed'):.4f}" for arm in (*arms, REPLAY))
-        say(f"{encounter.name} on {road.name}, K = {len(segmentation.changepoints)}, seed {seed}: " + "; ".join(figures))
+        figures = (
+            f"{arm} {values(arm, 'e_position'):.4f} / {values(arm, 'e_speed'):.4f}"
+            for arm in (*arms, REPLAY)
+        )
+        say(
+            f"{encounter.name} on {road.name}, K = {len(segmentation.changepoints)}, seed {seed}: "
+            + "; ".join(figures)
+        )
     return found
 
 
-def _evaluated(encounter: Encounter, arms: dict[str, GenerationResult], road: Road, *, own_road: bool, seed: int) -> Measured:
+def _evaluated(
+    encounter: Encounter,
+    arms: dict[str, GenerationResult],
+    road: Road,
+    *,
+    own_road: bool,
+    seed: int,
+) -> Measured:
     """Evaluate the arms, and with the first seed make the report too."""
     started = process_time()
     with_ = arms[WITH]
     oracle = replay(encounter, with_.road_and_fit()[1], road.frame_id)
     rows = {arm: made.generated.scenarios for arm, made in arms.items()} | {REPLAY: (oracle,)}
-    evaluation = evaluate_scenarios(encounter, rows, changepoints=len(with_.segmentation.changepoints), road=road.name)
+    evaluation = evaluate_scenarios(
+        encounter, rows, changepoints=len(with_.segmentation.changepoints), road=road.name
+    )
     if seed != SEEDS[0]:
         return Measured(evaluation, own_road, seed, 0.0)
     references = {WITHOUT: arms[WITHOUT].generated} if WITHOUT in arms else {}

@@ -15,7 +15,10 @@ from scenario_gen.numerics import Floats, runs
 from scenario_gen.template import conflict_of, departure, lane_gaps, Motion, passing, time_gaps
 from scenario_gen.types import Reaction
 
-EARLY, _ROUNDED = 0.5, 0.15  # s, by which a yielder leaves, and enters, before the other has cleared
+EARLY, _ROUNDED = (
+    0.5,
+    0.15,
+)  # s, by which a yielder leaves, and enters, before the other has cleared
 _BRAKES, _LOSES = 0.6, 1.5  # m/s², m/s
 _NEAR, _AHEAD = 12.0, 3.0  # m, s
 _BENDS = 0.8  # m/s² sideways
@@ -61,9 +64,15 @@ def following(edge: Reaction, template: Motion, scenarios: Sequence[Motion]) -> 
     leader, own = (speeds - speeds.mean(axis=0)).T
     square = float(np.square(leader).sum())
     slope = float((leader * own).sum()) / square if square > 1e-6 * len(leader) else np.nan
-    middles = [float(np.median(gaps)) for one in scenarios if len(gaps := time_gaps(one, edge.who, edge.whom)) > 0]
+    middles = [
+        float(np.median(gaps))
+        for one in scenarios
+        if len(gaps := time_gaps(one, edge.who, edge.whom)) > 0
+    ]
     base = time_gaps(template, edge.who, edge.whom)
-    relative = np.array(middles) / float(np.median(base)) if middles and len(base) else np.array([np.nan])
+    relative = (
+        np.array(middles) / float(np.median(base)) if middles and len(base) else np.array([np.nan])
+    )
     low, high = np.percentile(relative, (10, 90)).tolist()
     lag, explained = _answers(edge, scenarios)
     return Following(edge, slope, (low, high), lag, 1.0 - explained)
@@ -72,10 +81,18 @@ def following(edge: Reaction, template: Motion, scenarios: Sequence[Motion]) -> 
 def shared(motion: Motion) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
     """Return (who, whom) of all who drive behind another in its lane for two seconds, and of all who meet otherwise."""
     step = float(motion.time[1] - motion.time[0])
-    lanes = [pair for pair, (_, gap) in lane_gaps(motion).items() if np.count_nonzero(gap > 0.0) * step >= LONG_ENOUGH]
+    lanes = [
+        pair
+        for pair, (_, gap) in lane_gaps(motion).items()
+        if np.count_nonzero(gap > 0.0) * step >= LONG_ENOUGH
+    ]
     meet = [conflict_of(motion, a, b) for b in range(len(motion.vehicles)) for a in range(b)]
     others = [(one.second, one.first) for one in meet if one is not None]
-    return lanes, [(who, whom) for who, whom in others if (who, whom) not in lanes and (whom, who) not in lanes]
+    return lanes, [
+        (who, whom)
+        for who, whom in others
+        if (who, whom) not in lanes and (whom, who) not in lanes
+    ]
 
 
 def tailgates(motion: Motion, who: int, whom: int) -> bool:
@@ -97,7 +114,10 @@ def yielding(edge: Reaction, scenarios: Sequence[Motion]) -> Yielding:
             continue
         clears, enters = passing(one, conflict, merges=edge.merges)
         lags.append((departure(one, edge.who, enters) if edge.stands else enters) - clears)
-        early.append(enters - clears < min(edge.gap, 0.0) - _ROUNDED or (edge.stands and lags[-1] < min(edge.lag, 0.0) - EARLY))
+        early.append(
+            enters - clears < min(edge.gap, 0.0) - _ROUNDED
+            or (edge.stands and lags[-1] < min(edge.lag, 0.0) - EARLY)
+        )
     share = float(np.mean(early)) if early else np.nan
     if len(lags) < 2:
         return Yielding(edge, share, np.nan, np.nan)
@@ -126,7 +146,9 @@ def _for_nobody(motion: Motion, who: int, k: int) -> bool:
     time = motion.time
     own, speed, yaw = motion.position[who], motion.speed[who, k], motion.heading[who]
     later = np.flatnonzero(
-        (time >= time[k]) & (time <= time[k] + 2.0 * _AHEAD) & (np.arange(len(time)) <= motion.present[who, 1])
+        (time >= time[k])
+        & (time <= time[k] + 2.0 * _AHEAD)
+        & (np.arange(len(time)) <= motion.present[who, 1])
     )
     turning = np.abs(np.gradient(yaw, time))[later]
     if float((motion.speed[who, later] * turning).max(initial=0.0)) > _BENDS:
@@ -144,7 +166,9 @@ def _for_nobody(motion: Motion, who: int, k: int) -> bool:
         if np.sqrt(np.square(ahead).sum(axis=1)).min() < _NEAR:
             return False
         rows = np.arange(first, last + 1)
-        apart = np.sqrt(np.square(own[later][:, None] - motion.position[other, rows][None]).sum(axis=-1))
+        apart = np.sqrt(
+            np.square(own[later][:, None] - motion.position[other, rows][None]).sum(axis=-1)
+        )
         soon = np.abs(time[later][:, None] - time[rows][None]) <= _AHEAD
         if (soon & (apart < _PATH)).any():
             return False
@@ -173,7 +197,9 @@ def _answers(edge: Reaction, scenarios: Sequence[Motion]) -> tuple[float, float]
     return lag, best * best
 
 
-def pair_windows(time: Floats, position: Floats, speed: Floats, seconds: float = 3.5, stride: float = 1.0) -> Floats:
+def pair_windows(
+    time: Floats, position: Floats, speed: Floats, seconds: float = 3.5, stride: float = 1.0
+) -> Floats:
     """Return the features (W, F) of all windows of a pair: distance, closing speed, speeds, accelerations and lagged products.
 
     Args:
@@ -193,12 +219,17 @@ def pair_windows(time: Floats, position: Floats, speed: Floats, seconds: float =
         at = slice(first, first + width)
         d, c, v, a = apart[at], closing[at], speed[:, at], acceleration[:, at]
         row = [d[0], d[-1], d.min(), c[0], c[-1], c.mean(), float(np.abs(c).max())]
-        row += [value for one in v for value in (one[0], one[-1], one.mean())] + [v[1].mean() - v[0].mean()]
+        row += [value for one in v for value in (one[0], one[-1], one.mean())] + [
+            v[1].mean() - v[0].mean()
+        ]
         row += [value for one in a for value in (one.mean(), one.std(), one.min(), one.max())]
         for lag in lags:
             for one, other in ((0, 1), (1, 0)):
                 x, y = a[one, : width - lag], a[other, lag:]
-                row += [float((x * y).mean()), float((x * y).mean() / (np.sqrt((x * x).mean() * (y * y).mean()) + 1e-6))]
+                row += [
+                    float((x * y).mean()),
+                    float((x * y).mean() / (np.sqrt((x * x).mean() * (y * y).mean()) + 1e-6)),
+                ]
         row += [float((closing[at] * a[n]).mean()) for n in (0, 1)]
         found.append(row)
     return np.array(found)

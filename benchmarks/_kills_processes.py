@@ -15,8 +15,16 @@ import sys
 import time
 from typing import Any, TypeAlias
 
-KEYS = {"AWS_ACCESS_KEY_ID": "any", "AWS_SECRET_ACCESS_KEY": "any", "AWS_DEFAULT_REGION": "us-east-1"}
-QUIET: Any = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+KEYS = {
+    "AWS_ACCESS_KEY_ID": "any",
+    "AWS_SECRET_ACCESS_KEY": "any",
+    "AWS_DEFAULT_REGION": "us-east-1",
+}
+QUIET: Any = {
+    "stdin": subprocess.DEVNULL,
+    "stdout": subprocess.DEVNULL,
+    "stderr": subprocess.DEVNULL,
+}
 BUCKET = "kills"
 Process: TypeAlias = subprocess.Popen[bytes]
 
@@ -51,9 +59,19 @@ class Processes:
     def __init__(self, folder: Path) -> None:
         self.folder, self.temporary = folder, folder / "tmp"
         self.server_port, self.port = free_port(), free_port()
-        self.environment = {**os.environ, **KEYS, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.port}"}
-        self.environment |= {"TMPDIR": str(self.temporary), "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0"}
-        self.environment |= {"DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON": "{}", "OMP_NUM_THREADS": "1"}
+        self.environment = {
+            **os.environ,
+            **KEYS,
+            "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.port}",
+        }
+        self.environment |= {
+            "TMPDIR": str(self.temporary),
+            "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
+        }
+        self.environment |= {
+            "DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON": "{}",
+            "OMP_NUM_THREADS": "1",
+        }
         self.address, self.count = "", 0
         self.scheduler: Process | None = None
         self.forwarder: Process | None = None
@@ -71,7 +89,13 @@ class Processes:
 
     def start_forwarder(self) -> None:
         """Start what forwards to the server."""
-        words = [sys.executable, "-m", "benchmarks._kills_forwarder", str(self.port), str(self.server_port)]
+        words = [
+            sys.executable,
+            "-m",
+            "benchmarks._kills_forwarder",
+            str(self.port),
+            str(self.server_port),
+        ]
         self.forwarder = subprocess.Popen(words, start_new_session=True, **QUIET)
         wait_for_port(self.port)
 
@@ -79,9 +103,18 @@ class Processes:
         """Start a scheduler, at another address than earlier ones, and two workers."""
         self.count += 1
         known = self.folder / f"scheduler-{self.count}.json"
-        words = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
+        words = [
+            sys.executable,
+            "-m",
+            "distributed.cli.dask_scheduler",
+            "--port",
+            "0",
+            "--no-dashboard",
+        ]
         words += ["--scheduler-file", str(known)]
-        self.scheduler = subprocess.Popen(words, start_new_session=True, env=self.environment, **QUIET)
+        self.scheduler = subprocess.Popen(
+            words, start_new_session=True, env=self.environment, **QUIET
+        )
         while not known.exists() or not known.read_text().endswith("}"):
             time.sleep(0.05)
         self.address = json.loads(known.read_text())["address"]
@@ -89,7 +122,16 @@ class Processes:
 
     def start_worker(self) -> Process:
         """Start a nanny, which starts a worker."""
-        words = [sys.executable, "-m", "distributed.cli.dask_worker", self.address, "--nworkers", "1", "--nthreads", "1"]
+        words = [
+            sys.executable,
+            "-m",
+            "distributed.cli.dask_worker",
+            self.address,
+            "--nworkers",
+            "1",
+            "--nthreads",
+            "1",
+        ]
         words += ["--no-dashboard", "--memory-limit", "0", "--local-directory", str(self.folder)]
         return subprocess.Popen(words, start_new_session=True, env=self.environment, **QUIET)
 
@@ -98,7 +140,12 @@ class Processes:
         with log.open("ab") as output:
             command = [sys.executable, "-m", "scenario_gen", *words, "--scheduler", self.address]
             return subprocess.Popen(
-                command, start_new_session=True, env=self.environment, stdin=subprocess.DEVNULL, stdout=output, stderr=output
+                command,
+                start_new_session=True,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
             )
 
     def end_cluster(self) -> None:
@@ -130,6 +177,9 @@ def worker_of(nanny: Process) -> int:
         if entry.name.isdigit() and int(entry.name) != nanny.pid:
             with suppress(OSError):
                 own = int(entry.name)
-                if os.getsid(own) == nanny.pid and b"spawn_main" in (entry / "cmdline").read_bytes():
+                if (
+                    os.getsid(own) == nanny.pid
+                    and b"spawn_main" in (entry / "cmdline").read_bytes()
+                ):
                     return own
     return 0

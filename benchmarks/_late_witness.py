@@ -32,7 +32,9 @@ def natural_scenarios() -> NaturalScenarios:
     config = PipelineConfig()
     (encounter,) = read_log([bundled("b")]).encounters
     road, encounter = road_and_template("t_intersection", encounter, config.road)
-    attempt = Chain(encounter, segment(encounter, config.segmentation, SEED), road, config, seed=SEED)
+    attempt = Chain(
+        encounter, segment(encounter, config.segmentation, SEED), road, config, seed=SEED
+    )
     plan = plan_of(attempt.plan(), config.sampling, config.limits, Request())
     checker = checker_of(plan, config.sampling, config.limits, Request())
     return NaturalScenarios.of(plan, checker.check, config.sampling, SEED)
@@ -84,15 +86,25 @@ class LateWitness:
     def _response(motion: Scenario) -> Response:
         here = np.ones((len(motion.vehicles), len(motion.time)), dtype=np.bool_)
         apart = tuple(time_apart(motion, here, 0, i) for i in range(1, len(motion.vehicles)))
-        return Response(-1.0, apart, "contact") if touches(motion) else Response(max(min(apart), 1e-3), apart)
+        return (
+            Response(-1.0, apart, "contact")
+            if touches(motion)
+            else Response(max(min(apart), 1e-3), apart)
+        )
 
 
-def brute_force(natural: NaturalScenarios, lates: Sequence[float], count: int, seed: int = 1) -> list[int]:
+def brute_force(
+    natural: NaturalScenarios, lates: Sequence[float], count: int, seed: int = 1
+) -> list[int]:
     """Return in how many of `count` natural scenarios each of the planners fails."""
     rng = np.random.default_rng(seed)
     failures, done = [0] * len(lates), 0
     while done < count:
-        drawn = [one for one in natural.scenarios(rng.standard_normal((256, natural.size))) if one is not None]
+        drawn = [
+            one
+            for one in natural.scenarios(rng.standard_normal((256, natural.size)))
+            if one is not None
+        ]
         for scenario in drawn[: count - done]:
             for k, late in enumerate(lates):
                 failures[k] += touches(late_by(scenario, late))

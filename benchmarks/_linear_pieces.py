@@ -58,5 +58,9 @@ def _line_costs(series: Floats) -> Floats:
         for row in series - series.mean(axis=1, keepdims=True):
             sy, sxy, syy = between(row), between(x * row), between(row * row)
             spread = sxx - sx * sx / n
-            cost += syy - sy * sy / n - np.where(spread > 0.0, np.square(sxy - sx * sy / n) / spread, 0.0)
+            cost += (
+                syy
+                - sy * sy / n
+                - np.where(spread > 0.0, np.square(sxy - sx * sy / n) / spread, 0.0)
+            )
     return np.where(n > 0, np.maximum(cost, 0.0), np.inf)

@@ -45,14 +45,32 @@ def many(domain: int, folder: Path, client: Any, until: Any) -> list[Row]:
     sizes = ", ".join(f"{node} {size:.0f}" for node, size in peaks.items())
     name = f"one request of {COUNT:,} scenarios: "
     return [
-        Row(f"{name}lost on the way to the bag", COUNT - there, "scenarios", "lower", 0.0, f"{there} in the bag"),
-        Row(f"{name}recorded", there / seconds, "1/s", "higher", None, "for one second of the recorder's CPU time"),
+        Row(
+            f"{name}lost on the way to the bag",
+            COUNT - there,
+            "scenarios",
+            "lower",
+            0.0,
+            f"{there} in the bag",
+        ),
+        Row(
+            f"{name}recorded",
+            there / seconds,
+            "1/s",
+            "higher",
+            None,
+            "for one second of the recorder's CPU time",
+        ),
         Row(f"{name}largest process", max(peaks.values()), "MiB", "lower", MOST, sizes),
     ]
 
 
 def _peak(pid: int) -> float:
-    (line,) = [line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmHWM")]
+    (line,) = [
+        line
+        for line in Path(f"/proc/{pid}/status").read_text().splitlines()
+        if line.startswith("VmHWM")
+    ]
     return int(line.split()[1]) / 1024
 
 

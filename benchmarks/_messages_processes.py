@@ -21,7 +21,12 @@ from scenario_gen.base.ros_domain import this_host_only
 
 def environment(domain: int) -> dict[str, str]:
     """Return the environment of a process on `domain`, this host only."""
-    return {**os.environ, **this_host_only(), "ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0"}
+    return {
+        **os.environ,
+        **this_host_only(),
+        "ROS_DOMAIN_ID": str(domain),
+        "RCUTILS_COLORIZED_OUTPUT": "0",
+    }
 
 
 @dataclass(frozen=True)
@@ -56,7 +61,14 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
     """Run nodes, each a process with its ROS arguments and a log in the folder; they are ended at the end."""
     processes = []
     for node, own in arguments.items():
-        command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", node, "--ros-args", *own]
+        command = [
+            sys.executable,
+            "-m",
+            "scenario_gen.ros.plumbing.start",
+            node,
+            "--ros-args",
+            *own,
+        ]
         with (folder / f"{node}.log").open("wb") as log:
             variables = environment(domain) | {"ROS_LOG_DIR": str(folder)}
             processes.append(subprocess.Popen(command, stdout=log, stderr=log, env=variables))
@@ -67,10 +79,16 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
         suite.end()
 
 
-def publisher(domain: int, topic: str, size: int, count: int, rate: float) -> "subprocess.Popen[str]":
+def publisher(
+    domain: int, topic: str, size: int, count: int, rate: float
+) -> "subprocess.Popen[str]":
     """Start a publisher; it waits for a subscription, and for a second more."""
     words = ["publish", topic, str(size), str(count), str(rate)]
-    return subprocess.Popen([sys.executable, "-m", "benchmarks._messages_processes", *words], text=True, env=environment(domain))
+    return subprocess.Popen(
+        [sys.executable, "-m", "benchmarks._messages_processes", *words],
+        text=True,
+        env=environment(domain),
+    )
 
 
 def publish(topic: str, size: int, count: int, rate: float) -> None:

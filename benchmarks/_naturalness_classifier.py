@@ -27,7 +27,16 @@ SERIES = {
     "closing speed": 0.1,
 }
 """What a window holds, each with the band below which a value (of speed and gap: a step) has no sign."""
-STATISTICS = ("mean", "spread", "least", "greatest", "step", "largest step", "sign changes", "high frequencies")
+STATISTICS = (
+    "mean",
+    "spread",
+    "least",
+    "greatest",
+    "step",
+    "largest step",
+    "sign changes",
+    "high frequencies",
+)
 FEATURES = tuple(f"{series}: {statistic}" for series in SERIES for statistic in STATISTICS)
 GROUPS = {
     "all features": tuple(SERIES),
@@ -86,7 +95,14 @@ def features(series: dict[str, Floats]) -> Floats:
         power = np.square(np.abs(np.fft.rfft(values - line)))
         fast = np.fft.rfftfreq(len(values), DT) > HIGH
         share = float(power[fast].sum() / power.sum()) if power.sum() > 1e-12 else 0.0
-        found += [values.mean(), values.std(), values.min(), values.max(), step.std(), np.abs(step).max()]
+        found += [
+            values.mean(),
+            values.std(),
+            values.min(),
+            values.max(),
+            step.std(),
+            np.abs(step).max(),
+        ]
         found += [float(sign_changes(signed, band)), share]
     return np.array(found)
 
@@ -100,15 +116,21 @@ class Windows:
     generated: Floats
 
 
-def of_sets(name: str, template: Signals, samples: Sequence[Signals], rng: np.random.Generator) -> Windows:
+def of_sets(
+    name: str, template: Signals, samples: Sequence[Signals], rng: np.random.Generator
+) -> Windows:
     """Take all windows of the template, and RATIO times as many of the samples, drawn without putting them back."""
     recorded = windows(template)
     generated = np.concatenate([windows(sample) for sample in samples])
     kept = min(len(generated), RATIO * len(recorded))
-    return Windows(name, recorded, generated[np.sort(rng.choice(len(generated), kept, replace=False))])
+    return Windows(
+        name, recorded, generated[np.sort(rng.choice(len(generated), kept, replace=False))]
+    )
 
 
-def told_apart(sets: Sequence[Windows], series: Sequence[str], *, importances: bool = False) -> Progress | None:
+def told_apart(
+    sets: Sequence[Windows], series: Sequence[str], *, importances: bool = False
+) -> Progress | None:
     """Train and test; None where there are fewer encounters than folds, or scikit-learn is not installed."""
     try:
         from sklearn.ensemble import HistGradientBoostingClassifier
@@ -121,21 +143,43 @@ def told_apart(sets: Sequence[Windows], series: Sequence[str], *, importances: b
     if len(names) < FOLDS:
         return None
     columns = [k for k, name in enumerate(FEATURES) if name.split(":")[0] in series]
-    data = np.concatenate([part for one in sets for part in (one.recorded, one.generated)])[:, columns]
-    label = np.concatenate([np.repeat((0, 1), (len(one.recorded), len(one.generated))) for one in sets])
-    group = np.concatenate([np.full(len(one.recorded) + len(one.generated), names.index(one.name)) for one in sets])
-    weight = np.concatenate([np.full(len(part), 1.0 / len(part)) for one in sets for part in (one.recorded, one.generated)])
+    data = np.concatenate([part for one in sets for part in (one.recorded, one.generated)])[
+        :, columns
+    ]
+    label = np.concatenate(
+        [np.repeat((0, 1), (len(one.recorded), len(one.generated))) for one in sets]
+    )
+    group = np.concatenate(
+        [np.full(len(one.recorded) + len(one.generated), names.index(one.name)) for one in sets]
+    )
+    weight = np.concatenate(
+        [
+            np.full(len(part), 1.0 / len(part))
+            for one in sets
+            for part in (one.recorded, one.generated)
+        ]
+    )
     weight *= len(weight) / weight.sum()
     areas: list[float] = []
     falls: dict[str, list[float]] = {FEATURES[k]: [] for k in columns}
     rng = np.random.default_rng(0)
-    with threadpool_limits(1):  # threads that wait for each other on a busy machine cost a hundred times the work
+    with threadpool_limits(
+        1
+    ):  # threads that wait for each other on a busy machine cost a hundred times the work
         for train, test in folds(group, len(names), rng, 2 if len(data) < FEW else 1):
-            model = HistGradientBoostingClassifier(max_leaf_nodes=8, max_bins=64, min_samples_leaf=10, random_state=0)
+            model = HistGradientBoostingClassifier(
+                max_leaf_nodes=8, max_bins=64, min_samples_leaf=10, random_state=0
+            )
             model.fit(data[train], label[train], sample_weight=weight[train])
 
-            def area(table: Floats, model: HistGradientBoostingClassifier = model, test: Ints = test) -> float:
-                return float(roc_auc_score(label[test], model.predict_proba(table)[:, 1], sample_weight=weight[test]))
+            def area(
+                table: Floats, model: HistGradientBoostingClassifier = model, test: Ints = test
+            ) -> float:
+                return float(
+                    roc_auc_score(
+                        label[test], model.predict_proba(table)[:, 1], sample_weight=weight[test]
+                    )
+                )
 
             areas.append(area(data[test]))
             for k, column in enumerate(columns) if importances else ():
@@ -149,7 +193,9 @@ def told_apart(sets: Sequence[Windows], series: Sequence[str], *, importances: b
     )
 
 
-def folds(group: Ints, count: int, rng: np.random.Generator, repeats: int) -> Iterator[tuple[Ints, Ints]]:
+def folds(
+    group: Ints, count: int, rng: np.random.Generator, repeats: int
+) -> Iterator[tuple[Ints, Ints]]:
     """Yield train and test rows: whole groups together, `repeats` times with other groups together."""
     for _ in range(repeats):
         of_group = rng.permutation(count) % FOLDS

@@ -57,7 +57,8 @@ class Cut:
 def cuts() -> tuple[list[Cut], list[Cut]]:
     """Return the cuts that one may look at, and those that are held out."""
     known = [
-        Cut(**row | {"files": tuple(row["files"]), "vehicles": tuple(row["vehicles"])}) for row in json.loads(TABLE.read_text())
+        Cut(**row | {"files": tuple(row["files"]), "vehicles": tuple(row["vehicles"])})
+        for row in json.loads(TABLE.read_text())
     ]
     kept = len(known) - len(known) // 3
     return known[:kept], known[kept:]
@@ -68,7 +69,13 @@ def recorded(data: Path) -> list[Cut]:
     found = []
     for path in sorted((data / "trajectories").glob("*/encounter_*.csv")):
         place = next((name for key, name in MAPS.items() if key in path.stem.lower()), "")
-        found.append(Cut(path.stem.removeprefix("encounter_")[:32], (str(path.relative_to(data / "trajectories")),), map=place))
+        found.append(
+            Cut(
+                path.stem.removeprefix("encounter_")[:32],
+                (str(path.relative_to(data / "trajectories")),),
+                map=place,
+            )
+        )
     return found
 
 
@@ -85,26 +92,38 @@ def draw(data: Path, rng: np.random.Generator) -> Iterator[Cut]:
         for k in tries:
             encounter = encounters[k]
             length = min(float(rng.uniform(SHORTEST, LONGEST)), encounter.duration)
-            offset = 1e-9 * (encounter.start_ns - first) + float(rng.uniform(0.0, encounter.duration - length))
+            offset = 1e-9 * (encounter.start_ns - first) + float(
+                rng.uniform(0.0, encounter.duration - length)
+            )
             ids = [vehicle.id for vehicle in encounter.vehicles]
             if len(ids) > 2 and rng.random() < 0.5:
                 ids = [ids[n] for n in sorted(rng.choice(len(ids), 2, replace=False))]
             start, end = round(max(offset, 0.0), 1), round(max(offset, 0.0) + length, 1)
             if any(name in ids and begin < end and start < until for name, begin, until in taken):
                 continue
-            cut = Cut(f"{recording}-{number + 1}", files, tuple(ids), start, end, MAPS.get(recording, ""))
+            cut = Cut(
+                f"{recording}-{number + 1}", files, tuple(ids), start, end, MAPS.get(recording, "")
+            )
             try:
                 found = read_log(paths, cut.config()).encounters
             except InputError:
                 continue
-            if len(found) != 1 or len(found[0].vehicles) != len(ids) or found[0].duration < min(SHORTEST, 0.8 * length) - 1.0:
+            if (
+                len(found) != 1
+                or len(found[0].vehicles) != len(ids)
+                or found[0].duration < min(SHORTEST, 0.8 * length) - 1.0
+            ):
                 continue
             yield cut
             taken += [(name, start, end) for name in ids]
             number += 1
             if number == wanted:
                 break
-        print(f"{recording}: {number} of {wanted} from {len(encounters)} encounters", file=sys.stderr, flush=True)
+        print(
+            f"{recording}: {number} of {wanted} from {len(encounters)} encounters",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def main() -> None:

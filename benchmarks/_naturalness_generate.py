@@ -80,9 +80,15 @@ def made_by(jobs: Sequence[Job], checkout: Path | None = None) -> Iterator[Made]
         for job in jobs:
             yield from run(job)
         return
-    command = [sys.executable, "-c", f"import runpy; runpy.run_path({str(Path(__file__))!r}, run_name='__main__')"]
+    command = [
+        sys.executable,
+        "-c",
+        f"import runpy; runpy.run_path({str(Path(__file__))!r}, run_name='__main__')",
+    ]
     environment = os.environ | {"PYTHONPATH": str(checkout)}
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, cwd=checkout) as process:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, cwd=checkout
+    ) as process:
         if process.stdin is None or process.stdout is None:
             raise RuntimeError("no pipes")
         process.stdin.write(json.dumps([vars(job) for job in jobs]).encode())
@@ -98,7 +104,9 @@ def run(job: Job) -> Iterator[Made]:
     from scenario_gen.base.errors import ScenarioGenError
     from scenario_gen.logs import LogConfig, read_log
 
-    whole: Any = {"whole": True} if "whole" in {one.name for one in fields(LogConfig)} else {}  # so older versions cut
+    whole: Any = (
+        {"whole": True} if "whole" in {one.name for one in fields(LogConfig)} else {}
+    )  # so older versions cut
     config = LogConfig(vehicles=",".join(job.vehicles), start=job.start, end=job.end, **whole)
     try:
         found = read_log([Path(path) for path in job.paths], config).encounters
@@ -111,13 +119,17 @@ def run(job: Job) -> Iterator[Made]:
         yield generated(job.name, encounter, road, job.count, own=own, variety=job.variety)
 
 
-def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, variety: str = "wide") -> Made:
+def generated(
+    name: str, encounter: Any, road: str, count: int, *, own: bool, variety: str = "wide"
+) -> Made:
     """Put one encounter on one road."""
     from scenario_gen.base.errors import ScenarioGenError
     from scenario_gen.method.evaluation import EvaluationConfig
     from scenario_gen.pipeline import generate, PipelineConfig
 
-    compare: Any = {"compare": True} if hasattr(EvaluationConfig(), "compare") else {}  # older versions always do
+    compare: Any = (
+        {"compare": True} if hasattr(EvaluationConfig(), "compare") else {}
+    )  # older versions always do
     config: Any = PipelineConfig(evaluation=EvaluationConfig(resamples=10, **compare))
     if hasattr(config.sampling, "variety"):  # older versions have one preset
         config = replace(config, sampling=replace(config.sampling, variety=variety))
@@ -127,12 +139,17 @@ def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, va
     except ScenarioGenError as error:
         return Made(name, Path(road).stem, own, str(error), template=arrays(encounter))
     drawn = made.generated if hasattr(made, "generated") else made.with_changepoints
-    rows = {row.name: {key: made.evaluation.value(row.name, key) for key in EVALUATED} for row in made.evaluation.rows}
+    rows = {
+        row.name: {key: made.evaluation.value(row.name, key) for key in EVALUATED}
+        for row in made.evaluation.rows
+    }
     return Made(
         name,
         Path(road).stem,
         own,
-        "" if len(drawn.scenarios) > 1 else f"{len(drawn.scenarios)} scenarios: {dict(drawn.refused)}",
+        ""
+        if len(drawn.scenarios) > 1
+        else f"{len(drawn.scenarios)} scenarios: {dict(drawn.refused)}",
         template=arrays(encounter),
         oracle=arrays(made.replay),
         samples=[arrays(scenario) for scenario in drawn.scenarios],
@@ -151,7 +168,9 @@ def arrays(motion: Any) -> Arrays:
     """Return the motion of an encounter or a scenario as plain arrays."""
     import numpy as np
 
-    return {name: np.array(getattr(motion, name)) for name in ("time", "position", "heading", "speed")}
+    return {
+        name: np.array(getattr(motion, name)) for name in ("time", "position", "heading", "speed")
+    }
 
 
 def main() -> None:

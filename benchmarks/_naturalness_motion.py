@@ -48,7 +48,10 @@ class Signals:
     @classmethod
     def of(cls, motion: Mapping[str, Any]) -> "Signals":
         """Derive them from plain arrays; a clock that is not of 0.1 s is interpolated."""
-        time, heading = np.asarray(motion["time"], dtype=float), np.unwrap(motion["heading"], axis=1)
+        time, heading = (
+            np.asarray(motion["time"], dtype=float),
+            np.unwrap(motion["heading"], axis=1),
+        )
         position: Floats = np.array(motion["position"])
         speed: Floats = np.array(motion["speed"])
         clock: Floats = np.arange(int(np.floor(time[-1] / DT + 1e-6)) + 1, dtype=np.float64) * DT
@@ -61,7 +64,16 @@ class Signals:
             heading, speed = interpolated(heading), interpolated(speed)
         acceleration, yaw_rate = np.diff(speed, axis=1) / DT, np.diff(heading, axis=1) / DT
         lateral = 0.5 * (speed[:, 1:] + speed[:, :-1]) * yaw_rate
-        return cls(clock, position, heading, speed, acceleration, np.diff(acceleration, axis=1) / DT, yaw_rate, lateral)
+        return cls(
+            clock,
+            position,
+            heading,
+            speed,
+            acceleration,
+            np.diff(acceleration, axis=1) / DT,
+            yaw_rate,
+            lateral,
+        )
 
 
 def sign_changes(values: Floats, band: float) -> int:
@@ -123,8 +135,13 @@ def keeps_turn(template: Signals, sample: Signals) -> np.ndarray:
     before, after = turns(template), turns(sample)
     near = np.abs(before - after) <= TURN
     stands = (driven(template) < SHORT) == (driven(sample) < SHORT)
-    small, large = np.minimum(np.abs(before), np.abs(after)), np.maximum(np.abs(before), np.abs(after))
-    kind = ~((small < TURN) & (large > CLEARLY_TURNS)) & ~((small >= TURN) & (np.sign(before) != np.sign(after)))
+    small, large = (
+        np.minimum(np.abs(before), np.abs(after)),
+        np.maximum(np.abs(before), np.abs(after)),
+    )
+    kind = ~((small < TURN) & (large > CLEARLY_TURNS)) & ~(
+        (small >= TURN) & (np.sign(before) != np.sign(after))
+    )
     return np.asarray(near & stands & kind)
 
 

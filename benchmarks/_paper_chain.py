@@ -34,9 +34,13 @@ TRAINING_PERIOD = 1.0
 ITERATIONS = 3000
 END_SPEEDS, KNOTS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.5, None, 0.3, 0.7, 0.1, 0.9)
 """Shares of the asked end speeds, and places of a primitive's knot, that are tried in this order until a speed profile exists."""
-FITTING = FittingConfig(allow="lost_conflict", scale_low=0.01, scale_high=1000.0, max_move=100.0, clearance=0.0)
+FITTING = FittingConfig(
+    allow="lost_conflict", scale_low=0.01, scale_high=1000.0, max_move=100.0, clearance=0.0
+)
 PLANNING = PlanningConfig(iterations=ITERATIONS, drivable=False, rrt_star_connect=PAPER)
-UNLIMITED = Dynamics(max_speed=1e6, max_acceleration=1e6, max_deceleration=1e6, max_lateral_acceleration=1e6)
+UNLIMITED = Dynamics(
+    max_speed=1e6, max_acceleration=1e6, max_deceleration=1e6, max_lateral_acceleration=1e6
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +75,20 @@ def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Float
     reasons = []
     for name in ROADS:
         try:
-            metric = draw(name, layout_for(name, clean_tracks(encounter), RoadConfig()), RoadConfig())
-            fit = fit_template(encounter, segmentation, metric, FittingConfig(allow="lost_conflict"))
+            metric = draw(
+                name, layout_for(name, clean_tracks(encounter), RoadConfig()), RoadConfig()
+            )
+            fit = fit_template(
+                encounter, segmentation, metric, FittingConfig(allow="lost_conflict")
+            )
         except RefusedError as error:
             reasons.append(f"{name}: {error}")
             continue
         road = build_road(name, encounter, RoadConfig(paper=True))
         try:
-            return road, *_evenly_scaled(encounter, segmentation, road, _Lanes.of(road, metric, fit))
+            return road, *_evenly_scaled(
+                encounter, segmentation, road, _Lanes.of(road, metric, fit)
+            )
         except RefusedError as error:
             reasons.append(f"{name}: {error}")
     raise RefusedError("it fits none of the paper's roads; " + "; ".join(reasons))
@@ -108,7 +118,11 @@ class _Lanes:
             poses = [_on_lane(metric, pose, centre) for pose in side[:, :3]]
             found.append([(leaves, lane // lanes, distance) for leaves, lane, distance in poses])
         junction = 0.0 if road.name == "straight" else 3.5 * lanes
-        return cls((found[0], found[1]), junction, np.array([fitted.stands.all() for fitted in fit.fitted]))
+        return cls(
+            (found[0], found[1]),
+            junction,
+            np.array([fitted.stands.all() for fitted in fit.fitted]),
+        )
 
     def most_cells(self) -> float:
         """Cells per metre outside the junction with which the farthest start or end is just on the grid."""
@@ -119,12 +133,17 @@ class _Lanes:
     def ends(self, road: Road, cells: Floats) -> tuple[Floats, Floats]:
         """Starts and goals (N, 3) on the paper's road with so many cells (N,) per metre outside the junction."""
         states = [
-            np.array([self._pose(road, *lane, float(c)) for lane, c in zip(side, cells, strict=True)]) for side in self.found
+            np.array(
+                [self._pose(road, *lane, float(c)) for lane, c in zip(side, cells, strict=True)]
+            )
+            for side in self.found
         ]
         states[1][self.still] = states[0][self.still]
         return states[0], states[1]
 
-    def _pose(self, road: Road, leaves: bool, arm: int, distance: float, cells: float) -> list[float]:
+    def _pose(
+        self, road: Road, leaves: bool, arm: int, distance: float, cells: float
+    ) -> list[float]:
         x, y, heading = (road.exits if leaves else road.entries)[arm]
         outside = abs(distance) - self.junction
         reach = cells * outside + (HALF_ROAD if self.junction else 0.0)
@@ -134,7 +153,9 @@ class _Lanes:
         return [x + back * np.cos(heading), y + back * np.sin(heading), heading]
 
 
-def _evenly_scaled(encounter: Encounter, segmentation: Segmentation, road: Road, lanes: _Lanes) -> tuple[Floats, Floats]:
+def _evenly_scaled(
+    encounter: Encounter, segmentation: Segmentation, road: Road, lanes: _Lanes
+) -> tuple[Floats, Floats]:
     """Starts and goals with which eq 9 has, as nearly as the junction allows, one scale s for all vehicles.
 
     s is linear in the cells per metre outside the junction, so that two fits tell where it is the least vehicle's.
@@ -142,7 +163,14 @@ def _evenly_scaled(encounter: Encounter, segmentation: Segmentation, road: Road,
 
     def scales(cells: Floats) -> Floats:
         starts, goals = lanes.ends(road, cells)
-        fit = fit_template(encounter, without_changepoints(segmentation), road, FITTING, starts=starts, goals=goals)
+        fit = fit_template(
+            encounter,
+            without_changepoints(segmentation),
+            road,
+            FITTING,
+            starts=starts,
+            goals=goals,
+        )
         return np.array([fitted.scale for fitted in fit.fitted])
 
     most = np.full(len(encounter.vehicles), lanes.most_cells())
@@ -163,7 +191,9 @@ def _on_lane(road: Road, pose: Floats, centre: Floats) -> tuple[bool, int, float
             outward = along if leaves else -along
             offset = pose[:2] - gate[:2]
             distance = float((pose[:2] - centre) @ outward)
-            off = abs(offset @ np.array([-along[1], along[0]])) + 10.0 * abs(float(wrap_angle(np.asarray(pose[2] - gate[2]))))
+            off = abs(offset @ np.array([-along[1], along[0]])) + 10.0 * abs(
+                float(wrap_angle(np.asarray(pose[2] - gate[2])))
+            )
             cost = float(off) + (0.0 if distance >= 0.0 else 1.0)
             if cost < best:
                 best, answer = cost, (leaves, lane, distance)
@@ -171,7 +201,13 @@ def _on_lane(road: Road, pose: Floats, centre: Floats) -> tuple[bool, int, float
 
 
 def sample(
-    encounter: Encounter, segmentation: Segmentation, road: Road, ends: tuple[Floats, Floats], *, count: int, seed: int
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    ends: tuple[Floats, Floats],
+    *,
+    count: int,
+    seed: int,
 ) -> Sampled:
     """Fit, plan and sample with these changepoints; `ends` are start and end poses (N, 3) [m, m, rad] of all vehicles.
 
@@ -182,7 +218,10 @@ def sample(
         fit = fit_template(encounter, segmentation, road, FITTING, starts=ends[0], goals=ends[1])
         routes = plan_routes(road, fit, PLANNING, seed)
         waits = find_waits(encounter) if segmentation.changepoints.size else ()
-        drawn = [_vehicle(encounter, fit, n, route, waits=waits, count=count, seed=seed) for n, route in enumerate(routes)]
+        drawn = [
+            _vehicle(encounter, fit, n, route, waits=waits, count=count, seed=seed)
+            for n, route in enumerate(routes)
+        ]
     except InputError as error:  # no y(x), e.g. a vehicle that returns to where it started
         raise RefusedError(str(error)) from error
     position = np.stack([found for found, _ in drawn], axis=1)
@@ -198,7 +237,14 @@ def sample(
 
 
 def _vehicle(
-    encounter: Encounter, fit: Fit, n: int, route: Route, *, waits: tuple[Wait, ...], count: int, seed: int
+    encounter: Encounter,
+    fit: Fit,
+    n: int,
+    route: Route,
+    *,
+    waits: tuple[Wait, ...],
+    count: int,
+    seed: int,
 ) -> tuple[Floats, float]:
     """(S, T, 2) positions of one vehicle, and the share of its end speeds that could be kept."""
     if len(route.points) == 1:
@@ -214,7 +260,9 @@ def _vehicle(
     return np.stack([np.broadcast_to(x, y.shape), y], axis=-1) @ turn.T, factor
 
 
-def _profile(encounter: Encounter, fit: Fit, n: int, route: Route, waits: tuple[Wait, ...]) -> tuple[SpeedProfile, float]:
+def _profile(
+    encounter: Encounter, fit: Fit, n: int, route: Route, waits: tuple[Wait, ...]
+) -> tuple[SpeedProfile, float]:
     """The speed profile along the planned path: piecewise constant acceleration (IV-B); the share of the end speeds it keeps."""
     times = encounter.time[fit.anchor_index]
     own = [(wait.start, wait.end) for wait in waits if wait.vehicle == n]
@@ -245,7 +293,9 @@ def _driven(encounter: Encounter, n: int) -> float:
 
 def _along(route: Route, station: Floats) -> Floats:
     """(m, 2) positions at arc lengths along the planned path."""
-    return np.column_stack([np.interp(station, route.length, route.points[:, axis]) for axis in (0, 1)])
+    return np.column_stack(
+        [np.interp(station, route.length, route.points[:, axis]) for axis in (0, 1)]
+    )
 
 
 def rotation(direction: Floats) -> Floats:
@@ -270,7 +320,9 @@ def ordinate_posterior(anchors: Floats, x: Floats) -> Posterior:
     seen_x, seen_y = anchors[keep].T
     low, high = min(seen_x.min(), x.min()), max(seen_x.max(), x.max())
     if len(keep) < 2 or seen_x[0] == seen_x[-1]:
-        raise InputError("y as a function of x needs anchors at two different x; use the parametric form")
+        raise InputError(
+            "y as a function of x needs anchors at two different x; use the parametric form"
+        )
     noise = np.full(len(keep), NOISE)
     noise[[0, -1]] = 0.0
     features = Features(low, high, SIGMA, LENGTH, min(DEGREE, len(keep) - 1))

@@ -65,8 +65,12 @@ def _priors(case: PaperCase) -> Claim:
 
 
 def _trends(case: PaperCase) -> Claim:
-    said = "; ".join(f"{name} {error:.3f} (K = {count})" for name, (error, count) in case.trends.items())
-    ours, uniform = (case.trends[name][0] for name in ("paper preset", "uniform, as many as the paper preset"))
+    said = "; ".join(
+        f"{name} {error:.3f} (K = {count})" for name, (error, count) in case.trends.items()
+    )
+    ours, uniform = (
+        case.trends[name][0] for name in ("paper preset", "uniform, as many as the paper preset")
+    )
     return Claim(
         3,
         "Changepoints lie where the trend of speed changes, so that acceleration within a primitive can be taken as constant.",
@@ -82,7 +86,8 @@ def _generated(case: PaperCase) -> Claim:
     off = ", ".join(f"{name} {100.0 * share:.1f} %" for name, share in case.off_road.items())
     stops = {name: speed for name, speed in case.stop_speed.items() if math.isfinite(speed)}
     said = (
-        "While a vehicle waits in the template, its mean speed is, in m/s: " + ", ".join(f"{n} {v:.2f}" for n, v in stops.items())
+        "While a vehicle waits in the template, its mean speed is, in m/s: "
+        + ", ".join(f"{n} {v:.2f}" for n, v in stops.items())
         if stops
         else "No vehicle that drives in this template also waits, so there is no stop to keep"
     )
@@ -108,7 +113,9 @@ def _interaction(case: PaperCase) -> Claim:
         shown = []
         for name in (WITH, WITHOUT, UNIFORM):
             if name in case.similarity:
-                error, correlation = (case.similarity[name][f"{what}_{kind}"] for what in ("e", "correlation"))
+                error, correlation = (
+                    case.similarity[name][f"{what}_{kind}"] for what in ("e", "correlation")
+                )
                 shown.append(f"{name} {error.value:.3f} [{error.low:.3f}, {error.high:.3f}]")
                 for key, value in (("", error.value), (" low", error.low), (" high", error.high)):
                     values[f"e_{kind} {name}{key}"] = finite(value)
@@ -121,7 +128,9 @@ def _interaction(case: PaperCase) -> Claim:
         if name in case.similarity
     ]
     holds = errors[0] < errors[1] and errors[2] < errors[3] if len(errors) == 4 else None
-    scales = ", ".join(f"{fitted.scale:.2f}" for fitted in case.arms[WITH].fit.fitted if not fitted.stands.all())
+    scales = ", ".join(
+        f"{fitted.scale:.2f}" for fitted in case.arms[WITH].fit.fitted if not fitted.stands.all()
+    )
     return Claim(
         5,
         "The mean normalised DTW feature of the scenarios generated with changepoints is close to the template's, that of those "

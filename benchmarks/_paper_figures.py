@@ -19,8 +19,29 @@ from scenario_gen.numerics import Floats
 from scenario_gen.types import Road, WITH, WITHOUT
 
 VEHICLES = ("#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b")
-PRIMITIVES = ("#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#edc948", "#76b7b2", "#ff9da7", "#9c755f", "#79706e")
-HEAT = ("#313695", "#4575b4", "#74add1", "#abd9e9", "#ffffbf", "#fdae61", "#f46d43", "#d73027", "#a50026")
+PRIMITIVES = (
+    "#4e79a7",
+    "#f28e2b",
+    "#59a14f",
+    "#e15759",
+    "#b07aa1",
+    "#edc948",
+    "#76b7b2",
+    "#ff9da7",
+    "#9c755f",
+    "#79706e",
+)
+HEAT = (
+    "#313695",
+    "#4575b4",
+    "#74add1",
+    "#abd9e9",
+    "#ffffbf",
+    "#fdae61",
+    "#f46d43",
+    "#d73027",
+    "#a50026",
+)
 DRAWN = 50  # samples
 POINTS = 90  # of a curve
 MATRIX = 60  # side of a heat map
@@ -34,7 +55,10 @@ def colour(n: int) -> str:
 
 def figure_2(found: Regressions) -> go.Figure:
     """Ground truth with training data, and ten samples under each prior."""
-    titles = ["(a) ground truth", *(f"({k}) {n}" for k, n in zip("bcd", found.priors, strict=True))]
+    titles = [
+        "(a) ground truth",
+        *(f"({k}) {n}" for k, n in zip("bcd", found.priors, strict=True)),
+    ]
     panels = make_subplots(1, 4, subplot_titles=titles)
     panels.update_xaxes(title_text="x [cells]")
     panels.update_yaxes(title_text="y [cells]", col=1)
@@ -47,24 +71,40 @@ def figure_2(found: Regressions) -> go.Figure:
         _line(panels, found.x, found.truth, (1, column), color="black")
         _marks(panels, found.training, (1, column), color="red")
         curves = [found.truth, *samples]
-        least, most = min(float(curve.min()) for curve in curves), max(float(curve.max()) for curve in curves)
+        least, most = (
+            min(float(curve.min()) for curve in curves),
+            max(float(curve.max()) for curve in curves),
+        )
         panels.update_yaxes(range=[min(low - room, least), max(high + room, most)], col=column)
     return _finished(panels, 320)
 
 
 def figure_3(case: PaperCase) -> go.Figure:
     """Paths and speeds of the template, coloured by primitive."""
-    encounter, edges = case.encounter, [0, *case.segmentation.changepoints.tolist(), len(case.encounter.time) - 1]
+    encounter, edges = (
+        case.encounter,
+        [0, *case.segmentation.changepoints.tolist(), len(case.encounter.time) - 1],
+    )
     panels = make_subplots(1, 2, subplot_titles=["trajectory", "speed"])
     for n in range(len(encounter.vehicles)):
         for k, (a, b) in enumerate(pairwise(edges)):
             shade = PRIMITIVES[int(case.segmentation.labels[a]) % len(PRIMITIVES)]
-            xy, time, speed = (values[a : b + 1] for values in (encounter.position[n], encounter.time, encounter.speed[n]))
+            xy, time, speed = (
+                values[a : b + 1]
+                for values in (encounter.position[n], encounter.time, encounter.speed[n])
+            )
             symbol = "circle" if k == 0 else "triangle-up"
             _line(panels, xy[:, 0], xy[:, 1], (1, 1), color=shade, width=3)
             _line(panels, time, speed, (1, 2), color=shade, width=3)
             _marks(panels, xy[:1], (1, 1), symbol=symbol, size=8, color=colour(n))
-            _marks(panels, np.column_stack([time, speed])[:1], (1, 2), symbol=symbol, size=8, color=colour(n))
+            _marks(
+                panels,
+                np.column_stack([time, speed])[:1],
+                (1, 2),
+                symbol=symbol,
+                size=8,
+                color=colour(n),
+            )
         _marks(panels, encounter.position[n, -1:], (1, 1), symbol="x", size=8, color=colour(n))
     panels.update_xaxes(title_text="east [m]", col=1)
     panels.update_yaxes(title_text="north [m]", scaleanchor="x", col=1)
@@ -76,10 +116,19 @@ def figure_3(case: PaperCase) -> go.Figure:
 def figure_4(case: PaperCase) -> go.Figure:
     """The template, and what was generated from it with and without changepoints: paths above, speeds below."""
     names = [name for name in (WITH, WITHOUT) if name in case.arms]
-    panels = make_subplots(2, 1 + len(names), subplot_titles=["template", *names], vertical_spacing=0.12)
+    panels = make_subplots(
+        2, 1 + len(names), subplot_titles=["template", *names], vertical_spacing=0.12
+    )
     encounter = case.encounter
     for n in range(len(encounter.vehicles)):
-        _line(panels, encounter.position[n, :, 0], encounter.position[n, :, 1], (1, 1), color=colour(n), width=2)
+        _line(
+            panels,
+            encounter.position[n, :, 0],
+            encounter.position[n, :, 1],
+            (1, 1),
+            color=colour(n),
+            width=2,
+        )
         _line(panels, encounter.time, encounter.speed[n], (2, 1), color=colour(n), width=2)
     panels.update_yaxes(scaleanchor="x", row=1, col=1)
     for column, name in enumerate(names, start=2):
@@ -88,7 +137,15 @@ def figure_4(case: PaperCase) -> go.Figure:
             _lay(panels, case.road, column)
         for n in range(len(encounter.vehicles)):
             paths, speeds = arm.position[:DRAWN, n], arm.speed[:DRAWN, n]
-            _line(panels, paths[..., 0], paths[..., 1], (1, column), opacity=0.4, color=colour(n), width=1)
+            _line(
+                panels,
+                paths[..., 0],
+                paths[..., 1],
+                (1, column),
+                opacity=0.4,
+                color=colour(n),
+                width=1,
+            )
             time = np.broadcast_to(encounter.time, speeds.shape)
             _line(panels, time, speeds, (2, column), opacity=0.4, color=colour(n), width=1)
         panels.update_xaxes(range=[0, 1000], row=1, col=column)
@@ -109,18 +166,28 @@ def figure_5(case: PaperCase) -> go.Figure:
     for column, (position, speed) in enumerate(sets.values(), start=1):
         places = [np.ascontiguousarray(np.swapaxes(position[:, n][:, keep], 1, 2)) for n in (0, 1)]
         paces = [np.ascontiguousarray(speed[:, n][:, None, keep]) for n in (0, 1)]
-        matrices = mean_feature(places[0], places[1], "euclidean"), mean_feature(paces[0], paces[1], "manhattan")
+        matrices = (
+            mean_feature(places[0], places[1], "euclidean"),
+            mean_feature(paces[0], paces[1], "manhattan"),
+        )
         axis = np.round(encounter.time[keep], 2).tolist()
         for row, matrix in enumerate(matrices, start=1):
             shades = {"zmin": 0, "zmax": 1, "colorscale": scale, "showscale": False}
-            panels.add_heatmap(z=np.round(matrix, 3).tolist(), x=axis, y=axis, row=row, col=column, **shades)
+            panels.add_heatmap(
+                z=np.round(matrix, 3).tolist(), x=axis, y=axis, row=row, col=column, **shades
+            )
     panels.update_yaxes(title_text="position: time [s]", row=1, col=1)
     panels.update_yaxes(title_text="speed: time [s]", row=2, col=1)
     return _finished(panels, 480)
 
 
 def _finished(figure: go.Figure, height: int) -> go.Figure:
-    figure.update_layout(height=height, showlegend=False, margin={"l": 50, "r": 10, "t": 40, "b": 45}, template="plotly_white")
+    figure.update_layout(
+        height=height,
+        showlegend=False,
+        margin={"l": 50, "r": 10, "t": 40, "b": 45},
+        template="plotly_white",
+    )
     return figure
 
 
@@ -132,14 +199,31 @@ def _lay(panels: go.Figure, road: Road, column: int) -> None:
     Image.fromarray(grey[::step, ::step]).save(buffer, format="PNG")
     source = "data:image/png;base64," + b64encode(buffer.getvalue()).decode("ascii")
     height, width = road.drivable.shape
-    axis = {"xref": f"x{column}", "yref": f"y{column}", "x": 0, "y": height, "sizex": width, "sizey": height}
+    axis = {
+        "xref": f"x{column}",
+        "yref": f"y{column}",
+        "x": 0,
+        "y": height,
+        "sizex": width,
+        "sizey": height,
+    }
     panels.add_layout_image(source=source, sizing="stretch", layer="below", **axis)
 
 
-def _line(panels: go.Figure, x: Floats, y: Floats, at: tuple[int, int], opacity: float | None = None, **line: Any) -> None:
+def _line(
+    panels: go.Figure,
+    x: Floats,
+    y: Floats,
+    at: tuple[int, int],
+    opacity: float | None = None,
+    **line: Any,
+) -> None:
     """Draw a curve (T,), or curves (S, T) as one trace with gaps, in the panel at (row, column)."""
     ends = [] if x.ndim == 1 else [None]
-    xs, ys = ([value for curve in np.atleast_2d(curves) for value in (*_few(curve), *ends)] for curves in (x, y))
+    xs, ys = (
+        [value for curve in np.atleast_2d(curves) for value in (*_few(curve), *ends)]
+        for curves in (x, y)
+    )
     panels.add_scatter(x=xs, y=ys, mode="lines", line=line, opacity=opacity, row=at[0], col=at[1])
 
 

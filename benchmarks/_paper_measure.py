@@ -23,7 +23,16 @@ from scenario_gen.method.sampling import Features, Observations, Regression
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.template import find_waits
-from scenario_gen.types import Encounter, Interval, Road, Route, Segmentation, UNIFORM, WITH, WITHOUT
+from scenario_gen.types import (
+    Encounter,
+    Interval,
+    Road,
+    Route,
+    Segmentation,
+    UNIFORM,
+    WITH,
+    WITHOUT,
+)
 
 PRIORS = {"zero mean": -1, "training data mean": 0, "cubic polynomial": 3}
 """The priors of figure 2, as degrees of the mean."""
@@ -84,11 +93,17 @@ def run_case(encounter: Encounter, *, count: int, seed: int) -> PaperCase:
         road, *ends = place(encounter, segmentation)
     except RefusedError as error:
         return PaperCase(encounter, segmentation, trends, refused={"": str(error)})
-    choices = {WITH: segmentation, WITHOUT: without_changepoints(segmentation), UNIFORM: uniform_changepoints(segmentation)}
+    choices = {
+        WITH: segmentation,
+        WITHOUT: without_changepoints(segmentation),
+        UNIFORM: uniform_changepoints(segmentation),
+    }
     arms, refused = {}, {}
     for name, chosen in choices.items():
         try:
-            arms[name] = sample(encounter, chosen, road, (ends[0], ends[1]), count=count, seed=seed)
+            arms[name] = sample(
+                encounter, chosen, road, (ends[0], ends[1]), count=count, seed=seed
+            )
         except RefusedError as error:
             refused[name] = str(error)
     routes = next((arm.routes for arm in arms.values()), ())
@@ -106,7 +121,9 @@ def run_case(encounter: Encounter, *, count: int, seed: int) -> PaperCase:
     )
 
 
-def trend_fits(encounter: Encounter, paper: Segmentation, driving: Segmentation) -> dict[str, tuple[float, int]]:
+def trend_fits(
+    encounter: Encounter, paper: Segmentation, driving: Segmentation
+) -> dict[str, tuple[float, int]]:
     """Figure 3: how constant acceleration is within primitives, for several ways of cutting at once."""
     ways = {
         "paper preset": paper,
@@ -115,7 +132,10 @@ def trend_fits(encounter: Encounter, paper: Segmentation, driving: Segmentation)
         "uniform, as many as the paper preset": uniform_changepoints(paper),
         "best possible, as many as the paper preset": linear_changepoints(encounter, paper),
     }
-    return {name: (line_error(encounter.speed, way.changepoints), len(way.changepoints)) for name, way in ways.items()}
+    return {
+        name: (line_error(encounter.speed, way.changepoints), len(way.changepoints))
+        for name, way in ways.items()
+    }
 
 
 def line_error(speed: Floats, changepoints: Ints) -> float:
@@ -139,7 +159,9 @@ def stop_speed(encounter: Encounter, arm: Sampled) -> float:
     for wait in find_waits(encounter):
         if len(arm.routes[wait.vehicle].points) > 1:
             during = (encounter.time >= wait.start) & (encounter.time <= wait.end)
-            found.append(arm.speed[:, wait.vehicle, during].mean() / arm.fit.fitted[wait.vehicle].scale)
+            found.append(
+                arm.speed[:, wait.vehicle, during].mean() / arm.fit.fitted[wait.vehicle].scale
+            )
     return float(np.mean(found)) if found else float("nan")
 
 
@@ -147,13 +169,17 @@ def _bend(route: Route) -> tuple[float, float]:
     """How far a path strays from its chord; of straight ones the longest."""
     offset = route.points[:, :2] - route.points[0, :2]
     chord = offset[-1] / max(float(np.hypot(*offset[-1])), 1e-9)
-    return round(float(np.abs(offset[:, 0] * chord[1] - offset[:, 1] * chord[0]).max()), 1), float(route.length[-1])
+    return round(float(np.abs(offset[:, 0] * chord[1] - offset[:, 1] * chord[0]).max()), 1), float(
+        route.length[-1]
+    )
 
 
 def compare_priors(route: Route, seed: int) -> Regressions:
     """Figure 2 on one planned path: the grid is turned so that the path's chord is along x, and y is far from zero."""
     path = route.points[:, :2] @ rotation((route.points[-1] - route.points[0])[:2])
-    path = path[np.concatenate([[True], path[1:, 0] > np.maximum.accumulate(path[:, 0])[:-1]])]  # a function of x
+    path = path[
+        np.concatenate([[True], path[1:, 0] > np.maximum.accumulate(path[:, 0])[:-1]])
+    ]  # a function of x
     x = np.linspace(path[0, 0], path[-1, 0], 120)
     truth = np.interp(x, *path.T)
     at = np.linspace(x[0], x[-1], 5)
@@ -162,7 +188,9 @@ def compare_priors(route: Route, seed: int) -> Regressions:
     generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, 2])))
     priors = {}
     for name, degree in PRIORS.items():
-        posterior = Regression(Features(x[0], x[-1], SIGMA, LENGTH, degree), observations).predict(x)
+        posterior = Regression(Features(x[0], x[-1], SIGMA, LENGTH, degree), observations).predict(
+            x
+        )
         samples = posterior.sample(generator.standard_normal((10, posterior.factor.shape[1])))
         priors[name] = Prior(samples, float(np.sqrt((np.square(posterior.mean - truth)).mean())))
     return Regressions(x, truth, training, priors)
@@ -175,7 +203,9 @@ def similarity_of(encounter: Encounter, arm: Sampled, seed: int) -> dict[str, In
     paces = pair_similarities(encounter.speed[..., None], arm.speed[..., None], "manhattan")
     values: dict[str, Interval] = {}
     for kind, pairs in (("position", places), ("speed", paces)):
-        values[f"e_{kind}"] = bootstrap.interval(lambda weights, pairs=pairs: mean_error(pairs, weights))  # type: ignore[misc]
+        values[f"e_{kind}"] = bootstrap.interval(
+            lambda weights, pairs=pairs: mean_error(pairs, weights)
+        )  # type: ignore[misc]
         values[f"correlation_{kind}"] = bootstrap.interval(
             lambda weights, pairs=pairs: mean_correlation(pairs, weights)  # type: ignore[misc]
         )

@@ -97,7 +97,9 @@ class SpeedBounds:
 class SpeedProfileQP:
     """Solves the speeds of one vehicle for many samples of clock and lengths."""
 
-    def __init__(self, knots: SpeedKnots, limits: Dynamics, bounds: SpeedBounds | None = None) -> None:
+    def __init__(
+        self, knots: SpeedKnots, limits: Dynamics, bounds: SpeedBounds | None = None
+    ) -> None:
         self.knots, self.limits = knots, limits
         self.bounds = bounds or SpeedBounds.none()
         n, groups = knots.size, len(knots.bounds)
@@ -133,14 +135,21 @@ class SpeedProfileQP:
         if n == 0 or groups < 2:
             return *self.solve(knot, lengths), np.zeros(lengths.shape)
         h, f, a, low, high = self._programmes(knot, lengths)
-        reached, wanted = np.cumsum(a[:, :groups], axis=1), np.cumsum(low[:, n : n + groups], axis=1)
+        reached, wanted = (
+            np.cumsum(a[:, :groups], axis=1),
+            np.cumsum(low[:, n : n + groups], axis=1),
+        )
         inner = reached[:, :-1]
         h += (2.0 * _STIFFNESS * inner.transpose(0, 2, 1)) @ inner
         f -= 2.0 * _STIFFNESS * (wanted[:, None, :-1] @ inner)[:, 0]
         a[:, groups - 1] = reached[:, -1]
         low[:, n + groups - 1] = high[:, n + groups - 1] = wanted[:, -1]
         bounded = np.r_[0:n, n + groups - 1 : n + self._rows]
-        a, low, high = np.ascontiguousarray(a[:, groups - 1 :]), low[:, bounded].copy(), high[:, bounded].copy()
+        a, low, high = (
+            np.ascontiguousarray(a[:, groups - 1 :]),
+            low[:, bounded].copy(),
+            high[:, bounded].copy(),
+        )
         speeds, feasible = self._optimise(h, f, a, low, high, self._sense[bounded].copy())
         slid = (reached @ speeds[:, self.knots.unknown >= 0, None])[..., 0] - wanted
         return speeds, feasible, slid
@@ -149,19 +158,37 @@ class SpeedProfileQP:
         """The given speeds, (samples, M)."""
         return np.broadcast_to(self.knots.given, (samples, len(self.knots.knot))).copy()
 
-    def _programmes(self, knot: Floats, lengths: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    def _programmes(
+        self, knot: Floats, lengths: Floats
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """The quadratic programmes of S samples."""
         knots, samples, n = self.knots, len(knot), self.knots.size
-        h, f, a = np.zeros((samples, n, n)), np.zeros((samples, n)), np.zeros((samples, self._rows, n))
+        h, f, a = (
+            np.zeros((samples, n, n)),
+            np.zeros((samples, n)),
+            np.zeros((samples, self._rows, n)),
+        )
         low, high = np.zeros((samples, n + self._rows)), np.zeros((samples, n + self._rows))
         high[:, :n] = self.limits.max_speed
         limits = np.array([self.limits.max_deceleration, self.limits.max_acceleration])
         bounds = self.bounds
-        given = (knots.group, knots.moments, knots.interior, knots.unknown, knots.given, self._rated, limits)
-        _assemble(knot, lengths, *given, bounds.interval, bounds.at, bounds.most, h, f, a, low, high)
+        given = (
+            knots.group,
+            knots.moments,
+            knots.interior,
+            knots.unknown,
+            knots.given,
+            self._rated,
+            limits,
+        )
+        _assemble(
+            knot, lengths, *given, bounds.interval, bounds.at, bounds.most, h, f, a, low, high
+        )
         return h, f, a, low, high
 
-    def _optimise(self, h: Floats, f: Floats, a: Floats, low: Floats, high: Floats, sense: Marks) -> tuple[Floats, Bools]:
+    def _optimise(
+        self, h: Floats, f: Floats, a: Floats, low: Floats, high: Floats, sense: Marks
+    ) -> tuple[Floats, Bools]:
         """Solve S programmes one after the other; speeds (S, M) and feasible (S,)."""
         speeds, feasible = self._speeds(len(f)), np.zeros(len(f), dtype=np.bool_)
         free = self.knots.unknown >= 0
@@ -173,7 +200,16 @@ class SpeedProfileQP:
 
 
 @kernel(inline=True)
-def _term(share: float, unknown: int, given: float, a: Floats, low: Floats, high: Floats, row: int, n: int) -> None:
+def _term(
+    share: float,
+    unknown: int,
+    given: float,
+    a: Floats,
+    low: Floats,
+    high: Floats,
+    row: int,
+    n: int,
+) -> None:
     """Add share · v to a row: to its coefficients if v is unknown, else to its bounds, which follow n simple ones."""
     if unknown >= 0:
         a[row, unknown] += share
@@ -183,7 +219,9 @@ def _term(share: float, unknown: int, given: float, a: Floats, low: Floats, high
 
 
 @kernel(inline=True)
-def _square(weight: float, knots: Ints, shares: Floats, unknown: Ints, given: Floats, h: Floats, f: Floats) -> None:
+def _square(
+    weight: float, knots: Ints, shares: Floats, unknown: Ints, given: Floats, h: Floats, f: Floats
+) -> None:
     """Add weight · (Σ shares · v at knots)² to the cost; doubled, because of DAQP's ½."""
     for j in range(len(knots)):
         p = unknown[knots[j]]
@@ -231,7 +269,9 @@ def _assemble(
             low[s, n + g] = high[s, n + g] = lengths[s, g]
         for i in np.flatnonzero(group >= 0):
             g, step = group[i], knot[s, i + 1] - knot[s, i]
-            scale = min(max(lengths[s, g], 0.0), _TARGET_SCALE * natural[g]) / max(natural[g], 1e-9)
+            scale = min(max(lengths[s, g], 0.0), _TARGET_SCALE * natural[g]) / max(
+                natural[g], 1e-9
+            )
             for end in range(2):
                 p, q = unknown[i + end], unknown[i + 1 - end]
                 _term(0.5 * step, p, given[i + end], a[s], low[s], high[s], g, n)
@@ -248,7 +288,15 @@ def _assemble(
             before, after = knot[s, i] - knot[s, i - 1], knot[s, i + 1] - knot[s, i]
             whole = before + after
             shares = np.array([-after / whole, 1.0, -before / whole])
-            _square(CONSTANCY * (1.0 / before + 1.0 / after), np.arange(i - 1, i + 2), shares, unknown, given, h[s], f[s])
+            _square(
+                CONSTANCY * (1.0 / before + 1.0 / after),
+                np.arange(i - 1, i + 2),
+                shares,
+                unknown,
+                given,
+                h[s],
+                f[s],
+            )
         for k, i in enumerate(rated):
             row, step = groups + k, knot[s, i + 1] - knot[s, i]
             low[s, n + row], high[s, n + row] = -limits[0] * step, limits[1] * step

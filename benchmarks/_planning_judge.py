@@ -29,7 +29,9 @@ def is_drivable(case: Obstructed) -> bool:
     poses = (np.asarray(query.start) - [*road.origin, 0.0])[None]
     goal = np.asarray(query.goal) - [*road.origin, 0.0]
     for _ in range(PIECES):
-        poses = np.concatenate([_moved(poses, k) for k in (-query.curvature, 0.0, query.curvature)])
+        poses = np.concatenate(
+            [_moved(poses, k) for k in (-query.curvature, 0.0, query.curvature)]
+        )
         cell = np.floor(poses[:, :2] / road.resolution).astype(int)
         turn = np.round(poses[:, 2] / (2.0 * np.pi / DIRECTIONS)).astype(int) % DIRECTIONS
         inside = ((cell >= 0) & (cell < (width, height))).all(axis=1)
@@ -60,7 +62,9 @@ def _moved(poses: Floats, curvature: float) -> Floats:
 def _free(drivable: Bools, cell: float, length: float, width: float) -> Bools:
     """(DIRECTIONS, H, W): whether a footprint anywhere in a cell, within half a step of a direction or a piece, is drivable."""
     reach = 0.5 * np.hypot(length, width)
-    slack = np.sqrt(0.5) * cell + reach * np.pi / DIRECTIONS + 0.5 * STEP * 0.05  # of the place, of the direction, of a piece
+    slack = (
+        np.sqrt(0.5) * cell + reach * np.pi / DIRECTIONS + 0.5 * STEP * 0.05
+    )  # of the place, of the direction, of a piece
     size = int(np.ceil((reach + slack) / cell)) + 1
     y, x = (cell * axis for axis in np.mgrid[-size : size + 1, -size : size + 1])
     blocked = np.pad(~drivable, size, constant_values=True).astype(np.float64)
@@ -68,6 +72,9 @@ def _free(drivable: Bools, cell: float, length: float, width: float) -> Bools:
     for k in range(DIRECTIONS):
         c, s = np.cos(2.0 * np.pi * k / DIRECTIONS), np.sin(2.0 * np.pi * k / DIRECTIONS)
         along, across = np.abs(c * x + s * y) - 0.5 * length, np.abs(c * y - s * x) - 0.5 * width
-        body = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)) <= slack + np.sqrt(0.5) * cell
+        body = (
+            np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
+            <= slack + np.sqrt(0.5) * cell
+        )
         out[k] = fftconvolve(blocked, body[::-1, ::-1], mode="valid") < 0.5
     return out

@@ -59,7 +59,9 @@ def optimum(road: Road, ends: Floats) -> float:
     padded = np.pad(blocked, 1, constant_values=True)
     around = np.stack([padded[:-1, :-1], padded[:-1, 1:], padded[1:, :-1], padded[1:, 1:]])
     row, column = np.nonzero(around.sum(axis=0) == 1)
-    points = np.concatenate([np.round(2 * ends).astype(np.int64), 2 * np.column_stack((column, row))])
+    points = np.concatenate(
+        [np.round(2 * ends).astype(np.int64), 2 * np.column_stack((column, row))]
+    )
     a, b = np.triu_indices(len(points), k=1)
     seen = _visible(blocked, points[a], points[b])
     a, b = a[seen], b[seen]
@@ -72,7 +74,10 @@ def _visible(blocked: Bools, a: np.ndarray, b: np.ndarray) -> Bools:
     """Whether segments a-b (P, 2), in half cells, miss the inside of every blocked cell; exact."""
     free = np.ones(len(a), dtype=bool)
     steep = np.abs((b - a)[:, 1]) > np.abs((b - a)[:, 0])
-    for along, grid in ((~steep, blocked), (steep, blocked.T)):  # walk along the longer side, column by column
+    for along, grid in (
+        (~steep, blocked),
+        (steep, blocked.T),
+    ):  # walk along the longer side, column by column
         index = np.nonzero(along)[0]
         p, q = (a[index], b[index]) if grid is blocked else (a[index][:, ::-1], b[index][:, ::-1])
         swap = p[:, 0] > q[:, 0]
@@ -83,7 +88,9 @@ def _visible(blocked: Bools, a: np.ndarray, b: np.ndarray) -> Bools:
         for j in range(grid.shape[1]):
             left, right = np.maximum(p[:, 0], 2 * j), np.minimum(q[:, 0], 2 * j + 2)
             k = np.nonzero(good & (left < right))[0]
-            y0, y1 = (p[k, 1] * dx[k] + dy[k] * (x[k] - p[k, 0]) for x in (left, right))  # times dx
+            y0, y1 = (
+                p[k, 1] * dx[k] + dy[k] * (x[k] - p[k, 0]) for x in (left, right)
+            )  # times dx
             low, high = np.minimum(y0, y1) // (2 * dx[k]), -(-np.maximum(y0, y1) // (2 * dx[k]))
             good[k] = until[high, j] - until[np.minimum(low, high), j] == 0
         free[index] = good
@@ -94,7 +101,10 @@ def enters_blocked(drivable: Bools, path: Floats) -> bool:
     """Whether a path (P, 2) [cells] enters the inside of a cell that is not drivable; exact rational arithmetic on floats."""
     height, width = drivable.shape
     scale = 1 << 1074  # every float is a whole multiple of 2^-1074
-    whole = [[n * (scale // d) for n, d in (float(x).as_integer_ratio() for x in point)] for point in path]
+    whole = [
+        [n * (scale // d) for n, d in (float(x).as_integer_ratio() for x in point)]
+        for point in path
+    ]
     for p, q in itertools.pairwise(whole):
         steep = abs(q[1] - p[1]) > abs(q[0] - p[0])
         (ax, ay), (bx, by) = (p[::-1], q[::-1]) if steep else (p, q)
@@ -123,5 +133,14 @@ def recorded_maps(folder: Path) -> list[Road]:
         meta = yaml.safe_load(path.read_text())
         pixels = np.asarray(Image.open(path.parent / meta["image"]))
         drivable = np.flipud((255.0 - pixels) / 255.0 < meta["free_thresh"])
-        roads.append(Road(path.stem, drivable, meta["resolution"], np.array(meta["origin"][:2]), NOWHERE, NOWHERE))
+        roads.append(
+            Road(
+                path.stem,
+                drivable,
+                meta["resolution"],
+                np.array(meta["origin"][:2]),
+                NOWHERE,
+                NOWHERE,
+            )
+        )
     return roads

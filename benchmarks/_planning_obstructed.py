@@ -51,14 +51,35 @@ def obstructed(seed: int) -> Obstructed | None:
     if seed % 2 == 0:
         for _ in range(int(rng.integers(2, 6))):
             place = rng.uniform((15.0, WALL), (LENGTH - 15.0, WALL + WIDTH))
-            there.append(Obstacle(*map(float, (*place, rng.uniform(0.0, np.pi), rng.uniform(3.8, 5.0), rng.uniform(1.7, 2.0)))))
+            there.append(
+                Obstacle(
+                    *map(
+                        float,
+                        (
+                            *place,
+                            rng.uniform(0.0, np.pi),
+                            rng.uniform(3.8, 5.0),
+                            rng.uniform(1.7, 2.0),
+                        ),
+                    )
+                )
+            )
     else:
-        gap, count, pitch, side = rng.uniform(2.6, 4.0), int(rng.integers(2, 5)), rng.uniform(9.0, 16.0), int(rng.integers(2))
+        gap, count, pitch, side = (
+            rng.uniform(2.6, 4.0),
+            int(rng.integers(2, 5)),
+            rng.uniform(9.0, 16.0),
+            int(rng.integers(2)),
+        )
         depth = WIDTH - gap
         for k in range(count):
             middle = WALL + 0.5 * depth if (k + side) % 2 == 0 else WALL + WIDTH - 0.5 * depth
             angle = 0.5 * np.pi + rng.uniform(-0.2, 0.2)
-            there.append(Obstacle(*map(float, (20.0 + k * pitch, middle, angle, depth, rng.uniform(1.0, 2.0)))))
+            there.append(
+                Obstacle(
+                    *map(float, (20.0 + k * pitch, middle, angle, depth, rng.uniform(1.0, 2.0)))
+                )
+            )
     road = with_obstacles(road_of(f"obstructed {seed}", drivable, CELL), tuple(there))
     ends = np.array([[4.0, WALL + 0.25 * WIDTH, 0.0], [LENGTH - 4.0, WALL + 0.25 * WIDTH, 0.0]])
     ends[:, 1] += rng.uniform(-0.5, 0.5, 2)
@@ -67,7 +88,9 @@ def obstructed(seed: int) -> Obstructed | None:
     return Obstructed(road, PoseQuery(ends[0], ends[1], *CAR, CURVATURE))
 
 
-def rrt_connect(case: Obstructed, seconds: float, reach: float = REACH, *, simplify: bool = False) -> tuple[Floats, float]:
+def rrt_connect(
+    case: Obstructed, seconds: float, reach: float = REACH, *, simplify: bool = False
+) -> tuple[Floats, float]:
     """OMPL's path (P, 3) in cells, no row if it found none in so much CPU time, and the time without the simplifier's."""
     util.setLogLevel(util.LOG_NONE)
     started = process_time()
@@ -82,7 +105,12 @@ def rrt_connect(case: Obstructed, seconds: float, reach: float = REACH, *, simpl
     information = base.SpaceInformation(space)
 
     def free(a: Any, b: Any) -> bool:
-        return curve_cost(Pose(a.getX(), a.getY(), a.getYaw()), Pose(b.getX(), b.getY(), b.getYaw()), scene) < np.inf
+        return (
+            curve_cost(
+                Pose(a.getX(), a.getY(), a.getYaw()), Pose(b.getX(), b.getY(), b.getYaw()), scene
+            )
+            < np.inf
+        )
 
     def valid(_: Any) -> bool:
         return True  # the sweep of a motion says so of all its poses
@@ -125,14 +153,18 @@ def dubins_length(case: Obstructed, path: Floats) -> float:
     """Length [m] of a chain of Dubins curves (P, 3) in cells, infinity if it is not free: judged by the same sweep for all."""
     road, query = case.road, case.query
     scene = car_scene(road, (query.length, query.width), query.curvature)
-    return road.resolution * float(np.sum([curve_cost(Pose(*a), Pose(*b), scene) for a, b in pairwise(path.tolist())]))
+    return road.resolution * float(
+        np.sum([curve_cost(Pose(*a), Pose(*b), scene) for a, b in pairwise(path.tolist())])
+    )
 
 
 def first_path(case: Obstructed, seconds: float, seed: int) -> tuple[float, float] | None:
     """Our first path: CPU seconds it took, and its length [m]; None if it took longer, or there is none."""
     started = process_time()
     try:
-        plan = PoseRrtStarConnect().plan(case.road, case.query, Budget(None, seconds, first=True), seed)
+        plan = PoseRrtStarConnect().plan(
+            case.road, case.query, Budget(None, seconds, first=True), seed
+        )
     except RefusedError:
         return None
     return process_time() - started, float(plan.step.sum())

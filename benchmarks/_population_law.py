@@ -41,13 +41,21 @@ def members() -> list[Member]:
                 continue  # they have too little in common
             found += [member_of(encounter, path.stem, 0) for encounter in encounters]
     gap, distance = FEATURES.index("gap"), FEATURES.index("distance")
-    close = [abs(member.features[gap]) < CLOSE_S or member.features[distance] < CLOSE_M for member in found]
-    return [member for member, near in zip(found, close, strict=True) if near and member.kind != APART]
+    close = [
+        abs(member.features[gap]) < CLOSE_S or member.features[distance] < CLOSE_M
+        for member in found
+    ]
+    return [
+        member for member, near in zip(found, close, strict=True) if near and member.kind != APART
+    ]
 
 
 def _near_each_other(path: Path) -> Iterator[tuple[str, str]]:
     """Yield ids of two vehicles whose centres come within NEAR_M."""
-    tracks = {name: track.set_index("t_s")[["x_m", "y_m"]] for name, track in pd.read_csv(path).groupby("vehicle_id")}
+    tracks = {
+        name: track.set_index("t_s")[["x_m", "y_m"]]
+        for name, track in pd.read_csv(path).groupby("vehicle_id")
+    }
     for one, other in combinations(tracks, 2):
         apart = (tracks[one] - tracks[other]).dropna()
         if len(apart) and np.hypot(apart.x_m, apart.y_m).min() < NEAR_M:
@@ -58,9 +66,17 @@ def main() -> None:
     """Write the file."""
     seen = members()
     if not seen:
-        raise SystemExit(f"{DATA / WINDOWS}: no such recordings; set SCENARIO_GEN_DATA to the folder that has them")
-    rows = {kind: np.array([member.features for member in seen if member.kind == kind]) for kind in KINDS if kind != APART}
-    scatter = {kind: (own - own.mean(axis=0)).T @ (own - own.mean(axis=0)) for kind, own in rows.items()}
+        raise SystemExit(
+            f"{DATA / WINDOWS}: no such recordings; set SCENARIO_GEN_DATA to the folder that has them"
+        )
+    rows = {
+        kind: np.array([member.features for member in seen if member.kind == kind])
+        for kind in KINDS
+        if kind != APART
+    }
+    scatter = {
+        kind: (own - own.mean(axis=0)).T @ (own - own.mean(axis=0)) for kind, own in rows.items()
+    }
     pooled = sum(scatter.values()) / len(seen)
     kinds = {}
     for kind, own in rows.items():
@@ -71,7 +87,12 @@ def main() -> None:
             "covariance": covariance.round(DIGITS).tolist(),
         }
         print(kind, len(own))
-    document = {"source": SOURCE, "made by": "benchmarks/_population_law.py", "features": FEATURES, "kinds": kinds}
+    document = {
+        "source": SOURCE,
+        "made by": "benchmarks/_population_law.py",
+        "features": FEATURES,
+        "kinds": kinds,
+    }
     SHIPPED.write_text(json.dumps(document) + "\n")
 
 

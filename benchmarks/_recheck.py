@@ -29,7 +29,10 @@ from scenario_gen.types.scenario import BoundaryStates, Scenario
 ALIKE = 0.5  # rad, headings of vehicles on the same path
 FOLLOWING = 3.0  # vehicle lengths of shared path that are following
 ROOMS = (1.0, 0.5, 0.2)  # m
-COARSE, FINE = 2.0, 0.05  # m, between the poses of a sweep; the fine one decides where the coarse one leaves it open
+COARSE, FINE = (
+    2.0,
+    0.05,
+)  # m, between the poses of a sweep; the fine one decides where the coarse one leaves it open
 TIE = 0.02  # s, entries nearer to each other than this have no order
 
 
@@ -56,10 +59,16 @@ class Account:
 class Recheck:
     """Re-checks the scenarios of one template on one road."""
 
-    def __init__(self, encounter: Encounter, road: Road, asked: BoundaryStates, has_changepoints: bool) -> None:
+    def __init__(
+        self, encounter: Encounter, road: Road, asked: BoundaryStates, has_changepoints: bool
+    ) -> None:
         self.asked, self.limits = asked, Limits()
         walks = np.array([vehicle.type == "pedestrian" for vehicle in encounter.vehicles])
-        self.grounds = [(own, *_ground(road, on_foot)) for on_foot, own in ((False, ~walks), (True, walks)) if own.any()]
+        self.grounds = [
+            (own, *_ground(road, on_foot))
+            for on_foot, own in ((False, ~walks), (True, walks))
+            if own.any()
+        ]
         time = encounter.time
         self.template = Scenario(
             encounter.vehicles,
@@ -108,7 +117,12 @@ class Recheck:
         count = len(lanes.end) // n
         samples = np.searchsorted(lanes.key, SLOT * np.arange(n * count + 1))
         for a, b in combinations(range(n), 2):
-            rows = [np.concatenate([np.arange(samples[s * n + v], samples[s * n + v + 1]) for s in range(count)]) for v in (a, b)]
+            rows = [
+                np.concatenate(
+                    [np.arange(samples[s * n + v], samples[s * n + v + 1]) for s in range(count)]
+                )
+                for v in (a, b)
+            ]
             one, two = (np.minimum(r[:-1], len(turning) - 1) for r in rows)
             fast = np.hypot(*np.moveaxis(hodograph[one] - hodograph[two], -1, 0)).max(axis=1)
             radius = [float(np.hypot(*lanes.half[v])) for v in (a, b)]
@@ -116,10 +130,15 @@ class Recheck:
             paces = Paces.of(key, fast + turning[one] * radius[0] + turning[two] * radius[1])
 
             def distance(task: Ints, time: Floats, a: int = a, b: int = b) -> tuple[Floats, Bools]:
-                gap = shapely.distance(lanes.boxes(task * n + a, time), lanes.boxes(task * n + b, time))
+                gap = shapely.distance(
+                    lanes.boxes(task * n + a, time), lanes.boxes(task * n + b, time)
+                )
                 return gap, gap <= 0.0
 
-            both = np.maximum(lanes.begin[a::n], lanes.begin[b::n]), np.minimum(lanes.end[a::n], lanes.end[b::n])
+            both = (
+                np.maximum(lanes.begin[a::n], lanes.begin[b::n]),
+                np.minimum(lanes.end[a::n], lanes.end[b::n]),
+            )
             bad, more = advance(*both, paces, distance)
             looked += more
             for task in np.flatnonzero(bad).tolist():
@@ -134,10 +153,18 @@ class Recheck:
         )
         for k, asked in ((0, self.asked.start), (-1, self.asked.end)):
             driven, gained = _unseen(s, k)
-            far = (np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1) - self.asked.relaxed[:, k, 0] - driven).max()
-            other = (np.abs(s.speed[:, k] - asked[:, 3]) - self.asked.relaxed[:, k, 1] - gained).max()
+            far = (
+                np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1)
+                - self.asked.relaxed[:, k, 0]
+                - driven
+            ).max()
+            other = (
+                np.abs(s.speed[:, k] - asked[:, 3]) - self.asked.relaxed[:, k, 1] - gained
+            ).max()
             if far > one.position_tolerance or other > one.speed_tolerance:
-                account.add("boundary_state", f"{far:.3f} m, {other:.3f} m/s in scenario {s.index}")
+                account.add(
+                    "boundary_state", f"{far:.3f} m, {other:.3f} m/s in scenario {s.index}"
+                )
         h, slack = np.diff(s.time), 1e-5
         rate = np.diff(s.speed, axis=1) / h
         turn = np.abs(np.diff(s.heading, axis=1))
@@ -147,9 +174,13 @@ class Recheck:
         low = np.minimum(rate.min(axis=1), s.acceleration.min(axis=1))
         broken = {
             "speed": s.speed.min() < 0.0 or (s.speed.max(axis=1) > top).any(),
-            "longitudinal_acceleration": ((high > speeding + slack) | (-low > braking + slack)).any(),
+            "longitudinal_acceleration": (
+                (high > speeding + slack) | (-low > braking + slack)
+            ).any(),
             "lateral_acceleration": ((pace * turn / h).max(axis=1) > sideways + slack).any(),
-            "curvature": bool((turn > np.nan_to_num(bend[:, None], posinf=1e9) * way + 1.1e-4).any()),
+            "curvature": bool(
+                (turn > np.nan_to_num(bend[:, None], posinf=1e9) * way + 1.1e-4).any()
+            ),
         }
         for cause in (name for name, wrong in broken.items() if wrong):
             account.add(cause, f"scenario {s.index}")
@@ -172,7 +203,10 @@ class Recheck:
         """As many stands, and as many slow stretches in all, as the template has, one second for each."""
         for v, (standing, every) in enumerate(self.waits):
             account.waits += every
-            for wanted, limit in ((standing, self.limits.stand_speed), (every, self.limits.creep_speed)):
+            for wanted, limit in (
+                (standing, self.limits.stand_speed),
+                (every, self.limits.creep_speed),
+            ):
                 if wanted and sum(int(length + 1e-6) for length in _stands(s, v, limit)) < wanted:
                     account.add("stop_not_kept", f"vehicle {v} in scenario {s.index}")
                     break
@@ -190,7 +224,9 @@ def _unseen(s: Scenario, end: int) -> tuple[Floats, Floats]:
     return step * s.speed[rows, at], step * np.abs(s.acceleration[rows, at])
 
 
-def _off_ground(area: Any, edges: shapely.STRtree, lanes: Lanes, lane: Ints, time: Floats) -> tuple[Floats, Bools]:
+def _off_ground(
+    area: Any, edges: shapely.STRtree, lanes: Lanes, lane: Ints, time: Floats
+) -> tuple[Floats, Bools]:
     """How far [m] footprints are from the edges of an area at least, and whether they are not inside."""
     gap, open_ = np.zeros(len(lane)), np.arange(len(lane))
     for room in ROOMS:  # a footprint that is on the road when grown by so much is as far from its edge: quickly asked
@@ -198,7 +234,9 @@ def _off_ground(area: Any, edges: shapely.STRtree, lanes: Lanes, lane: Ints, tim
         gap[open_[free]] = room
         open_ = open_[~free]
     if len(open_):
-        (at, _), left = edges.query_nearest(lanes.boxes(lane[open_], time[open_]), all_matches=False, return_distance=True)
+        (at, _), left = edges.query_nearest(
+            lanes.boxes(lane[open_], time[open_]), all_matches=False, return_distance=True
+        )
         gap[open_[at]] = left
     # an edge may be touched; who starts inside and crosses none stays inside
     near = (gap <= TOUCH) | (time == lanes.begin[lane])
@@ -253,14 +291,22 @@ def _order(s: Scenario, a: int, b: int, step: float | None = None) -> int | None
     time, poses = zip(*(_sampled(s, v, step) for v in (a, b)), strict=True)
     moved = [_distinct(p, COARSE if step is None else FINE) for p in poses]
     boxes = [
-        boxes_at(p[m], np.repeat([[0.5 * v.length - TOUCH, 0.5 * v.width - TOUCH]], len(m), axis=0))
+        boxes_at(
+            p[m], np.repeat([[0.5 * v.length - TOUCH, 0.5 * v.width - TOUCH]], len(m), axis=0)
+        )
         for p, m, v in zip(poses, moved, (s.vehicles[a], s.vehicles[b]), strict=True)
     ]
     i, j = shapely.STRtree(boxes[1]).query(boxes[0], predicate="intersects")
     if not len(i):
         return None
     times = [t[m] for t, m in zip(time, moved, strict=True)]
-    lead = _lead(poses[0][moved[0]], poses[1][moved[1]], times, (i, j), max(s.vehicles[a].length, s.vehicles[b].length))
+    lead = _lead(
+        poses[0][moved[0]],
+        poses[1][moved[1]],
+        times,
+        (i, j),
+        max(s.vehicles[a].length, s.vehicles[b].length),
+    )
     if lead:
         return lead
     entry = times[0][i.min()], times[1][j.min()]
@@ -291,7 +337,9 @@ def _distinct(poses: Floats, apart: float) -> Ints:
     return np.flatnonzero(kept)
 
 
-def _lead(a: Floats, b: Floats, times: list[Floats], hits: tuple[Ints, Ints], length: float) -> int:
+def _lead(
+    a: Floats, b: Floats, times: list[Floats], hits: tuple[Ints, Ints], length: float
+) -> int:
     """Who leads where the two share a path in the same direction for more than three vehicle lengths; 0 if they do not."""
     i, j = hits
     same = np.cos(a[i, 2] - b[j, 2]) > np.cos(ALIKE)
@@ -316,15 +364,23 @@ def _waits(encounter: Encounter) -> list[tuple[int, int]]:
     """
     reach = round(0.25 / encounter.dt)
     counts = []
-    for vehicle, row, (first, last) in zip(encounter.vehicles, encounter.speed, encounter.present, strict=True):
+    for vehicle, row, (first, last) in zip(
+        encounter.vehicles, encounter.speed, encounter.present, strict=True
+    ):
         speed, least = row[first : last + 1], 0.2 if vehicle.type == "pedestrian" else 0.5
         padded = np.pad(speed, reach, mode="edge")
         smooth = np.convolve(padded, np.full(2 * reach + 1, 1.0 / (2 * reach + 1)), mode="valid")
         slow = np.concatenate([[0], (smooth < least).astype(np.int64), [0]])
         begin, end = np.flatnonzero(np.diff(slow) == 1), np.flatnonzero(np.diff(slow) == -1)
-        long = [(a, b) for a, b in zip(begin, end, strict=True) if (b - 1 - a) * encounter.dt >= 1.0 - 1e-9]
+        long = [
+            (a, b)
+            for a, b in zip(begin, end, strict=True)
+            if (b - 1 - a) * encounter.dt >= 1.0 - 1e-9
+        ]
         still = [np.flatnonzero(speed[a:b] <= 0.1) for a, b in long]
-        standing = sum(bool(len(k)) and float(k[-1] - k[0]) * encounter.dt >= 1.0 - 1e-9 for k in still)
+        standing = sum(
+            bool(len(k)) and float(k[-1] - k[0]) * encounter.dt >= 1.0 - 1e-9 for k in still
+        )
         counts.append((standing, len(long)))
     return counts
 
@@ -348,10 +404,19 @@ def batches(scenarios: Sequence[Scenario], size: int = 400) -> Iterator[Sequence
 def recheck_published(count: int) -> tuple[Account, int]:
     """Re-check `count` published scenarios, every case with the same share of driven time; also how many cases there were."""
     planned = [case for case in cases() if isinstance(case, Prepared)]
-    share = np.array([1.0 / (case.encounter.duration * len(case.encounter.vehicles)) for case in planned])
+    share = np.array(
+        [1.0 / (case.encounter.duration * len(case.encounter.vehicles)) for case in planned]
+    )
     account = Account()
-    for case, wanted in zip(planned, np.ceil(count * share / share.sum()).astype(int).tolist(), strict=True):
-        recheck = Recheck(case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size))
+    for case, wanted in zip(
+        planned, np.ceil(count * share / share.sum()).astype(int).tolist(), strict=True
+    ):
+        recheck = Recheck(
+            case.encounter,
+            case.road,
+            case.fit.requested,
+            bool(case.segmentation.changepoints.size),
+        )
         for batch in batches(case.sample(wanted).scenarios):
             recheck.check(batch, account)
         told = f"{case.name} on {case.road_name}: {wanted}, {account.scenarios} in all, {dict(account.found)}"

@@ -53,18 +53,38 @@ class Lanes:
             for n, vehicle in enumerate(s.vehicles):
                 key.append(s.time + SLOT * len(there))
                 came, went = s.time[s.present[n]]
-                before, after = s.time[s.time <= came - margin + ROUNDING], s.time[s.time >= went + margin - ROUNDING]
-                there.append((float(np.append(s.time[0], before)[-1]), float(np.append(after, s.time[-1])[0])))
+                before, after = (
+                    s.time[s.time <= came - margin + ROUNDING],
+                    s.time[s.time >= went + margin - ROUNDING],
+                )
+                there.append(
+                    (
+                        float(np.append(s.time[0], before)[-1]),
+                        float(np.append(after, s.time[-1])[0]),
+                    )
+                )
                 pose.append(_driven_on(s, n))
                 yaw = pose[-1][:, 2]
                 velocity.append(s.speed[n][:, None] * np.column_stack([np.cos(yaw), np.sin(yaw)]))
                 half.append((0.5 * vehicle.length, 0.5 * vehicle.width))
         begin, end = np.array(there).T
-        return cls(np.concatenate(key), begin, end, np.concatenate(pose), np.concatenate(velocity), np.array(half))
+        return cls(
+            np.concatenate(key),
+            begin,
+            end,
+            np.concatenate(pose),
+            np.concatenate(velocity),
+            np.array(half),
+        )
 
     def _interval(self, lane: Ints, time: Floats) -> tuple[Ints, Floats, Floats]:
         """First sample of the interval that holds each time, its length [s], and the share of it that has passed."""
-        k = np.searchsorted(self.key, lane * SLOT + np.minimum(time, self.end[lane] - 1e-9), side="right") - 1
+        k = (
+            np.searchsorted(
+                self.key, lane * SLOT + np.minimum(time, self.end[lane] - 1e-9), side="right"
+            )
+            - 1
+        )
         h = self.key[k + 1] - self.key[k]
         return k, h, (lane * SLOT + time - self.key[k]) / h
 
@@ -73,7 +93,12 @@ class Lanes:
         k, h, u = self._interval(lane, time)
         u, h = u[:, None], h[:, None]
         p, q, v, w = self.pose[k, :2], self.pose[k + 1, :2], self.velocity[k], self.velocity[k + 1]
-        basis = ((1.0 + 2.0 * u) * (1.0 - u) ** 2, u * (1.0 - u) ** 2, u * u * (3.0 - 2.0 * u), u * u * (u - 1.0))
+        basis = (
+            (1.0 + 2.0 * u) * (1.0 - u) ** 2,
+            u * (1.0 - u) ** 2,
+            u * u * (3.0 - 2.0 * u),
+            u * u * (u - 1.0),
+        )
         xy = basis[0] * p + h * basis[1] * v + basis[2] * q + h * basis[3] * w
         yaw = (1.0 - u[:, 0]) * self.pose[k, 2] + u[:, 0] * self.pose[k + 1, 2]
         return np.column_stack([xy, yaw])
@@ -98,10 +123,15 @@ def _driven_on(s: Scenario, n: int) -> Floats:
     """Poses (T, 3) of a vehicle; outside of its presence it keeps the speed and the rate of turn of its first or last step."""
     first, last = s.present[n].tolist()
     pose = np.column_stack([s.position[n], s.heading[n]])
-    for end, inner, beyond in ((first, first + 1, slice(first)), (last, last - 1, slice(last + 1, None))):
+    for end, inner, beyond in (
+        (first, first + 1, slice(first)),
+        (last, last - 1, slice(last + 1, None)),
+    ):
         since = s.time[beyond] - s.time[end]
         rate = (pose[inner, 2] - pose[end, 2]) / (s.time[inner] - s.time[end])
-        turned = np.expm1(1j * rate * since) / (1j * rate) if rate else since  # the integral of exp(i rate t)
+        turned = (
+            np.expm1(1j * rate * since) / (1j * rate) if rate else since
+        )  # the integral of exp(i rate t)
         way = s.speed[n, end] * np.exp(1j * pose[end, 2]) * turned
         pose[beyond] = pose[end] + np.column_stack([way.real, way.imag, rate * since])
     return pose
@@ -112,7 +142,10 @@ def boxes_at(poses: Floats, half: Floats) -> Any:
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     ahead = np.column_stack([cos, sin]) * half[:, :1]
     aside = np.column_stack([-sin, cos]) * half[:, 1:]
-    corners = np.stack([ahead + aside, aside - ahead, -ahead - aside, ahead - aside], axis=1) + poses[:, None, :2]
+    corners = (
+        np.stack([ahead + aside, aside - ahead, -ahead - aside, ahead - aside], axis=1)
+        + poses[:, None, :2]
+    )
     return shapely.polygons(corners)
 
 
@@ -141,14 +174,22 @@ class Paces:
     def after(self, task: Ints, time: Floats, distance: Floats, end: Floats) -> Floats:
         """The time until which nothing can have come nearer by `distance` [m]."""
         now = np.interp(task * SLOT + time, self.key, self.reach)
-        later = np.interp(np.minimum(now + distance, WAY * (task + 0.99)), self.reach, self.key) - task * SLOT
+        later = (
+            np.interp(np.minimum(now + distance, WAY * (task + 0.99)), self.reach, self.key)
+            - task * SLOT
+        )
         past = np.searchsorted(self.reach, now + distance, side="right")
-        beyond = (past >= len(self.reach)) | (np.floor(self.reach[np.minimum(past, len(self.reach) - 1)] / WAY) != task)
+        beyond = (past >= len(self.reach)) | (
+            np.floor(self.reach[np.minimum(past, len(self.reach) - 1)] / WAY) != task
+        )
         return np.where(beyond, end + 1.0, later)
 
 
 def advance(
-    begin: Floats, end: Floats, paces: Paces, distance: Callable[[Ints, Floats], tuple[Floats, Bools]]
+    begin: Floats,
+    end: Floats,
+    paces: Paces,
+    distance: Callable[[Ints, Floats], tuple[Floats, Bools]],
 ) -> tuple[Bools, int]:
     """Advance tasks from `begin` to `end` (L,) [s].
 
@@ -161,13 +202,20 @@ def advance(
     Returns:
         (L,) True where a violation was found, and the number of instants looked at.
     """
-    bad, time, open_, looked = np.zeros(len(end), dtype=np.bool_), begin.copy(), np.flatnonzero(begin <= end), 0
+    bad, time, open_, looked = (
+        np.zeros(len(end), dtype=np.bool_),
+        begin.copy(),
+        np.flatnonzero(begin <= end),
+        0,
+    )
     while len(open_):
         left, violated = distance(open_, time[open_])
         looked += len(open_)
         bad[open_] |= violated
         here = time[open_]
-        then = np.maximum(paces.after(open_, here, left * (1.0 - 1e-9), end[open_]), here + RESOLUTION)
+        then = np.maximum(
+            paces.after(open_, here, left * (1.0 - 1e-9), end[open_]), here + RESOLUTION
+        )
         time[open_] = np.where(here < end[open_], np.minimum(then, end[open_]), np.inf)
         open_ = open_[np.isfinite(time[open_]) & ~bad[open_]]
     return bad, looked

@@ -32,7 +32,9 @@ from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import Scenario, ScenarioSet, Verdict
 from scenario_gen.types.segmentation import Segmentation
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 LOGS = sized(None, quick=1)
 ROADS = ("corridor", "straight", "t_intersection", "four_way")
 
@@ -52,12 +54,24 @@ class Prepared:
     waits: tuple[Wait, ...]
 
     def sample(
-        self, count: int, seed: int = 0, config: SamplingConfig = SamplingConfig(), *, checked: bool = True
+        self,
+        count: int,
+        seed: int = 0,
+        config: SamplingConfig = SamplingConfig(),
+        *,
+        checked: bool = True,
     ) -> ScenarioSet:
         """Sample `count` scenarios; unchecked, every candidate counts as valid."""
         checker = Checker(self.road, self.fit.requested, self.conflicts, self.waits)
         check = checker.check if checked else lambda scenarios: [Verdict() for _ in scenarios]
-        plan = Plan(self.encounter, self.segmentation, self.road, self.routes, self.fit.requested, self.waits)
+        plan = Plan(
+            self.encounter,
+            self.segmentation,
+            self.road,
+            self.routes,
+            self.fit.requested,
+            self.waits,
+        )
         return draw_scenarios(plan, check, config, count=count, seed=seed)
 
 
@@ -83,7 +97,17 @@ def prepared(encounter: Encounter, road_name: str, name: str) -> Prepared:
     conflicts = conflicts_in(encounter)
     road = build_road(road_name, encounter)
     fit = fit_template(encounter, segmentation, road)
-    return Prepared(name, road_name, encounter, segmentation, road, fit, plan_routes(road, fit), conflicts, find_waits(encounter))
+    return Prepared(
+        name,
+        road_name,
+        encounter,
+        segmentation,
+        road,
+        fit,
+        plan_routes(road, fit),
+        conflicts,
+        find_waits(encounter),
+    )
 
 
 def displacement(scenarios: Sequence[Scenario]) -> float:
@@ -123,5 +147,10 @@ def divergences(case: Prepared, scenarios: Sequence[Scenario]) -> dict[str, floa
     samples = [values_of(at_period(s, period)) for s in scenarios]
     ones: Floats = np.ones((1, len(scenarios)))
     return {
-        q.id: float(compare(q, template[q.id], [values[q.id] for values in samples]).jensen_shannon(ones)[0]) for q in QUANTITIES
+        q.id: float(
+            compare(q, template[q.id], [values[q.id] for values in samples]).jensen_shannon(ones)[
+                0
+            ]
+        )
+        for q in QUANTITIES
     }

@@ -29,22 +29,59 @@ def rows() -> list[Row]:
         x, y, noise, at = _data(n, m)
         ours, mean, cov, seconds = _against_dense(x, y, noise, at)
         name = f"GP {n} seen, {m} asked"
-        found.append(Row(f"{name}: mean, largest error", float(np.abs(ours.mean - mean).max()), "", "lower", 1e-10))
-        found.append(Row(f"{name}: covariance, largest error", float(np.abs(ours.covariance - cov).max()), "", "lower", 1e-10))
+        found.append(
+            Row(
+                f"{name}: mean, largest error",
+                float(np.abs(ours.mean - mean).max()),
+                "",
+                "lower",
+                1e-10,
+            )
+        )
+        found.append(
+            Row(
+                f"{name}: covariance, largest error",
+                float(np.abs(ours.covariance - cov).max()),
+                "",
+                "lower",
+                1e-10,
+            )
+        )
         try:
             peer = min(_seconds(lambda: _sklearn(x, y, at)) for _ in range(3 if n < 500 else 1))  # noqa: B023
         except ImportError:
             found.append(
-                Row(f"{name}: fit and {SAMPLES} samples", 1e3 * seconds, "ms", "lower", None, "scikit-learn not installed")
+                Row(
+                    f"{name}: fit and {SAMPLES} samples",
+                    1e3 * seconds,
+                    "ms",
+                    "lower",
+                    None,
+                    "scikit-learn not installed",
+                )
             )
             continue
         plain = min(_seconds(lambda: _cholesky(x, y, noise, at)) for _ in range(3))  # noqa: B023
         found.append(
-            Row(f"{name}: times faster than NumPy's Cholesky", plain / seconds, "×", "higher", None, f"{1e3 * plain:.1f} ms")
+            Row(
+                f"{name}: times faster than NumPy's Cholesky",
+                plain / seconds,
+                "×",
+                "higher",
+                None,
+                f"{1e3 * plain:.1f} ms",
+            )
         )
         label = f"{name}: fit and {SAMPLES} samples, times faster"
         found.append(
-            Row(label, peer / seconds, "×", "higher", target, f"scikit-learn {1e3 * peer:.1f} ms, ours {1e3 * seconds:.2f} ms")
+            Row(
+                label,
+                peer / seconds,
+                "×",
+                "higher",
+                target,
+                f"scikit-learn {1e3 * peer:.1f} ms, ours {1e3 * seconds:.2f} ms",
+            )
         )
     return found
 
@@ -54,7 +91,12 @@ def _against_dense(x: Floats, y: Floats, noise: Floats, at: Floats):  # type: ig
     mean, cov = _dense(x, y, noise, at)
     ours = _ours(x, y, noise, at)
     z = np.random.default_rng(0).standard_normal((SAMPLES, ours.factor.shape[1]))
-    return ours, mean, cov, min(_seconds(lambda: _ours(x, y, noise, at).sample(z)) for _ in range(sized(25, quick=1)))
+    return (
+        ours,
+        mean,
+        cov,
+        min(_seconds(lambda: _ours(x, y, noise, at).sample(z)) for _ in range(sized(25, quick=1))),
+    )
 
 
 def _data(n: int, m: int) -> tuple[Floats, Floats, Floats, Floats]:
@@ -62,11 +104,18 @@ def _data(n: int, m: int) -> tuple[Floats, Floats, Floats, Floats]:
     x = np.linspace(0.0, EXTENT, n)
     noise = np.full(n, NOISE)
     noise[[0, -1]] = 0.0
-    return x, 50.0 * np.sin(x / 100.0) + 0.1 * x + rng.normal(0.0, NOISE, n), noise, np.linspace(0.0, EXTENT, m)
+    return (
+        x,
+        50.0 * np.sin(x / 100.0) + 0.1 * x + rng.normal(0.0, NOISE, n),
+        noise,
+        np.linspace(0.0, EXTENT, m),
+    )
 
 
 def _ours(x: Floats, y: Floats, noise: Floats, at: Floats):  # type: ignore[no-untyped-def]  # noqa: ANN202
-    return Regression(Features(0.0, EXTENT, SIGMA, LENGTH, DEGREE), Observations(x, y, noise)).predict(at)
+    return Regression(
+        Features(0.0, EXTENT, SIGMA, LENGTH, DEGREE), Observations(x, y, noise)
+    ).predict(at)
 
 
 def _sklearn(x: Floats, y: Floats, at: Floats) -> None:
@@ -77,8 +126,12 @@ def _sklearn(x: Floats, y: Floats, at: Floats) -> None:
 
     kernel = ConstantKernel(SIGMA**2, "fixed") * RBF(LENGTH, "fixed")
     with warnings.catch_warnings(), threadpool_limits(1):
-        warnings.simplefilter("ignore")  # its sampler complains of a covariance that is not quite positive
-        GaussianProcessRegressor(kernel, alpha=NOISE**2, optimizer=None).fit(x[:, None], y).sample_y(at[:, None], SAMPLES)
+        warnings.simplefilter(
+            "ignore"
+        )  # its sampler complains of a covariance that is not quite positive
+        GaussianProcessRegressor(kernel, alpha=NOISE**2, optimizer=None).fit(
+            x[:, None], y
+        ).sample_y(at[:, None], SAMPLES)
 
 
 def _cholesky(x: Floats, y: Floats, noise: Floats, at: Floats) -> None:
@@ -93,7 +146,10 @@ def _cholesky(x: Floats, y: Floats, noise: Floats, at: Floats) -> None:
 
 def _dense(x: Floats, y: Floats, noise: Floats, at: Floats) -> tuple[Floats, Floats]:
     """Rasmussen & Williams eqs 2.41 and 2.42 by Cholesky factors."""
-    cross, prior = squared_exponential(x, at, SIGMA, LENGTH), squared_exponential(at, at, SIGMA, LENGTH)
+    cross, prior = (
+        squared_exponential(x, at, SIGMA, LENGTH),
+        squared_exponential(at, at, SIGMA, LENGTH),
+    )
     factor = scipy.linalg.cho_factor(squared_exponential(x, x, SIGMA, LENGTH) + np.diag(noise**2))
     h, h_at = (np.vander(2.0 * v / EXTENT - 1.0, DEGREE + 1).T for v in (x, at))
     a = h @ scipy.linalg.cho_solve(factor, h.T)

@@ -16,7 +16,9 @@ from scenario_gen.method.evaluation.nearness import APART
 
 ROOT = Path(__file__).resolve().parents[1]
 PYTHON = ROOT / ".venv-judges-verifai" / "bin" / "python"
-EDGE = 1e-9  # the unit cube's numbers are kept so far from 0 and 1, where a normal number has no end
+EDGE = (
+    1e-9  # the unit cube's numbers are kept so far from 0 and 1, where a normal number has no end
+)
 
 
 def first_failure(problem: LateWitness, kind: str, seed: int, most: int) -> int:
@@ -29,12 +31,29 @@ def first_failure(problem: LateWitness, kind: str, seed: int, most: int) -> int:
         most: drives.
     """
     generator = np.random.default_rng(seed)
-    natural = [one for one in problem.candidates(generator.standard_normal((256, problem.size))) if one is not None]
-    margins = [response.margin for response in problem.drive(natural[:100])]  # these are not counted
-    command = [PYTHON, ROOT / "benchmarks" / "_verifai_sampler.py", kind, problem.size, seed, np.quantile(margins, 0.1)]
+    natural = [
+        one
+        for one in problem.candidates(generator.standard_normal((256, problem.size)))
+        if one is not None
+    ]
+    margins = [
+        response.margin for response in problem.drive(natural[:100])
+    ]  # these are not counted
+    command = [
+        PYTHON,
+        ROOT / "benchmarks" / "_verifai_sampler.py",
+        kind,
+        problem.size,
+        seed,
+        np.quantile(margins, 0.1),
+    ]
     driven = 0
     with subprocess.Popen(
-        [str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        [str(word) for word in command],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     ) as sampler:
         assert sampler.stdin is not None and sampler.stdout is not None
         while driven < most:
@@ -43,7 +62,9 @@ def first_failure(problem: LateWitness, kind: str, seed: int, most: int) -> int:
                 raise RuntimeError(f"VerifAI's sampler {kind} ended after {driven} drives")
             point = np.clip(np.array(json.loads(line)), EDGE, 1.0 - EDGE)
             (scenario,) = problem.candidates(np.asarray(special.ndtri(point))[None])
-            margin: float | None = None if kind == "ce" else APART  # the Bayesian one needs a number
+            margin: float | None = (
+                None if kind == "ce" else APART
+            )  # the Bayesian one needs a number
             if scenario is not None:
                 (response,) = problem.drive([scenario])
                 driven += 1

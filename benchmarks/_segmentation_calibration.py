@@ -33,13 +33,19 @@ class Calibration:
     def table(self) -> str:
         """Every decile in words."""
         rows = zip(self.predicted, self.observed, self.counts, strict=True)
-        return "predicted: observed (n) " + ", ".join(f"{p:.2f}: {o:.2f} ({n})" for p, o, n in rows)
+        return "predicted: observed (n) " + ", ".join(
+            f"{p:.2f}: {o:.2f} ({n})" for p, o, n in rows
+        )
 
     @property
     def worst(self) -> float:
         """Largest distance of predicted and observed in a decile with at least 30 samples."""
         enough = self.counts >= 30
-        return float(np.abs(self.predicted - self.observed)[enough].max()) if enough.any() else float("nan")
+        return (
+            float(np.abs(self.predicted - self.observed)[enough].max())
+            if enough.any()
+            else float("nan")
+        )
 
 
 def deciles(predicted: Floats, truth: Floats) -> tuple[Floats, Floats, Ints]:
@@ -47,7 +53,11 @@ def deciles(predicted: Floats, truth: Floats) -> tuple[Floats, Floats, Ints]:
     decile = np.minimum((predicted * 10.0).astype(np.int64), 9)
     counts = np.bincount(decile, minlength=10)
     with np.errstate(invalid="ignore"):
-        return np.bincount(decile, predicted, 10) / counts, np.bincount(decile, truth, 10) / counts, counts
+        return (
+            np.bincount(decile, predicted, 10) / counts,
+            np.bincount(decile, truth, 10) / counts,
+            counts,
+        )
 
 
 def near(changepoints: Ints, samples: int, radius: int) -> Floats:
@@ -58,7 +68,9 @@ def near(changepoints: Ints, samples: int, radius: int) -> Floats:
     return result
 
 
-def from_prior(rng: np.random.Generator, samples: int, d: int, config: SamplerConfig) -> tuple[Floats, Ints]:
+def from_prior(
+    rng: np.random.Generator, samples: int, d: int, config: SamplerConfig
+) -> tuple[Floats, Ints]:
     """Draw a series (T, D) and its labels from the sticky HDP-HMM's prior, covariances Inverse-Wishart(D + 10, 9 I)."""
     states = config.states or 20
     gamma = rng.gamma(config.gamma_shape) / config.gamma_rate
@@ -101,7 +113,11 @@ def calibrate(seeds: range, samples: int = 200, d: int = 2, radius: int = 5) -> 
         predicted.append(posterior.probability_within(radius)[apart])
         truth.append(near(real, samples, radius)[apart])
         inside += _covered(posterior, real, rng)
-    return Calibration(*deciles(np.concatenate(predicted), np.concatenate(truth)), float(np.mean(inside)), len(inside))
+    return Calibration(
+        *deciles(np.concatenate(predicted), np.concatenate(truth)),
+        float(np.mean(inside)),
+        len(inside),
+    )
 
 
 def _covered(posterior: Posterior, real: Ints, rng: np.random.Generator) -> list[bool]:

@@ -70,7 +70,11 @@ def _schedule(rng: np.random.Generator, samples: int) -> tuple[Floats, Floats, F
             choices = ["stand"] if last == "stop" else ["accelerate"]
         else:
             choices = [
-                c for c in choices if c != last and not (c == "accelerate" and v > 15.0) and not (c == "brake" and v < 6.0)
+                c
+                for c in choices
+                if c != last
+                and not (c == "accelerate" and v > 15.0)
+                and not (c == "brake" and v < 6.0)
             ]
         last = str(rng.choice(choices))
         length = int(rng.uniform(30, 80))
@@ -133,7 +137,9 @@ def driving(seed: int, samples: int = 1200) -> Labelled:
     return Labelled(x, labels, encounter=encounter)
 
 
-def with_outliers(encounter: Encounter, rng: np.random.Generator, share: float = 0.01) -> Encounter:
+def with_outliers(
+    encounter: Encounter, rng: np.random.Generator, share: float = 0.01
+) -> Encounter:
     """Single speeds off by 10 m/s and single positions off by 20 m (standard deviations)."""
     position, speed = encounter.position.copy(), encounter.speed.copy()
     wrong = rng.uniform(size=speed.shape) < share

@@ -34,10 +34,14 @@ def sweeps_run(found: Posterior) -> int:
     return 2 * int(np.sum([len(trace) for trace in found.trace]))
 
 
-def posterior_of(encounter: Encounter, config: SegmentationConfig, seed: int) -> tuple[Floats, Posterior]:
+def posterior_of(
+    encounter: Encounter, config: SegmentationConfig, seed: int
+) -> tuple[Floats, Posterior]:
     """Return the features (T, D) of an encounter, and the posterior that `segment` draws from them with this seed."""
     clean = without_outliers(encounter)
-    features, blur = driving_features(clean, config.speed_window, config.turn_window, config.speed_noise, config.turn_noise)
+    features, blur = driving_features(
+        clean, config.speed_window, config.turn_window, config.speed_noise, config.turn_noise
+    )
     return features, segment_series(features, config.sampler, seed, blur=blur)
 
 
@@ -57,7 +61,13 @@ class Chain:
 
 
 def jax_moseq(
-    x: Floats, sweeps: int, states: int = 20, *, done: Callable[[Ints], bool] | None = None, every: int = 10, most: float = np.inf
+    x: Floats,
+    sweeps: int,
+    states: int = 20,
+    *,
+    done: Callable[[Ints], bool] | None = None,
+    every: int = 10,
+    most: float = np.inf,
 ) -> Chain | None:
     """Run jax-moseq's public sampler (arhmm.resample_model) with a plain Gaussian; None if it is not installed.
 
@@ -74,12 +84,16 @@ def jax_moseq(
     """
     if not installed("jax_moseq"):
         return None
-    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")  # as ours: one thread
+    os.environ.setdefault(
+        "XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+    )  # as ours: one thread
     import jax
 
     jax.config.update("jax_enable_x64", True)
     cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(cores)})  # idle threads of XLA spin on other cores, which counts as CPU time
+    os.sched_setaffinity(
+        0, {min(cores)}
+    )  # idle threads of XLA spin on other cores, which counts as CPU time
     try:
         return _timed(*_gaussian(x, states), len(x), sweeps, done, every, most)
     finally:
@@ -155,7 +169,9 @@ def hmmlearn(x: Floats, states: int, starts: int = 10) -> Ints | None:
         warnings.simplefilter("ignore")
         for seed in range(starts):
             try:
-                model = GaussianHMM(states, "full", n_iter=100, random_state=seed, min_covar=1e-3).fit(y)
+                model = GaussianHMM(
+                    states, "full", n_iter=100, random_state=seed, min_covar=1e-3
+                ).fit(y)
                 score = float(model.score(y))
             except ValueError:
                 continue

@@ -39,7 +39,11 @@ def changes(labels: Ints) -> Ints:
 
 def smoother(sequence: Labelled, dof: float = 0.0) -> Ints:
     """(T,) the most probable label of each sample under the true parameters; `dof` > 0: of Student's t."""
-    assert sequence.means is not None and sequence.covariances is not None and sequence.transition is not None
+    assert (
+        sequence.means is not None
+        and sequence.covariances is not None
+        and sequence.transition is not None
+    )
     log_likelihood = np.empty((len(sequence.x), len(sequence.means)))
     for k, (mean, covariance) in enumerate(zip(sequence.means, sequence.covariances, strict=True)):
         factor = np.linalg.cholesky(covariance)

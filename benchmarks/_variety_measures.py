@@ -19,7 +19,14 @@ SHARED = 3.0  # lengths of a vehicle; who shares a longer stretch with another o
 
 def pet(scenario: Scenario) -> float:
     """Return the least PET [s] of all crossing pairs; NaN without one."""
-    return min((found[0] for pair in _pairs(scenario) if (found := _crossing(scenario, *pair)) is not None), default=float("nan"))
+    return min(
+        (
+            found[0]
+            for pair in _pairs(scenario)
+            if (found := _crossing(scenario, *pair)) is not None
+        ),
+        default=float("nan"),
+    )
 
 
 def ttc(scenario: Scenario) -> float:
@@ -37,7 +44,9 @@ def _pairs(scenario: Scenario) -> list[tuple[int, int]]:
 
 
 def _half(scenario: Scenario, n: int, count: int) -> Any:
-    return np.tile([0.5 * scenario.vehicles[n].length, 0.5 * scenario.vehicles[n].width], (count, 1))
+    return np.tile(
+        [0.5 * scenario.vehicles[n].length, 0.5 * scenario.vehicles[n].width], (count, 1)
+    )
 
 
 def _boxes(scenario: Scenario, n: int) -> tuple[Any, Any]:
@@ -78,7 +87,10 @@ def _follows(scenario: Scenario, a: int, b: int) -> bool:
     for k in np.flatnonzero(steps > 1e-3).tolist():
         point = shapely.points(scenario.position[a, k + 1])
         near = int(np.argmin(np.hypot(*(scenario.position[b] - scenario.position[a, k + 1]).T)))
-        turned = abs((scenario.heading[a, k + 1] - scenario.heading[b, near] + np.pi) % (2.0 * np.pi) - np.pi)
+        turned = abs(
+            (scenario.heading[a, k + 1] - scenario.heading[b, near] + np.pi) % (2.0 * np.pi)
+            - np.pi
+        )
         if turned < 0.5 and shapely.distance(line, point) < width:
             shared += float(steps[k])
     return shared >= SHARED * longest
@@ -88,7 +100,9 @@ def _time(scenario: Scenario, a: int, b: int, k: int, most: float) -> float:
     """Time [s] until two footprints touch from instant k on, by conservative advancement; inf if it is more than `most`."""
     pair = [a, b]
     pose = np.column_stack([scenario.position[pair, k], scenario.heading[pair, k]])
-    ways = scenario.speed[pair, k, None] * np.column_stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])])
+    ways = scenario.speed[pair, k, None] * np.column_stack(
+        [np.cos(pose[:, 2]), np.sin(pose[:, 2])]
+    )
     relative = float(np.hypot(*(ways[0] - ways[1])))
     half = np.concatenate([_half(scenario, n, 1) for n in pair])
     if relative < 1e-6:

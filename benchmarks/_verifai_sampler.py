@@ -21,10 +21,16 @@ def main(kind: str, dimensions: int, seed: int, threshold: float) -> None:
     space = FeatureSpace({"u": Feature(Box(*[[0.0, 1.0]] * dimensions))})
     if kind == "ce":
         cross_entropy = DotMap(alpha=0.9, thres=threshold)  # the alpha of VerifAI's examples
-        cross_entropy.cont.buckets, cross_entropy.cont.dist, cross_entropy.disc.dist = 5, None, None
+        cross_entropy.cont.buckets, cross_entropy.cont.dist, cross_entropy.disc.dist = (
+            5,
+            None,
+            None,
+        )
         sampler = FeatureSampler.crossEntropySamplerFor(space, cross_entropy)
     else:
-        sampler = FeatureSampler.bayesianOptimizationSamplerFor(space, BO_params=DotMap(init_num=5))
+        sampler = FeatureSampler.bayesianOptimizationSamplerFor(
+            space, BO_params=DotMap(init_num=5)
+        )
     out = sys.stdout
     sys.stdout = sys.stderr  # GPyOpt writes there
     margin = None

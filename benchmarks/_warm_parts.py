@@ -72,7 +72,18 @@ def main() -> None:
     timed(imports, "imports")()
     from scenario_gen.cli.commands import app
 
-    sys.argv[1:] = ["generate", log, "--road", "four_way", "--count", count, "--seed", "7", "--out", out]
+    sys.argv[1:] = [
+        "generate",
+        log,
+        "--road",
+        "four_way",
+        "--count",
+        count,
+        "--seed",
+        "7",
+        "--out",
+        out,
+    ]
     try:
         timed(app, "command line, folder, and what is imported late")()
     finally:

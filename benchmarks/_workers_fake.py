@@ -28,4 +28,13 @@ def sleep(task: FakeTask) -> None:
     begun = time.time()
     time.sleep(task.seconds)
     with arriving(task.target) as part:
-        part.write_text(json.dumps({"worker": os.getpid(), "begun": begun, "ended": time.time(), "known": bool(task.config)}))
+        part.write_text(
+            json.dumps(
+                {
+                    "worker": os.getpid(),
+                    "begun": begun,
+                    "ended": time.time(),
+                    "known": bool(task.config),
+                }
+            )
+        )

@@ -54,7 +54,9 @@ class Sizes:
     asam: int  # scenarios of a case: a checker takes a second or two for each
 
 
-USUAL = sized(Sizes(demo=10, recorded=2, cases=20, cuts=10, problems=40, asam=2), Sizes(2, 1, 1, 1, 1, 1))
+USUAL = sized(
+    Sizes(demo=10, recorded=2, cases=20, cuts=10, problems=40, asam=2), Sizes(2, 1, 1, 1, 1, 1)
+)
 FULL = sized(Sizes(demo=50, recorded=5, cases=20, cuts=10, problems=40, asam=50), USUAL)
 
 
@@ -74,7 +76,11 @@ def run(full: bool | None = None) -> list[Row]:
         driven = judges.submit(_driven, folder / "problems", problems)
         rows = [Row("bridges.cases", len(bags), "cases", "higher")]
         others = []
-        for target, judge in (("commonroad", _commonroad), ("openscenario", _asam), ("osi", _omega)):
+        for target, judge in (
+            ("commonroad", _commonroad),
+            ("openscenario", _asam),
+            ("osi", _omega),
+        ):
             few = sizes.asam if target == "openscenario" else None
             for k, bag in enumerate(bags):
                 known = [one.index for case in read_cases(bag) for one in case.scenarios][:few]
@@ -98,22 +104,41 @@ def _bags(folder: Path, sizes: Sizes) -> Iterator[Path]:
         yield from _bag(folder, read_log(bundled(case)).encounters, road, sizes.demo)
     yield from _bag(folder, read_log(_all_types()).encounters, "corridor", sizes.demo)
     logs = sorted((DATA / "trajectories").glob("*/*.csv"))
-    recorded = [read_log(path).encounters[0] for path in logs if path.name.startswith("encounter_")]
+    recorded = [
+        read_log(path).encounters[0] for path in logs if path.name.startswith("encounter_")
+    ]
     yield from islice(_turns(folder, recorded, sizes.recorded), sizes.cases)
-    found = [one for path in logs if path.name.endswith("_all_vehicles.csv") for one in read_log(path).encounters]
-    yield from islice(_turns(folder, [found[k] for k in np.random.default_rng(7).permutation(len(found))], 1), sizes.cuts)
+    found = [
+        one
+        for path in logs
+        if path.name.endswith("_all_vehicles.csv")
+        for one in read_log(path).encounters
+    ]
+    yield from islice(
+        _turns(folder, [found[k] for k in np.random.default_rng(7).permutation(len(found))], 1),
+        sizes.cuts,
+    )
 
 
 def _all_types() -> pd.DataFrame:
     """A bus, a truck and a car in one lane, a bicycle before a motorcycle in the other, and a pedestrian that crosses behind."""
     t, rows = np.arange(0.0, 12.05, 0.1), []
-    lanes = {"bus": (10.0, 0.0, 0.0, 7.0), "truck": (-15.0, 0.0, 0.0, 7.0), "car": (-36.0, 0.0, 0.0, 7.0)}
+    lanes = {
+        "bus": (10.0, 0.0, 0.0, 7.0),
+        "truck": (-15.0, 0.0, 0.0, 7.0),
+        "car": (-36.0, 0.0, 0.0, 7.0),
+    }
     lanes |= {"motorcycle": (90.0, 3.5, np.pi, 8.0), "bicycle": (60.0, 3.5, np.pi, 4.5)}
     lanes |= {"pedestrian": (-40.0, -14.5, np.pi / 2.0, 1.3)}
     for n, (kind, (x, y, yaw, speed)) in enumerate(lanes.items(), start=1):
         way, size = speed * t + 0.5 * np.sin(t / 2.0 + n), VEHICLE_TYPES[kind]
         driven = speed + 0.25 * np.cos(t / 2.0 + n)
-        place = {"x": x + way * np.cos(yaw), "y": y + way * np.sin(yaw), "heading": yaw, "speed": driven}
+        place = {
+            "x": x + way * np.cos(yaw),
+            "y": y + way * np.sin(yaw),
+            "heading": yaw,
+            "speed": driven,
+        }
         fixed = {"id": str(n), "agent_type": kind, "length": size.length, "width": size.width}
         rows.append(pd.DataFrame({"t": t} | fixed | place))
     return pd.concat(rows)
@@ -142,7 +167,9 @@ def _round_trip(folder: Path, bags: Sequence[Path], target: str) -> list[Row]:
         known = {one.sha256: one.others for case in read_cases(bag) for one in case.scenarios}
         for entry in entries:
             scenario: Scenario = known[entry["sha256"]]
-            for n, track in enumerate(read_raw([folder / str(k) / entry["files"][0]], LogConfig()).vehicles):
+            for n, track in enumerate(
+                read_raw([folder / str(k) / entry["files"][0]], LogConfig()).vehicles
+            ):
                 there = slice(int(scenario.present[n, 0]), int(scenario.present[n, 1]) + 1)
                 place = max(place, float(np.abs(track.fix - scenario.position[n, there]).max()))
                 speed = max(speed, float(np.abs(track.speed - scenario.speed[n, there]).max()))
@@ -157,7 +184,12 @@ def judged(environment: str, program: str, *arguments: str) -> Any:
     python = ROOT / f".venv-judges-{environment}" / "bin" / "python"
     if not python.is_file():
         return None
-    run = subprocess.run([python, ROOT / "test" / "judges" / program, *arguments], capture_output=True, text=True, check=False)
+    run = subprocess.run(
+        [python, ROOT / "test" / "judges" / program, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     lines = [line for line in run.stdout.splitlines() if line.startswith("{")]
     if not lines:
         raise RuntimeError(f"{program} said nothing: {run.stderr[-500:]}")
@@ -174,7 +206,14 @@ def _commonroad(folder: Path) -> list[Row]:
         Row("bridges.commonroad.read_error", found["read_error"], "m", "lower", 1e-6, peer),
         Row("bridges.commonroad.collisions", len(found["collisions"]), "files", "lower", 0, peer),
         Row("bridges.commonroad.off_road", len(found["off_road"]), "files", "lower", 0, peer),
-        Row("bridges.commonroad.planted_not_found", len(found["not_found"]), "files", "lower", 0, peer),
+        Row(
+            "bridges.commonroad.planted_not_found",
+            len(found["not_found"]),
+            "files",
+            "lower",
+            0,
+            peer,
+        ),
     ]
 
 
@@ -194,7 +233,9 @@ def _omega(folder: Path) -> list[Row]:
     found = judged("omega", "omega_files.py", str(folder))
     if found is None:
         return []
-    peer = f"omega-prime 0.3.7: {found['files']} files, the map of {found['maps']} of {found['of']}"
+    peer = (
+        f"omega-prime 0.3.7: {found['files']} files, the map of {found['maps']} of {found['of']}"
+    )
     return [
         Row("bridges.osi.files_with_faults", len(found["faults"]), "files", "lower", 0, peer),
         Row("bridges.osi.planted_not_found", len(found["missed"]), "faults", "lower", 0, peer),
@@ -216,9 +257,13 @@ def _egos(bags: Sequence[Path]) -> Iterator[tuple[Case, Exported]]:
     """Yield the first scenario of each case with each vehicle as its ego, then the second of each, and so on."""
     groups: list[list[tuple[Case, Exported]]] = []
     for bag in bags:
-        for vehicle in [v.id for case in read_cases(bag) for v in case.scenarios[0].others.vehicles]:
+        for vehicle in [
+            v.id for case in read_cases(bag) for v in case.scenarios[0].others.vehicles
+        ]:
             cases = read_cases(bag, ExportConfig(ego=vehicle))
-            groups.append([(case, one) for case in cases for one in case.scenarios if _drives(one)])
+            groups.append(
+                [(case, one) for case in cases for one in case.scenarios if _drives(one)]
+            )
             yield from groups[-1][:1]
     for turn in range(1, max(map(len, groups), default=0)):
         yield from (group[turn] for group in groups if turn < len(group))
@@ -233,7 +278,18 @@ def _driven(folder: Path, problems: int) -> list[Row]:
     found = judged("commonroad", "commonroad_files.py", "drive", str(folder)) if problems else None
     if found is None:
         return []
-    peer = f"commonroad-reactive-planner 2025.1: {found['reached']} of {found['problems']} problems"
+    peer = (
+        f"commonroad-reactive-planner 2025.1: {found['reached']} of {found['problems']} problems"
+    )
     for name, (how, step) in found["outcomes"].items():
         peer += "" if how == "reached" else f"; {name}: {how} at step {step}"
-    return [Row("bridges.commonroad.problems_solved", found["reached"] / found["problems"], "share", "higher", 0.9, peer)]
+    return [
+        Row(
+            "bridges.commonroad.problems_solved",
+            found["reached"] / found["problems"],
+            "share",
+            "higher",
+            0.9,
+            peer,
+        )
+    ]

@@ -44,10 +44,22 @@ from scenario_gen.method.segmentation.library import assign, build_library, Prim
 from scenario_gen.numerics.arrays import Ints
 from scenario_gen.types.encounter import Encounter
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 ROWS = sized(10_000_000, quick=40_000)
-DENSE = {"rows": ROWS, "hours": 6.0, "encounters": sized(1000, quick=6), "outside": sized(500, quick=6)}
-SPARSE = {"rows": 5 * ROWS, "hours": 30.0, "encounters": sized(537, quick=6), "outside": sized(268, quick=6)}
+DENSE = {
+    "rows": ROWS,
+    "hours": 6.0,
+    "encounters": sized(1000, quick=6),
+    "outside": sized(500, quick=6),
+}
+SPARSE = {
+    "rows": 5 * ROWS,
+    "hours": 30.0,
+    "encounters": sized(537, quick=6),
+    "outside": sized(268, quick=6),
+}
 """As many encounters in a row as the Safety Pilot's archive has: 462,161 in 43 · 10⁹."""
 MESSAGES, ENCOUNTERS, TEXT = 43.1e9, 462_161, 5.4e12  # of that archive; bytes
 CORE_HOUR, STORED = 0.05, 0.023  # $ for a core-hour, and for a GB and month
@@ -77,7 +89,9 @@ def _stage(name: str, archive: Path, rest: str) -> dict[str, list[float] | float
     """Run a stage in a process of its own; return CPU seconds of its tasks, and MiB at its peak."""
     words = [sys.executable, "-m", "benchmarks._corpus_stage", name, str(archive), rest]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
-    found: dict[str, list[float] | float] = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
+    found: dict[str, list[float] | float] = (
+        json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
+    )
     return found
 
 
@@ -104,7 +118,11 @@ def _scores(planted: list[Planted], out: Path) -> tuple[float, float, float]:
     found = {frozenset(device % TRUE for device in row["devices"]): row["kind"] for row in rows}
     true = {frozenset(one.devices): one.kind for one in planted if one.inside}
     hit = found.keys() & true.keys()
-    return len(hit) / len(true), len(hit) / max(len(rows), 1), float(np.mean([found[who] == true[who] for who in hit]))
+    return (
+        len(hit) / len(true),
+        len(hit) / max(len(rows), 1),
+        float(np.mean([found[who] == true[who] for who in hit])),
+    )
 
 
 def _peer(archive: Path, place: Path) -> float:
@@ -112,7 +130,9 @@ def _peer(archive: Path, place: Path) -> float:
     import duckdb
 
     wanted = {"TxDevice", "Gentime", "DSecond", "Latitude", "Longitude", "Speed", "Heading"}
-    columns = ", ".join(f"'{name}': '{'DOUBLE' if name in wanted else 'VARCHAR'}'" for name in COLUMNS)
+    columns = ", ".join(
+        f"'{name}': '{'DOUBLE' if name in wanted else 'VARCHAR'}'" for name in COLUMNS
+    )
     with duckdb.connect() as base:
         base.execute("SET threads = 1")
         begun = time.process_time()
@@ -144,17 +164,42 @@ def mining(place: Path) -> list[Row]:
         Row(f"recall, {what}", recall, "", "higher", 0.99),
         Row("precision", precision, "", "higher", 0.99),
         Row("kinds", kinds, "", "higher", 0.95),
-        Row("from text to the table of encounters", rows / all_of_it / 1e6, "M rows/CPU s", "higher", 0.6, peer),
         Row(
-            "from Parquet to the table of encounters", kept / (all_of_it - seconds["parse"]) / 1e6, "M rows/CPU s", "higher", 2.5
+            "from text to the table of encounters",
+            rows / all_of_it / 1e6,
+            "M rows/CPU s",
+            "higher",
+            0.6,
+            peer,
         ),
-        Row("text to Parquet", rows / seconds["parse"] / 1e6, "M rows/CPU s", "higher", None, peer),
+        Row(
+            "from Parquet to the table of encounters",
+            kept / (all_of_it - seconds["parse"]) / 1e6,
+            "M rows/CPU s",
+            "higher",
+            2.5,
+        ),
+        Row(
+            "text to Parquet", rows / seconds["parse"] / 1e6, "M rows/CPU s", "higher", None, peer
+        ),
         Row("cleaning of found encounters", cleaned, "CPU s each", "lower"),
         Row("text", text / rows, "bytes/row", "lower"),
-        *(Row(f"files of {stage}", size / rows, "bytes/row", "lower") for stage, size in stored.items()),
-        *(Row(f"files of {stage}, share of text", 100.0 * size / text, "%", "lower", 5.0) for stage, size in stored.items()),
-        *(Row(f"a task of {stage}", seconds[f"{stage}, a task"], "CPU s", "higher") for stage in ("parse", "search")),
-        *(Row(f"peak memory of {stage}", memory[stage], "MiB", "lower", 1024.0) for stage in memory),
+        *(
+            Row(f"files of {stage}", size / rows, "bytes/row", "lower")
+            for stage, size in stored.items()
+        ),
+        *(
+            Row(f"files of {stage}, share of text", 100.0 * size / text, "%", "lower", 5.0)
+            for stage, size in stored.items()
+        ),
+        *(
+            Row(f"a task of {stage}", seconds[f"{stage}, a task"], "CPU s", "higher")
+            for stage in ("parse", "search")
+        ),
+        *(
+            Row(f"peak memory of {stage}", memory[stage], "MiB", "lower", 1024.0)
+            for stage in memory
+        ),
     ]
 
 
@@ -182,22 +227,39 @@ def memory_of(place: Path) -> list[Row]:
         for folder, pattern in (("messages", "*.parquet"), ("hours", "*.parquet"))
     )
     cleaned = _cleaning(archive, place)
-    each = sum(path.stat().st_size for path in (place / "small" / "encounters").glob("*.parquet")) / CLEANED
+    each = (
+        sum(path.stat().st_size for path in (place / "small" / "encounters").glob("*.parquet"))
+        / CLEANED
+    )
     whole = estimate(rows / seconds["parse"], rows / searching, cleaned, stored, shuffled, each)
     what = f"{rows / 1e6:.0f} M rows, {SPARSE['encounters']} encounters"
     return [
         Row(f"{what}: recall", recall, "", "higher", 0.99),
         Row(f"{what}: precision", precision, "", "higher", 0.99),
         Row(f"{what}: kinds", kinds, "", "higher", 0.95),
-        Row(f"{what}: from text", rows / (seconds["parse"] + searching) / 1e6, "M rows/CPU s", "higher", 0.6),
+        Row(
+            f"{what}: from text",
+            rows / (seconds["parse"] + searching) / 1e6,
+            "M rows/CPU s",
+            "higher",
+            0.6,
+        ),
         Row(f"{what}: from Parquet", rows / searching / 1e6, "M rows/CPU s", "higher", 2.5),
         Row(f"{what}: peak memory", max(memory.values()), "MiB", "lower", 1024.0),
-        Row(f"{what}: peak memory by that of {ROWS / 1e6:.0f} M", max(memory.values()) / max(few.values()), "", "lower", 1.2),
+        Row(
+            f"{what}: peak memory by that of {ROWS / 1e6:.0f} M",
+            max(memory.values()) / max(few.values()),
+            "",
+            "lower",
+            1.2,
+        ),
         *whole,
     ]
 
 
-def estimate(parsed: float, searched: float, cleaned: float, stored: float, shuffled: float, each: float) -> list[Row]:
+def estimate(
+    parsed: float, searched: float, cleaned: float, stored: float, shuffled: float, each: float
+) -> list[Row]:
     """Return what the whole archive of the Safety Pilot would cost, by stage, from measured rates.
 
     Args:
@@ -221,10 +283,27 @@ def estimate(parsed: float, searched: float, cleaned: float, stored: float, shuf
     spent, kept = sum(hours.values()), sum(disk.values())
     reading = TEXT / 1e9 / spent * 16.0 / 3600.0
     return [
-        *(Row(f"whole archive: {what}", value, "core-hours", "lower") for what, value in hours.items()),
+        *(
+            Row(f"whole archive: {what}", value, "core-hours", "lower")
+            for what, value in hours.items()
+        ),
         *(Row(f"whole archive: {what}", value, "GB", "lower") for what, value in disk.items()),
-        Row("whole archive: computing", spent * CORE_HOUR, "$", "lower", None, f"{spent:.1f} core-hours at {CORE_HOUR} $"),
-        Row("whole archive: storage", kept * STORED, "$ a month", "lower", None, f"{kept:.0f} GB at {STORED} $"),
+        Row(
+            "whole archive: computing",
+            spent * CORE_HOUR,
+            "$",
+            "lower",
+            None,
+            f"{spent:.1f} core-hours at {CORE_HOUR} $",
+        ),
+        Row(
+            "whole archive: storage",
+            kept * STORED,
+            "$ a month",
+            "lower",
+            None,
+            f"{kept:.0f} GB at {STORED} $",
+        ),
         Row("whole archive: sixteen cores read", reading, "GB/s", "lower"),
     ]
 
@@ -234,13 +313,21 @@ def store(place: Path) -> list[Row]:
     if find_spec("moto") is None or find_spec("flask") is None:
         return []
     archive = place / "stored-archive"
-    _stage("write", archive, json.dumps({"rows": STORED, "hours": 6.0, "encounters": 40, "outside": 20}))
+    _stage(
+        "write",
+        archive,
+        json.dumps({"rows": STORED, "hours": 6.0, "encounters": 40, "outside": 20}),
+    )
     mined = ["-m", "scenario_gen", "mine", "--workers", "1"]
     cpu: dict[str, list[float]] = {"store": [], "local": [], "start": [], "start local": []}
     with bucket_with(archive) as (url, environment):
         for k in range(ROUNDS):
-            cpu["local"].append(spent([*mined, str(archive), "--out", str(place / f"stored-{k}")], {}))
-            cpu["store"].append(spent([*mined, f"{url}/archive", "--out", f"{url}/out-{k}"], environment))
+            cpu["local"].append(
+                spent([*mined, str(archive), "--out", str(place / f"stored-{k}")], {})
+            )
+            cpu["store"].append(
+                spent([*mined, f"{url}/archive", "--out", f"{url}/out-{k}"], environment)
+            )
             cpu["start local"].append(spent(["-c", START, str(place)], {}))
             cpu["start"].append(spent(["-c", START, url], environment))
     of = {name: float(np.median(values)) for name, values in cpu.items()}
@@ -248,14 +335,31 @@ def store(place: Path) -> list[Row]:
     what = f"{_bytes(archive.glob('*.csv')) / 1e6:.0f} MB of text, in and to s3"
     parts = f"{of['store']:.1f} and {of['local']:.1f} s, of which the libraries of the store take {loaded:.1f} s to load"
     return [
-        Row(f"{what}: CPU over that of folders", of["store"] / of["local"], "×", "lower", 1.2, parts),
-        Row(f"{what}: the same without loading the libraries", (of["store"] - loaded) / of["local"], "×", "lower"),
+        Row(
+            f"{what}: CPU over that of folders",
+            of["store"] / of["local"],
+            "×",
+            "lower",
+            1.2,
+            parts,
+        ),
+        Row(
+            f"{what}: the same without loading the libraries",
+            (of["store"] - loaded) / of["local"],
+            "×",
+            "lower",
+        ),
     ]
 
 
 RECORDED = {  # what is known of the full recordings: how they are read, and at least how many encounters they hold
     "cats_av_lane_change": (
-        ("cats_vehicle1_full.csv", "cats_vehicle2_full.csv", "cats_vehicle3_full.csv", "cats_vehicle4_full.csv"),
+        (
+            "cats_vehicle1_full.csv",
+            "cats_vehicle2_full.csv",
+            "cats_vehicle3_full.csv",
+            "cats_vehicle4_full.csv",
+        ),
         10,
     ),
     "psu_2obu": (("psu_meet_full.csv",), 1),
@@ -276,7 +380,9 @@ def recorded(place: Path) -> list[Row]:
             shutil.copy(DATA / "trajectories" / folder / file, source)
         mined = mine([source], place / "recorded" / f"{folder}-corpus", CorpusConfig())
         kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(mined.kinds.items()))
-        rows.append(Row(f"encounters in {folder} ({kinds})", mined.encounters, "", "higher", least))
+        rows.append(
+            Row(f"encounters in {folder} ({kinds})", mined.encounters, "", "higher", least)
+        )
     return rows
 
 
@@ -284,14 +390,28 @@ def _corpus(place: Path) -> Path:
     """A corpus of as many synthetic templates as a batch takes."""
     out = place / "templates"
     if not out.exists():
-        settings = {"rows": 1500 * TEMPLATES + 5000, "hours": 1.0, "encounters": TEMPLATES, "outside": 0}
+        settings = {
+            "rows": 1500 * TEMPLATES + 5000,
+            "hours": 1.0,
+            "encounters": TEMPLATES,
+            "outside": 0,
+        }
         _stage("write", place / "templates-archive", json.dumps(settings))
         mine([place / "templates-archive"], out)
     return out
 
 
 def _words(corpus: Path, out: Path, workers: int, count: int, templates: int) -> list[str]:
-    words = ["batch", str(corpus), "--out", str(out), "--roads", ",".join(ROADS), "--workers", str(workers)]
+    words = [
+        "batch",
+        str(corpus),
+        "--out",
+        str(out),
+        "--roads",
+        ",".join(ROADS),
+        "--workers",
+        str(workers),
+    ]
     return [*words, "--count", str(count), "--templates", str(templates)]
 
 
@@ -309,12 +429,22 @@ def batch(place: Path) -> list[Row]:
         begun, before = time.monotonic(), os.times()
         out = place / f"batch-{workers}"
         subprocess.run(
-            [sys.executable, "-m", "scenario_gen", *_words(corpus, out, workers, COUNT, TEMPLATES)],
+            [
+                sys.executable,
+                "-m",
+                "scenario_gen",
+                *_words(corpus, out, workers, COUNT, TEMPLATES),
+            ],
             check=True,
             capture_output=True,
         )
         after = os.times()
-        cpu[workers] = after.children_user + after.children_system - before.children_user - before.children_system
+        cpu[workers] = (
+            after.children_user
+            + after.children_system
+            - before.children_user
+            - before.children_system
+        )
         wall[workers] = time.monotonic() - begun
     cases = list(rows_of(sorted((place / "batch-1" / "cases").rglob("*.parquet"))))
     scenarios = sum(int(case["published"]) for case in cases)
@@ -322,8 +452,16 @@ def batch(place: Path) -> list[Row]:
     causes = Counter(case["cause"] for case in cases if not case["published"])
     without = "; ".join(f"{n} × {cause}" for cause, n in causes.most_common(3))
     return [
-        Row(f"{what}: CPU with two processes by that with one", cpu[2] / cpu[1], "", "lower", 1.15),
-        Row(f"{what}: the same bytes", float(_digests(place / "batch-1") == _digests(place / "batch-2")), "", "higher", 1.0),
+        Row(
+            f"{what}: CPU with two processes by that with one", cpu[2] / cpu[1], "", "lower", 1.15
+        ),
+        Row(
+            f"{what}: the same bytes",
+            float(_digests(place / "batch-1") == _digests(place / "batch-2")),
+            "",
+            "higher",
+            1.0,
+        ),
         Row(f"{what}: scenarios (cases without any: {without})", scenarios, "", "higher"),
         Row("CPU of a template on a road", cpu[1] / len(cases), "s", "lower"),
         Row("CPU of a scenario", cpu[1] / max(scenarios, 1), "s", "lower"),
@@ -335,12 +473,28 @@ def kills(place: Path) -> list[Row]:
     """SIGKILLs of workers and of the run, and what is then missing, doubled or other."""
     corpus, few = _corpus(place), min(40, TEMPLATES)
     subprocess.run(
-        [sys.executable, "-m", "scenario_gen", *_words(corpus, place / "whole", 1, 5, few)], check=True, capture_output=True
+        [sys.executable, "-m", "scenario_gen", *_words(corpus, place / "whole", 1, 5, few)],
+        check=True,
+        capture_output=True,
     )
-    workers, runs = killed_batch(_words(corpus, place / "killed", 2, 5, few), place / "killed", KILLS)
+    workers, runs = killed_batch(
+        _words(corpus, place / "killed", 2, 5, few), place / "killed", KILLS
+    )
     return [
-        Row(f"SIGKILLs ({workers} of a worker, {runs} of the run)", workers + runs, "", "higher", KILLS),
-        Row("after them the same bytes", float(_digests(place / "whole") == _digests(place / "killed")), "", "higher", 1.0),
+        Row(
+            f"SIGKILLs ({workers} of a worker, {runs} of the run)",
+            workers + runs,
+            "",
+            "higher",
+            KILLS,
+        ),
+        Row(
+            "after them the same bytes",
+            float(_digests(place / "whole") == _digests(place / "killed")),
+            "",
+            "higher",
+            1.0,
+        ),
     ]
 
 
@@ -353,16 +507,36 @@ def library(place: Path) -> list[Row]:
     found, labels, fitted = _two_seeds(encounters)
     planted = np.concatenate([own for _, _, own in old])
     again = [assign(e, found, SHARED) for e, _, _ in new]
-    assigned = score([f1(one.segmentation.changepoints, points) for one, (_, points, _) in zip(again, new, strict=True)])
+    assigned = score(
+        [
+            f1(one.segmentation.changepoints, points)
+            for one, (_, points, _) in zip(again, new, strict=True)
+        ]
+    )
     alone = score([f1(segment(e).changepoints, points) for e, points, _ in new])
     told = np.concatenate(
-        [labels_of(a.segmentation.changepoints, a.primitives, e) for a, (e, _, _) in zip(again, new, strict=True)]
+        [
+            labels_of(a.segmentation.changepoints, a.primitives, e)
+            for a, (e, _, _) in zip(again, new, strict=True)
+        ]
     )
     truth = np.concatenate([own for _, _, own in new])
     rows = [
-        Row(f"library of {LIBRARY} synthetic ({len(found.means)} primitives, 8 planted)", fitted, "CPU s", "lower", 1200.0),
+        Row(
+            f"library of {LIBRARY} synthetic ({len(found.means)} primitives, 8 planted)",
+            fitted,
+            "CPU s",
+            "lower",
+            1200.0,
+        ),
         Row("two seeds, adjusted Rand", adjusted_rand(*labels), "", "higher", 0.8),
-        Row("planted primitives, adjusted Rand", adjusted_rand(planted, labels[0]), "", "higher", 0.9),
+        Row(
+            "planted primitives, adjusted Rand",
+            adjusted_rand(planted, labels[0]),
+            "",
+            "higher",
+            0.9,
+        ),
         Row(
             f"F1 of {NEW} new ones, alone less assigned",
             alone - assigned,
@@ -371,7 +545,9 @@ def library(place: Path) -> list[Row]:
             0.05,
             f"alone {alone:.3f}, assigned {assigned:.3f}",
         ),
-        Row("new ones, planted primitives, adjusted Rand", adjusted_rand(truth, told), "", "higher"),
+        Row(
+            "new ones, planted primitives, adjusted Rand", adjusted_rand(truth, told), "", "higher"
+        ),
     ]
     if not (DATA / "trajectories").is_dir():
         return rows
@@ -391,8 +567,20 @@ def library(place: Path) -> list[Row]:
         found, labels, fitted = _two_seeds(those)
         both = adjusted_rand(*(each[: sum(len(pair.time) for pair in real)] for each in labels))
         rows += [
-            Row(f"library of {name} ({len(found.means)} primitives)", fitted, "CPU s", "lower", 1200.0),
-            Row(f"library of {name}: two seeds, adjusted Rand of the recorded ones", both, "", "higher", 0.8),
+            Row(
+                f"library of {name} ({len(found.means)} primitives)",
+                fitted,
+                "CPU s",
+                "lower",
+                1200.0,
+            ),
+            Row(
+                f"library of {name}: two seeds, adjusted Rand of the recorded ones",
+                both,
+                "",
+                "higher",
+                0.8,
+            ),
         ]
     return rows
 
@@ -403,7 +591,12 @@ def _two_seeds(encounters: Sequence[Encounter]) -> tuple[PrimitiveLibrary, list[
     found, assignments = build_library(encounters, SHARED, 0)
     fitted = time.process_time() - begun
     labels = [
-        np.concatenate([labels_of(a.segmentation.changepoints, a.primitives, e) for a, e in zip(each, encounters, strict=True)])
+        np.concatenate(
+            [
+                labels_of(a.segmentation.changepoints, a.primitives, e)
+                for a, e in zip(each, encounters, strict=True)
+            ]
+        )
         for each in (assignments, build_library(encounters, SHARED, 1)[1])
     ]
     return found, labels, fitted
@@ -421,13 +614,33 @@ def peers(place: Path) -> list[Row]:
                 spent.append(costs(encounter_of(row), road, COUNT, seed_of(0, row["name"], road)))
     spent = spent[len(ROADS) :] or spent  # those of the first template load and compile
     chain = [sum(one.values()) - one["ours"] for one in spent]
-    parts = ", ".join(f"{name} {np.median([one[name] for one in spent]):.2f}" for name in spent[0] if name != "ours")
+    parts = ", ".join(
+        f"{name} {np.median([one[name] for one in spent]):.2f}"
+        for name in spent[0]
+        if name != "ours"
+    )
     times = [theirs / one["ours"] for theirs, one in zip(chain, spent, strict=True)]
     what = f"{len(spent)} templates on roads × {COUNT}, median"
     return [
-        Row(f"{what}: CPU of ours", float(np.median([one["ours"] for one in spent])), "s", "lower"),
-        Row(f"{what}: CPU of the chain of peers", float(np.median(chain)), "s", "lower", None, parts),
-        Row(f"{what}: chain by ours", float(np.median(times)), "×", "higher", 20.0, f"{min(times):.1f} to {max(times):.1f}"),
+        Row(
+            f"{what}: CPU of ours", float(np.median([one["ours"] for one in spent])), "s", "lower"
+        ),
+        Row(
+            f"{what}: CPU of the chain of peers",
+            float(np.median(chain)),
+            "s",
+            "lower",
+            None,
+            parts,
+        ),
+        Row(
+            f"{what}: chain by ours",
+            float(np.median(times)),
+            "×",
+            "higher",
+            20.0,
+            f"{min(times):.1f} to {max(times):.1f}",
+        ),
     ]
 
 

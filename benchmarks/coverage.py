@@ -61,12 +61,23 @@ class Set:
 
 def run() -> list[Row]:
     """Measure."""
-    encounters = [(name, replace(encounter, name=str(k))) for k, (name, encounter) in enumerate(list(_encounters())[:MOST])]
-    recombined = recombinations([encounter for _, encounter in encounters], len(encounters) ** 2)[0]
+    encounters = [
+        (name, replace(encounter, name=str(k)))
+        for k, (name, encounter) in enumerate(list(_encounters())[:MOST])
+    ]
+    recombined = recombinations([encounter for _, encounter in encounters], len(encounters) ** 2)[
+        0
+    ]
     rows: list[Row] = []
     for variety in ("wide", "population"):
         made = list(_generated(encounters, variety, COUNT))
-        more = list(_generated([("recombined", encounter) for encounter in recombined], variety, max(COUNT // 5, 1)))
+        more = list(
+            _generated(
+                [("recombined", encounter) for encounter in recombined],
+                variety,
+                max(COUNT // 5, 1),
+            )
+        )
         for setting, beside in ((variety, []), (f"{variety}, recombined", more)):
             rows += _measured(setting, made, beside, np.random.default_rng(1))
     return rows
@@ -76,12 +87,20 @@ Made = tuple[str, Encounter, tuple[Scenario, ...]]
 """Recording, encounter and scenarios."""
 
 
-def _measured(setting: str, made: Sequence[Made], recombined: Sequence[Made], rng: np.random.Generator) -> Iterator[Row]:
+def _measured(
+    setting: str, made: Sequence[Made], recombined: Sequence[Made], rng: np.random.Generator
+) -> Iterator[Row]:
     """Yield all rows of a setting; its nulls, of recorded encounters alone, have as many members."""
     plain, more = (sum(len(members) for _, _, members in sets) for sets in (made, recombined))
     times = round(1.0 + more / plain)
-    shifted = [(name, own, tuple(_shifted(own, rng) for _ in range(times * len(members)))) for name, own, members in made]
-    mixed = [(name, own, tuple(itertools.chain(*(_mixed(members, rng) for _ in range(times))))) for name, own, members in made]
+    shifted = [
+        (name, own, tuple(_shifted(own, rng) for _ in range(times * len(members))))
+        for name, own, members in made
+    ]
+    mixed = [
+        (name, own, tuple(itertools.chain(*(_mixed(members, rng) for _ in range(times)))))
+        for name, own, members in made
+    ]
     found, *nulls = (
         members_of([(name, Set(own, members)) for name, own, members in sets])  # type: ignore[misc]
         for sets in ([*made, *recombined], shifted, mixed)
@@ -102,11 +121,27 @@ def _by_kind(setting: str, found: Members) -> Iterator[Row]:
         enough = [own for own in kinds if len(own.recorded) >= 2 * n]
         if enough:
             shares = np.array([[share.value for share in own.shares(n)] for own in enough])
-            alone, generated, precision, recorded = np.average(shares, axis=0, weights=[len(own.recorded) for own in enough])
+            alone, generated, precision, recorded = np.average(
+                shares, axis=0, weights=[len(own.recorded) for own in enough]
+            )
             message = f"{len(enough)} kinds; templates alone {alone:.2f}"
-            yield Row(f"{setting}: coverage with {n} of a kind", generated, "", "higher", TARGETS.get(n), message)
+            yield Row(
+                f"{setting}: coverage with {n} of a kind",
+                generated,
+                "",
+                "higher",
+                TARGETS.get(n),
+                message,
+            )
             message = f"of the recorded {recorded:.2f}"
-            yield Row(f"{setting}: precision with {n} of a kind", precision, "", "higher", OF_RECORDED * recorded, message)
+            yield Row(
+                f"{setting}: precision with {n} of a kind",
+                precision,
+                "",
+                "higher",
+                OF_RECORDED * recorded,
+                message,
+            )
 
 
 def _curve(variety: str, found: Members) -> Iterator[Row]:
@@ -114,15 +149,33 @@ def _curve(variety: str, found: Members) -> Iterator[Row]:
     for point in found.curve(TEMPLATES):
         n, multiplier = point.templates, point.multiplier
         alone = f"{in_words(point.generated)}; templates alone {in_words(point.alone)}"
-        yield Row(f"{variety}: coverage with {n}", point.generated.value, "", "higher", TARGETS.get(n), alone)
+        yield Row(
+            f"{variety}: coverage with {n}",
+            point.generated.value,
+            "",
+            "higher",
+            TARGETS.get(n),
+            alone,
+        )
         recorded = f"of the recorded {in_words(point.recorded)}"
         least = OF_RECORDED * point.recorded.value if math.isfinite(point.recorded.value) else None
-        yield Row(f"{variety}: precision with {n}", point.precision.value, "", "higher", least, recorded)
+        yield Row(
+            f"{variety}: precision with {n}", point.precision.value, "", "higher", least, recorded
+        )
         name = f"{variety}: multiplier with {n} (inf: more than there are)"
-        yield Row(name, multiplier.value, "", "higher", 10.0, f"[{multiplier.low:.1f}, {multiplier.high:.1f}] over draws")
+        yield Row(
+            name,
+            multiplier.value,
+            "",
+            "higher",
+            10.0,
+            f"[{multiplier.low:.1f}, {multiplier.high:.1f}] over draws",
+        )
 
 
-def _beside(variety: str, found: Members, nulls: Mapping[str, Members], rng: np.random.Generator) -> Iterator[Row]:
+def _beside(
+    variety: str, found: Members, nulls: Mapping[str, Members], rng: np.random.Generator
+) -> Iterator[Row]:
     """Yield what the nulls have, as they are and at the precision of the generated ones."""
     _, coverage, precision, _ = found.shares(MIDDLE)
     best: tuple[float, str] = (0.0, "")
@@ -131,24 +184,59 @@ def _beside(variety: str, found: Members, nulls: Mapping[str, Members], rng: np.
         message = f"{name} {equal[0].value:.2f} at {equal[1].value:.2f}; as it is {plain[1].value:.2f} at {plain[2].value:.2f}"
         if name in nulls:
             gain = coverage.value - equal[0].value
-            yield Row(f"{variety}: coverage with {MIDDLE} over {name} at equal precision", gain, "", "higher", 0.12, message)
+            yield Row(
+                f"{variety}: coverage with {MIDDLE} over {name} at equal precision",
+                gain,
+                "",
+                "higher",
+                0.12,
+                message,
+            )
         else:
             best = max(best, (equal[0].value, message))
     gain = coverage.value - best[0]
-    yield Row(f"{variety}: coverage with {MIDDLE} over the best jitter at equal precision", gain, "", "higher", 0.25, best[1])
+    yield Row(
+        f"{variety}: coverage with {MIDDLE} over the best jitter at equal precision",
+        gain,
+        "",
+        "higher",
+        0.25,
+        best[1],
+    )
     for kind, joint in joint_gain(found, nulls["mixed"], MIDDLE).items():
         target = 0.1 if kind == "following" else 0.05
-        yield Row(f"{variety}: precision of joint features over mixed, {kind}", joint, "", "higher", target)
-    yield Row(f"{variety}: spread of speeds within a set over the recorded", speed_spread(found), "", "higher", 0.4)
+        yield Row(
+            f"{variety}: precision of joint features over mixed, {kind}",
+            joint,
+            "",
+            "higher",
+            target,
+        )
+    yield Row(
+        f"{variety}: spread of speeds within a set over the recorded",
+        speed_spread(found),
+        "",
+        "higher",
+        0.4,
+    )
 
 
-def _generated(encounters: Sequence[tuple[str, Encounter]], variety: str, count: int) -> Iterator[Made]:
+def _generated(
+    encounters: Sequence[tuple[str, Encounter]], variety: str, count: int
+) -> Iterator[Made]:
     """Yield what is generated from each encounter."""
     config = PipelineConfig(sampling=SamplingConfig(variety=variety))
     for name, encounter in encounters:
         try:
             road, template = road_and_template("corridor", encounter, config.road)
-            chain = Chain(template, segment(template, config.segmentation, SEED), road, config, count=count, seed=SEED)
+            chain = Chain(
+                template,
+                segment(template, config.segmentation, SEED),
+                road,
+                config,
+                count=count,
+                seed=SEED,
+            )
             yield name, encounter, tuple(chain.run())
         except ScenarioGenError as error:
             print(f"{encounter.name}: {error}", file=sys.stderr)
@@ -158,11 +246,20 @@ def _encounters() -> Iterator[tuple[str, Encounter]]:
     if not (DATA / "trajectories").is_dir():
         sys.path.append(str(Path(__file__).resolve().parents[1] / "test" / "worlds"))
         drawn = import_module("textbook_motions")
-        yield from ((f"drawn {seed}", drawn.labelled(kind, seed).encounter) for kind in drawn.REACTIONS for seed in range(3))
+        yield from (
+            (f"drawn {seed}", drawn.labelled(kind, seed).encounter)
+            for kind in drawn.REACTIONS
+            for seed in range(3)
+        )
         return
     for row in json.loads(PAIRS.read_text()):
         config = LogConfig(vehicles=",".join(row["vehicles"]), start=row["start"], end=row["end"])
-        yield row["name"], read_log([DATA / "trajectories" / file for file in row["files"]], config).encounters[0]
+        yield (
+            row["name"],
+            read_log([DATA / "trajectories" / file for file in row["files"]], config).encounters[
+                0
+            ],
+        )
 
 
 def _shifted(encounter: Encounter, rng: np.random.Generator) -> Scenario:
@@ -171,11 +268,15 @@ def _shifted(encounter: Encounter, rng: np.random.Generator) -> Scenario:
     for n in range(len(encounter.vehicles)):
         pace = 1.0 + PACE * rng.standard_normal()
         at = np.clip(time * pace + SHIFT_S * rng.standard_normal(), 0.0, time[-1])
-        track = np.column_stack([encounter.position[n], encounter.heading[n], encounter.speed[n] * pace])
+        track = np.column_stack(
+            [encounter.position[n], encounter.heading[n], encounter.speed[n] * pace]
+        )
         rows.append(np.array([np.interp(at, time, column) for column in track.T]))
     x, y, heading, speed = np.stack(rows, axis=1)
     position = np.stack((x, y), axis=-1)
-    return Scenario(encounter.vehicles, time, position, heading, speed, np.gradient(speed, time, axis=1))
+    return Scenario(
+        encounter.vehicles, time, position, heading, speed, np.gradient(speed, time, axis=1)
+    )
 
 
 def _mixed(members: Sequence[Scenario], rng: np.random.Generator) -> tuple[Scenario, ...]:
@@ -189,6 +290,8 @@ def _mixed(members: Sequence[Scenario], rng: np.random.Generator) -> tuple[Scena
             name: np.stack([getattr(one, name)[n, :count] for n, one in enumerate(own)])
             for name in ("position", "heading", "speed", "acceleration", "present")
         }
-        rows["present"] = np.minimum(np.stack([one.present[n] for n, one in enumerate(own)]), count - 1)
+        rows["present"] = np.minimum(
+            np.stack([one.present[n] for n, one in enumerate(own)]), count - 1
+        )
         mixed.append(replace(members[0], time=own[0].time[:count], reference_drive=None, **rows))
     return tuple(mixed)

@@ -56,9 +56,19 @@ def run(count: int = sized(200, quick=2)) -> list[Row]:
         found, driven = planners(spread(trials, count))
         bad = partial(run_trials, trials, BAD, ClosedLoopConfig(policy=REPLAY))
         rows += found + discriminating(spread(trials, TRIED))
-        rows += reactive_planner(spread(trials, max(3 * count // 5, 1)), bad) + witnesses(spread(trials, WITNESSES))
+        rows += reactive_planner(spread(trials, max(3 * count // 5, 1)), bad) + witnesses(
+            spread(trials, WITNESSES)
+        )
     found, wild = anything()
-    return rows + found + rear_ends() + collisions([*driven, *wild]) + speed() + gymnasium_steps() + dds(made)
+    return (
+        rows
+        + found
+        + rear_ends()
+        + collisions([*driven, *wild])
+        + speed()
+        + gymnasium_steps()
+        + dds(made)
+    )
 
 
 def recorded(count: int) -> tuple[list[Trial], GenerationResult | None]:
@@ -70,7 +80,9 @@ def recorded(count: int) -> tuple[list[Trial], GenerationResult | None]:
         each = max(1, -(-count // max(len(prepared) * len(case.encounter.vehicles), 1)))
         found = case.sample(each)
         if made is None or len(case.encounter.vehicles) == 4:
-            made = GenerationResult(case.encounter, case.segmentation, case.road, case.fit, case.routes, found)
+            made = GenerationResult(
+                case.encounter, case.segmentation, case.road, case.fit, case.routes, found
+            )
         for scenario in found.scenarios:
             for ego in range(len(scenario.vehicles)):
                 name = f"{case.name} on {case.road_name} {scenario.index} {ego}"
@@ -85,7 +97,10 @@ def after(steps: int) -> Callable[[State], bool]:
 
 def spread(trials: list[Trial], count: int) -> list[Trial]:
     """Return so many of the trials, spread over all."""
-    return [trials[k] for k in np.unique(np.linspace(0, len(trials) - 1, count).round().astype(int)).tolist()]
+    return [
+        trials[k]
+        for k in np.unique(np.linspace(0, len(trials) - 1, count).round().astype(int)).tolist()
+    ]
 
 
 def planners(trials: list[Trial]) -> tuple[list[Row], list[Outcome]]:
@@ -93,21 +108,40 @@ def planners(trials: list[Trial]) -> tuple[list[Row], list[Outcome]]:
     bad, good = (run_trials(trials, name) for name in (BAD, GOOD))
     found = {"constant speed": rates(bad), "IDM follower": rates(good)}
     rows = [
-        Row(f"{name}: {what}", rate.share.value, "", "lower" if what != "goals" else "higher", None, str(rate))
+        Row(
+            f"{name}: {what}",
+            rate.share.value,
+            "",
+            "lower" if what != "goals" else "higher",
+            None,
+            str(rate),
+        )
         for name, each in found.items()
         for what, rate in each.items()
     ]
     unit, encounters = units_of([one.name for one in bad], [one.origin for one in bad])
-    more = [float(a.verdict.collision is not None) - (b.verdict.collision is not None) for a, b in zip(bad, good, strict=True)]
+    more = [
+        float(a.verdict.collision is not None) - (b.verdict.collision is not None)
+        for a, b in zip(bad, good, strict=True)
+    ]
     share = paired_difference(np.array(more), unit, 0.95)
     said = f"{share.value:.3f}, {share.low:.3f} to {share.high:.3f}; {encounters} encounters"
     rows.append(
-        Row("collisions: constant speed's less IDM's on the same scenarios, lower bound", share.low, "", "higher", 0.0, said)
+        Row(
+            "collisions: constant speed's less IDM's on the same scenarios, lower bound",
+            share.low,
+            "",
+            "higher",
+            0.0,
+            said,
+        )
     )
     again = run_trials(trials[:40], GOOD, workers=2)
     config = ClosedLoopConfig()
     same = Drives(good[:40], GOOD, config).json() == Drives(again, GOOD, config).json()
-    rows.append(Row("same bytes in a second run, with two workers", float(same), "", "higher", 1.0))
+    rows.append(
+        Row("same bytes in a second run, with two workers", float(same), "", "higher", 1.0)
+    )
     return rows, [*bad, *good]
 
 
@@ -118,20 +152,51 @@ def collisions(outcomes: list[Outcome]) -> list[Row]:
     of = f"{len(outcomes)} drives, {hits} with a collision"
     rows = [
         Row("collisions at 1 ms that the verdict lacks", float(lacking), "", "lower", 0.0, of),
-        Row("collisions of the verdict that no millisecond shows", float(brief), "", "lower", None, of),
-        Row("collisions of the verdict that no microsecond of their step shows either", float(beyond), "", "lower", 0.0, of),
+        Row(
+            "collisions of the verdict that no millisecond shows",
+            float(brief),
+            "",
+            "lower",
+            None,
+            of,
+        ),
+        Row(
+            "collisions of the verdict that no microsecond of their step shows either",
+            float(beyond),
+            "",
+            "lower",
+            0.0,
+            of,
+        ),
     ]
     theirs = contacts(outcomes)
     if theirs is not None:
         both = list(zip(theirs, outcomes, strict=True))
         missed = sum(k is not None and one.verdict.collision is None for k, one in both)
         late = sum(
-            k is not None and one.verdict.collision is not None and one.verdict.collision.time > 0.1 * k + 1e-3 for k, one in both
+            k is not None
+            and one.verdict.collision is not None
+            and one.verdict.collision.time > 0.1 * k + 1e-3
+            for k, one in both
         )
         said = f"commonroad-drivability-checker 2025.4.0: {sum(k is not None for k in theirs)} of {len(theirs)} drives"
         rows += [
-            Row("collisions of the drivability checker that the verdict lacks", float(missed), "", "lower", 0.0, said),
-            Row("collisions that it has earlier than the verdict", float(late), "", "lower", 0.0, said),
+            Row(
+                "collisions of the drivability checker that the verdict lacks",
+                float(missed),
+                "",
+                "lower",
+                0.0,
+                said,
+            ),
+            Row(
+                "collisions that it has earlier than the verdict",
+                float(late),
+                "",
+                "lower",
+                0.0,
+                said,
+            ),
         ]
     return rows
 
@@ -155,7 +220,9 @@ def dense(outcomes: list[Outcome]) -> tuple[int, int, int]:
     return lacking, brief, beyond
 
 
-def seen_at(drive: Drive, looked_at: Sequence[int] | None = None, every: float = 1e-3) -> float | None:
+def seen_at(
+    drive: Drive, looked_at: Sequence[int] | None = None, every: float = 1e-3
+) -> float | None:
     """First instant [s] at which the ego's box overlaps another's, by plain numpy on the motion, in some steps or in all.
 
     A jump is no motion: nobody is met on its way.
@@ -163,20 +230,31 @@ def seen_at(drive: Drive, looked_at: Sequence[int] | None = None, every: float =
     motion, ego = drive.motion, drive.ego
     first = None
     for i in range(len(motion.vehicles)):
-        steps = np.setdiff1d(np.flatnonzero(drive.here[i][:-1] & drive.here[i][1:]), np.subtract(drive.jumps, 1))
+        steps = np.setdiff1d(
+            np.flatnonzero(drive.here[i][:-1] & drive.here[i][1:]), np.subtract(drive.jumps, 1)
+        )
         if looked_at is not None:
             steps = np.intersect1d(steps, looked_at)
         if i == ego or not len(steps):
             continue
         near = np.hypot(*(motion.position[i] - motion.position[ego]).T)
         moved = np.linalg.norm(np.diff(motion.position[[i, ego]], axis=1), axis=2).sum(axis=0)
-        reach = 15.0 + moved + motion.speed[[i, ego]].max(axis=1).sum() * (motion.time[1] - motion.time[0])
+        reach = (
+            15.0
+            + moved
+            + motion.speed[[i, ego]].max(axis=1).sum() * (motion.time[1] - motion.time[0])
+        )
         steps = steps[near[steps] < reach[steps]]
         if not len(steps):
             continue
         a, b = (instants(drive, n, steps, every) for n in (ego, i))
         hits = overlapping(
-            a, b, motion.vehicles[ego].length, motion.vehicles[ego].width, motion.vehicles[i].length, motion.vehicles[i].width
+            a,
+            b,
+            motion.vehicles[ego].length,
+            motion.vehicles[ego].width,
+            motion.vehicles[i].length,
+            motion.vehicles[i].width,
         )
         if hits.any():
             k, m = (int(v[0]) for v in np.nonzero(hits))
@@ -194,7 +272,12 @@ def instants(drive: Drive, n: int, steps: np.ndarray, every: float) -> Floats:
     yaw = motion.heading[n]
     way = motion.speed[n][:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
     v, w = way[steps][:, None], way[steps + 1][:, None]
-    xy = (1 + 2 * u) * (1 - u) ** 2 * p + u * (1 - u) ** 2 * h * v + u * u * (3 - 2 * u) * q + u * u * (u - 1) * h * w
+    xy = (
+        (1 + 2 * u) * (1 - u) ** 2 * p
+        + u * (1 - u) ** 2 * h * v
+        + u * u * (3 - 2 * u) * q
+        + u * u * (u - 1) * h * w
+    )
     turn = yaw[steps][:, None] + u[..., 0] * (yaw[steps + 1] - yaw[steps])[:, None]
     return np.concatenate([xy, turn[..., None]], axis=-1)
 
@@ -227,14 +310,23 @@ def witnesses(trials: list[Trial]) -> list[Row]:
             hits += verdict.collision is not None or verdict.among_others > 0
             off += verdict.off_road == verdict.off_road
             missed += verdict.goal != verdict.goal
-            deviation = max(deviation, float(np.abs(drive.motion.position - scenario.position).max()))
+            deviation = max(
+                deviation, float(np.abs(drive.motion.position - scenario.position).max())
+            )
         name = f"witness as ego, {policy}"
         of = f"{len(trials)} drives"
         rows += [
             Row(f"{name}: collisions", float(hits), "", "lower", 0.0, of),
             Row(f"{name}: off the road", float(off), "", "lower", 0.0, of),
             Row(f"{name}: goal not reached", float(missed), "", "lower", 0.0, of),
-            Row(f"{name}: largest distance from the certified motion", 100.0 * deviation, "cm", "lower", 5.0, of),
+            Row(
+                f"{name}: largest distance from the certified motion",
+                100.0 * deviation,
+                "cm",
+                "lower",
+                5.0,
+                of,
+            ),
         ]
     return rows
 
@@ -274,8 +366,22 @@ def anything() -> tuple[list[Row], list[Outcome]]:
     bounds = wilson(forced, RUNS, 0.95)
     said = f"{forced} of {RUNS}, {100 * bounds.low:.1f} to {100 * bounds.high:.1f} %"
     rows = [
-        Row("ego doing anything: contacts among the others", float(met), "", "lower", 0.0, f"{RUNS} runs"),
-        Row("ego doing anything: runs with a circle without the ego", float(stuck), "", "lower", 0.0, f"{RUNS} runs"),
+        Row(
+            "ego doing anything: contacts among the others",
+            float(met),
+            "",
+            "lower",
+            0.0,
+            f"{RUNS} runs",
+        ),
+        Row(
+            "ego doing anything: runs with a circle without the ego",
+            float(stuck),
+            "",
+            "lower",
+            0.0,
+            f"{RUNS} runs",
+        ),
         Row(
             f"ego doing anything: runs with a vehicle more than {LATE:g} s late after it",
             float(late),
@@ -284,8 +390,22 @@ def anything() -> tuple[list[Row], list[Outcome]]:
             0.0,
             f"{RUNS} runs",
         ),
-        Row("ego doing anything: runs with braking that the order forced", bounds.value, "", "lower", None, said),
-        Row("others' braking jerk, 99th percentile", hardest, "m/s³", "lower", 10.0, f"{len(jerk)} steps"),
+        Row(
+            "ego doing anything: runs with braking that the order forced",
+            bounds.value,
+            "",
+            "lower",
+            None,
+            said,
+        ),
+        Row(
+            "others' braking jerk, 99th percentile",
+            hardest,
+            "m/s³",
+            "lower",
+            10.0,
+            f"{len(jerk)} steps",
+        ),
     ]
     return rows, kept
 
@@ -295,7 +415,9 @@ def speed() -> list[Row]:
     rows = []
     for vehicles in (2, 4):
         drawn = [draw_scenario(seed, vehicles) for seed in range(sized(20, quick=1))]
-        loops = [ClosedLoop(scenario, 0) for scenario in drawn if len(scenario.vehicles) == vehicles]
+        loops = [
+            ClosedLoop(scenario, 0) for scenario in drawn if len(scenario.vehicles) == vehicles
+        ]
         best = 0.0
         for _ in range(3):
             began, steps = process_time(), 0
@@ -303,7 +425,15 @@ def speed() -> list[Row]:
                 drive = loop.drive(Witness(loop.scenario, 0), after(60))
                 steps += drive.here.size
             best = max(best, steps / (process_time() - began))
-        rows.append(Row(f"in process, reactive, {vehicles} vehicles", best, "vehicle-steps/s", "higher", 40_000.0))
+        rows.append(
+            Row(
+                f"in process, reactive, {vehicles} vehicles",
+                best,
+                "vehicle-steps/s",
+                "higher",
+                40_000.0,
+            )
+        )
         rows += [*highway_env(vehicles), *sumo(vehicles)]
     return rows
 
@@ -316,8 +446,12 @@ def gymnasium_steps() -> list[Row]:
         print(f"the Gymnasium environment is not measured: {error}", file=sys.stderr)
         return []
     none = np.zeros((0, 3))
-    road = Road("large", np.ones((3000, 3000), dtype=np.bool_), 0.2, np.array((-300.0, -300.0)), none, none)
-    environment = DriveEnv([Trial(str(seed), draw_scenario(seed), 0, road) for seed in range(1, 13)])
+    road = Road(
+        "large", np.ones((3000, 3000), dtype=np.bool_), 0.2, np.array((-300.0, -300.0)), none, none
+    )
+    environment = DriveEnv(
+        [Trial(str(seed), draw_scenario(seed), 0, road) for seed in range(1, 13)]
+    )
     best, action = 0.0, np.array((0.1, 0.0), dtype=np.float32)
     for _ in range(4):  # the first prepares the scenarios
         began, steps = process_time(), 0
@@ -328,7 +462,16 @@ def gymnasium_steps() -> list[Row]:
                 _, _, terminated, truncated, _ = environment.step(action)
                 over, steps = terminated or truncated, steps + 1
         best = max(best, steps / (process_time() - began))
-    return [Row("Gymnasium environment, road of 600 m by 600 m", best, "steps/s", "higher", 3_000.0, "12 scenarios")]
+    return [
+        Row(
+            "Gymnasium environment, road of 600 m by 600 m",
+            best,
+            "steps/s",
+            "higher",
+            3_000.0,
+            "12 scenarios",
+        )
+    ]
 
 
 def dds(made: GenerationResult | None) -> list[Row]:
@@ -347,7 +490,21 @@ def dds(made: GenerationResult | None) -> list[Row]:
     late = real_time(made, sized(200, quick=10))
     load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     return [
-        Row(f"lock-step over DDS, {count} vehicles at 10 Hz", faster, "× real time", "higher", 20.0, load),
-        Row("CPU time of such a step, node and client", used, "ms", "lower", 5.0, "100 ms of the drive"),
+        Row(
+            f"lock-step over DDS, {count} vehicles at 10 Hz",
+            faster,
+            "× real time",
+            "higher",
+            20.0,
+            load,
+        ),
+        Row(
+            "CPU time of such a step, node and client",
+            used,
+            "ms",
+            "lower",
+            5.0,
+            "100 ms of the drive",
+        ),
         Row("real time, 99th percentile of the period's error", late, "ms", "lower", 10.0, load),
     ]

@@ -23,7 +23,9 @@ from benchmarks.row import Row
 from scenario_gen.method.evaluation import dtw_distance, feature_matrix
 from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 STEPS = sized(3000, quick=100)
 SIGNIFICANT = 0.03  # below it, E without changepoints leaves nothing to gain
 
@@ -45,11 +47,29 @@ def _kernels() -> list[Row]:
         theirs, reference = _fastest(lambda: dtw_ndim.distance_fast(a, b, inner_dist="euclidean"))
         peer = f"dtaidistance C {1e3 * theirs:.1f} ms, ours {1e3 * ours:.1f} ms"
         rows += [
-            Row(f"DTW, 2-D, T = {STEPS}: faster than dtaidistance", theirs / ours, "×", "higher", 4.0, peer),
-            Row("DTW: difference from dtaidistance", abs(distance - reference), "", "lower", 1e-9, "dtaidistance C"),
+            Row(
+                f"DTW, 2-D, T = {STEPS}: faster than dtaidistance",
+                theirs / ours,
+                "×",
+                "higher",
+                4.0,
+                peer,
+            ),
+            Row(
+                "DTW: difference from dtaidistance",
+                abs(distance - reference),
+                "",
+                "lower",
+                1e-9,
+                "dtaidistance C",
+            ),
         ]
     except ImportError:
-        rows.append(Row(f"DTW, 2-D, T = {STEPS} (dtaidistance is not installed)", 1e3 * ours, "ms", "lower"))
+        rows.append(
+            Row(
+                f"DTW, 2-D, T = {STEPS} (dtaidistance is not installed)", 1e3 * ours, "ms", "lower"
+            )
+        )
 
     def normalised() -> Any:
         matrix = cdist(a, b)
@@ -58,9 +78,25 @@ def _kernels() -> list[Row]:
     ours, matrix = _fastest(lambda: feature_matrix(a, b))
     theirs, reference = _fastest(normalised)
     peer = f"scipy cdist {1e3 * theirs:.0f} ms, ours {1e3 * ours:.0f} ms"
-    rows.append(Row(f"feature matrix, T = {STEPS}: faster than scipy", theirs / ours, "×", "higher", 2.0, peer))
     rows.append(
-        Row("feature matrix: difference from scipy", float(np.abs(matrix - reference).max()), "", "lower", 1e-12, "scipy")
+        Row(
+            f"feature matrix, T = {STEPS}: faster than scipy",
+            theirs / ours,
+            "×",
+            "higher",
+            2.0,
+            peer,
+        )
+    )
+    rows.append(
+        Row(
+            "feature matrix: difference from scipy",
+            float(np.abs(matrix - reference).max()),
+            "",
+            "lower",
+            1e-12,
+            "scipy",
+        )
     )
     return rows
 
@@ -68,10 +104,25 @@ def _kernels() -> list[Row]:
 def _figure5(cases: Sequence[Measured]) -> list[Row]:
     if not cases:
         return []
-    own, others = [case for case in cases if case.own_road], [case for case in cases if not case.own_road]
+    own, others = (
+        [case for case in cases if case.own_road],
+        [case for case in cases if not case.own_road],
+    )
     rows = [
-        Row("evaluation and report of 50 samples, most costly case", max(c.seconds for c in cases), "s CPU", "lower", 10.0),
-        Row("figure 5: cases measured", len(cases), "", "higher", peer=f"seeds {', '.join(map(str, SEEDS))}"),
+        Row(
+            "evaluation and report of 50 samples, most costly case",
+            max(c.seconds for c in cases),
+            "s CPU",
+            "lower",
+            10.0,
+        ),
+        Row(
+            "figure 5: cases measured",
+            len(cases),
+            "",
+            "higher",
+            peer=f"seeds {', '.join(map(str, SEEDS))}",
+        ),
         Row(
             "changepoints per second, most",
             max(c.evaluation.changepoints / c.evaluation.duration for c in cases),
@@ -85,18 +136,61 @@ def _figure5(cases: Sequence[Measured]) -> list[Row]:
         telling = [c for c in cases if c.value(WITHOUT, key) >= SIGNIFICANT]
         worse = [c for c in telling if not c.value(WITH, key) < c.value(WITHOUT, key)]
         label = f"E {kind}: with below without, of {len(telling)} cases"
-        peer = ", ".join(f"not {c.evaluation.encounter} on {c.evaluation.road}, seed {c.seed}" for c in worse)
-        rows.append(Row(label, 1.0 - len(worse) / len(telling) if telling else float("nan"), "share", "higher", 1.0, peer))
-        for name, group, target in (("own road", own, targets[0]), ("other roads", others, targets[1])):
+        peer = ", ".join(
+            f"not {c.evaluation.encounter} on {c.evaluation.road}, seed {c.seed}" for c in worse
+        )
+        rows.append(
+            Row(
+                label,
+                1.0 - len(worse) / len(telling) if telling else float("nan"),
+                "share",
+                "higher",
+                1.0,
+                peer,
+            )
+        )
+        for name, group, target in (
+            ("own road", own, targets[0]),
+            ("other roads", others, targets[1]),
+        ):
             peer = f"uniform {_ratio(group, UNIFORM, key):.2f}, best linear pieces {_ratio(group, LINEAR, key):.2f}"
-            rows.append(Row(f"E {kind}: median with / without, {name}", _ratio(group, WITH, key), "", "lower", target, peer))
+            rows.append(
+                Row(
+                    f"E {kind}: median with / without, {name}",
+                    _ratio(group, WITH, key),
+                    "",
+                    "lower",
+                    target,
+                    peer,
+                )
+            )
         even = [c for c in cases if np.isfinite(c.value(UNIFORM, key))]
         below = {c: c.value(WITH, key) < c.value(UNIFORM, key) for c in even}
-        shares = (f"seed {seed} {_share([below[c] for c in even if c.seed == seed]):.2f}" for seed in SEEDS)
+        shares = (
+            f"seed {seed} {_share([below[c] for c in even if c.seed == seed]):.2f}"
+            for seed in SEEDS
+        )
         label = f"E {kind}: below uniform, of {len(even)} cases"
-        rows.append(Row(label, _share(list(below.values())), "share", "higher", targets[2], ", ".join(shares)))
+        rows.append(
+            Row(
+                label,
+                _share(list(below.values())),
+                "share",
+                "higher",
+                targets[2],
+                ", ".join(shares),
+            )
+        )
         correlation = float(np.nanmedian([c.value(WITH, f"correlation_{kind}") for c in cases]))
-        rows.append(Row(f"{kind}: correlation with the template's matrix, median", correlation, "", "higher", 0.9))
+        rows.append(
+            Row(
+                f"{kind}: correlation with the template's matrix, median",
+                correlation,
+                "",
+                "higher",
+                0.9,
+            )
+        )
     return rows
 
 
@@ -106,7 +200,11 @@ def _share(hits: Sequence[bool]) -> float:
 
 def _ratio(cases: Sequence[Measured], arm: str, key: str) -> float:
     """Median of E with / E without over the cases in which E without is worth speaking of."""
-    ratios = [c.value(arm, key) / c.value(WITHOUT, key) for c in cases if c.value(WITHOUT, key) >= SIGNIFICANT]
+    ratios = [
+        c.value(arm, key) / c.value(WITHOUT, key)
+        for c in cases
+        if c.value(WITHOUT, key) >= SIGNIFICANT
+    ]
     known = [ratio for ratio in ratios if np.isfinite(ratio)]
     return float(np.median(known)) if known else float("nan")
 

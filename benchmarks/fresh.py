@@ -23,7 +23,15 @@ from benchmarks.row import Row
 
 ROOT = Path(__file__).resolve().parents[1]
 DRY = sized((), quick=("--dry-run",))
-LEFT_OUT = ("CI", "PYTHONPATH", "VIRTUAL_ENV", "MAKEFLAGS", "AMENT_PREFIX_PATH", "NUMBA_CACHE_DIR", "PYTHONDONTWRITEBYTECODE")
+LEFT_OUT = (
+    "CI",
+    "PYTHONPATH",
+    "VIRTUAL_ENV",
+    "MAKEFLAGS",
+    "AMENT_PREFIX_PATH",
+    "NUMBA_CACHE_DIR",
+    "PYTHONDONTWRITEBYTECODE",
+)
 PEER = "4ef626c, idle: demo 278 s (321 s of CPU), test 581 s (976 s of CPU, and red), 244 packages, 1,600 MB"
 
 
@@ -34,7 +42,11 @@ def run() -> list[Row]:
         clone = place / "clone"
         subprocess.run(["git", "clone", "--quiet", str(ROOT), str(clone)], check=True)
         variables = {name: value for name, value in os.environ.items() if name not in LEFT_OUT}
-        variables |= {"XDG_CACHE_HOME": str(place / "cache"), "PIP_NO_CACHE_DIR": "1", "SCENARIO_GEN_DATA": str(place / "none")}
+        variables |= {
+            "XDG_CACHE_HOME": str(place / "cache"),
+            "PIP_NO_CACHE_DIR": "1",
+            "SCENARIO_GEN_DATA": str(place / "none"),
+        }
         results = place / "tests.xml"
 
         def step(*command: str, **more: str) -> tuple[float, float]:
@@ -51,7 +63,11 @@ def run() -> list[Row]:
         parts["test: ruff, mypy, pytest"] = make("test", PYTEST_ADDOPTS=f"--junitxml={results}")
         alone = sized(("-m", "scenario_gen.numerics"), quick=("--version",))
         python = str(clone / ".venv" / "bin" / "python") if not DRY else sys.executable
-        apart = {"all kernels, by themselves": step(python, *alone, NUMBA_CACHE_DIR=str(place / "kernels"))}
+        apart = {
+            "all kernels, by themselves": step(
+                python, *alone, NUMBA_CACHE_DIR=str(place / "kernels")
+            )
+        }
         totals = {f"make {name}": _sum(parts, name) for name in ("demo", "test")}
         rows = [
             *_rows(totals, {"make demo": (100.0, None), "make test": (240.0, 420.0)}, PEER),
@@ -61,26 +77,41 @@ def run() -> list[Row]:
         return rows + _by_folder(results)
 
 
-def _measured(command: Sequence[str], where: Path, variables: dict[str, str]) -> tuple[float, float]:
+def _measured(
+    command: Sequence[str], where: Path, variables: dict[str, str]
+) -> tuple[float, float]:
     """Seconds of the clock and of the CPU that a command takes; what it says goes to stderr if it fails."""
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-    done = subprocess.run(command, cwd=where, env=variables, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=where, env=variables, capture_output=True, text=True, check=False
+    )
     wall, after = time.monotonic() - started, resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode:
-        print(f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout[-5000:]}{done.stderr[-2000:]}", file=sys.stderr)
+        print(
+            f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout[-5000:]}{done.stderr[-2000:]}",
+            file=sys.stderr,
+        )
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def _sum(parts: dict[str, tuple[float, float]], name: str) -> tuple[float, float]:
     """What the parts of one command take together."""
-    walls, used = zip(*(figures for part, figures in parts.items() if part.startswith(f"{name}:")), strict=True)
+    walls, used = zip(
+        *(figures for part, figures in parts.items() if part.startswith(f"{name}:")), strict=True
+    )
     return sum(walls), sum(used)
 
 
-def _rows(parts: dict[str, tuple[float, float]], targets: dict[str, tuple[float, float | None]], peer: str | None) -> list[Row]:
+def _rows(
+    parts: dict[str, tuple[float, float]],
+    targets: dict[str, tuple[float, float | None]],
+    peer: str | None,
+) -> list[Row]:
     rows = []
     for name, figures in parts.items():
-        for what, value, target in zip(("clock", "CPU"), figures, targets.get(name, (None, None)), strict=True):
+        for what, value, target in zip(
+            ("clock", "CPU"), figures, targets.get(name, (None, None)), strict=True
+        ):
             rows.append(Row(f"{name}, {what}", value, "s", "lower", target, peer))
     return rows
 
@@ -105,10 +136,24 @@ def _by_folder(results: Path) -> list[Row]:
         parts = case.get("classname", "").split(".")
         folder = parts[1] if len(parts) > 2 else "the top"
         seconds[folder] = seconds.get(folder, 0.0) + float(case.get("time", "0"))
-        outcomes[next((child.tag for child in case if child.tag in ("failure", "error", "skipped")), "passed")] += 1
+        outcomes[
+            next(
+                (child.tag for child in case if child.tag in ("failure", "error", "skipped")),
+                "passed",
+            )
+        ] += 1
     rows = []
     for name, count in outcomes.items():
-        rows.append(Row(f"tests: {name}", float(count), "", "higher" if name == "passed" else "lower", None, None))
+        rows.append(
+            Row(
+                f"tests: {name}",
+                float(count),
+                "",
+                "higher" if name == "passed" else "lower",
+                None,
+                None,
+            )
+        )
     for name, value in sorted(seconds.items(), key=lambda pair: -pair[1]):
         rows.append(Row(f"tests of {name}, clock of the workers", value, "s", "lower", None, None))
     return rows

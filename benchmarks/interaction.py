@@ -22,7 +22,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from benchmarks._interaction_measures import following, ghosts, pair_windows, shared, tailgates, yielding
+from benchmarks._interaction_measures import (
+    following,
+    ghosts,
+    pair_windows,
+    shared,
+    tailgates,
+    yielding,
+)
 from benchmarks._naturalness_classifier import windows
 from benchmarks._naturalness_cuts import cuts, recorded
 from benchmarks._naturalness_motion import displacement, Signals
@@ -48,9 +55,18 @@ LOGS = sized(None, quick=1)
 SEED, APART = 7, 7  # of a set; how far apart two scenarios are that a mixed pair is of
 RESAMPLES = sized(1000, quick=20)
 FOLDS = 5
-RATIO, MOST = 4, 400  # generated windows for each recorded one; of an encounter in a set, which bounds the cost
+RATIO, MOST = (
+    4,
+    400,
+)  # generated windows for each recorded one; of an encounter in a set, which bounds the cost
 _TOLD_APART: tuple[tuple[str, str, str, Literal["higher", "lower"], float | None], ...] = (
-    ("AUC, pairs that share a lane or a conflict against mixed ones", "together", "mixed", "higher", 0.62),
+    (
+        "AUC, pairs that share a lane or a conflict against mixed ones",
+        "together",
+        "mixed",
+        "higher",
+        0.62,
+    ),
     ("AUC, pairs against recorded ones", "pairs", "recorded_pairs", "lower", 0.6),
     ("AUC, vehicles against recorded ones", "singles", "recorded_singles", "lower", 0.62),
 )
@@ -94,7 +110,9 @@ def run(
             found.append(case)
             print(json.dumps(_finite(case.figures)), file=sys.stderr, flush=True)
     if details:
-        Path(details).write_text("".join(json.dumps(_finite(case.figures)) + "\n" for case in found))
+        Path(details).write_text(
+            "".join(json.dumps(_finite(case.figures)) + "\n" for case in found)
+        )
     return _rows(found)
 
 
@@ -104,7 +122,10 @@ def _encounters(*, held_out: bool) -> Any:
     for cut in chosen:
         paths = [DATA / "trajectories" / file for file in cut.files]
         if all(path.is_file() for path in paths):
-            yield cut.name, max(read_log(paths, cut.config()).encounters, key=lambda one: one.duration)
+            yield (
+                cut.name,
+                max(read_log(paths, cut.config()).encounters, key=lambda one: one.duration),
+            )
     if not held_out:
         for letter in "abc":
             yield f"bundled {letter}", read_log([bundled(letter)]).encounters[0]
@@ -116,11 +137,18 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
     config = PipelineConfig()
     config = replace(config, sampling=replace(config.sampling, variety=variety))
     case = Case(
-        {"name": name, "road": road_name, "edges": [edge.document(encounter.vehicles) for edge in graph.edges]},
+        {
+            "name": name,
+            "road": road_name,
+            "edges": [edge.document(encounter.vehicles) for edge in graph.edges],
+        },
         *([] for _ in range(6)),
     )
     try:
-        road, segmentation = build_road(road_name, encounter, config.road), segment(encounter, config.segmentation, SEED)
+        road, segmentation = (
+            build_road(road_name, encounter, config.road),
+            segment(encounter, config.segmentation, SEED),
+        )
         begun = process_time()
         made = Chain(encounter, segmentation, road, config, count=count, seed=SEED).run()
         seconds = process_time() - begun
@@ -140,20 +168,41 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
     braking = np.array([[ghosts(one, n) > 0 for n in clean] for one in scenarios])
     case.figures |= {"clean drives": braking.size, "ghosts": int(braking.sum())}
     if len(clean) == len(encounter.vehicles):
-        case.figures |= {"clean scenarios": len(scenarios), "haunted": int(braking.any(axis=1).sum())}
+        case.figures |= {
+            "clean scenarios": len(scenarios),
+            "haunted": int(braking.any(axis=1).sum()),
+        }
     lanes, others = shared(encounter)
     follows = {(edge.who, edge.whom): edge for edge in graph.edges if edge.kind == FOLLOW}
     told: list[dict[str, Any]] = []
     for who, whom in lanes:
-        edge = follows.get((who, whom), Reaction(FOLLOW, who, whom, math.nan, 1.0, 1.0, 0.0, 0.0, 0.0))
+        edge = follows.get(
+            (who, whom), Reaction(FOLLOW, who, whom, math.nan, 1.0, 1.0, 0.0, 0.0, 0.0)
+        )
         measured = following(edge, encounter, scenarios)
-        told.append({"slope": measured.slope, "gaps": measured.gaps, "own": measured.own, "lag off": measured.lag - edge.lag})
+        told.append(
+            {
+                "slope": measured.slope,
+                "gaps": measured.gaps,
+                "own": measured.own,
+                "lag off": measured.lag - edge.lag,
+            }
+        )
         if not tailgates(encounter, who, whom):
-            told[-1]["tailgates"] = sum(tailgates(one, who, whom) for one in scenarios) / len(scenarios)
+            told[-1]["tailgates"] = sum(tailgates(one, who, whom) for one in scenarios) / len(
+                scenarios
+            )
     for edge in graph.edges:
         if edge.kind != FOLLOW and edge.gap < math.inf:
             seen = yielding(edge, scenarios)
-            told.append({"early": seen.early, "mean": seen.mean, "spread": seen.spread, "template": edge.lag})
+            told.append(
+                {
+                    "early": seen.early,
+                    "mean": seen.mean,
+                    "spread": seen.spread,
+                    "template": edge.lag,
+                }
+            )
     case.figures["figures"] = told
     for who, whom in (*lanes, *others):
         for k, one in enumerate(scenarios):
@@ -164,12 +213,19 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
     case.together, case.mixed = _some(case.together, MOST), _some(case.mixed, MOST)
     case.recorded_singles = list(windows(Signals.of(vars(encounter) | {"time": encounter.time})))
     case.pairs = _some(case.together, RATIO * len(case.recorded_pairs))
-    case.singles = _some([row for one in signals for row in windows(one)], RATIO * len(case.recorded_singles))
+    case.singles = _some(
+        [row for one in signals for row in windows(one)], RATIO * len(case.recorded_singles)
+    )
     case.figures["displacement"] = displacement(signals[:20])
     if all(edge.kind == FOLLOW for edge in graph.edges):
-        arrivals, pets = (np.array([measure(one, name) for one in scenarios]) for name in ("arrival_gap", "pet"))
+        arrivals, pets = (
+            np.array([measure(one, name) for one in scenarios]) for name in ("arrival_gap", "pet")
+        )
         if np.isfinite(arrivals).any() and np.isfinite(pets).any():
-            case.figures |= {"arrival": float(np.nanstd(arrivals)), "pet": float(np.nanmax(pets) - np.nanmin(pets))}
+            case.figures |= {
+                "arrival": float(np.nanstd(arrivals)),
+                "pet": float(np.nanmax(pets) - np.nanmin(pets)),
+            }
     return case
 
 
@@ -193,17 +249,65 @@ def _windows(one: Motion, a: int, other: Motion, b: int) -> list[Floats]:
 def _rows(found: Sequence[Case]) -> list[Row]:
     """Sum the cases up."""
     good = [case for case in found if "figures" in case.figures]
-    follows = [(case, told) for case in good for told in case.figures["figures"] if "slope" in told]
+    follows = [
+        (case, told) for case in good for told in case.figures["figures"] if "slope" in told
+    ]
     yields = [(case, told) for case in good for told in case.figures["figures"] if "early" in told]
-    rows = [Row("encounters that generate", len(good) / max(len(found), 1), "share", "higher", None, f"{len(found)} encounters")]
+    rows = [
+        Row(
+            "encounters that generate",
+            len(good) / max(len(found), 1),
+            "share",
+            "higher",
+            None,
+            f"{len(found)} encounters",
+        )
+    ]
 
-    def row(label: str, pairs: Any, of: Callable[[Any], float], unit: str, better: Any, target: float | None) -> None:
+    def row(
+        label: str,
+        pairs: Any,
+        of: Callable[[Any], float],
+        unit: str,
+        better: Any,
+        target: float | None,
+    ) -> None:
         if pairs:
-            rows.append(Row(label, of([told for _, told in pairs]), unit, better, target, _interval(pairs, of)))
+            rows.append(
+                Row(
+                    label,
+                    of([told for _, told in pairs]),
+                    unit,
+                    better,
+                    target,
+                    _interval(pairs, of),
+                )
+            )
 
-    row("follower's mean speed on its leader's, median slope", follows, _median("slope"), "", "higher", 0.8)
-    row("time gap over the template's, 10th percentile", follows, _median("gaps", 0), "×", "higher", 0.7)
-    row("time gap over the template's, 90th percentile", follows, _median("gaps", 1), "×", "lower", 1.3)
+    row(
+        "follower's mean speed on its leader's, median slope",
+        follows,
+        _median("slope"),
+        "",
+        "higher",
+        0.8,
+    )
+    row(
+        "time gap over the template's, 10th percentile",
+        follows,
+        _median("gaps", 0),
+        "×",
+        "higher",
+        0.7,
+    )
+    row(
+        "time gap over the template's, 90th percentile",
+        follows,
+        _median("gaps", 1),
+        "×",
+        "lower",
+        1.3,
+    )
     row(
         "lag of followers' deviations off the template's, median",
         follows,
@@ -212,17 +316,62 @@ def _rows(found: Sequence[Case]) -> list[Row]:
         "lower",
         0.5,
     )
-    row("own part of followers' deviations, median", follows, _median("own"), "share", "higher", 0.05)
+    row(
+        "own part of followers' deviations, median",
+        follows,
+        _median("own"),
+        "share",
+        "higher",
+        0.05,
+    )
     near = [(case, told) for case, told in follows if "tailgates" in told]
-    row("drives below 0.3 s behind another where the record is not", near, _mean("tailgates"), "share", "lower", 0.0)
-    row("yielder leaves early where the template does not, mean", yields, _mean("early"), "share", "lower", 0.01)
+    row(
+        "drives below 0.3 s behind another where the record is not",
+        near,
+        _mean("tailgates"),
+        "share",
+        "lower",
+        0.0,
+    )
+    row(
+        "yielder leaves early where the template does not, mean",
+        yields,
+        _mean("early"),
+        "share",
+        "lower",
+        0.01,
+    )
     row("spread of a yielder's lag, median", yields, _median("spread"), "s", "lower", 0.9)
-    for what, few, many in (("drives", "ghosts", "clean drives"), ("scenarios", "haunted", "clean scenarios")):
+    for what, few, many in (
+        ("drives", "ghosts", "clean drives"),
+        ("scenarios", "haunted", "clean scenarios"),
+    ):
         seen = [(case, case.figures) for case in good if case.figures.get(many)]
-        row(f"{what} with ghost braking, where the record has none", seen, _ratio(few, many), "share", "lower", 0.04)
-    row("acceptance, median", [(case, case.figures) for case in good], _median("acceptance"), "share", "higher", None)
+        row(
+            f"{what} with ghost braking, where the record has none",
+            seen,
+            _ratio(few, many),
+            "share",
+            "lower",
+            0.04,
+        )
+    row(
+        "acceptance, median",
+        [(case, case.figures) for case in good],
+        _median("acceptance"),
+        "share",
+        "higher",
+        None,
+    )
     free = [(case, case.figures) for case in good if "arrival" in case.figures]
-    row("standard deviation of the arrival gap, nobody waits, median", free, _median("arrival"), "s", "higher", 0.8)
+    row(
+        "standard deviation of the arrival gap, nobody waits, median",
+        free,
+        _median("arrival"),
+        "s",
+        "higher",
+        0.8,
+    )
     row("range of PET, nobody waits, median", free, _median("pet"), "s", "higher", 3.0)
     row(
         "displacement without the clock, median",
@@ -239,7 +388,9 @@ def _rows(found: Sequence[Case]) -> list[Row]:
     return rows
 
 
-def _told_apart(sets: Sequence[tuple[list[Floats], list[Floats]]]) -> tuple[float, float, float] | None:
+def _told_apart(
+    sets: Sequence[tuple[list[Floats], list[Floats]]],
+) -> tuple[float, float, float] | None:
     """Area under the curve with its interval, boosted trees, whole encounters held out; None with too few of them."""
     try:
         from sklearn.ensemble import HistGradientBoostingClassifier
@@ -252,8 +403,12 @@ def _told_apart(sets: Sequence[tuple[list[Floats], list[Floats]]]) -> tuple[floa
         return None
     data = np.concatenate([part for pair in sets for part in pair])
     label = np.concatenate([np.repeat((1, 0), (len(one), len(other))) for one, other in sets])
-    group = np.concatenate([np.full(len(one) + len(other), k) for k, (one, other) in enumerate(sets)])
-    weight = np.concatenate([np.full(len(part), 1.0 / len(part)) for pair in sets for part in pair])
+    group = np.concatenate(
+        [np.full(len(one) + len(other), k) for k, (one, other) in enumerate(sets)]
+    )
+    weight = np.concatenate(
+        [np.full(len(part), 1.0 / len(part)) for pair in sets for part in pair]
+    )
     weight *= len(weight) / weight.sum()
     rng = np.random.default_rng(0)
     told, rounds = np.zeros(len(data)), sized(3, 1)
@@ -262,18 +417,30 @@ def _told_apart(sets: Sequence[tuple[list[Floats], list[Floats]]]) -> tuple[floa
             fold = rng.permutation(len(sets)) % FOLDS
             for k in range(FOLDS):
                 test = fold[group] == k
-                model = HistGradientBoostingClassifier(max_leaf_nodes=8, max_iter=150, min_samples_leaf=40, random_state=0)
+                model = HistGradientBoostingClassifier(
+                    max_leaf_nodes=8, max_iter=150, min_samples_leaf=40, random_state=0
+                )
                 model.fit(data[~test], label[~test], sample_weight=weight[~test])
                 told[test] += model.predict_proba(data[test])[:, 1] / rounds
-    each = np.array([float(roc_auc_score(label[group == k], told[group == k])) for k in range(len(sets))])
+    each = np.array(
+        [float(roc_auc_score(label[group == k], told[group == k])) for k in range(len(sets))]
+    )
     draws = [float(each[rng.integers(0, len(each), len(each))].mean()) for _ in range(RESAMPLES)]
     return float(each.mean()), float(np.percentile(draws, 2.5)), float(np.percentile(draws, 97.5))
 
 
-def _median(key: str, part: int | None = None, *, absolute: bool = False) -> Callable[[Any], float]:
+def _median(
+    key: str, part: int | None = None, *, absolute: bool = False
+) -> Callable[[Any], float]:
     def of(told: Any) -> float:
-        values = np.array([one[key] if part is None else one[key][part] for one in told], dtype=float)
-        return float(np.nanmedian(np.abs(values) if absolute else values)) if np.isfinite(values).any() else math.nan
+        values = np.array(
+            [one[key] if part is None else one[key][part] for one in told], dtype=float
+        )
+        return (
+            float(np.nanmedian(np.abs(values) if absolute else values))
+            if np.isfinite(values).any()
+            else math.nan
+        )
 
     return of
 
@@ -293,7 +460,10 @@ def _interval(pairs: Sequence[tuple[Case, Any]], of: Callable[[Any], float]) -> 
     groups = [[told for case, told in pairs if case.figures["name"] == name] for name in names]
     if len(groups) < _FIGURES:
         return f"{len(pairs)} in {len(groups)} encounters"
-    draws = [of([told for k in rng.integers(0, len(groups), len(groups)) for told in groups[k]]) for _ in range(RESAMPLES)]
+    draws = [
+        of([told for k in rng.integers(0, len(groups), len(groups)) for told in groups[k]])
+        for _ in range(RESAMPLES)
+    ]
     low, high = np.nanpercentile(draws, (2.5, 97.5)).tolist()
     return f"{low:.3g} to {high:.3g}; {len(pairs)} in {len(groups)} encounters"
 

@@ -59,9 +59,21 @@ def run(part: str = "all") -> list[Row]:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         archive = write_archive(folder / "archive", 5, **ARCHIVE)
-        words = [sys.executable, "-m", "scenario_gen", "mine", str(archive), "--out", str(folder / "whole"), *SETTINGS]
+        words = [
+            sys.executable,
+            "-m",
+            "scenario_gen",
+            "mine",
+            str(archive),
+            "--out",
+            str(folder / "whole"),
+            *SETTINGS,
+        ]
         subprocess.run(words, check=True, capture_output=True)
-        whole = {f"{path.parent.name}/{path.name}": path.read_bytes() for path in _tables_in(folder / "whole")}
+        whole = {
+            f"{path.parent.name}/{path.name}": path.read_bytes()
+            for path in _tables_in(folder / "whole")
+        }
         processes = Processes(folder)
         try:
             processes.start()
@@ -86,7 +98,13 @@ def _rows(victim: str, seen: Seen) -> list[Row]:
         Row(f"{victim}: kills during the work", seen.kills, "", "higher", KILLS, what),
         Row(f"{victim}: the same bytes", seen.same, "", "higher", KILLS),
         Row(f"{victim}: temporary objects and files left", seen.left, "", "lower", 0.0),
-        Row(f"{victim}: runs that hang or print a traceback", seen.hung + seen.tracebacks, "", "lower", 0.0),
+        Row(
+            f"{victim}: runs that hang or print a traceback",
+            seen.hung + seen.tracebacks,
+            "",
+            "lower",
+            0.0,
+        ),
     ]
 
 
@@ -132,11 +150,19 @@ def _names(processes: Processes, out: str) -> set[str]:
 
 def _listed(processes: Processes, out: str) -> list[str]:
     """Names of the objects of a run."""
-    pages = processes.store().get_paginator("list_objects_v2").paginate(Bucket=BUCKET, Prefix=f"{out}/")
-    return [one["Key"].removeprefix(f"{out}/") for page in pages for one in page.get("Contents", ())]
+    pages = (
+        processes.store()
+        .get_paginator("list_objects_v2")
+        .paginate(Bucket=BUCKET, Prefix=f"{out}/")
+    )
+    return [
+        one["Key"].removeprefix(f"{out}/") for page in pages for one in page.get("Contents", ())
+    ]
 
 
-def _kill(victim: str, processes: Processes, client: Process, chance: random.Random, number: int) -> None:
+def _kill(
+    victim: str, processes: Processes, client: Process, chance: random.Random, number: int
+) -> None:
     """Kill the victim, and start what takes its place."""
     third = number % 3 == 0
     if victim == "client":
@@ -179,12 +205,17 @@ def _go_on(processes: Processes, client: Process, out: str, log: Path, seen: See
     end(client)
 
 
-def _judge(processes: Processes, out: str, log: Path, whole: Tables, names: set[str], seen: Seen) -> None:
+def _judge(
+    processes: Processes, out: str, log: Path, whole: Tables, names: set[str], seen: Seen
+) -> None:
     """Compare what is there with an undisturbed run, and count what is left."""
     store: Any = processes.store()
     there = _listed(processes, out)
     wanted = [name for name in there if name.startswith(tuple(f"{stage}/" for stage in STAGES))]
-    tables = {name: store.get_object(Bucket=BUCKET, Key=f"{out}/{name}")["Body"].read() for name in wanted}
+    tables = {
+        name: store.get_object(Bucket=BUCKET, Key=f"{out}/{name}")["Body"].read()
+        for name in wanted
+    }
     same = tables == whole
     seen.same += same
     extra = set(there) - names

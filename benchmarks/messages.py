@@ -35,7 +35,9 @@ SMALL = sized(6000, quick=20)  # messages sent to the recorder
 RATE = 2000.0  # a second
 INTERRUPT, TERMINATE = signal.SIGINT, signal.SIGTERM
 CALLS = sized(40, quick=2)
-EXITS = (("Ctrl-C", INTERRUPT), ("Ctrl-C twice", INTERRUPT, INTERRUPT), ("SIGTERM", TERMINATE))[: sized(None, quick=1)]
+EXITS = (("Ctrl-C", INTERRUPT), ("Ctrl-C twice", INTERRUPT, INTERRUPT), ("SIGTERM", TERMINATE))[
+    : sized(None, quick=1)
+]
 
 
 def run() -> list[Row]:
@@ -48,7 +50,11 @@ def run() -> list[Row]:
     with free_domain() as domain, tempfile.TemporaryDirectory() as folder:
         rows += _calls(domain, Path(folder))
         rows += [_exit(domain, Path(folder), *how) for how in EXITS]
-    with free_domain() as domain, tempfile.TemporaryDirectory() as folder, _Client(domain) as client:
+    with (
+        free_domain() as domain,
+        tempfile.TemporaryDirectory() as folder,
+        _Client(domain) as client,
+    ):
         rows += many(domain, Path(folder), client, _until)
     return rows
 
@@ -58,8 +64,17 @@ def _scenario(n: int) -> Scenario:
     rng = np.random.Generator(np.random.PCG64(1))
     heading = np.cumsum(rng.normal(0.0, 0.02, (n, POINTS)), axis=1)
     speed = np.full((n, POINTS), 8.0)
-    position: Floats = np.cumsum(0.8 * np.stack([np.cos(heading), np.sin(heading)], axis=-1), axis=1)
-    return Scenario(tuple(Vehicle(str(k)) for k in range(n)), clock, position, heading, speed, np.zeros_like(speed))
+    position: Floats = np.cumsum(
+        0.8 * np.stack([np.cos(heading), np.sin(heading)], axis=-1), axis=1
+    )
+    return Scenario(
+        tuple(Vehicle(str(k)) for k in range(n)),
+        clock,
+        position,
+        heading,
+        speed,
+        np.zeros_like(speed),
+    )
 
 
 def _cpu(work: Callable[[], object], rounds: int) -> float:
@@ -89,7 +104,10 @@ def _path() -> Row:
             pose.header.frame_id = "map"
             pose.header.stamp.sec, pose.header.stamp.nanosec = divmod(stamp, 10**9)
             pose.pose.position.x, pose.pose.position.y = x, y
-            pose.pose.orientation.z, pose.pose.orientation.w = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
+            pose.pose.orientation.z, pose.pose.orientation.w = (
+                math.sin(0.5 * yaw),
+                math.cos(0.5 * yaw),
+            )
             message.poses.append(pose)
         return bytes(serialize_message(message))
 
@@ -114,13 +132,23 @@ def _trajectory() -> Row:
         message.header.frame_id = "map"
         for k in range(POINTS):
             point = MultiDOFJointTrajectoryPoint()
-            point.time_from_start.sec, point.time_from_start.nanosec = divmod(k * 100_000_000, 10**9)
+            point.time_from_start.sec, point.time_from_start.nanosec = divmod(
+                k * 100_000_000, 10**9
+            )
             for i in range(4):
                 transform, velocity, acceleration = Transform(), Twist(), Twist()
-                transform.translation.x, transform.translation.y = map(float, scenario.position[i, k])
+                transform.translation.x, transform.translation.y = map(
+                    float, scenario.position[i, k]
+                )
                 yaw = float(scenario.heading[i, k])
-                transform.rotation.z, transform.rotation.w = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
-                velocity.linear.x, acceleration.linear.x = float(scenario.speed[i, k]), float(scenario.acceleration[i, k])
+                transform.rotation.z, transform.rotation.w = (
+                    math.sin(0.5 * yaw),
+                    math.cos(0.5 * yaw),
+                )
+                velocity.linear.x, acceleration.linear.x = (
+                    float(scenario.speed[i, k]),
+                    float(scenario.acceleration[i, k]),
+                )
                 point.transforms.append(transform)
                 point.velocities.append(velocity)
                 point.accelerations.append(acceleration)
@@ -130,7 +158,9 @@ def _trajectory() -> Row:
     def own() -> bytes:
         return encode_scenario(scenario, 0)
 
-    if len(theirs()) != len(own()) or not np.array_equal(decode_scenario(theirs())[1].position, scenario.position):
+    if len(theirs()) != len(own()) or not np.array_equal(
+        decode_scenario(theirs())[1].position, scenario.position
+    ):
         raise RuntimeError("the two encoders do not make the same message")
     return _ratio("encode a scenario of 4 vehicles and 200 points", own, theirs, 50.0)
 
@@ -143,7 +173,9 @@ def decode_names(data: bytes) -> list[str]:
     return list(deserialize_message(data, MultiDOFJointTrajectory).joint_names)
 
 
-def _ratio(name: str, own: Callable[[], object], theirs: Callable[[], object], target: float) -> Row:
+def _ratio(
+    name: str, own: Callable[[], object], theirs: Callable[[], object], target: float
+) -> Row:
     peer, mine = _cpu(theirs, 5), _cpu(own, 200)
     words = f"built and serialised with rclpy: {1e3 * peer:.2f} ms, ours {1e3 * mine:.4f} ms"
     return Row(name, peer / mine, "×", "higher", target, words)
@@ -189,14 +221,25 @@ def _consumer(domain: int) -> Row:
     stamps: list[float] = []
     with _Client(domain) as client:
         client.node.create_subscription(
-            String, "large", lambda _: stamps.append(time.perf_counter()), QoSProfile(depth=1000), raw=True
+            String,
+            "large",
+            lambda _: stamps.append(time.perf_counter()),
+            QoSProfile(depth=1000),
+            raw=True,
         )
         sender = publisher(domain, "large", size, SCENARIOS, 0.0)
         _until(lambda: len(stamps) == SCENARIOS, 40.0)
         sender.wait(30.0)
     rate = (len(stamps) - 1) / (stamps[-1] - stamps[0]) if len(stamps) > 1 else 0.0
     words = f"{len(stamps)} of {SCENARIOS} messages of {size} bytes arrived, from one process to another"
-    return Row("scenarios received by a raw consumer (2 vehicles, 200 points)", rate, "1/s", "higher", 500.0, words)
+    return Row(
+        "scenarios received by a raw consumer (2 vehicles, 200 points)",
+        rate,
+        "1/s",
+        "higher",
+        500.0,
+        words,
+    )
 
 
 def _recorder(domain: int, folder: Path) -> Row:
@@ -206,7 +249,14 @@ def _recorder(domain: int, folder: Path) -> Row:
         sender.wait(60.0)
     (topic,) = bag_topics(bag)
     words = f"{topic.count} of {SMALL} messages of 100 bytes, 2,000 a second"
-    return Row("messages that the recorder lost at 2,000 a second", SMALL - topic.count, "messages", "lower", 0.0, words)
+    return Row(
+        "messages that the recorder lost at 2,000 a second",
+        SMALL - topic.count,
+        "messages",
+        "lower",
+        0.0,
+        words,
+    )
 
 
 def _calls(domain: int, folder: Path) -> list[Row]:
@@ -218,7 +268,9 @@ def _calls(domain: int, folder: Path) -> list[Row]:
     with nodes(folder, domain, _arguments()), _Client(domain) as client:
         generate, request = _generation(client), _request(50)
         plan = GetPlan.Request()
-        plan.start.pose.position.x, plan.goal.pose.position.x, plan.start.pose.position.y = _ends(client)
+        plan.start.pose.position.x, plan.goal.pose.position.x, plan.start.pose.position.y = _ends(
+            client
+        )
         plan.goal.pose.position.y = plan.start.pose.position.y
         own = ListParameters.Request()
         for kind, name, call in (
@@ -229,7 +281,13 @@ def _calls(domain: int, folder: Path) -> list[Row]:
             service = client.node.create_client(kind, name)
             service.wait_for_service(30.0)
             answer = _done(service.call_async(call))
-            if not (answer.map.data if kind is GetMap else answer.plan.poses if kind is GetPlan else answer.result.names):
+            if not (
+                answer.map.data
+                if kind is GetMap
+                else answer.plan.poses
+                if kind is GetPlan
+                else answer.result.names
+            ):
                 raise RuntimeError(f"{name} answers with nothing")
             running, taken = generate.call_async(request), []
             for _ in range(CALLS):
@@ -240,7 +298,16 @@ def _calls(domain: int, folder: Path) -> list[Row]:
                 taken.append(time.perf_counter() - started)
             _done(running)
             words = f"median {1e3 * float(np.median(taken)):.1f} ms; {CALLS} calls while generations of 50 run"
-            rows.append(Row(f"{kind.__name__} round trip, 95th percentile", 1e3 * _high(taken), "ms", "lower", 200.0, words))
+            rows.append(
+                Row(
+                    f"{kind.__name__} round trip, 95th percentile",
+                    1e3 * _high(taken),
+                    "ms",
+                    "lower",
+                    200.0,
+                    words,
+                )
+            )
     return rows
 
 
@@ -260,7 +327,9 @@ def _request(count: int) -> Any:
     from rcl_interfaces.srv import SetParametersAtomically
     from rclpy.parameter import Parameter
 
-    return SetParametersAtomically.Request(parameters=[Parameter("count", value=count).to_parameter_msg()])
+    return SetParametersAtomically.Request(
+        parameters=[Parameter("count", value=count).to_parameter_msg()]
+    )
 
 
 def _generation(client: _Client) -> Any:
@@ -293,7 +362,11 @@ def _ends(client: _Client) -> tuple[float, float, float]:
     service.wait_for_service(30.0)
     info = _done(service.call_async(GetMap.Request())).map.info
     west, south = info.origin.position.x, info.origin.position.y
-    return west + 10.0, west + info.width * info.resolution - 10.0, south + 0.5 * info.height * info.resolution - 1.75
+    return (
+        west + 10.0,
+        west + info.width * info.resolution - 10.0,
+        south + 0.5 * info.height * info.resolution - 1.75,
+    )
 
 
 def _high(values: list[float]) -> float:

@@ -28,12 +28,21 @@ from benchmarks._naturalness_motion import displacement, keeps_turn, roughness, 
 from benchmarks._size import sized
 from benchmarks.row import Row
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 BEFORE = Path(__file__).with_name("_naturalness_665a212.json")
 ROADS = ("four_way", "t_intersection", "straight")
 COUNT, FEW = sized((50, 20), quick=(4, 4))
 LOGS = sized(None, quick=1)
-FLOOR = {"jerk": 0.5, "lateral jerk": 0.5, "lateral": 0.1, "yaw acceleration": 0.05, "yaw rate": 0.01, "acceleration": 0.1}
+FLOOR = {
+    "jerk": 0.5,
+    "lateral jerk": 0.5,
+    "lateral": 0.1,
+    "yaw acceleration": 0.05,
+    "yaw rate": 0.01,
+    "acceleration": 0.1,
+}
 """What a template's greatest value counts as at least, so that a ratio to it says something."""
 SIGNIFICANT = 0.03  # below it, E without changepoints leaves nothing to gain
 OWN, OTHERS = "own roads", "other roads"
@@ -45,12 +54,20 @@ class Case:
     def __init__(self, made: Made, rng: np.random.Generator) -> None:
         self.made = made
         self.kind = OWN if made.own else OTHERS
-        self.figures: dict[str, Any] = {"name": made.name, "road": made.road, "own": made.own, "refused": made.refused}
+        self.figures: dict[str, Any] = {
+            "name": made.name,
+            "road": made.road,
+            "own": made.own,
+            "refused": made.refused,
+        }
         self.windows: Windows | None = None
         self.oracle: Windows | None = None
         if made.refused or made.template is None:
             return
-        template, samples = Signals.of(made.template), [Signals.of(sample) for sample in made.samples]
+        template, samples = (
+            Signals.of(made.template),
+            [Signals.of(sample) for sample in made.samples],
+        )
         self.figures |= {
             "vehicles": len(template.speed),
             "duration": float(template.time[-1]),
@@ -76,8 +93,12 @@ class Case:
         for key, floor in FLOOR.items():
             self.figures[f"{key}: template"] = float(before[key].max())
             self.figures[f"{key}: samples"] = float(np.median(after[key].max(axis=1)))
-            self.figures[f"{key}: ratio"] = self.figures[f"{key}: samples"] / max(self.figures[f"{key}: template"], floor)
-            self.figures[f"{key}: vehicles"] = (np.median(after[key], axis=0) / np.maximum(before[key], floor)).tolist()
+            self.figures[f"{key}: ratio"] = self.figures[f"{key}: samples"] / max(
+                self.figures[f"{key}: template"], floor
+            )
+            self.figures[f"{key}: vehicles"] = (
+                np.median(after[key], axis=0) / np.maximum(before[key], floor)
+            ).tolist()
         for key in ("acceleration changes", "lateral changes", "yaw changes"):
             self.figures[f"{key}: template"] = float(before[key].mean())
             self.figures[f"{key}: samples"] = float(after[key].mean())
@@ -91,7 +112,11 @@ class Case:
         """E of a row over E of another; NaN where one of them is missing or nothing is to be gained."""
         errors = self.figures.get("errors") or {}
         one, other = (errors.get(name, {}).get(key, float("nan")) for name in (row, base))
-        return one / other if other >= (SIGNIFICANT if base == "without changepoints" else 1e-6) else float("nan")
+        return (
+            one / other
+            if other >= (SIGNIFICANT if base == "without changepoints" else 1e-6)
+            else float("nan")
+        )
 
     def line(self) -> str:
         """Return the case in one line."""
@@ -99,9 +124,15 @@ class Case:
         head = f"{told['name']:<34} {told['road']:<20}"
         if told["refused"]:
             return f"{head} refused: {told['refused'][:160]}"
-        ratios = " ".join(f"{told[f'{key}: ratio']:6.2f}" for key in ("jerk", "lateral", "lateral jerk", "yaw rate"))
+        ratios = " ".join(
+            f"{told[f'{key}: ratio']:6.2f}"
+            for key in ("jerk", "lateral", "lateral jerk", "yaw rate")
+        )
         changes = f"{told['acceleration changes: template']:5.1f} {told['acceleration changes: samples']:5.1f}"
-        errors = " ".join(f"{self.error_ratio(key, 'with changepoints'):5.2f}" for key in ("e_position", "e_speed"))
+        errors = " ".join(
+            f"{self.error_ratio(key, 'with changepoints'):5.2f}"
+            for key in ("e_position", "e_speed")
+        )
         turns = f"{100 * float(np.mean(told['turns kept'])):4.0f}"
         return (
             f"{head} {ratios}  {changes} {told['extrema: more']:+6.2f} {turns}  {told['displacement']:5.2f} {errors} "
@@ -137,15 +168,30 @@ def run(
         held_out: take the random cuts that are kept apart.
     """
     chosen = cuts()[1] if held_out else [*cuts()[0], *recorded(DATA)]
-    chosen = [cut for cut in chosen if all((DATA / "trajectories" / file).is_file() for file in cut.files)]
+    chosen = [
+        cut
+        for cut in chosen
+        if all((DATA / "trajectories" / file).is_file() for file in cut.files)
+    ]
     if not chosen:
-        return [Row("recorded encounters", 0.0, "cases", "higher", 1.0, "no recorded data (SCENARIO_GEN_DATA)")]
+        return [
+            Row(
+                "recorded encounters",
+                0.0,
+                "cases",
+                "higher",
+                1.0,
+                "no recorded data (SCENARIO_GEN_DATA)",
+            )
+        ]
     names = roads.split(",") if roads else ["corridor"] if cases else ["corridor", "map", *ROADS]
     jobs = [_job(cut, names, FEW if cases else COUNT, variety) for cut in chosen[:LOGS][:cases]]
     rng = np.random.default_rng(0)
     found: list[Case] = []
     print(HEADER, file=sys.stderr, flush=True)
-    for made in made_by([job for job in jobs if job.roads], Path(checkout).resolve() if checkout else None):
+    for made in made_by(
+        [job for job in jobs if job.roads], Path(checkout).resolve() if checkout else None
+    ):
         found.append(Case(made, rng))
         print(found[-1].line(), file=sys.stderr, flush=True)
         if pictures and len(found) <= 10 and not made.refused:
@@ -162,14 +208,25 @@ def run(
 
 def _still(found: Sequence[Case], before: Sequence[list[str]]) -> list[Row]:
     """How many of the encounters and roads that generated at 665a212 still do; of those that were asked for."""
-    good = {(case.figures["name"], case.figures["road"]): not case.figures["refused"] for case in found}
+    good = {
+        (case.figures["name"], case.figures["road"]): not case.figures["refused"] for case in found
+    }
     asked = [(name, road) for name, road in before if (name, road) in good]
     if not asked:
         return []
     lost = ", ".join(f"{name} on {road}" for name, road in asked if not good[name, road])
     share = float(np.mean([good[pair] for pair in asked]))
     told = f"{len(asked)} pairs; not {lost}" if lost else f"all {len(asked)}"
-    return [Row("encounters and roads that generate at 665a212 and still do", share, "share", "higher", 0.85, told)]
+    return [
+        Row(
+            "encounters and roads that generate at 665a212 and still do",
+            share,
+            "share",
+            "higher",
+            0.85,
+            told,
+        )
+    ]
 
 
 def _job(cut: Cut, names: Sequence[str], count: int, variety: str) -> Job:
@@ -179,7 +236,9 @@ def _job(cut: Cut, names: Sequence[str], count: int, variety: str) -> Job:
     roads = [name for name in roads if name]
     own = tuple(name in ("corridor", own_map) for name in roads)
     paths = tuple(str(DATA / "trajectories" / file) for file in cut.files)
-    return Job(cut.name, paths, cut.vehicles, cut.start, cut.end, tuple(roads), own, count, variety)
+    return Job(
+        cut.name, paths, cut.vehicles, cut.start, cut.end, tuple(roads), own, count, variety
+    )
 
 
 def figures(found: Sequence[Case], before: dict[str, float]) -> list[Row]:
@@ -188,7 +247,12 @@ def figures(found: Sequence[Case], before: dict[str, float]) -> list[Row]:
     for kind in (OWN, OTHERS):
         group = [case for case in found if case.kind == kind]
         if group:
-            rows += [*_motion(group, kind), *_classifier(group, kind), *_similarity(group, kind), *_yield(group, kind)]
+            rows += [
+                *_motion(group, kind),
+                *_classifier(group, kind),
+                *_similarity(group, kind),
+                *_yield(group, kind),
+            ]
     return [_beside(row, before) for row in rows]
 
 
@@ -197,7 +261,14 @@ def _beside(row: Row, before: dict[str, float]) -> Row:
     if row.id not in before:
         return row
     told = f"665a212: {before[row.id]:.3g}" if before[row.id] is not None else "665a212: none"
-    return Row(row.id, row.value, row.unit, row.better, row.target, f"{told}; {row.peer}" if row.peer else told)
+    return Row(
+        row.id,
+        row.value,
+        row.unit,
+        row.better,
+        row.target,
+        f"{told}; {row.peer}" if row.peer else told,
+    )
 
 
 def _motion(group: Sequence[Case], kind: str) -> list[Row]:
@@ -215,11 +286,27 @@ def _motion(group: Sequence[Case], kind: str) -> list[Row]:
         ratios = of(f"{key}: ratio")
         told = f"template {np.median(of(f'{key}: template')):.3g}, samples {np.median(of(f'{key}: samples')):.3g} (medians)"
         rows.append(
-            Row(f"{kind}: largest {key}, samples / template, median", float(np.median(ratios)), "×", "lower", median, told)
+            Row(
+                f"{kind}: largest {key}, samples / template, median",
+                float(np.median(ratios)),
+                "×",
+                "lower",
+                median,
+                told,
+            )
         )
         last = group[int(np.argmax(ratios))].figures
         told = f"{last['name']} on {last['road']}"
-        rows.append(Row(f"{kind}: largest {key}, samples / template, worst", max(ratios), "×", "lower", worst, told))
+        rows.append(
+            Row(
+                f"{kind}: largest {key}, samples / template, worst",
+                max(ratios),
+                "×",
+                "lower",
+                worst,
+                told,
+            )
+        )
     for key in ("acceleration", "lateral", "yaw"):
         template, samples = (sum(of(f"{key} changes: {who}")) for who in ("template", "samples"))
         ratio = samples / template if template else float("nan")
@@ -227,17 +314,48 @@ def _motion(group: Sequence[Case], kind: str) -> list[Row]:
         label = f"{kind}: changes of sign of {key}, ratio of means, from 1"
         rows.append(Row(label, abs(ratio - 1.0), "×", "lower", 0.15, told))
     rows += [
-        Row(f"{kind}: extra speed extrema per vehicle", float(np.mean(of("extrema: more"))), "", "lower", 0.2),
-        Row(f"{kind}: the same, fewer not set against more", float(np.mean(of("extrema: only more"))), "", "lower"),
+        Row(
+            f"{kind}: extra speed extrema per vehicle",
+            float(np.mean(of("extrema: more"))),
+            "",
+            "lower",
+            0.2,
+        ),
+        Row(
+            f"{kind}: the same, fewer not set against more",
+            float(np.mean(of("extrema: only more"))),
+            "",
+            "lower",
+        ),
     ]
     turns = [share for case in group for share in case.figures["turns kept"]]
-    lost = [f"{case.figures['name']} on {case.figures['road']}" for case in group if min(case.figures["turns kept"]) < 0.5]
+    lost = [
+        f"{case.figures['name']} on {case.figures['road']}"
+        for case in group
+        if min(case.figures["turns kept"]) < 0.5
+    ]
     rows.append(
-        Row(f"{kind}: vehicles with the template's turn", float(np.mean(turns)), "share", "higher", 0.99, ", ".join(lost))
+        Row(
+            f"{kind}: vehicles with the template's turn",
+            float(np.mean(turns)),
+            "share",
+            "higher",
+            0.99,
+            ", ".join(lost),
+        )
     )
     moved = of("displacement")
     told = f"least {min(moved):.2f} m"
-    rows.append(Row(f"{kind}: displacement without the clock, median", float(np.median(moved)), "m", "higher", 0.49, told))
+    rows.append(
+        Row(
+            f"{kind}: displacement without the clock, median",
+            float(np.median(moved)),
+            "m",
+            "higher",
+            0.49,
+            told,
+        )
+    )
     return rows
 
 
@@ -251,11 +369,27 @@ def _classifier(group: Sequence[Case], kind: str) -> list[Row]:
         if told is None:
             continue
         target = 0.7 if kind == OWN else 0.8
-        rows.append(Row(f"{kind}: classifier, {name}, AUC", told.area, "", "lower", target, _explained(told)))
+        rows.append(
+            Row(
+                f"{kind}: classifier, {name}, AUC",
+                told.area,
+                "",
+                "lower",
+                target,
+                _explained(told),
+            )
+        )
         told = told_apart(oracles, series)
         if told is not None:
             rows.append(
-                Row(f"{kind}: classifier, {name}, AUC of the oracle", told.area, "", "lower", None, f"± {told.error:.3f}")
+                Row(
+                    f"{kind}: classifier, {name}, AUC of the oracle",
+                    told.area,
+                    "",
+                    "lower",
+                    None,
+                    f"± {told.error:.3f}",
+                )
             )
     return rows
 
@@ -274,17 +408,54 @@ def _similarity(group: Sequence[Case], kind: str) -> list[Row]:
     for key, (target, below) in targets.items():
         label = key.replace("e_", "E ")
         with_ = _known([case.error_ratio(key, "with changepoints") for case in group])
-        uniform = _known([case.error_ratio(key, "with changepoints", "uniform changepoints") for case in group])
+        uniform = _known(
+            [case.error_ratio(key, "with changepoints", "uniform changepoints") for case in group]
+        )
         if not with_:
             continue
         value = float(np.median(with_))
-        rows.append(Row(f"{kind}: {label}, with / without, median", value, "", "lower", target, f"{len(with_)} cases"))
-        rows.append(Row(f"{kind}: {label}, with below without", _share(with_), "share", "higher", 0.97 if target else None))
-        rows.append(Row(f"{kind}: {label}, below uniform", _share(uniform), "share", "higher", below, f"{len(uniform)} cases"))
+        rows.append(
+            Row(
+                f"{kind}: {label}, with / without, median",
+                value,
+                "",
+                "lower",
+                target,
+                f"{len(with_)} cases",
+            )
+        )
+        rows.append(
+            Row(
+                f"{kind}: {label}, with below without",
+                _share(with_),
+                "share",
+                "higher",
+                0.97 if target else None,
+            )
+        )
+        rows.append(
+            Row(
+                f"{kind}: {label}, below uniform",
+                _share(uniform),
+                "share",
+                "higher",
+                below,
+                f"{len(uniform)} cases",
+            )
+        )
     if group:
         numbers = [case.figures["changepoints"] for case in group]
         told = f"{min(numbers)} to {max(numbers)}"
-        rows.append(Row(f"{kind}: K, mean number of changepoints", float(np.mean(numbers)), "", "lower", None, told))
+        rows.append(
+            Row(
+                f"{kind}: K, mean number of changepoints",
+                float(np.mean(numbers)),
+                "",
+                "lower",
+                None,
+                told,
+            )
+        )
     return rows
 
 
@@ -299,9 +470,26 @@ def _share(ratios: Sequence[float]) -> float:
 def _yield(group: Sequence[Case], kind: str) -> list[Row]:
     """How many pairs of encounter and road generate, at what acceptance and cost."""
     good = [case for case in group if not case.figures["refused"]]
-    refused = [f"{case.figures['name']} on {case.figures['road']}" for case in group if case.figures["refused"]]
-    told = f"{len(good)} of {len(group)}; not {', '.join(refused)}" if refused else f"all {len(group)}"
-    rows = [Row(f"{kind}: encounters and roads that generate", len(good) / len(group), "share", "higher", None, told)]
+    refused = [
+        f"{case.figures['name']} on {case.figures['road']}"
+        for case in group
+        if case.figures["refused"]
+    ]
+    told = (
+        f"{len(good)} of {len(group)}; not {', '.join(refused)}"
+        if refused
+        else f"all {len(group)}"
+    )
+    rows = [
+        Row(
+            f"{kind}: encounters and roads that generate",
+            len(good) / len(group),
+            "share",
+            "higher",
+            None,
+            told,
+        )
+    ]
     if not good:
         return rows
     acceptance = [case.figures["acceptance"] for case in good]
@@ -309,10 +497,22 @@ def _yield(group: Sequence[Case], kind: str) -> list[Row]:
     seconds = [case.figures["seconds"] for case in good]
     return [
         *rows,
-        Row(f"{kind}: acceptance, median", float(np.median(acceptance)), "share", "higher", None, f"worst {min(acceptance):.2f}"),
+        Row(
+            f"{kind}: acceptance, median",
+            float(np.median(acceptance)),
+            "share",
+            "higher",
+            None,
+            f"worst {min(acceptance):.2f}",
+        ),
         Row(f"{kind}: sets that stayed short", float(short), "sets", "lower", 0.0),
         Row(
-            f"{kind}: CPU of one generation, median", float(np.median(seconds)), "s", "lower", None, f"worst {max(seconds):.1f} s"
+            f"{kind}: CPU of one generation, median",
+            float(np.median(seconds)),
+            "s",
+            "lower",
+            None,
+            f"worst {max(seconds):.1f} s",
         ),
     ]
 

@@ -40,7 +40,13 @@ SETTINGS = (
 )
 
 
-def write_page(folder: Path, cases: Sequence[PaperCase], *, quality: Sequence[str], provenance: Mapping[str, str]) -> None:
+def write_page(
+    folder: Path,
+    cases: Sequence[PaperCase],
+    *,
+    quality: Sequence[str],
+    provenance: Mapping[str, str],
+) -> None:
     """Write `paper.html` and `paper.json` to `folder`; the same input gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
     claims = [claims_of(case) for case in cases]
@@ -48,13 +54,19 @@ def write_page(folder: Path, cases: Sequence[PaperCase], *, quality: Sequence[st
         "provenance": dict(provenance),
         "cases": [_figures(case, found) for case, found in zip(cases, claims, strict=True)],
     }
-    write_text(folder / FIGURES, json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(
+        folder / FIGURES,
+        json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+    )
     write_text(folder / PAGE, _render(cases, claims, quality, provenance))
 
 
 def refusals(case: PaperCase) -> list[str]:
     """Say what is missing, and why."""
-    return [f"{name}: {why}" if name else f"The encounter cannot be placed: {why}" for name, why in case.refused.items()]
+    return [
+        f"{name}: {why}" if name else f"The encounter cannot be placed: {why}"
+        for name, why in case.refused.items()
+    ]
 
 
 def _figures(case: PaperCase, claims: Sequence[Claim]) -> dict[str, Any]:
@@ -63,13 +75,23 @@ def _figures(case: PaperCase, claims: Sequence[Claim]) -> dict[str, Any]:
         "road": case.road.name if case.road else None,
         "refused": refusals(case),
         "figures": [
-            {"figure": c.number, "claim": c.claim, "measured": c.measured, "holds": c.holds, "values": c.values} for c in claims
+            {
+                "figure": c.number,
+                "claim": c.claim,
+                "measured": c.measured,
+                "holds": c.holds,
+                "values": c.values,
+            }
+            for c in claims
         ],
     }
 
 
 def _render(
-    cases: Sequence[PaperCase], claims: Sequence[Sequence[Claim]], quality: Sequence[str], provenance: Mapping[str, str]
+    cases: Sequence[PaperCase],
+    claims: Sequence[Sequence[Claim]],
+    quality: Sequence[str],
+    provenance: Mapping[str, str],
 ) -> str:
     views = [
         {
@@ -82,7 +104,9 @@ def _render(
         for i, (case, found) in enumerate(zip(cases, claims, strict=True))
     ]
     drawings = {
-        f"plot-{k}-{i}": json.loads(claim.figure.to_json()) for i, found in enumerate(claims) for k, claim in enumerate(found)
+        f"plot-{k}-{i}": json.loads(claim.figure.to_json())
+        for i, found in enumerate(claims)
+        for k, claim in enumerate(found)
     }
     for drawing in drawings.values():
         drawing["layout"].pop("template", None)
@@ -100,7 +124,12 @@ def _render(
 
 
 def reproduce(
-    logs: Sequence[Sequence[Path]], out: Path, *, count: int, seed: int, report: Callable[[str], None] = lambda line: None
+    logs: Sequence[Sequence[Path]],
+    out: Path,
+    *,
+    count: int,
+    seed: int,
+    report: Callable[[str], None] = lambda line: None,
 ) -> list[PaperCase]:
     """Draw the paper's figures 2 to 5 for every encounter of `logs`, with what we measure for them, to one page and JSON.
 
@@ -119,10 +148,21 @@ def reproduce(
     files = [path for group in logs for path in group]
     with replaced_folder(out, REPRODUCED, files) as partial:
         found = [read_log(list(group), config.log) for group in logs]
-        cases = [run_case(encounter, count=count, seed=seed) for log in found for encounter in log.encounters]
+        cases = [
+            run_case(encounter, count=count, seed=seed)
+            for log in found
+            for encounter in log.encounters
+        ]
         facts = provenance_of(files, seed, count, ROADS, config)
-        own = {name: value for name, value in facts.items() if name not in flatten(config)}  # the paper's parameters are fixed
-        write_page(partial, cases, quality=[line for log in found for line in log.quality.lines()], provenance=own)
+        own = {
+            name: value for name, value in facts.items() if name not in flatten(config)
+        }  # the paper's parameters are fixed
+        write_page(
+            partial,
+            cases,
+            quality=[line for log in found for line in log.quality.lines()],
+            provenance=own,
+        )
     for case in cases:
         report(f"{case.encounter.name} on {case.road.name if case.road else 'no road'}")
         for line in refusals(case):
@@ -131,17 +171,30 @@ def reproduce(
             report(f"  figure {claim.number}{VERDICTS[claim.holds]}: {claim.measured}")
     report(f"page: {out / PAGE}")
     if not any(case.arms for case in cases):
-        raise RefusedError("no encounter could be placed on a road of the paper; the page says why")
+        raise RefusedError(
+            "no encounter could be placed on a road of the paper; the page says why"
+        )
     return cases
 
 
-def run(out: str = "out/paper", count: int | None = None, log: Sequence[str] = (), seed: int = SEED) -> list[Row]:
+def run(
+    out: str = "out/paper", count: int | None = None, log: Sequence[str] = (), seed: int = SEED
+) -> list[Row]:
     """Measure the bundled cases, or a log, on the paper's settings, and write the page and its figures to `out`."""
     count = count or sized(50, quick=2)
     logs = [[Path(name) for name in log]] if log else [[bundled(case)] for case in CASES]
-    cases = reproduce(logs, Path(out), count=count, seed=seed, report=lambda line: print(line, file=sys.stderr))
+    cases = reproduce(
+        logs, Path(out), count=count, seed=seed, report=lambda line: print(line, file=sys.stderr)
+    )
     rows = []
     for case in cases:
         holds = [claim.holds for claim in claims_of(case) if claim.holds is not None]
-        rows.append(Row(f"claims of the paper that hold, {case.encounter.name}", float(sum(holds)), f"of {len(holds)}", "higher"))
+        rows.append(
+            Row(
+                f"claims of the paper that hold, {case.encounter.name}",
+                float(sum(holds)),
+                f"of {len(holds)}",
+                "higher",
+            )
+        )
     return rows

@@ -20,7 +20,15 @@ from time import process_time
 import numpy as np
 
 from benchmarks._planning_judge import is_drivable
-from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, recorded_maps, road_of, t_intersection
+from benchmarks._planning_maps import (
+    clutter,
+    enters_blocked,
+    lane,
+    optimum,
+    recorded_maps,
+    road_of,
+    t_intersection,
+)
 from benchmarks._planning_obstructed import CAR, dubins_length, first_path, obstructed, rrt_connect
 from benchmarks._size import sized
 from benchmarks.row import Row
@@ -28,9 +36,19 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.routing.search.ompl.solve import Options, PLANNERS, solve
-from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, path_length, plan_with_retry, Query
+from scenario_gen.method.routing.search.planner import (
+    Budget,
+    BudgetSpentError,
+    path_length,
+    plan_with_retry,
+    Query,
+)
 from scenario_gen.method.routing.search.pose_planner import PoseRrtStarConnect
-from scenario_gen.method.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.method.routing.search.rrt_star_connect import (
+    PAPER,
+    RrtStarConnect,
+    RrtStarConnectConfig,
+)
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
 from scenario_gen.roads.connectivity import common_component, component_at, components
@@ -41,15 +59,21 @@ from scenario_gen.types.scenario import BoundaryStates
 
 SEEDS = sized(20, quick=1)
 BUDGETS = sized((0.01, 0.1, 1.0), quick=(0.01,))  # [s] of CPU time
-FEW, MORE, MANY = sized((20_000, 100_000, 1_000_000), quick=(8000, 9000, 10_000))  # iterations of one tree
+FEW, MORE, MANY = sized(
+    (20_000, 100_000, 1_000_000), quick=(8000, 9000, 10_000)
+)  # iterations of one tree
 QUERIES, QUERIES_OF_A_MAP = sized((100_000, 500), quick=(100, 2))
 MAPS = sized(None, quick=1)
 TURNS = sized(10, quick=2)
-OBSTRUCTED, MEASURED = sized((200, 40), quick=(2, 1))  # feasible roads, and those of them on which lengths are compared
+OBSTRUCTED, MEASURED = sized(
+    (200, 40), quick=(2, 1)
+)  # feasible roads, and those of them on which lengths are compared
 WITHIN = 1.0  # [s] of CPU time to solve a road
 STEP = RrtStarConnectConfig(step=5.0, pull=False)
 OWN_STEP = RrtStarConnectConfig(pull=False)
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 Case = tuple[Road, Floats, float]
 
 
@@ -59,7 +83,13 @@ def run() -> list[Row]:
     for road, ends in (lane(), t_intersection(), clutter()):
         cases[road.name] = road, ends, optimum(road, ends)
         _warm(road, ends)
-    rows = _field(cases["clutter"][0]) + _first(cases) + _first_own_step(cases) + _curves(cases) + _throughput(cases)
+    rows = (
+        _field(cases["clutter"][0])
+        + _first(cases)
+        + _first_own_step(cases)
+        + _curves(cases)
+        + _throughput(cases)
+    )
     return rows + _soundness() + _recorded() + _drivable() + _obstructed()
 
 
@@ -70,7 +100,14 @@ def _warm(road: Road, ends: Floats) -> None:
 
 
 def _ompl(
-    road: Road, ends: Floats, name: str, seconds: float, step: float | None = None, *, first: bool = False, states: bool = False
+    road: Road,
+    ends: Floats,
+    name: str,
+    seconds: float,
+    step: float | None = None,
+    *,
+    first: bool = False,
+    states: bool = False,
 ) -> Floats:
     """Return OMPL's path (P, 2) after so much CPU time (or its first one, for RRTConnect), simplified but for the `first`."""
     started = process_time()
@@ -79,7 +116,9 @@ def _ompl(
         return process_time() - started > seconds
 
     field = clearance_in_cells(road)
-    return solve(field, ends, 0.0, name, stop, Options(step, simplify=not first, state_by_state=states)).simplified
+    return solve(
+        field, ends, 0.0, name, stop, Options(step, simplify=not first, state_by_state=states)
+    ).simplified
 
 
 def _field(road: Road) -> list[Row]:
@@ -107,7 +146,10 @@ def _first(cases: dict[str, Case]) -> list[Row]:
                 _ompl(road, ends, "ompl_rrt_connect", 60.0, 5.0, first=True, states=by_state)
                 theirs.append(process_time() - started)
         rows.append(Row(f"{name}: first path, step 5", 1e3 * median(ours), "ms", "lower"))
-        for theirs, how in ((exact, "our compiled exact edge check in it"), (states, "a Python callback per state")):
+        for theirs, how in (
+            (exact, "our compiled exact edge check in it"),
+            (states, "a Python callback per state"),
+        ):
             peer = f"OMPL RRTConnect, {how}: {1e3 * median(theirs):.2f} ms"
             label = f"{name}: first path, speed-up{', state by state' if theirs is states else ''}"
             rows.append(Row(label, median(theirs) / median(ours), "×", "higher", target, peer))
@@ -127,14 +169,23 @@ def _first_own_step(cases: dict[str, Case]) -> list[Row]:
             started = process_time()
             _ompl(road, ends, "ompl_rrt_connect", 60.0, first=True)
             theirs.append(process_time() - started)
-        peer = f"OMPL RRTConnect, our compiled exact edge check in it: {1e3 * median(theirs):.2f} ms"
-        rows.append(Row(f"{name}: first path, own step", 1e3 * median(ours), "ms", "lower", target, peer))
+        peer = (
+            f"OMPL RRTConnect, our compiled exact edge check in it: {1e3 * median(theirs):.2f} ms"
+        )
+        rows.append(
+            Row(f"{name}: first path, own step", 1e3 * median(ours), "ms", "lower", target, peer)
+        )
     return rows
 
 
 def _curves(cases: dict[str, Case]) -> list[Row]:
     """Cost over the optimum at equal CPU time."""
-    targets = {("lane", 0.01): 1e-6, ("T", 0.1): 5e-4, ("clutter", 0.1): 0.02, ("clutter", 1.0): 0.003}
+    targets = {
+        ("lane", 0.01): 1e-6,
+        ("T", 0.1): 5e-4,
+        ("clutter", 0.1): 0.02,
+        ("clutter", 1.0): 0.003,
+    }
     rows = []
     below = 0
     for name, (road, ends, best) in cases.items():
@@ -147,18 +198,24 @@ def _curves(cases: dict[str, Case]) -> list[Row]:
                     path = _ompl(road, ends, planner, budget)
                     excess[planner].append(path_length(path) / best - 1.0 if len(path) else np.inf)
             ours = median(excess.pop("ours"))
-            peer, theirs = min(((key, median(values)) for key, values in excess.items()), key=lambda item: item[1])
+            peer, theirs = min(
+                ((key, median(values)) for key, values in excess.items()), key=lambda item: item[1]
+            )
             told = f"{peer} {theirs:.2e}"
             label = f"{name}: excess over the optimum at {budget:g} s"
             rows.append(Row(label, ours, "", "lower", targets.get((name, budget)), told))
             if name != "lane":
-                rows.append(Row(f"{label}, ours / best of OMPL", ours / theirs, "", "lower", 0.5, told))
+                rows.append(
+                    Row(f"{label}, ours / best of OMPL", ours / theirs, "", "lower", 0.5, told)
+                )
     return [*rows, Row("paths shorter than the optimum", float(below), "", "lower", 0.0)]
 
 
 def _excess_of_ours(road: Road, ends: Floats, best: float, budget: float, seed: int) -> float:
     try:
-        return RrtStarConnect().plan(road, Query(*ends), Budget(None, budget), seed).cost / best - 1.0
+        return (
+            RrtStarConnect().plan(road, Query(*ends), Budget(None, budget), seed).cost / best - 1.0
+        )
     except BudgetSpentError:
         return np.inf
 
@@ -171,7 +228,9 @@ def _throughput(cases: dict[str, Case]) -> list[Row]:
         default = _per_iteration(road, ends, RrtStarConnectConfig(), FEW)
         few, more, many = (_per_iteration(road, ends, PAPER, n) for n in (FEW, MORE, MANY))
         for cost, label in ((default, "default"), (few, "paper preset")):
-            rows.append(Row(f"{name}: iterations per second, {label}", 1.0 / cost, "1/s", "higher", 1e5))
+            rows.append(
+                Row(f"{name}: iterations per second, {label}", 1.0 / cost, "1/s", "higher", 1e5)
+            )
         for base, start, target, told in (
             (few, FEW, 1.0, _growth_of_ompl(road, ends) if name == "T" else None),
             (more, MORE, None, "from where eq 10, not zeta, sets the radius"),
@@ -182,7 +241,9 @@ def _throughput(cases: dict[str, Case]) -> list[Row]:
     return rows
 
 
-def _per_iteration(road: Road, ends: Floats, config: RrtStarConnectConfig, iterations: int) -> float:
+def _per_iteration(
+    road: Road, ends: Floats, config: RrtStarConnectConfig, iterations: int
+) -> float:
     """CPU seconds per iteration, the median of three runs (of one, if they are many)."""
     times = []
     for seed in range(1, 4 if iterations < 500_000 else 2):
@@ -229,7 +290,16 @@ def _soundness(queries: int = QUERIES) -> list[Row]:
             found += 1
             hits += enters_blocked(drivable, path)
     told = f"{found} paths, {missed} budgets spent"
-    return [Row(f"paths into occupied cells, of {asked} random queries", float(hits), "", "lower", 0.0, told)]
+    return [
+        Row(
+            f"paths into occupied cells, of {asked} random queries",
+            float(hits),
+            "",
+            "lower",
+            0.0,
+            told,
+        )
+    ]
 
 
 def _recorded(queries: int = QUERIES_OF_A_MAP) -> list[Row]:
@@ -242,19 +312,35 @@ def _recorded(queries: int = QUERIES_OF_A_MAP) -> list[Row]:
             times, ways, failed = [], 0, 0
             component_at(road, np.zeros(2), radius)
             for seed in range(queries):
-                start, goal = road.origin + (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * road.resolution
+                start, goal = (
+                    road.origin
+                    + (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * road.resolution
+                )
                 if common_component(road, start, goal, radius) is None:
                     continue
                 ways += 1
                 started = process_time()
                 try:
-                    plan_with_retry(RrtStarConnect(), road, Query(start, goal, radius), PlanningConfig().iterations, seed)
+                    plan_with_retry(
+                        RrtStarConnect(),
+                        road,
+                        Query(start, goal, radius),
+                        PlanningConfig().iterations,
+                        seed,
+                    )
                 except BudgetSpentError:
                     failed += 1
                 times.append(process_time() - started)
             name = f"{road.name}, radius {radius:g} m"
             rows.append(
-                Row(f"{name}: found where a way exists", 100.0 * (1 - failed / ways), "%", "higher", 100.0, f"{ways} ways")
+                Row(
+                    f"{name}: found where a way exists",
+                    100.0 * (1 - failed / ways),
+                    "%",
+                    "higher",
+                    100.0,
+                    f"{ways} ways",
+                )
             )
             rows.append(Row(f"{name}: median time", 1e3 * median(times), "ms", "lower", 50.0))
     return rows
@@ -267,11 +353,20 @@ def _drivable() -> list[Row]:
     drivable = (abs(y - 50.0) < half) | ((abs(x - 50.0) < half) & (y < 50.0))
     for side in (-1.0, 1.0):  # kerbs of 5 m radius
         corner = np.hypot(x - 50.0 - side * (half + 5.0), y - (50.0 - half - 5.0)) > 5.0
-        drivable |= corner & (y < 50.0) & (y > 50.0 - half - 5.0) & (side * (x - 50.0) > 0.0) & (side * (x - 50.0) < half + 5.0)
+        drivable |= (
+            corner
+            & (y < 50.0)
+            & (y > 50.0 - half - 5.0)
+            & (side * (x - 50.0) > 0.0)
+            & (side * (x - 50.0) < half + 5.0)
+        )
     road = road_of("metric T", drivable, 0.2)
     config = PlanningConfig()
     rows = []
-    turns = {"left": ((51.75, 10.0, np.pi / 2), (10.0, 51.75, np.pi)), "right": ((51.75, 10.0, np.pi / 2), (90.0, 48.25, 0.0))}
+    turns = {
+        "left": ((51.75, 10.0, np.pi / 2), (10.0, 51.75, np.pi)),
+        "right": ((51.75, 10.0, np.pi / 2), (90.0, 48.25, 0.0)),
+    }
     for name, anchors in turns.items():
         poses = np.array(anchors)
         fitted = FittedVehicle(poses, np.zeros(2), np.zeros(1, dtype=bool), 1.0, name)
@@ -283,13 +378,32 @@ def _drivable() -> list[Row]:
             (route,) = plan_routes(road, fit, config, seed)
             times.append(process_time() - started)
         curvature = np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max()
-        shortest = RrtStarConnect().plan(road, Query(poses[0, :2], poses[1, :2], 0.95), Budget(2000), 0).cost
-        rows.append(Row(f"drivable, {name} turn: time", 1e3 * median(times[1:]), "ms", "lower", 150.0))
-        rows.append(
-            Row(f"drivable, {name} turn: largest curvature", float(curvature), "1/m", "lower", Dynamics().planned.max_curvature)
+        shortest = (
+            RrtStarConnect()
+            .plan(road, Query(poses[0, :2], poses[1, :2], 0.95), Budget(2000), 0)
+            .cost
         )
         rows.append(
-            Row(f"drivable, {name} turn: length", float(route.length[-1]), "m", "lower", None, f"shortest {shortest:.2f} m")
+            Row(f"drivable, {name} turn: time", 1e3 * median(times[1:]), "ms", "lower", 150.0)
+        )
+        rows.append(
+            Row(
+                f"drivable, {name} turn: largest curvature",
+                float(curvature),
+                "1/m",
+                "lower",
+                Dynamics().planned.max_curvature,
+            )
+        )
+        rows.append(
+            Row(
+                f"drivable, {name} turn: length",
+                float(route.length[-1]),
+                "m",
+                "lower",
+                None,
+                f"shortest {shortest:.2f} m",
+            )
         )
     return rows
 
@@ -303,7 +417,13 @@ def _unsure(solved: list[tuple[bool, bool]]) -> Row:
 
 def _obstructed() -> list[Row]:
     """Roads with something in the way: solved within a second, time to the first path, its length, the published route."""
-    ours, theirs, excess, routes, bends = list[float](), list[float](), list[float](), list[float](), list[float]()
+    ours, theirs, excess, routes, bends = (
+        list[float](),
+        list[float](),
+        list[float](),
+        list[float](),
+        list[float](),
+    )
     feasible, seed, unsure = 0, 0, list[tuple[bool, bool]]()
     while feasible < OBSTRUCTED:
         case = obstructed(seed)
@@ -320,7 +440,9 @@ def _obstructed() -> list[Row]:
         theirs += [took] if len(path) else []
         started = process_time()
         try:
-            (route,) = plan_routes(case.road, _straight_fit(case.query.start, case.query.goal), PlanningConfig(), 0)
+            (route,) = plan_routes(
+                case.road, _straight_fit(case.query.start, case.query.goal), PlanningConfig(), 0
+            )
         except RefusedError:
             continue
         routes.append(process_time() - started)
@@ -328,11 +450,18 @@ def _obstructed() -> list[Row]:
         if len(excess) < MEASURED and len(path):
             simplified = [rrt_connect(case, WITHIN, simplify=True)[0] for _ in range(3)]
             lengths = [dubins_length(case, each) for each in simplified if len(each)]
-            plan = PoseRrtStarConnect().plan(case.road, case.query, Budget(20 * PlanningConfig().iterations), 0)
+            plan = PoseRrtStarConnect().plan(
+                case.road, case.query, Budget(20 * PlanningConfig().iterations), 0
+            )
             excess += [float(plan.step.sum()) / median(lengths)] if lengths else []
-    share, peer = 100.0 * len(ours) / feasible, f"OMPL RRTConnect {100.0 * len(theirs) / feasible:.1f} %"
+    share, peer = (
+        100.0 * len(ours) / feasible,
+        f"OMPL RRTConnect {100.0 * len(theirs) / feasible:.1f} %",
+    )
     within = 100.0 * float(np.mean(np.array(excess) <= 1.02)) if excess else float("nan")
-    told = f"OMPL RRTConnect {1e3 * median(theirs):.1f} ms, with Python callbacks" if theirs else ""
+    told = (
+        f"OMPL RRTConnect {1e3 * median(theirs):.1f} ms, with Python callbacks" if theirs else ""
+    )
     return [
         Row(
             f"obstructed: solved within {WITHIN:g} s, of {feasible} roads a judge drives",
@@ -344,11 +473,28 @@ def _obstructed() -> list[Row]:
         ),
         _unsure(unsure),
         Row("obstructed: first path", 1e3 * median(ours), "ms", "lower", 5.0, told),
-        Row("obstructed: length over the median of OMPL's, simplified", median(excess or [np.inf]), "×", "lower", 1.02),
+        Row(
+            "obstructed: length over the median of OMPL's, simplified",
+            median(excess or [np.inf]),
+            "×",
+            "lower",
+            1.02,
+        ),
         Row("obstructed: roads on which that is at most 1.02", within, "%", "higher"),
-        Row("obstructed: routes published, with side and margin kept", 100.0 * len(routes) / feasible, "%", "higher", 99.0),
+        Row(
+            "obstructed: routes published, with side and margin kept",
+            100.0 * len(routes) / feasible,
+            "%",
+            "higher",
+            99.0,
+        ),
         Row("obstructed: time of such a route", 1e3 * median(routes or [np.inf]), "ms", "lower"),
-        Row("obstructed: largest curvature of a route, median", median(bends or [np.inf]), "1/m", "lower"),
+        Row(
+            "obstructed: largest curvature of a route, median",
+            median(bends or [np.inf]),
+            "1/m",
+            "lower",
+        ),
     ]
 
 

@@ -46,4 +46,7 @@ class Row:
 
     def document(self) -> dict[str, Any]:
         """Return what stands in the JSON line; null for a value that is not finite, which JSON cannot say."""
-        return asdict(self) | {"value": self.value if math.isfinite(self.value) else None, "met": self.met}
+        return asdict(self) | {
+            "value": self.value if math.isfinite(self.value) else None,
+            "met": self.met,
+        }

@@ -33,7 +33,9 @@ from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import read_network, RoadConfig
 from scenario_gen.types import Encounter, LaneNetwork, RuleKind, Scenario, TrafficRule
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 SEEDS = sized(3, quick=1)
 COUNT = sized(10, quick=2)
 MAPS = sized(5, quick=1)
@@ -57,7 +59,12 @@ def run() -> list[Row]:
     maps = sorted((DATA / "maps" / "opendrive").glob("*.xodr"))
     tallies = {"kept": Tally(), "ignored": Tally()}
     with tempfile.TemporaryDirectory() as scratch:
-        signed = [path for source in maps for seed in range(SEEDS) for path in planted(source, seed, Path(scratch))]
+        signed = [
+            path
+            for source in maps
+            for seed in range(SEEDS)
+            for path in planted(source, seed, Path(scratch))
+        ]
         for path in signed[: MAPS * SEEDS]:
             for encounter in _encounters():
                 for choice, tally in tallies.items():
@@ -69,7 +76,14 @@ def run() -> list[Row]:
         of = f"{tally.scenarios} scenarios of {tally.generated} of {tally.pairs} pairs of an encounter and a map with signs"
         rows += [
             Row(f"rules {choice}: stop lines run", tally.runs, "scenarios", "lower", asked, of),
-            Row(f"rules {choice}: rights of way taken", tally.taken, "scenarios", "lower", asked, of),
+            Row(
+                f"rules {choice}: rights of way taken",
+                tally.taken,
+                "scenarios",
+                "lower",
+                asked,
+                of,
+            ),
         ]
     return rows
 
@@ -89,12 +103,18 @@ def planted(source: Path, seed: int, folder: Path) -> Iterator[Path]:
     except ScenarioGenError:
         return
     rng = np.random.default_rng(seed)
-    mouths = [lane for lane in lanes if not lane.junction and any(lanes[k].junction for k in lane.successors)]
+    mouths = [
+        lane
+        for lane in lanes
+        if not lane.junction and any(lanes[k].junction for k in lane.successors)
+    ]
     lengths = {road.get("id"): road.number("length") for road in root.all("road")}
     text = source.read_text()
     if not mouths or "<signal " in text:
         return
-    for key in sorted({(lane.id.split(".")[0], not lane.id.split(".")[2].startswith("-")) for lane in mouths}):
+    for key in sorted(
+        {(lane.id.split(".")[0], not lane.id.split(".")[2].startswith("-")) for lane in mouths}
+    ):
         if rng.random() < SHARE:
             road, against = key
             s = 0.5 if against else lengths[road] - 0.5
@@ -111,7 +131,9 @@ def planted(source: Path, seed: int, folder: Path) -> Iterator[Path]:
 def _before_end_of(text: str, road: str, sign: str) -> str:
     """Put a sign at the end of a road."""
     begin = next(
-        at for at in range(len(text)) if text.startswith("<road ", at) and f' id="{road}"' in text[at : text.index(">", at)]
+        at
+        for at in range(len(text))
+        if text.startswith("<road ", at) and f' id="{road}"' in text[at : text.index(">", at)]
     )
     end = text.index("</road>", begin)
     return text[:end] + sign + text[end + len("</road>") :]
@@ -119,7 +141,9 @@ def _before_end_of(text: str, road: str, sign: str) -> str:
 
 def _judge(encounter: Encounter, path: Path, choice: str, tally: Tally) -> None:
     tally.pairs += 1
-    config = PipelineConfig(road=RoadConfig(traffic_rules=choice), evaluation=EvaluationConfig(resamples=10))
+    config = PipelineConfig(
+        road=RoadConfig(traffic_rules=choice), evaluation=EvaluationConfig(resamples=10)
+    )
     try:
         made = generate(encounter, str(path), count=COUNT, seed=7, config=config)
     except ScenarioGenError:
@@ -128,7 +152,11 @@ def _judge(encounter: Encounter, path: Path, choice: str, tally: Tally) -> None:
     network = read_network(path)
     for scenario in made.generated:
         tally.scenarios += 1
-        tally.runs += any(runs_line(network, rule, scenario, n) for rule in network.rules for n in range(len(scenario.vehicles)))
+        tally.runs += any(
+            runs_line(network, rule, scenario, n)
+            for rule in network.rules
+            for n in range(len(scenario.vehicles))
+        )
         tally.taken += takes_way(network, scenario)
 
 
@@ -147,7 +175,9 @@ def runs_line(network: LaneNetwork, rule: TrafficRule, scenario: Scenario, n: in
     at = path.project(Point(path.intersection(LineString(rule.line)).centroid))
     along = np.concatenate(([0.0], np.hypot(*np.diff(front[own], axis=0).T).cumsum()))
     before = (along <= at) & (along >= at - NEAR)
-    return at >= NEAR and bool(before.any()) and float(scenario.speed[n, own][before].min()) > STANDS
+    return (
+        at >= NEAR and bool(before.any()) and float(scenario.speed[n, own][before].min()) > STANDS
+    )
 
 
 def takes_way(network: LaneNetwork, scenario: Scenario) -> bool:
@@ -155,7 +185,11 @@ def takes_way(network: LaneNetwork, scenario: Scenario) -> bool:
     for rule in network.rules:
         for i in range(len(scenario.vehicles)):
             for j in range(len(scenario.vehicles)):
-                if i == j or not _came(network, rule.lanes, scenario, i) or not _came(network, rule.over, scenario, j):
+                if (
+                    i == j
+                    or not _came(network, rule.lanes, scenario, i)
+                    or not _came(network, rule.over, scenario, j)
+                ):
                     continue
                 if _came(network, rule.lanes, scenario, j):
                     continue
@@ -185,12 +219,21 @@ def _inside(scenario: Scenario, n: int, other: int) -> tuple[float, float] | Non
     """First and last time [s] at which a vehicle's footprint meets where another one drives."""
     prints, others = (_footprints(scenario, k) for k in (n, other))
     swept = unary_union(others)
-    times = [time for time, shape in zip(scenario.time[scenario.there[n]], prints, strict=True) if shape.intersects(swept)]
+    times = [
+        time
+        for time, shape in zip(scenario.time[scenario.there[n]], prints, strict=True)
+        if shape.intersects(swept)
+    ]
     return (float(times[0]), float(times[-1])) if times else None
 
 
 def _footprints(scenario: Scenario, n: int) -> list[BaseGeometry]:
     vehicle, own = scenario.vehicles[n], scenario.there[n]
-    shape = box(-vehicle.length / 2.0, -vehicle.width / 2.0, vehicle.length / 2.0, vehicle.width / 2.0)
+    shape = box(
+        -vehicle.length / 2.0, -vehicle.width / 2.0, vehicle.length / 2.0, vehicle.width / 2.0
+    )
     poses = zip(scenario.position[n, own], scenario.heading[n, own], strict=True)
-    return [translate(rotate(shape, yaw, origin=(0.0, 0.0), use_radians=True), x, y) for (x, y), yaw in poses]
+    return [
+        translate(rotate(shape, yaw, origin=(0.0, 0.0), use_radians=True), x, y)
+        for (x, y), yaw in poses
+    ]

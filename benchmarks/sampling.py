@@ -39,7 +39,13 @@ TARGETS = {"speed": 0.1, "acceleration": 0.2, "gap": 0.1}
 
 def run() -> list[Row]:
     """Measure."""
-    return [*_sampling_peers.rows(), *_throughput(), *_crossing(), *_recorded("wide"), *_recorded("narrow")]
+    return [
+        *_sampling_peers.rows(),
+        *_throughput(),
+        *_crossing(),
+        *_recorded("wide"),
+        *_recorded("narrow"),
+    ]
 
 
 def reference() -> float:
@@ -61,26 +67,63 @@ def _crossing() -> list[Row]:
             machine = reference()
             started = process_time()
             found = case.sample(CROSSING, config=SamplingConfig(variety=variety))
-            taken.append((process_time() - started, machine, len(found.scenarios), found.acceptance))
+            taken.append(
+                (process_time() - started, machine, len(found.scenarios), found.acceptance)
+            )
         spent, machine, count, acceptance = min(taken)
         told = f"acceptance {acceptance:.2f}; NumPy's fixed job beside it {machine:.3f} s"
         rows += [
-            Row(f"crossing, {variety}: valid scenarios, checked, one core", count / spent, "1/s", "higher", None, told),
-            Row(f"crossing, {variety}: a scenario over NumPy's fixed job", spent / count / machine, "×", "lower"),
+            Row(
+                f"crossing, {variety}: valid scenarios, checked, one core",
+                count / spent,
+                "1/s",
+                "higher",
+                None,
+                told,
+            ),
+            Row(
+                f"crossing, {variety}: a scenario over NumPy's fixed job",
+                spent / count / machine,
+                "×",
+                "lower",
+            ),
         ]
     return rows
 
 
 def _throughput() -> list[Row]:
-    shapes = ((2, 20.0, SCENARIOS), (2, 20.0, 4 * SCENARIOS), (2, 40.0, SCENARIOS), (8, 20.0, SCENARIOS))
-    taken = [[_seconds(*shape) for shape in shapes] for _ in range(REPEATS)]  # in turn: the machine is not always as fast
+    shapes = (
+        (2, 20.0, SCENARIOS),
+        (2, 20.0, 4 * SCENARIOS),
+        (2, 40.0, SCENARIOS),
+        (8, 20.0, SCENARIOS),
+    )
+    taken = [
+        [_seconds(*shape) for shape in shapes] for _ in range(REPEATS)
+    ]  # in turn: the machine is not always as fast
     machine = reference()
     base = min(times[0] for times in taken)
-    more, longer, fuller = (float(np.median([times[k] / times[0] for times in taken])) for k in (1, 2, 3))
+    more, longer, fuller = (
+        float(np.median([times[k] / times[0] for times in taken])) for k in (1, 2, 3)
+    )
     slowest = f"least of {REPEATS} runs; the slowest {SCENARIOS / max(times[0] for times in taken):.0f}/s"
     return [
-        Row("valid two-vehicle 20 s scenarios, checked, one core", SCENARIOS / base, "1/s", "higher", 2000.0, slowest),
-        Row("such a scenario over NumPy's fixed job", base / SCENARIOS / machine, "×", "lower", None, f"{machine:.3f} s"),
+        Row(
+            "valid two-vehicle 20 s scenarios, checked, one core",
+            SCENARIOS / base,
+            "1/s",
+            "higher",
+            2000.0,
+            slowest,
+        ),
+        Row(
+            "such a scenario over NumPy's fixed job",
+            base / SCENARIOS / machine,
+            "×",
+            "lower",
+            None,
+            f"{machine:.3f} s",
+        ),
         Row("cost of four times the samples", more, "×", "lower", 4.4),
         Row("cost of twice the duration", longer, "×", "lower", 2.2),
         Row("cost of four times the vehicles (8)", fuller, "×", "lower", 16.0),
@@ -91,7 +134,9 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
     """CPU seconds for `count` valid scenarios of vehicles that drive side by side, a changepoint every 2.5 s."""
     time: Floats = np.linspace(0.0, duration, round(duration / 0.1) + 1)
     speed = 8.0 + 2.0 * np.sin(time[None] / 3.0 + np.arange(vehicles)[:, None])
-    along = np.concatenate([np.zeros((vehicles, 1)), np.cumsum(0.05 * (speed[:, 1:] + speed[:, :-1]), axis=1)], axis=1)
+    along = np.concatenate(
+        [np.zeros((vehicles, 1)), np.cumsum(0.05 * (speed[:, 1:] + speed[:, :-1]), axis=1)], axis=1
+    )
     lane = 4.0 * np.arange(vehicles)[:, None]
     position = np.stack([20.0 + along, lane + 0.0 * along], axis=-1)
     changes = np.arange(25, len(time) - 12, 25)
@@ -100,18 +145,27 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
     for n in range(vehicles):
         s = np.linspace(0.0, along[n, -1], int(along[n, -1] / 0.4) + 2)
         anchor = np.searchsorted(s, along[n, index] - 1e-9).clip(0, len(s) - 1)
-        routes.append(Route(np.column_stack([20.0 + s, np.full_like(s, lane[n, 0]), 0.0 * s]), anchor, s))
+        routes.append(
+            Route(np.column_stack([20.0 + s, np.full_like(s, lane[n, 0]), 0.0 * s]), anchor, s)
+        )
     names = tuple(Vehicle(str(n)) for n in range(vehicles))
     encounter = Encounter("side by side", names, 0, 100_000_000, position, heading, speed)
     labels = np.searchsorted(changes, np.arange(len(time)), side="right")
     segmentation = Segmentation(labels, changes, np.zeros(len(time)), ("",) * (len(changes) + 1))
     drivable = np.ones((5 * (40 + 4 * vehicles), 5 * int(along.max() + 60)), dtype=bool)
-    road = Road("wide", drivable, 0.2, np.array([-10.0, -20.0]), np.zeros((0, 3)), np.zeros((0, 3)))
-    states = [np.array([[*r.points[k], v[k]] for r, v in zip(routes, speed, strict=True)]) for k in (0, -1)]
+    road = Road(
+        "wide", drivable, 0.2, np.array([-10.0, -20.0]), np.zeros((0, 3)), np.zeros((0, 3))
+    )
+    states = [
+        np.array([[*r.points[k], v[k]] for r, v in zip(routes, speed, strict=True)])
+        for k in (0, -1)
+    ]
     asked = BoundaryStates(states[0], states[1])
     checker = Checker(road, asked, find_conflicts(names, time, position, heading), ())
     started = process_time()
-    found = draw_scenarios(Plan(encounter, segmentation, road, routes, asked, ()), checker.check, count=count)
+    found = draw_scenarios(
+        Plan(encounter, segmentation, road, routes, asked, ()), checker.check, count=count
+    )
     spent = process_time() - started
     if len(found.scenarios) < count:
         raise RuntimeError(f"only {len(found.scenarios)} of {count} scenarios: {found.refused}")
@@ -140,7 +194,16 @@ def _recorded(variety: str) -> list[Row]:
             if name in realism:
                 realism[name].append(value)
     if not acceptance:
-        return [Row("recorded encounters", 0.0, "cases", "higher", 1.0, "no recorded data, or none can be planned")]
+        return [
+            Row(
+                "recorded encounters",
+                0.0,
+                "cases",
+                "higher",
+                1.0,
+                "no recorded data, or none can be planned",
+            )
+        ]
     everywhere = [value for values in acceptance.values() for value in values]
     peer = f"{len(everywhere)} encounters × roads, {refused} refused before sampling"
     rows = [
@@ -152,9 +215,22 @@ def _recorded(variety: str) -> list[Row]:
             0.7,
             peer,
         ),
-        Row(f"{variety}: raw acceptance, worst encounter and road", min(everywhere), "", "higher", 0.3),
+        Row(
+            f"{variety}: raw acceptance, worst encounter and road",
+            min(everywhere),
+            "",
+            "higher",
+            0.3,
+        ),
         Row(f"{variety}: sets that stayed short", float(broken), "sets", "lower", 0.0),
-        Row(f"{variety}: mean pairwise displacement, least", min(apart), "m", "higher", 0.5, f"median {np.median(apart):.2f} m"),
+        Row(
+            f"{variety}: mean pairwise displacement, least",
+            min(apart),
+            "m",
+            "higher",
+            0.5,
+            f"median {np.median(apart):.2f} m",
+        ),
         Row(
             f"{variety}: the same without the clock's part, least",
             min(moved),
@@ -166,7 +242,16 @@ def _recorded(variety: str) -> list[Row]:
     ]
     if spreads:
         label = f"{variety}: standard deviation of arrival at a crossing conflict, median"
-        rows.append(Row(label, float(np.median(spreads)), "s", "higher", 0.5, f"from {min(spreads):.2f} to {max(spreads):.2f} s"))
+        rows.append(
+            Row(
+                label,
+                float(np.median(spreads)),
+                "s",
+                "higher",
+                0.5,
+                f"from {min(spreads):.2f} to {max(spreads):.2f} s",
+            )
+        )
     rows += [
         Row(
             f"{variety}: JS {name} to the fitted template, median",

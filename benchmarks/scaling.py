@@ -33,11 +33,15 @@ def run() -> list[Row]:
     for cell, horizons in sized(fine, quick=((COARSE, (20.0, 25.0)),)):
         count = sized(COUNT, quick=2)
         found = {seconds: _measured("generate", 2, seconds, count, cell) for seconds in horizons}
-        rows += _rows("horizon", f"s, 2 vehicles, {count} scenarios, cells of {cell:g} m", found, 1.2)
+        rows += _rows(
+            "horizon", f"s, 2 vehicles, {count} scenarios, cells of {cell:g} m", found, 1.2
+        )
     sizes = sized((50, 1000, 100_000), quick=(2, 4))
     found = {n: _measured("generate", 2, SECONDS, n, CELL) for n in sizes}
     rows += _rows("scenarios", f"scenarios, 2 vehicles, {SECONDS:g} s", found, 1.0)
-    found = {n * n: _measured("grid", n) for n in sized((200, 1000, 3000, 10_000), quick=(200, 300))}
+    found = {
+        n * n: _measured("grid", n) for n in sized((200, 1000, 3000, 10_000), quick=(200, 300))
+    }
     rows += _rows("cells", "cells: drawing, distances, first path", found, 1.0)
     found = {n: _measured("map", n) for n in sized((1000, 3000, 10_000), quick=(400, 500))}
     rows += _rows("lanes", "lanes: reading, best place of two vehicles", found)
@@ -51,7 +55,14 @@ def _vehicles(sizes: tuple[int, ...]) -> list[Row]:
     rows = _rows("vehicles", f"vehicles, {SECONDS:g} s, {count} scenarios", found, 1.5, TARGETS)
     for n in sized((2, 8), quick=(2,)):
         for stage in ("generation", "references", "evaluation"):
-            rows.append(Row(f"{n} vehicles: share of {stage}", 100.0 * found[n][stage] / found[n]["all"], "%", "lower"))
+            rows.append(
+                Row(
+                    f"{n} vehicles: share of {stage}",
+                    100.0 * found[n][stage] / found[n]["all"],
+                    "%",
+                    "lower",
+                )
+            )
     return rows
 
 
@@ -65,11 +76,29 @@ def _rows(
     """Rows of what was measured at each size, and of the exponent."""
     rows = []
     for size, case in found.items():
-        parts = ", ".join(f"{part} {value:.3g} s" for part, value in case.items() if part not in ("all", "mebibytes"))
-        rows.append(Row(f"{size:,g} {what}", case["all"], "CPU s", "lower", (targets or {}).get(int(size)), parts or None))
+        parts = ", ".join(
+            f"{part} {value:.3g} s"
+            for part, value in case.items()
+            if part not in ("all", "mebibytes")
+        )
+        rows.append(
+            Row(
+                f"{size:,g} {what}",
+                case["all"],
+                "CPU s",
+                "lower",
+                (targets or {}).get(int(size)),
+                parts or None,
+            )
+        )
         rows.append(Row(f"{size:,g} {what}: peak memory", case["mebibytes"], "MiB", "lower"))
     slope = np.polyfit(np.log(list(found)), np.log([case["all"] for case in found.values()]), 1)[0]
-    return [*rows, Row(f"exponent in {name}", slope, "", "lower", target, f"{min(found):g} to {max(found):g}")]
+    return [
+        *rows,
+        Row(
+            f"exponent in {name}", slope, "", "lower", target, f"{min(found):g} to {max(found):g}"
+        ),
+    ]
 
 
 def _measured(*words: object) -> dict[str, float]:

@@ -25,17 +25,30 @@ PLANNERS = {  # seconds late: drives of a search, failures of brute force, share
 BRUTE = 300_000
 SEEDS = 20
 MIDDLE = 0.485  # s, of the planner on which VerifAI's samplers are tried
-VERIFAI = {"ce": ("cross-entropy", 5, 3000), "bo": ("Bayesian", 1, 40)}  # seeds, drives at most: 40 Bayesian ones take 4 min
+VERIFAI = {
+    "ce": ("cross-entropy", 5, 3000),
+    "bo": ("Bayesian", 1, 40),
+}  # seeds, drives at most: 40 Bayesian ones take 4 min
 PLAIN = 5000  # drives of plain sampling and of VerifAI's samplers until the first failure, at most
 
 
 def run(seeds: int = sized(SEEDS, quick=1), brute: int = sized(0, quick=200)) -> list[Row]:
     """Measure; with `brute` scenarios the failure rates are counted anew (1,000 take 1.5 s of CPU time)."""
     natural = natural_scenarios()
-    counted = brute_force(natural, list(PLANNERS), brute) if brute else [failures for _, failures, _ in PLANNERS.values()]
+    counted = (
+        brute_force(natural, list(PLANNERS), brute)
+        if brute
+        else [failures for _, failures, _ in PLANNERS.values()]
+    )
     rows = []
     for (late, (budget, _, asked)), failures in zip(PLANNERS.items(), counted, strict=True):
-        rows += _planner(LateWitness(natural, late), failures / (brute or BRUTE), sized(budget, 60), asked, seeds)
+        rows += _planner(
+            LateWitness(natural, late),
+            failures / (brute or BRUTE),
+            sized(budget, 60),
+            asked,
+            seeds,
+        )
     return rows + _verifai(LateWitness(natural, MIDDLE))
 
 
@@ -45,12 +58,25 @@ def _verifai(problem: LateWitness) -> list[Row]:
     for kind, (name, seeds, limit) in VERIFAI.items() if PYTHON.exists() else ():
         most = sized(limit, 2)
         first = [first_failure(problem, kind, seed, most) for seed in range(sized(seeds, 1))]
-        remark = f"{seeds} seed(s); {len([k for k in first if k > most])} found none in {most} drives"
-        rows.append(Row(f"VerifAI {name}: drives until the first failure", median(first), "", "lower", None, remark))
+        remark = (
+            f"{seeds} seed(s); {len([k for k in first if k > most])} found none in {most} drives"
+        )
+        rows.append(
+            Row(
+                f"VerifAI {name}: drives until the first failure",
+                median(first),
+                "",
+                "lower",
+                None,
+                remark,
+            )
+        )
     return rows
 
 
-def _planner(problem: LateWitness, truth: float, budget: int, asked: float, seeds: int) -> list[Row]:
+def _planner(
+    problem: LateWitness, truth: float, budget: int, asked: float, seeds: int
+) -> list[Row]:
     held, share, first, begun = 0, [], [], process_time()
     for seed in range(seeds):
         found = Search(problem, seed, budget).run()
@@ -64,7 +90,14 @@ def _planner(problem: LateWitness, truth: float, budget: int, asked: float, seed
     return [
         Row(f"{name}: intervals that hold it, of {seeds}", held, "", "higher", 0.9 * seeds),
         Row(f"{name}: drives, as a share of plain sampling's", median(share), "", "lower", asked),
-        Row(f"{name}: drives until the first failure", median(first), "", "lower", None, f"plain {median(plain):g}"),
+        Row(
+            f"{name}: drives until the first failure",
+            median(first),
+            "",
+            "lower",
+            None,
+            f"plain {median(plain):g}",
+        ),
         Row(
             f"{name}: plain sampling's over the search's",
             median(plain) / median(first),

@@ -36,14 +36,23 @@ from scenario_gen.numerics.arrays import Floats, Ints
 
 SEEDS = range(9101, sized(9113, quick=9102))
 SEEDS_OF_A = range(9101, sized(9141, quick=9102))  # short sequences, so more of them
-PRIORS, TICKS = sized((400, 36_000), quick=(5, 80))  # sequences of the calibration, samples of the online hour
+PRIORS, TICKS = sized(
+    (400, 36_000), quick=(5, 80)
+)  # sequences of the calibration, samples of the online hour
 ROBUST_SEEDS = range(9201, sized(9206, quick=9202))
 MANY_SEEDS = range(9301, sized(9304, quick=9301))
 LABELLED = sized(None, quick=1)  # recordings of a set
 MOST_SWEEPS, MOST_TIMES = sized((5000, 20.0), quick=(20, 1.0))  # of jax-moseq until its F1 is ours
 TARGET_HAMMING = {"A": 0.01, "B": 0.01, "C": 0.02}
 TARGET_F1 = {"A": 0.03, "B": 0.03, "C": 0.05}
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")) / "labelled_series"
+DATA = (
+    Path(
+        os.environ.get(
+            "SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"
+        )
+    )
+    / "labelled_series"
+)
 LABELLED_SEEDS = range(1, sized(11, quick=2))
 NOT_INSTALLED = "peer not installed"
 
@@ -78,7 +87,10 @@ def _first_call() -> Row:
         "all imports": "import numpy, scenario_gen.method.segmentation",
         "first answer": "import numpy, scenario_gen.method.segmentation as s; s.segment_series(numpy.eye(50)[:, :2])",
     }
-    spent = {name: float(np.median([_fresh(code) for _ in range(sized(3, quick=1))])) for name, code in parts.items()}
+    spent = {
+        name: float(np.median([_fresh(code) for _ in range(sized(3, quick=1))]))
+        for name, code in parts.items()
+    }
     text = "CPU after: " + ", ".join(f"{name} {seconds:.2f} s" for name, seconds in spent.items())
     return Row("first call in a fresh process", spent["first answer"], "s", "lower", 2.0, text)
 
@@ -88,7 +100,9 @@ def _fresh(code: str) -> float:
     before = os.times()
     subprocess.run([sys.executable, "-c", code], check=True)
     after = os.times()
-    return after.children_user + after.children_system - before.children_user - before.children_system
+    return (
+        after.children_user + after.children_system - before.children_user - before.children_system
+    )
 
 
 def _cell(cell: str, seconds: dict[str, float]) -> list[Row]:
@@ -115,7 +129,10 @@ def _cell(cell: str, seconds: dict[str, float]) -> list[Row]:
     seconds[cell] = float(np.median(spent))
     known = f"true parameters: Hamming {np.median(best_hamming):.4f}, F1 {np.median(best_f1):.3f}"
     limit = 2.0 if cell == "C" else None
-    traces = ", ".join(f"{name} {value:.2f}" for name, value in zip(TRACE, np.quantile(r_hats, 0.9, axis=0), strict=True))
+    traces = ", ".join(
+        f"{name} {value:.2f}"
+        for name, value in zip(TRACE, np.quantile(r_hats, 0.9, axis=0), strict=True)
+    )
     calibration = Calibration(*deciles(np.concatenate(predicted), np.concatenate(truth)), 0.0, 0)
     return [
         Row(
@@ -126,13 +143,53 @@ def _cell(cell: str, seconds: dict[str, float]) -> list[Row]:
             TARGET_HAMMING[cell],
             f"{known}; mean {np.mean(lost_hamming):.4f}, worst {max(lost_hamming):.3f}; {spread(lost_hamming)}",
         ),
-        Row(f"{cell}: F1 below the smoother's", float(np.median(lost_f1)), "", "lower", TARGET_F1[cell], spread(lost_f1)),
-        Row(f"{cell}: seeds with fewer states than the smoother finds, of {len(spent)}", short, "", "lower", len(spent) / 40.0),
+        Row(
+            f"{cell}: F1 below the smoother's",
+            float(np.median(lost_f1)),
+            "",
+            "lower",
+            TARGET_F1[cell],
+            spread(lost_f1),
+        ),
+        Row(
+            f"{cell}: seeds with fewer states than the smoother finds, of {len(spent)}",
+            short,
+            "",
+            "lower",
+            len(spent) / 40.0,
+        ),
         Row(f"{cell}: spurious states, worst seed", max(spurious), "", "lower", 1.0),
-        Row(f"{cell}: split R-hat, worst trace, median", float(np.median(np.max(r_hats, axis=1))), "", "lower", 1.1),
-        Row(f"{cell}: split R-hat, worst trace, 90 %", float(np.quantile(np.max(r_hats, axis=1), 0.9)), "", "lower", 1.2, traces),
-        Row(f"{cell}: calibration, worst decile with 30 samples or more", calibration.worst, "", "lower", 0.1, calibration.table),
-        Row(f"{cell}: CPU", seconds[cell], "s", "lower", limit, f"{spread(spent)}; {np.median(sweeps):.0f} sweeps in all"),
+        Row(
+            f"{cell}: split R-hat, worst trace, median",
+            float(np.median(np.max(r_hats, axis=1))),
+            "",
+            "lower",
+            1.1,
+        ),
+        Row(
+            f"{cell}: split R-hat, worst trace, 90 %",
+            float(np.quantile(np.max(r_hats, axis=1), 0.9)),
+            "",
+            "lower",
+            1.2,
+            traces,
+        ),
+        Row(
+            f"{cell}: calibration, worst decile with 30 samples or more",
+            calibration.worst,
+            "",
+            "lower",
+            0.1,
+            calibration.table,
+        ),
+        Row(
+            f"{cell}: CPU",
+            seconds[cell],
+            "s",
+            "lower",
+            limit,
+            f"{spread(spent)}; {np.median(sweeps):.0f} sweeps in all",
+        ),
     ]
 
 
@@ -151,16 +208,40 @@ def _driving(seconds: dict[str, float]) -> list[Row]:
         ratios.append(len(found.changepoints) / len(sequence.changepoints))
         for name, change in (("1 % outliers", with_outliers), ("5 % lost", with_gaps)):
             changed = change(sequence.encounter, np.random.default_rng([seed, 5]))
-            worse[name].append(f1(sequence.changepoints, segment(changed, config, seed).changepoints, 5))
-        rivals = peers.ruptures(np.gradient(sequence.x[:, [2, 5]], axis=0)) if seed < SEEDS[0] + 3 else None
+            worse[name].append(
+                f1(sequence.changepoints, segment(changed, config, seed).changepoints, 5)
+            )
+        rivals = (
+            peers.ruptures(np.gradient(sequence.x[:, [2, 5]], axis=0))
+            if seed < SEEDS[0] + 3
+            else None
+        )
         if rivals is not None:
             pelt.append(f1(sequence.changepoints, rivals, 5))
     seconds["D"] = float(np.median(spent))
-    rival = f"; ruptures PELT on accelerations {np.median(pelt):.3f}" if pelt else f"; ruptures: {NOT_INSTALLED}"
+    rival = (
+        f"; ruptures PELT on accelerations {np.median(pelt):.3f}"
+        if pelt
+        else f"; ruptures: {NOT_INSTALLED}"
+    )
     return [
         Row("D: F1", float(np.median(scores)), "", "higher", 0.90, spread(scores) + rival),
-        Row("D, 1 % outliers: F1", float(np.median(worse["1 % outliers"])), "", "higher", 0.90, spread(worse["1 % outliers"])),
-        Row("D, 5 % lost: F1", float(np.median(worse["5 % lost"])), "", "higher", 0.92, spread(worse["5 % lost"])),
+        Row(
+            "D, 1 % outliers: F1",
+            float(np.median(worse["1 % outliers"])),
+            "",
+            "higher",
+            0.90,
+            spread(worse["1 % outliers"]),
+        ),
+        Row(
+            "D, 5 % lost: F1",
+            float(np.median(worse["5 % lost"])),
+            "",
+            "higher",
+            0.92,
+            spread(worse["5 % lost"]),
+        ),
         Row("D: changepoints found per true one", float(np.median(ratios)), "", "lower"),
         Row("D: CPU", seconds["D"], "s", "lower", None, spread(spent)),
     ]
@@ -184,22 +265,37 @@ def _speed() -> list[Row]:
             found = segment(sequence.encounter, config, SEEDS[0]).changepoints
         ours = time.process_time() - started
         if sequence.encounter is not None:
-            posterior = peers.posterior_of(sequence.encounter, config, SEEDS[0])[1]  # the same again, for its sweeps
-        rows += _against_moseq(cell, sequence, ours, f1(sequence.changepoints, found, 5), peers.sweeps_run(posterior))
+            posterior = peers.posterior_of(sequence.encounter, config, SEEDS[0])[
+                1
+            ]  # the same again, for its sweeps
+        rows += _against_moseq(
+            cell, sequence, ours, f1(sequence.changepoints, found, 5), peers.sweeps_run(posterior)
+        )
     return rows
 
 
-def _against_moseq(cell: str, sequence: Labelled, ours: float, own: float, sweeps: int) -> list[Row]:
+def _against_moseq(
+    cell: str, sequence: Labelled, ours: float, own: float, sweeps: int
+) -> list[Row]:
     """Rows of a cell, from our CPU seconds, our F1 and the sweeps that we ran."""
 
     def score(labels: Ints) -> float:
         return f1(sequence.changepoints, changes(labels), 5)
 
-    titles = f"{cell}: CPU of jax-moseq for as many sweeps, over ours", f"{cell}: CPU of jax-moseq to our F1, over ours"
+    titles = (
+        f"{cell}: CPU of jax-moseq for as many sweeps, over ours",
+        f"{cell}: CPU of jax-moseq to our F1, over ours",
+    )
     same = peers.jax_moseq(sequence.x, sweeps)
     if same is None:
         return [Row(title, 0.0, "×", "higher", None, NOT_INSTALLED) for title in titles]
-    until = peers.jax_moseq(sequence.x, MOST_SWEEPS, done=lambda labels: score(labels) >= own, every=10, most=MOST_TIMES * ours)
+    until = peers.jax_moseq(
+        sequence.x,
+        MOST_SWEEPS,
+        done=lambda labels: score(labels) >= own,
+        every=10,
+        most=MOST_TIMES * ours,
+    )
     assert until is not None
     reached = "reached" if score(until.labels) >= own else "not reached, a lower bound"
     mine = f"ours {ours:.2f} s, F1 {own:.3f}, {sweeps} sweeps"
@@ -209,7 +305,14 @@ def _against_moseq(cell: str, sequence: Labelled, ours: float, own: float, sweep
     ]
     return [
         Row(titles[0], same.seconds / ours, "×", "higher", None, f"{told[0]}; {mine}"),
-        Row(titles[1], until.seconds / ours, "×", "higher", None, f"{reached} after {until.sweeps} sweeps: {told[1]}; {mine}"),
+        Row(
+            titles[1],
+            until.seconds / ours,
+            "×",
+            "higher",
+            None,
+            f"{reached} after {until.sweeps} sweeps: {told[1]}; {mine}",
+        ),
     ]
 
 
@@ -228,7 +331,14 @@ def _sweeps() -> list[Row]:
                 spent.append(time.process_time() - started)
             cost[name] = (spent[1] - spent[0]) / 200.0
         rows.append(Row(f"{cell}: a sweep, Gaussian", 1e6 * cost["Gaussian"], "µs", "lower"))
-        rows.append(Row(f"{cell}: a Student-t sweep over a Gaussian one", cost["Student-t"] / cost["Gaussian"], "", "lower"))
+        rows.append(
+            Row(
+                f"{cell}: a Student-t sweep over a Gaussian one",
+                cost["Student-t"] / cost["Gaussian"],
+                "",
+                "lower",
+            )
+        )
     return rows
 
 
@@ -249,28 +359,78 @@ def _robust() -> list[Row]:
         sequence = gaussian_hmm("B", seed)
         x = sequence.x
         plain = segment_series(x, seed=1)
-        base, best = hamming(sequence.labels, plain.labels), f1(sequence.changepoints, plain.changepoints, 5)
+        base, best = (
+            hamming(sequence.labels, plain.labels),
+            f1(sequence.changepoints, plain.changepoints, 5),
+        )
         note("twin channel", sequence, np.column_stack([x, 2.0 * x[:, 0]]), base, best)
         note("summed channel", sequence, np.column_stack([x[:, 0] + x[:, 1], x]), base, best)
-        note("5 % of cells missing", sequence, np.where(rng.uniform(size=x.shape) < 0.05, np.nan, x), base, best)
+        note(
+            "5 % of cells missing",
+            sequence,
+            np.where(rng.uniform(size=x.shape) < 0.05, np.nan, x),
+            base,
+            best,
+        )
         far = (rng.uniform(size=(len(x), 1)) < 0.01) * rng.normal(size=x.shape)
         note("1 % outliers of 20 deviations", sequence, x + 20.0 * far, base, best)
         note("1 % outliers of 1000 deviations", sequence, x + 1000.0 * far, base, best)
     rows = [
-        Row("B, Student-t noise of 3 degrees: Hamming", float(np.median(lost.pop("t3"))), "", "lower", 0.06),
-        Row("B, Student-t noise of 3 degrees: F1 below the smoother's", float(np.median(scores.pop("t3"))), "", "lower", 0.05),
+        Row(
+            "B, Student-t noise of 3 degrees: Hamming",
+            float(np.median(lost.pop("t3"))),
+            "",
+            "lower",
+            0.06,
+        ),
+        Row(
+            "B, Student-t noise of 3 degrees: F1 below the smoother's",
+            float(np.median(scores.pop("t3"))),
+            "",
+            "lower",
+            0.05,
+        ),
     ]
     for name, values in lost.items():
-        rows.append(Row(f"B, {name}: Hamming above that without", max(values), "", "lower", 0.01, "the worst seed"))
-    many = [int(segment_series(gaussian_hmm("M", seed, distance=4.0).x).labels.max()) + 1 for seed in MANY_SEEDS]
-    return [*rows, Row("30 states: found", float(np.median(many)), "", "higher", 30.0, f"T 12,000, means 4 apart; {many}")]
+        rows.append(
+            Row(
+                f"B, {name}: Hamming above that without",
+                max(values),
+                "",
+                "lower",
+                0.01,
+                "the worst seed",
+            )
+        )
+    many = [
+        int(segment_series(gaussian_hmm("M", seed, distance=4.0).x).labels.max()) + 1
+        for seed in MANY_SEEDS
+    ]
+    return [
+        *rows,
+        Row(
+            "30 states: found",
+            float(np.median(many)),
+            "",
+            "higher",
+            30.0,
+            f"T 12,000, means 4 apart; {many}",
+        ),
+    ]
 
 
 def _calibration() -> list[Row]:
     """Sequences from the model's own prior: are probabilities and intervals right?"""
     found = calibrate(range(SEEDS[0], SEEDS[0] + PRIORS), d=1)
     return [
-        Row("calibration: worst decile with 30 samples or more", found.worst, "", "lower", 0.1, found.table),
+        Row(
+            "calibration: worst decile with 30 samples or more",
+            found.worst,
+            "",
+            "lower",
+            0.1,
+            found.table,
+        ),
         Row(
             "calibration: coverage of 5-95 % intervals",
             found.coverage,
@@ -290,7 +450,11 @@ def _online() -> list[Row]:
         encounter = sequence.encounter
         assert encounter is not None
         online = OnlineSegmenter(2, 0.1)
-        found = [c for t in range(len(sequence.x)) for c in online.push(encounter.position[:, t], encounter.speed[:, t])]
+        found = [
+            c
+            for t in range(len(sequence.x))
+            for c in online.push(encounter.position[:, t], encounter.speed[:, t])
+        ]
         samples = np.array([c.sample for c in found], dtype=np.int64)
         scores.append(f1(sequence.changepoints, samples, 5))
         for change in found:
@@ -321,7 +485,13 @@ def _hour() -> list[Row]:
             sizes.append(len(pickle.dumps(online)))
     spent = time.process_time() - started
     return [
-        Row("online: growth of its state over an hour, 8 vehicles", (sizes[1] - sizes[0]) / 1024.0, "KiB", "lower", 64.0),
+        Row(
+            "online: growth of its state over an hour, 8 vehicles",
+            (sizes[1] - sizes[0]) / 1024.0,
+            "KiB",
+            "lower",
+            64.0,
+        ),
         Row("online: CPU per sample, 8 vehicles", 1e3 * spent / TICKS, "ms", "lower", 100.0),
     ]
 
@@ -332,7 +502,10 @@ def _mocap6() -> Iterator[tuple[Floats, Ints]]:
     tables = [[line.split(",") for line in lines] for lines in files]
     actions = sorted({row[-1] for rows in tables for row in rows})
     for rows in tables:
-        yield np.array([[float(v) for v in row[2:14]] for row in rows]), np.array([actions.index(row[-1]) for row in rows])
+        yield (
+            np.array([[float(v) for v in row[2:14]] for row in rows]),
+            np.array([actions.index(row[-1]) for row in rows]),
+        )
 
 
 def _bee_dance() -> Iterator[tuple[Floats, Ints]]:
@@ -354,43 +527,97 @@ def _labelled() -> list[Row]:
     learned = [peers.hmmlearn(x, len(np.unique(z))) for x, z in mocap]
     wrong = [_mean(mocap, [p.labels for p in found], hamming) for found in moves]
     eight = [int(segment_series(x, SamplerConfig(chains=8), seed=1).kept.sum()) for x, _ in mocap]
-    rows.append(Row("mocap6: chains of 8 that agree, worst sequence", min(eight), "", "higher", 6.0))
-    stops, actions = tuple(np.cumsum([len(x) for x, _ in mocap]).tolist()), np.concatenate([z for _, z in mocap])
+    rows.append(
+        Row("mocap6: chains of 8 that agree, worst sequence", min(eight), "", "higher", 6.0)
+    )
+    stops, actions = (
+        tuple(np.cumsum([len(x) for x, _ in mocap]).tolist()),
+        np.concatenate([z for _, z in mocap]),
+    )
     joint = [
-        hamming(actions, segment_series(np.vstack([x for x, _ in mocap]), seed=k, ends=stops).labels) for k in LABELLED_SEEDS
+        hamming(
+            actions, segment_series(np.vstack([x for x, _ in mocap]), seed=k, ends=stops).labels
+        )
+        for k in LABELLED_SEEDS
     ]
-    rows.append(Row("mocap6, all sequences at once: Hamming", float(np.mean(joint)), "", "lower", 0.2, f"ours by seed {joint}"))
-    rows.append(Row("mocap6, all sequences at once: its standard deviation", float(np.std(joint)), "", "lower", 0.02))
-    rows.append(_against("mocap6: Hamming", wrong, "lower", {"hmmlearn, true K": _mean(mocap, learned, hamming)}))
+    rows.append(
+        Row(
+            "mocap6, all sequences at once: Hamming",
+            float(np.mean(joint)),
+            "",
+            "lower",
+            0.2,
+            f"ours by seed {joint}",
+        )
+    )
+    rows.append(
+        Row(
+            "mocap6, all sequences at once: its standard deviation",
+            float(np.std(joint)),
+            "",
+            "lower",
+            0.02,
+        )
+    )
+    rows.append(
+        _against(
+            "mocap6: Hamming", wrong, "lower", {"hmmlearn, true K": _mean(mocap, learned, hamming)}
+        )
+    )
     rivals = {
-        "hmmlearn, true K": _mean(mocap, [None if z is None else changes(z) for z in learned], lambda z, c: f1(changes(z), c, 5)),
-        "ruptures": _mean(mocap, [peers.ruptures(x) for x, _ in mocap], lambda z, c: f1(changes(z), c, 5)),
+        "hmmlearn, true K": _mean(
+            mocap,
+            [None if z is None else changes(z) for z in learned],
+            lambda z, c: f1(changes(z), c, 5),
+        ),
+        "ruptures": _mean(
+            mocap, [peers.ruptures(x) for x, _ in mocap], lambda z, c: f1(changes(z), c, 5)
+        ),
     }
-    scores = [_mean(mocap, [p.changepoints for p in found], lambda z, c: f1(changes(z), c, 5)) for found in moves]
+    scores = [
+        _mean(mocap, [p.changepoints for p in found], lambda z, c: f1(changes(z), c, 5))
+        for found in moves
+    ]
     rows.append(_against("mocap6: F1 (5 samples)", scores, "higher", rivals))
     learned = [peers.hmmlearn(x, 3) for x, _ in bees]
     rivals = {
         "hmmlearn, 3 dances": _mean(
-            bees, [None if z is None else changes(z) for z in learned], lambda z, c: f1(changes(z), c, 15)
+            bees,
+            [None if z is None else changes(z) for z in learned],
+            lambda z, c: f1(changes(z), c, 15),
         ),
-        "ruptures": _mean(bees, [peers.ruptures(x) for x, _ in bees], lambda z, c: f1(changes(z), c, 15)),
+        "ruptures": _mean(
+            bees, [peers.ruptures(x) for x, _ in bees], lambda z, c: f1(changes(z), c, 15)
+        ),
     }
-    scores = [_mean(bees, [p.changepoints for p in found], lambda z, c: f1(changes(z), c, 15)) for found in dances]
+    scores = [
+        _mean(bees, [p.changepoints for p in found], lambda z, c: f1(changes(z), c, 15))
+        for found in dances
+    ]
     rows.append(_against("bee_dance: F1 (15 frames), AR(2)", scores, "higher", rivals))
     return rows
 
 
-def _mean(series: list[tuple[Floats, Ints]], found: Sequence[Ints | None], score: Callable[[Ints, Ints], float]) -> float | None:
+def _mean(
+    series: list[tuple[Floats, Ints]],
+    found: Sequence[Ints | None],
+    score: Callable[[Ints, Ints], float],
+) -> float | None:
     """Mean score over a set; None if the peer is missing."""
     scores = [score(z, f) for (_, z), f in zip(series, found, strict=True) if f is not None]
     return float(np.mean(scores)) if len(scores) == len(series) else None
 
 
-def _against(name: str, ours: Sequence[float | None], better: str, rivals: dict[str, float | None]) -> Row:
+def _against(
+    name: str, ours: Sequence[float | None], better: str, rivals: dict[str, float | None]
+) -> Row:
     """Return a row of the mean over our seeds, whose target is the best rival's figure."""
     each = [value for value in ours if value is not None]
     known = [value for value in rivals.values() if value is not None]
-    text = ", ".join(f"{rival} {NOT_INSTALLED if value is None else f'{value:.3f}'}" for rival, value in rivals.items())
+    text = ", ".join(
+        f"{rival} {NOT_INSTALLED if value is None else f'{value:.3f}'}"
+        for rival, value in rivals.items()
+    )
     text += f"; ours by seed {', '.join(f'{value:.3f}' for value in each)}"
     if better == "lower":
         return Row(name, float(np.mean(each)), "", "lower", min(known) if known else None, text)

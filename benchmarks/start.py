@@ -23,7 +23,9 @@ from benchmarks.row import Row
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.base.ros_domain import free_domain, this_host_only
 
-NODES = ("evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")[sized(0, quick=5) :]
+NODES = ("evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")[
+    sized(0, quick=5) :
+]
 LOAD = sized(16, quick=1)
 LAUNCH = 5.0  # seconds that launch gives a node after Ctrl-C, and once more after SIGTERM
 BARE = "import rclpy\nrclpy.init()\nnode = rclpy.create_node('bare')\ntry:\n    rclpy.spin(node)\nexcept BaseException:\n    pass"
@@ -37,18 +39,32 @@ def run() -> list[Row]:
         place = Path(folder)
         peer = _peer(place, domain)
         rows = _start("six nodes, warm", place, domain, [[node] for node in NODES], 5.0, peer)
-        rows += _start("composed suite, warm", place, domain, [["suite", "--nodes", ",".join(NODES)]], 3.0, peer)
+        rows += _start(
+            "composed suite, warm",
+            place,
+            domain,
+            [["suite", "--nodes", ",".join(NODES)]],
+            3.0,
+            peer,
+        )
         if sized(True, quick=False):
-            rows += _start("six nodes, cold", place, domain, [[node] for node in NODES], None, peer, cold=True)
+            rows += _start(
+                "six nodes, cold", place, domain, [[node] for node in NODES], None, peer, cold=True
+            )
         return rows + _exit(place, domain, peer)
 
 
 @contextmanager
-def _running(folder: Path, domain: int, commands: Sequence[Sequence[str]], **variables: str) -> Iterator[list[Process]]:
+def _running(
+    folder: Path, domain: int, commands: Sequence[Sequence[str]], **variables: str
+) -> Iterator[list[Process]]:
     """Start processes together; whatever is left of them at the end is killed."""
     variables = environment(domain) | {"ROS_LOG_DIR": str(folder)} | variables
     with (folder / "nodes.log").open("ab") as log:
-        processes = [subprocess.Popen([sys.executable, *words], stdout=log, stderr=log, env=variables) for words in commands]
+        processes = [
+            subprocess.Popen([sys.executable, *words], stdout=log, stderr=log, env=variables)
+            for words in commands
+        ]
     try:
         yield processes
     finally:
@@ -80,7 +96,14 @@ def _active(client: _Client, nodes: Sequence[str]) -> None:
 
 
 def _start(
-    name: str, folder: Path, domain: int, which: list[list[str]], target: float | None, peer: str, *, cold: bool = False
+    name: str,
+    folder: Path,
+    domain: int,
+    which: list[list[str]],
+    target: float | None,
+    peer: str,
+    *,
+    cold: bool = False,
 ) -> list[Row]:
     commands = [["-m", "scenario_gen.ros.plumbing.start", *words] for words in which]
     with tempfile.TemporaryDirectory() as cache, _Client(domain) as client:
@@ -88,7 +111,10 @@ def _start(
         started = time.monotonic()
         with _running(folder, domain, commands, **variables) as processes:
             _active(client, NODES)
-            wall, used = time.monotonic() - started, sum(_cpu(process.pid) for process in processes)
+            wall, used = (
+                time.monotonic() - started,
+                sum(_cpu(process.pid) for process in processes),
+            )
             for process in processes:
                 process.send_signal(signal.SIGINT)
             for process in processes:
@@ -120,14 +146,26 @@ def _exit(folder: Path, domain: int, peer: str) -> list[Row]:
     """End the nodes and a recorder as launch does, beside busy loops."""
     bag = folder / "bag"
     commands = [["-m", "scenario_gen.ros.plumbing.start", node] for node in NODES]
-    record = ["-m", "scenario_gen.ros.plumbing.start", "recorder", "--ros-args", "-p", f"bag:={bag}", "-p", "topics:=.*"]
+    record = [
+        "-m",
+        "scenario_gen.ros.plumbing.start",
+        "recorder",
+        "--ros-args",
+        "-p",
+        f"bag:={bag}",
+        "-p",
+        "topics:=.*",
+    ]
     with _running(folder, domain, [*commands, record]) as processes, _Client(domain) as client:
         _active(client, NODES)
         while not list(bag.glob("*.mcap")):
             time.sleep(0.1)
         with _running(folder, domain, [["-c", "while True: pass"]] * LOAD):
             time.sleep(sized(3.0, quick=0.1))
-            started, used = time.monotonic(), {process.pid: _cpu(process.pid) for process in processes}
+            started, used = (
+                time.monotonic(),
+                {process.pid: _cpu(process.pid) for process in processes},
+            )
             slowest, killed = 0.0, 0
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
                 left = [process for process in processes if process.poll() is None]
@@ -135,12 +173,28 @@ def _exit(folder: Path, domain: int, peer: str) -> list[Row]:
                 for process in left:
                     process.send_signal(number)
                 deadline = time.monotonic() + LAUNCH
-                while any(process.poll() is None for process in left) and time.monotonic() < deadline:
+                while (
+                    any(process.poll() is None for process in left) and time.monotonic() < deadline
+                ):
                     time.sleep(0.01)
                 slowest = time.monotonic() - started if left else slowest
     whole = len(list(read_messages(bag))) if killed == 0 else 0
     words = f"{len(used)} processes at a load of {LOAD} on {os.cpu_count()} cores; {whole} messages in the bag; {peer}"
     return [
-        Row("the slowest node ends after Ctrl-C, machine busy", slowest, "s", "lower", LAUNCH, words),
-        Row("nodes that launch would have killed, machine busy", killed, "nodes", "lower", 0.0, words),
+        Row(
+            "the slowest node ends after Ctrl-C, machine busy",
+            slowest,
+            "s",
+            "lower",
+            LAUNCH,
+            words,
+        ),
+        Row(
+            "nodes that launch would have killed, machine busy",
+            killed,
+            "nodes",
+            "lower",
+            0.0,
+            words,
+        ),
     ]

@@ -40,7 +40,9 @@ def run(count: int = sized(1000, quick=4)) -> list[Row]:
     longer = _seconds_per_check(CASES["opposite directions"], 801) / base
     rows.append(Row("cost of four times the samples (20 s, T = 801)", longer, "×", "lower", 4.0))
     more = _seconds_per_check(PLATOONS, 201) / base
-    rows.append(Row("cost of four times the vehicles (two platoons of four)", more, "×", "lower", 16.0))
+    rows.append(
+        Row("cost of four times the vehicles (two platoons of four)", more, "×", "lower", 16.0)
+    )
     time, position, heading = _motion(PLATOONS[::2], 401)
     vehicles = tuple(Vehicle(str(i)) for i in range(4))
     conflict = _seconds(lambda: find_conflicts(vehicles, time, position, heading))
@@ -52,7 +54,16 @@ def _rechecked(count: int) -> list[Row]:
     """What an independent checker finds in published scenarios."""
     account, planned = recheck_published(count)
     if not account.scenarios:
-        return [Row("published scenarios re-checked", 0.0, "", "higher", 1.0, "no recorded data, or none can be planned")]
+        return [
+            Row(
+                "published scenarios re-checked",
+                0.0,
+                "",
+                "higher",
+                1.0,
+                "no recorded data, or none can be planned",
+            )
+        ]
     wrong, moving = account.found.pop("passing_order", 0), account.found.pop("stop_not_kept", 0)
     causes = ", ".join(f"{n} × {cause}" for cause, n in account.found.most_common())
     return [
@@ -64,7 +75,14 @@ def _rechecked(count: int) -> list[Row]:
             float(count),
             f"{planned} encounters × roads, {account.vehicles} vehicles, {account.instants} instants of the advancement",
         ),
-        Row("violations found by the re-check", float(account.found.total()), "", "lower", 0.0, causes or None),
+        Row(
+            "violations found by the re-check",
+            float(account.found.total()),
+            "",
+            "lower",
+            0.0,
+            causes or None,
+        ),
         Row(
             "wrong passing orders",
             float(wrong),
@@ -92,7 +110,12 @@ def _seconds_per_check(drives: tuple[Drive, ...], samples: int) -> float:
     scenario = Scenario(vehicles, time, position, heading, speed, np.zeros_like(speed))
     start, end = (np.column_stack((position[:, k], heading[:, k], speed[:, k])) for k in (0, -1))
     waits: tuple[Wait, ...] = ()
-    checker = Checker(_t_intersection(), BoundaryStates(start, end), find_conflicts(vehicles, time, position, heading), waits)
+    checker = Checker(
+        _t_intersection(),
+        BoundaryStates(start, end),
+        find_conflicts(vehicles, time, position, heading),
+        waits,
+    )
     (verdict,) = checker.check([scenario])
     if not verdict.valid:
         raise RuntimeError(f"the measured scenario must be valid: {verdict.violations}")
@@ -117,4 +140,11 @@ def _t_intersection() -> Road:
     drivable = np.zeros((1000, 1000), dtype=np.bool_)
     drivable[482:518] = True
     drivable[:500, 482:518] = True
-    return Road("T, 0.2 m cells", drivable, 0.2, np.array((-100.0, -100.0)), np.empty((0, 3)), np.empty((0, 3)))
+    return Road(
+        "T, 0.2 m cells",
+        drivable,
+        0.2,
+        np.array((-100.0, -100.0)),
+        np.empty((0, 3)),
+        np.empty((0, 3)),
+    )

@@ -31,7 +31,13 @@ from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation.measures import features, measure, MEASURES
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import Callbacks, draw_scenarios, Plan, relaxed_states, SamplingConfig
+from scenario_gen.method.sampling import (
+    Callbacks,
+    draw_scenarios,
+    Plan,
+    relaxed_states,
+    SamplingConfig,
+)
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
@@ -68,15 +74,23 @@ class Case:
             ScenarioGenError: the road cannot be used.
         """
         cut = next(cut for cut in [*cuts()[0], *recorded(DATA)] if cut.name == name)
-        encounter = read_log([DATA / "trajectories" / file for file in cut.files], cut.config()).encounters[0]
+        encounter = read_log(
+            [DATA / "trajectories" / file for file in cut.files], cut.config()
+        ).encounters[0]
         road, segmentation = build_road(road_name, encounter), segment(encounter)
         fit = fit_template(encounter, segmentation, road)
         routes = plan_routes(road, fit)
         given = (encounter, segmentation, road, routes)
-        return cls(f"{name} on {road_name}", given, waits_to_keep(encounter, segmentation), fit.requested)
+        return cls(
+            f"{name} on {road_name}", given, waits_to_keep(encounter, segmentation), fit.requested
+        )
 
     def sample(
-        self, request: Request = Request(), count: int = COUNT, config: SamplingConfig = SamplingConfig(), **more: Any
+        self,
+        request: Request = Request(),
+        count: int = COUNT,
+        config: SamplingConfig = SamplingConfig(),
+        **more: Any,
     ) -> tuple[ScenarioSet, float]:
         """Sample; return the set and the CPU seconds that it took."""
         encounter, segmentation, road, routes = self.given
@@ -84,15 +98,28 @@ class Case:
         begun = process_time()
         check = Checker.of_template(encounter, road, asked, self.waits, None, request.order).check
         plan = Plan(encounter, segmentation, road, routes, asked, self.waits)
-        made = draw_scenarios(plan, check, config, count=count, request=request, measures=MEASURES, **more)
+        made = draw_scenarios(
+            plan, check, config, count=count, request=request, measures=MEASURES, **more
+        )
         return made, process_time() - begun
 
 
-def run(cases: int | None = None, count: int | None = None, details: str | None = None) -> list[Row]:
+def run(
+    cases: int | None = None, count: int | None = None, details: str | None = None
+) -> list[Row]:
     """Measure."""
     found: list[dict[str, Any]] = []
     if not (DATA / "trajectories").is_dir():
-        return [Row("recorded encounters", 0.0, "cases", "higher", 1.0, "no recorded data (SCENARIO_GEN_DATA)")]
+        return [
+            Row(
+                "recorded encounters",
+                0.0,
+                "cases",
+                "higher",
+                1.0,
+                "no recorded data (SCENARIO_GEN_DATA)",
+            )
+        ]
     refused: list[str] = []
     for name in CASES[: cases or MOST]:
         for road in ROADS:
@@ -120,7 +147,9 @@ def _measured(case: Case, natural: int) -> dict[str, Any]:
 
     config = SamplingConfig()
     plain, seconds = case.sample()
-    brute, _ = case.sample(count=natural, config=replace(config, attempts=1), callbacks=Callbacks(found=found))
+    brute, _ = case.sample(
+        count=natural, config=replace(config, attempts=1), callbacks=Callbacks(found=found)
+    )
     each = {name: np.array(seen) for name, seen in values.items()}
     few = list(plain.scenarios[:COUNT])
     figures: dict[str, Any] = {
@@ -144,7 +173,9 @@ def _measured(case: Case, natural: int) -> dict[str, Any]:
     return figures
 
 
-def _target(case: Case, text: str, each: dict[str, Any], candidates: int, seconds: float) -> dict[str, Any]:
+def _target(
+    case: Case, text: str, each: dict[str, Any], candidates: int, seconds: float
+) -> dict[str, Any]:
     """One target: how many came, how many of them are in the range by the other measure, what it cost, the estimated share."""
     (target,) = read_targets(text)
     hits = int(sum(target.holds(value) for value in each[target.name]))
@@ -154,12 +185,20 @@ def _target(case: Case, text: str, each: dict[str, Any], candidates: int, second
     try:
         made, spent = case.sample(Request(target=text))
     except RefusedError as error:
-        return {"share": share, "hits": hits, "published": 0, "said": str(error), "seconds": process_time() - begun}
+        return {
+            "share": share,
+            "hits": hits,
+            "published": 0,
+            "said": str(error),
+            "seconds": process_time() - begun,
+        }
     values = [again(one) for one in made.scenarios]
     inside = [bool(target.low - SLACK <= value <= target.high + SLACK) for value in values]
     half = 1.96 * math.sqrt(max(share * (1.0 - share), 1.0 / candidates) / candidates)
     reached = made.reached
-    agrees = reached is not None and bool(reached.low <= share + half and share - half <= reached.high)
+    agrees = reached is not None and bool(
+        reached.low <= share + half and share - half <= reached.high
+    )
     return {
         "share": share, "hits": hits, "published": len(values), "outside": inside.count(False),
         "estimate": None if reached is None else [reached.low, reached.share, reached.high], "agrees": agrees,
@@ -191,8 +230,22 @@ def _rows(found: list[dict[str, Any]], cases: int, refused: int) -> list[Row]:
 
     told = f"{cases} cases, {cases - len(found)} without a valid scenario; {refused} not fitted"
     rows = [
-        Row("standard deviation of the arrival gap, median", median("arrival sd"), "s", "higher", 0.8, told),
-        Row("range of PET in 50, median", median("pet range"), "s", "higher", 3.0, f"brute: {median('pet range, brute'):.2f} s"),
+        Row(
+            "standard deviation of the arrival gap, median",
+            median("arrival sd"),
+            "s",
+            "higher",
+            0.8,
+            told,
+        ),
+        Row(
+            "range of PET in 50, median",
+            median("pet range"),
+            "s",
+            "higher",
+            3.0,
+            f"brute: {median('pet range, brute'):.2f} s",
+        ),
         Row("displacement without the clock, median", median("displacement"), "m", "higher", 1.0),
         Row("natural valid scenarios a second, median", 1.0 / median("seconds"), "1/s", "higher"),
     ]
@@ -205,7 +258,11 @@ def _rows(found: list[dict[str, Any]], cases: int, refused: int) -> list[Row]:
     agrees = [one["agrees"] for one in published]
     often = [one["cost"] for one in published if one["share"] >= OFTEN]
     between = [one["cost"] for one in published if RARE <= one["share"] < OFTEN]
-    rare = [1.0 / max(one["estimate"][1], 1e-9) / one["cost"] for one in published if one["estimate"][1] < RARE]
+    rare = [
+        1.0 / max(one["estimate"][1], 1e-9) / one["cost"]
+        for one in published
+        if one["estimate"][1] < RARE
+    ]
     rows += [
         Row(
             "published in the range, by the other measure",
@@ -215,10 +272,31 @@ def _rows(found: list[dict[str, Any]], cases: int, refused: int) -> list[Row]:
             1.0,
             f"{total} scenarios",
         ),
-        Row("full sets where natural candidates hold one", _mean(full), "share", "higher", 0.95, f"{len(full)} targets"),
-        Row("CPU per scenario / natural, share ≥ 5 %, median", _median(often), "×", "lower", 5.0, f"{len(often)} targets"),
+        Row(
+            "full sets where natural candidates hold one",
+            _mean(full),
+            "share",
+            "higher",
+            0.95,
+            f"{len(full)} targets",
+        ),
+        Row(
+            "CPU per scenario / natural, share ≥ 5 %, median",
+            _median(often),
+            "×",
+            "lower",
+            5.0,
+            f"{len(often)} targets",
+        ),
         Row("the same, worst", max(often, default=math.nan), "×", "lower", 5.0),
-        Row("the same, share 0.1 to 5 %, median", _median(between), "×", "lower", None, f"{len(between)} targets"),
+        Row(
+            "the same, share 0.1 to 5 %, median",
+            _median(between),
+            "×",
+            "lower",
+            None,
+            f"{len(between)} targets",
+        ),
         Row(
             "cheaper than rejection, share < 0.1 %, least",
             min(rare, default=math.nan),
@@ -227,12 +305,34 @@ def _rows(found: list[dict[str, Any]], cases: int, refused: int) -> list[Row]:
             10.0,
             f"{len(rare)} targets",
         ),
-        Row("estimates that agree with natural sampling", _mean(agrees), "share", "higher", 0.9, f"{len(agrees)} targets"),
         Row(
-            "bins, diverse / natural, median", _median([one["bins, diverse"] / one["bins"] for one in found]), "×", "higher", 2.0
+            "estimates that agree with natural sampling",
+            _mean(agrees),
+            "share",
+            "higher",
+            0.9,
+            f"{len(agrees)} targets",
         ),
-        Row("crossings whose order is swapped", _mean([one["swap"] > 0 for one in found]), "share", "higher", 0.7),
-        Row("crossings with a full swapped set", _mean([one["swap"] == COUNT for one in found]), "share", "higher"),
+        Row(
+            "bins, diverse / natural, median",
+            _median([one["bins, diverse"] / one["bins"] for one in found]),
+            "×",
+            "higher",
+            2.0,
+        ),
+        Row(
+            "crossings whose order is swapped",
+            _mean([one["swap"] > 0 for one in found]),
+            "share",
+            "higher",
+            0.7,
+        ),
+        Row(
+            "crossings with a full swapped set",
+            _mean([one["swap"] == COUNT for one in found]),
+            "share",
+            "higher",
+        ),
     ]
     return rows
 

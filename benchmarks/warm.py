@@ -31,21 +31,39 @@ def run() -> list[Row]:
     """Measure; one run before, which compiles what is not in the cache, is not counted."""
     with tempfile.TemporaryDirectory() as folder:
         log, out = _table(Path(folder)), f"{folder}/out"
-        words = ["generate", str(log), "--road", "four_way", "--count", str(COUNT), "--seed", "7", "--out", out]
+        words = [
+            "generate",
+            str(log),
+            "--road",
+            "four_way",
+            "--count",
+            str(COUNT),
+            "--seed",
+            "7",
+            "--out",
+            out,
+        ]
         command = [sys.executable, "-m", "scenario_gen", *words]
         _spent(command)
         whole = [_spent(command) for _ in range(RUNS)]
         plain = [_spent([sys.executable, "-c", "import scenario_gen"]) for _ in range(RUNS)]
         asked = [_spent([sys.executable, "-m", "scenario_gen", "--help"]) for _ in range(RUNS)]
         parts = _parts([sys.executable, "-m", "benchmarks._warm_parts", str(log), out, str(COUNT)])
-    rows = [*_both("generate", whole, TARGET), *_both("--help", asked), *_both("import scenario_gen", plain)]
-    return rows + [row for name, spent in parts.items() for row in _both(f"generate, {name}", [spent])]
+    rows = [
+        *_both("generate", whole, TARGET),
+        *_both("--help", asked),
+        *_both("import scenario_gen", plain),
+    ]
+    return rows + [
+        row for name, spent in parts.items() for row in _both(f"generate, {name}", [spent])
+    ]
 
 
 def _both(name: str, spent: Sequence[Sequence[float]], target: float | None = None) -> list[Row]:
     """Medians of the seconds of CPU and clock."""
     return [
-        Row(f"{name}: {what}", median(each[k] for each in spent), "s", "lower", target) for k, what in enumerate(("CPU", "clock"))
+        Row(f"{name}: {what}", median(each[k] for each in spent), "s", "lower", target)
+        for k, what in enumerate(("CPU", "clock"))
     ]
 
 
@@ -55,7 +73,9 @@ def _table(folder: Path) -> Path:
     path = folder / "log.csv"
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
-        rows.writerow(["t_s", "vehicle_id", "x_m", "y_m", "speed_mps", "heading_rad", "length_m", "width_m"])
+        rows.writerow(
+            ["t_s", "vehicle_id", "x_m", "y_m", "speed_mps", "heading_rad", "length_m", "width_m"]
+        )
         for n, vehicle in enumerate(encounter.vehicles):
             columns = (
                 encounter.time,
@@ -65,7 +85,15 @@ def _table(folder: Path) -> Path:
                 encounter.heading[n],
             )
             for t, *values in zip(*columns, strict=True):
-                rows.writerow([f"{t:.3f}", vehicle.id, *(f"{value:.4f}" for value in values), vehicle.length, vehicle.width])
+                rows.writerow(
+                    [
+                        f"{t:.3f}",
+                        vehicle.id,
+                        *(f"{value:.4f}" for value in values),
+                        vehicle.length,
+                        vehicle.width,
+                    ]
+                )
     return path
 
 
@@ -81,6 +109,9 @@ def _spent(command: Sequence[str]) -> tuple[float, float]:
 
 
 def _parts(command: Sequence[str]) -> dict[str, list[float]]:
-    ran = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[-1] for _ in range(RUNS)]
+    ran = [
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[-1]
+        for _ in range(RUNS)
+    ]
     told = [json.loads(line) for line in ran]
     return {name: [median(one[name][k] for one in told) for k in (0, 1)] for name in told[0]}

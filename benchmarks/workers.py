@@ -50,7 +50,12 @@ def run() -> list[Row]:
         rng = np.random.default_rng(0)
         config = (PipelineConfig(), CorpusConfig())
         tasks = [
-            FakeTask(f"task {k}", config, folder / f"{k % 100:02}" / f"{k}.json", float(rng.uniform(*SECONDS)))
+            FakeTask(
+                f"task {k}",
+                config,
+                folder / f"{k % 100:02}" / f"{k}.json",
+                float(rng.uniform(*SECONDS)),
+            )
             for k in range(COUNT * EACH)
         ]
         with _cluster(folder) as (address, scheduler):
@@ -67,17 +72,51 @@ def run() -> list[Row]:
     whole = max(one["ended"] for one in done) - min(one["begun"] for one in done)
     a_task = 1e3 * (spent - resting * whole) / len(tasks)
     waits = _between(done)
-    load = a_task * MANY / (1e3 * sum(SECONDS) / 2.0) + resting * _heartbeats(MANY) / _heartbeats(COUNT)
+    load = a_task * MANY / (1e3 * sum(SECONDS) / 2.0) + resting * _heartbeats(MANY) / _heartbeats(
+        COUNT
+    )
     return [
         Row(
-            "share of their time that workers wait", 100.0 * (1.0 - busy / (COUNT * whole)), "%", "lower", 5.0, f"{COUNT} workers"
+            "share of their time that workers wait",
+            100.0 * (1.0 - busy / (COUNT * whole)),
+            "%",
+            "lower",
+            5.0,
+            f"{COUNT} workers",
         ),
         Row("wait between two tasks, median", 1e3 * float(np.median(waits)), "ms", "lower"),
-        Row("scheduler's CPU for a task", a_task, "ms", "lower", 1.0, f"{len(tasks)} tasks, without what it spends at rest"),
-        Row("scheduler's CPU at rest", 100.0 * resting, "%", "lower", None, f"{COUNT} workers that only say that they live"),
+        Row(
+            "scheduler's CPU for a task",
+            a_task,
+            "ms",
+            "lower",
+            1.0,
+            f"{len(tasks)} tasks, without what it spends at rest",
+        ),
+        Row(
+            "scheduler's CPU at rest",
+            100.0 * resting,
+            "%",
+            "lower",
+            None,
+            f"{COUNT} workers that only say that they live",
+        ),
         Row("scheduler's peak memory", most, "MiB", "lower", 2048.0),
-        Row(f"{MANY} workers: the scheduler's load", 100.0 * load, "%", "lower", 100.0, "extrapolated"),
-        Row("a task as it is sent", len(pickle.dumps(FakeTask("task 1", None, tasks[1].target, 5.0))), "bytes", "lower", 500.0),
+        Row(
+            f"{MANY} workers: the scheduler's load",
+            100.0 * load,
+            "%",
+            "lower",
+            100.0,
+            "extrapolated",
+        ),
+        Row(
+            "a task as it is sent",
+            len(pickle.dumps(FakeTask("task 1", None, tasks[1].target, 5.0))),
+            "bytes",
+            "lower",
+            500.0,
+        ),
     ]
 
 
@@ -85,18 +124,48 @@ def run() -> list[Row]:
 def _cluster(folder: Path) -> Iterator[tuple[str, int]]:
     """A scheduler and workers, each in a process of its own: the scheduler's address and process."""
     known = folder / "scheduler.json"
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file"]
+    command = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+    ]
     command += [str(known)]
-    workers = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(known), "--nworkers", str(COUNT)]
-    workers += ["--nthreads", "1", "--no-dashboard", "--memory-limit", "0", "--local-directory", str(folder)]
+    workers = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_worker",
+        "--scheduler-file",
+        str(known),
+        "--nworkers",
+        str(COUNT),
+    ]
+    workers += [
+        "--nthreads",
+        "1",
+        "--no-dashboard",
+        "--memory-limit",
+        "0",
+        "--local-directory",
+        str(folder),
+    ]
     with subprocess.Popen(
-        command, env={**os.environ, **SETTINGS}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        command,
+        env={**os.environ, **SETTINGS},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     ) as scheduler:
         try:
             while not known.exists():
                 time.sleep(0.1)
             with subprocess.Popen(
-                workers, env={**os.environ, **SETTINGS}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                workers,
+                env={**os.environ, **SETTINGS},
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
             ) as nannies:
                 try:
                     address = json.loads(known.read_text())["address"]

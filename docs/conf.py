@@ -19,7 +19,10 @@ autoapi_ignore = ["*/resources/*"]
 autoapi_add_toctree_entry = False
 autoapi_keep_files = False
 autoapi_member_order = "bysource"
-suppress_warnings = ["autoapi.python_import_resolution", "ref.python"]  # constants; Config, which each node has its own of
+suppress_warnings = [
+    "autoapi.python_import_resolution",
+    "ref.python",
+]  # constants; Config, which each node has its own of
 default_role = "code"
 napoleon_google_docstring = True
 napoleon_use_ivar = True
@@ -29,7 +32,9 @@ html_title = "scenario_gen"
 html_show_sphinx = False
 
 
-def escaped(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+def escaped(
+    _app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]
+) -> None:
     """Escape what is mathematics in our docstrings and markup in reStructuredText: |u|, outside of backticks."""
     for k, line in enumerate(lines):
         parts = re.split(r"(`[^`]*`)", line)

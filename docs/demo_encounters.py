@@ -35,9 +35,17 @@ def write(name: str, rng: np.random.Generator, drives: list[Drive]) -> None:
         station = start + np.concatenate([[0.0], np.cumsum(0.5 * DT * (speed[1:] + speed[:-1]))])
         x, y = path.at(station)[:, :2].T
         noise = ndimage.gaussian_filter1d(rng.standard_normal((2, len(x))), 5.0) * NOISE_M * 4.0
-        measured = np.where(speed > 0.0, np.maximum(speed + NOISE_MPS * rng.standard_normal(len(speed)), 0.0), 0.0)
+        measured = np.where(
+            speed > 0.0, np.maximum(speed + NOISE_MPS * rng.standard_normal(len(speed)), 0.0), 0.0
+        )
         moving = ndimage.gaussian_filter1d((speed > 0.0).astype(float), 3.0)
-        rows = zip(np.arange(len(x)) * DT, x + moving * noise[0], y + moving * noise[1], measured, strict=True)
+        rows = zip(
+            np.arange(len(x)) * DT,
+            x + moving * noise[0],
+            y + moving * noise[1],
+            measured,
+            strict=True,
+        )
         lines += [f"{vehicle},{t:.1f},{a:.2f},{b:.2f},{v:.2f}" for t, a, b, v in rows]
     FOLDER.mkdir(exist_ok=True)
     (FOLDER / f"{name}.csv").write_text("\n".join(lines) + "\n")
@@ -73,13 +81,17 @@ def left_turner(rng: np.random.Generator) -> Drive:
 
 def following(rng: np.random.Generator) -> list[Drive]:
     """A leader that slows for something ahead and goes on, and a follower that answers after 0.8 s (intelligent driver model)."""
-    leader = speeds(rng, 24.0, (0.0, 13.0), (5.0, 13.0), (9.0, 4.5), (13.0, 4.5), (19.0, 12.0), (24.0, 12.5))
+    leader = speeds(
+        rng, 24.0, (0.0, 13.0), (5.0, 13.0), (9.0, 4.5), (13.0, 4.5), (19.0, 12.0), (24.0, 12.5)
+    )
     ahead = np.cumsum(leader) * DT + 24.0
     own, station, speed = [], 0.0, 13.0
     for k in range(len(leader)):
         seen = max(k - 8, 0)
         gap = max(ahead[seen] - (np.sum(own[:seen]) * DT if seen else 0.0) - 4.6, 0.5)
-        wanted = 2.5 + max(0.0, 1.3 * speed + speed * (speed - leader[seen]) / (2.0 * np.sqrt(1.6 * 2.2)))
+        wanted = 2.5 + max(
+            0.0, 1.3 * speed + speed * (speed - leader[seen]) / (2.0 * np.sqrt(1.6 * 2.2))
+        )
         speed = max(speed + DT * 1.6 * (1.0 - (speed / 15.0) ** 4 - (wanted / gap) ** 2), 0.0)
         own.append(speed)
         station += DT * speed

@@ -8,7 +8,15 @@ from pathlib import Path
 import matplotlib
 from matplotlib import pyplot
 
-from scenario_gen import bundled, Encounter, generate, GenerationResult, InputError, read_log, RefusedError
+from scenario_gen import (
+    bundled,
+    Encounter,
+    generate,
+    GenerationResult,
+    InputError,
+    read_log,
+    RefusedError,
+)
 
 PAGE = Path(__file__).with_name("gallery.md")
 PICTURES = PAGE.with_suffix("")
@@ -30,13 +38,19 @@ def main() -> None:
     for case in CASES:
         log = bundled(case)
         (encounter,) = read_log(log).encounters
-        drawn = {road: result for road in ROADS if (result := drawn_on(encounter, road, COUNT, f"{case}_{road}"))}
+        drawn = {
+            road: result
+            for road in ROADS
+            if (result := drawn_on(encounter, road, COUNT, f"{case}_{road}"))
+        }
         words = "; ".join(sentences(next(iter(drawn.values()))))
         pictures = "".join(f"![{road}]({PICTURES.name}/{case}_{road}.png)\n" for road in drawn)
         roads = " ".join(f"--road {road}" for road in drawn)
         command = f"scenario-gen generate scenario_gen/resources/{log.name} {roads} --count {COUNT} --seed {SEED}"
         text = f"{words[:1].upper()}{words[1:]}."
-        parts.append(f"## Case {case}: {', '.join(drawn)}\n\n{pictures}\n{text}\n\n```sh\n{command}\n```\n")
+        parts.append(
+            f"## Case {case}: {', '.join(drawn)}\n\n{pictures}\n{text}\n\n```sh\n{command}\n```\n"
+        )
     PAGE.write_text("\n".join(parts), encoding="utf-8")
     drawn_on(read_log(TUTORIAL).encounters[0], "four_way", 20, "tutorial")
 
@@ -57,7 +71,9 @@ def drawn_on(encounter: Encounter, name: str, count: int, picture: str) -> Gener
 
 def sentences(result: GenerationResult) -> list[str]:
     """Return who reacts to whom, in words."""
-    return [str(sentence) for sentence in result.reacting["sentences"]] or ["No vehicle is seen to react to another"]
+    return [str(sentence) for sentence in result.reacting["sentences"]] or [
+        "No vehicle is seen to react to another"
+    ]
 
 
 if __name__ == "__main__":

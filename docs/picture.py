@@ -44,23 +44,38 @@ def main() -> None:
     road = build_road(ROAD, encounter)
     scenarios = generate(encounter, road, count=COUNT, seed=SEED).generated.scenarios
     motions: list[Encounter | Scenario] = [encounter, *spread(scenarios)]
-    clock = np.arange(0.0, max(motion.time[-1] for motion in (encounter, *scenarios)) + PAUSE_S, STEP_S)
+    clock = np.arange(
+        0.0, max(motion.time[-1] for motion in (encounter, *scenarios)) + PAUSE_S, STEP_S
+    )
     height = PLOT_TOP + PLOT_HEIGHT + 40
-    lines = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}">']
-    lines += [f"<style>{STYLE}</style>", f'<clipPath id="panel"><rect width="{PANEL}" height="{PANEL}"/></clipPath>']
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}">'
+    ]
+    lines += [
+        f"<style>{STYLE}</style>",
+        f'<clipPath id="panel"><rect width="{PANEL}" height="{PANEL}"/></clipPath>',
+    ]
     for k, motion in enumerate(motions):
         scenario = f"scenario {motion.index}" if isinstance(motion, Scenario) else "recorded"
         title = f"generated on {road.name}, {scenario}" if k == 1 else scenario
         lines.append(f'<text x="{k * (PANEL + GAP)}" y="15">{title}</text>')
-        lines.append(f'<g transform="translate({k * (PANEL + GAP)} {TOP})" clip-path="url(#panel)">')
-        lines += [f'<rect class="back" width="{PANEL}" height="{PANEL}"/>', *panel(motion, road if k else None, clock), "</g>"]
+        lines.append(
+            f'<g transform="translate({k * (PANEL + GAP)} {TOP})" clip-path="url(#panel)">'
+        )
+        lines += [
+            f'<rect class="back" width="{PANEL}" height="{PANEL}"/>',
+            *panel(motion, road if k else None, clock),
+            "</g>",
+        ]
     lines += [*speeds(encounter, scenarios, clock), "</svg>"]
     PICTURE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def spread(scenarios: Sequence[Scenario]) -> list[Scenario]:
     """Return scenarios that differ in when the one that waits drives off: the earliest, the middle and the latest."""
-    leaves = [scenario.time[scenario.speed[TURNS] < STANDS_MPS][-1:].sum() for scenario in scenarios]
+    leaves = [
+        scenario.time[scenario.speed[TURNS] < STANDS_MPS][-1:].sum() for scenario in scenarios
+    ]
     order = np.argsort(leaves, kind="stable")
     return [scenarios[k] for k in order[np.linspace(0, len(order) - 1, PANELS - 1).astype(int)]]
 
@@ -79,7 +94,9 @@ def panel(motion: Encounter | Scenario, road: Road | None, clock: Floats) -> Ite
             yield f'<path class="road" d="M{path(place(np.concatenate([lane.left, lane.right[::-1]])))}Z"/>'
         for kind, painted in markings(road.lanes).items():
             css = {"lane": " dashed", "centre": " dashed", "stop": " thick"}.get(kind.value, "")
-            yield from (f'<path class="marking{css}" d="M{path(place(line))}"/>' for line in painted)
+            yield from (
+                f'<path class="marking{css}" d="M{path(place(line))}"/>' for line in painted
+            )
     seconds = f'dur="{clock[-1]:.1f}s" repeatCount="indefinite"'
     for n, vehicle in enumerate(motion.vehicles):
         at = np.minimum(np.searchsorted(motion.time, clock), len(motion.time) - 1)
@@ -94,7 +111,9 @@ def panel(motion: Encounter | Scenario, road: Road | None, clock: Floats) -> Ite
 
 def animated(kind: str, values: str, seconds: str) -> str:
     """Return a transformation that changes with time."""
-    return f'<animateTransform attributeName="transform" type="{kind}" values="{values}" {seconds}/>'
+    return (
+        f'<animateTransform attributeName="transform" type="{kind}" values="{values}" {seconds}/>'
+    )
 
 
 def waits(motion: Encounter | Scenario, at: Ints, seconds: str) -> str:
@@ -124,7 +143,10 @@ def speeds(encounter: Encounter, scenarios: Sequence[Scenario], clock: Floats) -
     yield f'<text x="0" y="{PLOT_TOP - 12}">speeds [m/s]: recorded (thick) and of {len(scenarios)} scenarios (thin)</text>'
     for n, label in enumerate(LABELS):
         yield f'<text class="f{n}" x="{480 + 200 * n}" y="{PLOT_TOP - 12}">{label}</text>'
-        yield from (f'<path class="thin s{n}" d="M{curve(scenario.time, scenario.speed[n])}"/>' for scenario in scenarios)
+        yield from (
+            f'<path class="thin s{n}" d="M{curve(scenario.time, scenario.speed[n])}"/>'
+            for scenario in scenarios
+        )
         yield f'<path class="recorded s{n}" d="M{curve(encounter.time, encounter.speed[n])}"/>'
     yield f'<path class="axis" d="M{LEFT} {PLOT_TOP}V{bottom}H{right}"/>'
     for speed in (0, 5, 10, 15):

@@ -31,7 +31,9 @@ def heading(orientation: Quaternion) -> float:
     return 2.0 * math.atan2(orientation.z, orientation.w)
 
 
-def free_way(grid: np.ndarray, origin: np.ndarray, resolution: float, route: np.ndarray, start: int) -> float:
+def free_way(
+    grid: np.ndarray, origin: np.ndarray, resolution: float, route: np.ndarray, start: int
+) -> float:
     """Return the metres along the route (M, 3), from its point `start`, up to the first taken cell of a grid (H, W)."""
     way = 0.0
     for k in range(start + 1, len(route)):
@@ -49,7 +51,11 @@ def free_way(grid: np.ndarray, origin: np.ndarray, resolution: float, route: np.
 
 
 def decide(
-    pose: np.ndarray, speed: float, route: np.ndarray, grid: tuple[np.ndarray, np.ndarray, float] | None, wanted: float
+    pose: np.ndarray,
+    speed: float,
+    route: np.ndarray,
+    grid: tuple[np.ndarray, np.ndarray, float] | None,
+    wanted: float,
 ) -> tuple[float, float]:
     """Return speed [m/s] and yaw rate [rad/s] for an ego at `pose` (3,) that follows a route (M, 3)."""
     away = np.hypot(*(route[:, :2] - pose[:2]).T)
@@ -62,7 +68,9 @@ def decide(
     curvature = 2.0 * aside / max(dx * dx + dy * dy, 1.0)
     if grid is not None:
         room = free_way(*grid, route, nearest) - FRONT - GAP
-        wanted = min(wanted, math.sqrt(2.0 * BRAKING * max(room, 0.0)) if math.isfinite(room) else wanted)
+        wanted = min(
+            wanted, math.sqrt(2.0 * BRAKING * max(room, 0.0)) if math.isfinite(room) else wanted
+        )
     return min(wanted, speed + 0.2), curvature * max(speed, 0.5)
 
 
@@ -81,7 +89,9 @@ class EgoConsumer(Node):
         self.create_subscription(Odometry, "ego/goal", self._hear_goal, LATCHED)
         self.create_subscription(Path, "ego/route", self._hear_route, LATCHED)
         self.create_subscription(OccupancyGrid, "traffic/local_map", self._hear_map, 1)
-        self.create_subscription(DiagnosticArray, "verdicts", self._hear_verdict, QoSProfile(depth=100))
+        self.create_subscription(
+            DiagnosticArray, "verdicts", self._hear_verdict, QoSProfile(depth=100)
+        )
 
     def _hear_goal(self, message: Odometry) -> None:
         topic = f"{message.child_frame_id}/odom"
@@ -89,16 +99,25 @@ class EgoConsumer(Node):
             self.destroy_subscription(self._odometry)
             self._odometry = None
         if self._odometry is None:
-            self._vehicle, self._odometry = topic, self.create_subscription(Odometry, topic, self._drive, 10)
+            self._vehicle, self._odometry = (
+                topic,
+                self.create_subscription(Odometry, topic, self._drive, 10),
+            )
 
     def _hear_route(self, message: Path) -> None:
         poses = [stamped.pose for stamped in message.poses]
-        self.route = np.array([(pose.position.x, pose.position.y, heading(pose.orientation)) for pose in poses])
+        self.route = np.array(
+            [(pose.position.x, pose.position.y, heading(pose.orientation)) for pose in poses]
+        )
 
     def _hear_map(self, message: OccupancyGrid) -> None:
         info = message.info
         cells = np.array(message.data, dtype=np.int8).reshape(info.height, info.width)
-        self.grid = cells, np.array([info.origin.position.x, info.origin.position.y]), info.resolution
+        self.grid = (
+            cells,
+            np.array([info.origin.position.x, info.origin.position.y]),
+            info.resolution,
+        )
 
     def _hear_verdict(self, message: DiagnosticArray) -> None:
         for status in message.status:

@@ -21,11 +21,15 @@ from archives import ArchiveConfig, read_planted, write_archive
 
 def main() -> None:
     """Write the archive that the command line describes."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seed", type=int, default=0)
     for one in fields(ArchiveConfig):
-        parser.add_argument(f"--{one.name.replace('_', '-')}", type=type(one.default), default=one.default)
+        parser.add_argument(
+            f"--{one.name.replace('_', '-')}", type=type(one.default), default=one.default
+        )
     arguments = vars(parser.parse_args())
     folder, seed = arguments.pop("folder"), arguments.pop("seed")
     try:
@@ -33,7 +37,9 @@ def main() -> None:
     except ValueError as error:
         parser.error(str(error))
     inside = sum(one.inside for one in planted)
-    print(f"{folder}: synthetic, {inside} encounters to find, {len(planted) - inside} just beyond a threshold")
+    print(
+        f"{folder}: synthetic, {inside} encounters to find, {len(planted) - inside} just beyond a threshold"
+    )
 
 
 if __name__ == "__main__":

@@ -28,11 +28,18 @@ def start(launch):
         output="screen",
         respawn=own.respawn,
     )
-    rviz = Node(package="rviz2", executable="rviz2", arguments=display, parameters=[{"use_sim_time": True}])
+    rviz = Node(
+        package="rviz2", executable="rviz2", arguments=display, parameters=[{"use_sim_time": True}]
+    )
     return [traffic, rviz] if own.rviz else [traffic]
 
 
 def generate_launch_description():
-    arguments = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in meanings(DRIVE).items()]
-    begin = OpaqueFunction(function=lambda context: start(read(DRIVE, context.launch_configurations)))
+    arguments = [
+        DeclareLaunchArgument(name, default_value="", description=text)
+        for name, text in meanings(DRIVE).items()
+    ]
+    begin = OpaqueFunction(
+        function=lambda context: start(read(DRIVE, context.launch_configurations))
+    )
     return LaunchDescription([*arguments, begin])

@@ -30,7 +30,10 @@ def start(launch):
     if own.composed:  # without a name, for it would be that of every node in the process
         started = [Node(executable="suite", arguments=["--nodes", ",".join(names)], **common)]
     else:  # a bag is begun once
-        started = [Node(executable=name, name=name, respawn=own.respawn and name != "recorder", **common) for name in names]
+        started = [
+            Node(executable=name, name=name, respawn=own.respawn and name != "recorder", **common)
+            for name in names
+        ]
     if own.rviz:
         # tracks lie in local_enu: shown on the map's origin, so that RViz can show both
         frames = ["--frame-id", "map", "--child-frame-id", "local_enu"]
@@ -43,6 +46,11 @@ def start(launch):
 
 
 def generate_launch_description():
-    arguments = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in meanings(SUITE).items()]
-    begin = OpaqueFunction(function=lambda context: start(read(SUITE, context.launch_configurations)))
+    arguments = [
+        DeclareLaunchArgument(name, default_value="", description=text)
+        for name, text in meanings(SUITE).items()
+    ]
+    begin = OpaqueFunction(
+        function=lambda context: start(read(SUITE, context.launch_configurations))
+    )
     return LaunchDescription([*arguments, begin])

@@ -24,7 +24,10 @@ from msg_conventions.poses import pose_rows
 from scenario_gen.numerics import Floats
 from scenario_gen.types import height, Quality, rear_axle, Scenario, shifted, Vehicle
 
-OBJECTS, TRACKS = "/perception/object_recognition/objects", "/perception/object_recognition/tracking/objects"
+OBJECTS, TRACKS = (
+    "/perception/object_recognition/objects",
+    "/perception/object_recognition/tracking/objects",
+)
 EGO, BASE_LINK = "/localization/kinematic_state", "base_link"
 QUALITY = Quality(depth=1, transient_local=False)
 STEP_NS, HORIZON_NS = 500_000_000, 10_000_000_000
@@ -53,12 +56,19 @@ class AutowareEncoder:
 
     def present_at(self, k: int) -> list[int]:
         """Return the vehicles that are present at instant `k`."""
-        return [n for n, (first, last) in enumerate(self.scenario.present.tolist()) if first <= k <= last]
+        return [
+            n
+            for n, (first, last) in enumerate(self.scenario.present.tolist())
+            if first <= k <= last
+        ]
 
     def predicted_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as PredictedObjects."""
         here, frame = self.present_at(k), self.scenario.frame_id
-        vehicles, paths = [self.scenario.vehicles[n] for n in here], [self.states[n, self._ahead(n, k), :3] for n in here]
+        vehicles, paths = (
+            [self.scenario.vehicles[n] for n in here],
+            [self.states[n, self._ahead(n, k), :3] for n in here],
+        )
         return encode_predicted_objects(vehicles, self.states[here, k], paths, frame, stamp_ns)
 
     def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
@@ -72,17 +82,25 @@ class AutowareEncoder:
 
     def odometry(self, k: int, stamp_ns: int, n: int = 0) -> bytes:
         """Return vehicle `n` at instant `k` as the ego's Odometry."""
-        return encode_kinematic_state(self.scenario.vehicles[n], self.states[n, k], self.scenario.frame_id, stamp_ns)
+        return encode_kinematic_state(
+            self.scenario.vehicles[n], self.states[n, k], self.scenario.frame_id, stamp_ns
+        )
 
     def _ahead(self, n: int, k: int) -> list[int]:
         """Return the instants of the predicted path from `k` on: those at whole steps, while the vehicle is there."""
         last = int(self.scenario.present[n, 1])
-        wanted = np.arange(self.time_ns[k], min(self.time_ns[last], self.time_ns[k] + HORIZON_NS) + 1, STEP_NS)
+        wanted = np.arange(
+            self.time_ns[k], min(self.time_ns[last], self.time_ns[k] + HORIZON_NS) + 1, STEP_NS
+        )
         return [int(at) for at in np.minimum(np.searchsorted(self.time_ns, wanted), last)]
 
 
 def encode_predicted_objects(
-    vehicles: Sequence[Vehicle], states: Floats, paths: Sequence[Floats], frame_id: str, stamp_ns: int
+    vehicles: Sequence[Vehicle],
+    states: Floats,
+    paths: Sequence[Floats],
+    frame_id: str,
+    stamp_ns: int,
 ) -> bytes:
     """Return vehicles as PredictedObjects.
 
@@ -94,7 +112,8 @@ def encode_predicted_objects(
         stamp_ns: now.
     """
     objects = [
-        _object(vehicle, state) | {"paths": [{"poses": _shape_poses(vehicle, path), "step": STEP_NS, "confidence": 1.0}]}
+        _object(vehicle, state)
+        | {"paths": [{"poses": _shape_poses(vehicle, path), "step": STEP_NS, "confidence": 1.0}]}
         for vehicle, state, path in zip(vehicles, states, paths, strict=True)
     ]
     return encode(PREDICTED, stamp=stamp_ns, frame_id=frame_id, objects=objects)
@@ -103,7 +122,9 @@ def encode_predicted_objects(
 def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp_ns: int) -> bytes:
     """Return the ego as Odometry; `state` (6,) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s]."""
     axle = shifted(state[:2], state[2], -rear_axle(vehicle))
-    return encode_odometry(np.array([*axle, *state[2:4]]), float(state[5]), BASE_LINK, frame_id, stamp_ns)
+    return encode_odometry(
+        np.array([*axle, *state[2:4]]), float(state[5]), BASE_LINK, frame_id, stamp_ns
+    )
 
 
 def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
@@ -116,7 +137,10 @@ def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
         "pose": _shape_poses(vehicle, state[None, :3]),
         "twist": (speed, 0.0, 0.0, 0.0, 0.0, rate),
         "acceleration": (acceleration, 0.0, 0.0, 0.0, 0.0, 0.0),
-        "shape": {"type": BOUNDING_BOX, "dimensions": (vehicle.length, vehicle.width, height(vehicle))},
+        "shape": {
+            "type": BOUNDING_BOX,
+            "dimensions": (vehicle.length, vehicle.width, height(vehicle)),
+        },
     }
 
 

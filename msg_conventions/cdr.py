@@ -96,7 +96,9 @@ class CdrWriter:
         elif kind == "time":
             seconds, rest = divmod(value or 0, NANOSECONDS)
             if not -(2**31) <= seconds < 2**31:
-                raise InputError(f"stamp {value} ns does not fit a ROS time (32-bit seconds, until 2038)")
+                raise InputError(
+                    f"stamp {value} ns does not fit a ROS time (32-bit seconds, until 2038)"
+                )
             self._count(seconds % 2**32)
             self._count(rest)
         elif isinstance(kind, str):
@@ -139,7 +141,9 @@ class CdrReader:
     def _take(self, size: int, alignment: int) -> memoryview:
         start = self.place + -self.place % alignment
         if size < 0 or start + size > len(self._data):
-            raise InputError(f"{self._what}: the message ends at byte {len(self._data)}, {start + size} are needed")
+            raise InputError(
+                f"{self._what}: the message ends at byte {len(self._data)}, {start + size} are needed"
+            )
         self.place = start + size
         return self._data[start : start + size]
 
@@ -151,13 +155,17 @@ class CdrReader:
         """
         count, left = int.from_bytes(self._take(4, 4), "little"), len(self._data) - self.place
         if count * size > left:
-            raise InputError(f"{self._what}: {count} items are announced where {left} bytes are left")
+            raise InputError(
+                f"{self._what}: {count} items are announced where {left} bytes are left"
+            )
         return count
 
     def array(self, dtype: npt.DTypeLike, count: int, alignment: int) -> npt.NDArray[Any]:
         """Read `count` items (n,) of a numpy type, the first one aligned; nothing (no padding either) if `count` is 0."""
         kind = np.dtype(dtype)
-        return np.frombuffer(self._take(kind.itemsize * count, alignment) if count else b"", dtype=kind, count=count)
+        return np.frombuffer(
+            self._take(kind.itemsize * count, alignment) if count else b"", dtype=kind, count=count
+        )
 
     def string(self) -> str:
         """Read a string.
@@ -188,7 +196,9 @@ class CdrReader:
             return None
         self.place = end
         body = self._data[start:end]
-        return np.frombuffer(b"".join((body[:4], bytes(4), body[4:])) if amid else body, dtype=kind)
+        return np.frombuffer(
+            b"".join((body[:4], bytes(4), body[4:])) if amid else body, dtype=kind
+        )
 
     def fields(self, layout: Layout, *, framed: bool = False) -> SimpleNamespace:
         """Read the fields of a table: numbers, arrays, texts, stamps [ns], lists and namespaces; `framed` as in `decode`.
@@ -198,7 +208,9 @@ class CdrReader:
         """
         found = SimpleNamespace(**{name: self._value(kind) for name, kind in layout.items()})
         if framed and not found.frame_id:
-            raise InputError(f"{self._what}: header.frame_id is empty; name the frame that the positions are in")
+            raise InputError(
+                f"{self._what}: header.frame_id is empty; name the frame that the positions are in"
+            )
         return found
 
     def _value(self, kind: Any) -> Any:

@@ -28,7 +28,17 @@ from scenario_gen.types import Encounter, LiveChangepoints, Segmentation
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
 UINT16, FLOAT32, FLOAT64 = 4, 7, 8  # sensor_msgs/PointField datatypes
-POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("vehicle", "<u2"), ("primitive", "<u2"), ("t", "<f8"), ("p", "<f8")])
+POINT = np.dtype(
+    [
+        ("x", "<f4"),
+        ("y", "<f4"),
+        ("z", "<f4"),
+        ("vehicle", "<u2"),
+        ("primitive", "<u2"),
+        ("t", "<f8"),
+        ("p", "<f8"),
+    ]
+)
 DATATYPES = {"<f4": FLOAT32, "<u2": UINT16, "<f8": FLOAT64}
 
 
@@ -40,10 +50,14 @@ def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> byt
 def encode_live_changepoints(found: LiveChangepoints) -> bytes:
     """Return newly confirmed changepoints as CDR bytes; accelerations are not known yet: 0."""
     states = (found.position, found.heading, found.speed, np.zeros_like(found.speed))
-    return trajectory.encode(Trajectory(found.start_ns, FRAME, found.vehicles, found.time_ns, *states))
+    return trajectory.encode(
+        Trajectory(found.start_ns, FRAME, found.vehicles, found.time_ns, *states)
+    )
 
 
-def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepoints") -> Segmentation:
+def decode_changepoints(
+    data: bytes, encounter: Encounter, what: str = "changepoints"
+) -> Segmentation:
     """Return the segmentation that the message and its tracks describe: a primitive of its own for every segment.
 
     Shared labels, probabilities and descriptions are in `posterior` and the diagnostics; no later stage needs them.
@@ -53,11 +67,15 @@ def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepo
     """
     message = trajectory.decode(data, what)
     if message.stamp_ns != encounter.start_ns:
-        raise InputError(f"{what}: stamp {message.stamp_ns} ns is not that of the tracks ({encounter.start_ns} ns)")
+        raise InputError(
+            f"{what}: stamp {message.stamp_ns} ns is not that of the tracks ({encounter.start_ns} ns)"
+        )
     index, rest = np.divmod(message.time_ns, encounter.dt_ns)
     samples = encounter.speed.shape[1]
     if rest.any() or (np.diff(index) <= 0).any() or (index < 1).any() or (index >= samples).any():
-        raise InputError(f"{what}: times must increase and be those of samples 1 to {samples - 1} of the tracks")
+        raise InputError(
+            f"{what}: times must increase and be those of samples 1 to {samples - 1} of the tracks"
+        )
     marks = np.zeros(samples)
     marks[index] = 1.0
     descriptions = tuple(f"segment {k}" for k in range(len(index) + 1))
@@ -74,14 +92,26 @@ def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
     cloud["t"] = encounter.time
     cloud["p"] = segmentation.changepoint_probability
     columns = (POINT.fields or {}).items()
-    fields = [{"name": name, "offset": at, "datatype": DATATYPES[kind.str], "count": 1} for name, (kind, at, *_) in columns]
+    fields = [
+        {"name": name, "offset": at, "datatype": DATATYPES[kind.str], "count": 1}
+        for name, (kind, at, *_) in columns
+    ]
     steps, data = (POINT.itemsize, POINT.itemsize * samples), np.frombuffer(cloud, dtype=np.uint8)
     return encode(
-        CLOUD, stamp=encounter.start_ns, frame_id=FRAME, size=(n, samples), fields=fields, steps=steps, data=data, is_dense=1
+        CLOUD,
+        stamp=encounter.start_ns,
+        frame_id=FRAME,
+        size=(n, samples),
+        fields=fields,
+        steps=steps,
+        data=data,
+        is_dense=1,
     )
 
 
-def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior") -> Segmentation:
+def decode_posterior(
+    data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior"
+) -> Segmentation:
     """Return the segmentation; its sentences for people travel on the diagnostics.
 
     Raises:
@@ -90,22 +120,39 @@ def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str 
     found = decode(CLOUD, data, what)
     n, samples = found.size.tolist()
     size, names = n * samples * POINT.itemsize, tuple(field.name for field in found.fields)
-    if names != POINT.names or found.steps[0] != POINT.itemsize or len(found.data) != size or size == 0:
-        raise InputError(f"{what}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}")
+    if (
+        names != POINT.names
+        or found.steps[0] != POINT.itemsize
+        or len(found.data) != size
+        or size == 0
+    ):
+        raise InputError(
+            f"{what}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}"
+        )
     cloud = found.data.view(POINT).reshape(n, samples)
     labels = cloud["primitive"][0].astype(np.int64)
-    return Segmentation(labels, 1 + np.flatnonzero(np.diff(labels)), cloud["p"][0].astype(np.float64), descriptions)
+    return Segmentation(
+        labels, 1 + np.flatnonzero(np.diff(labels)), cloud["p"][0].astype(np.float64), descriptions
+    )
 
 
 def segmentation_status(segmentation: Segmentation, node: str, duration: float) -> Status:
     """Return the segmenter's report on an encounter of `duration` s; `node` is its full name."""
     values = {f"segment.{k}": text for k, text in enumerate(segmentation.descriptions)}
-    message = f"{len(segmentation.changepoints)} changepoints, {segmentation.n_primitives} primitives"
+    message = (
+        f"{len(segmentation.changepoints)} changepoints, {segmentation.n_primitives} primitives"
+    )
     remark = segmentation.remark(duration)
     values |= {} if math.isnan(segmentation.r_hat) else {"r_hat": f"{segmentation.r_hat:.3g}"}
-    return Status(f"{node}: segmentation", Level.WARN if remark else Level.OK, remark or message, values)
+    return Status(
+        f"{node}: segmentation", Level.WARN if remark else Level.OK, remark or message, values
+    )
 
 
 def segment_descriptions(statuses: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
     """Return the sentences of such a status, one for each segment; `statuses` are key-values by subject."""
-    return tuple(text for key, text in statuses.get("segmentation", {}).items() if key.startswith("segment."))
+    return tuple(
+        text
+        for key, text in statuses.get("segmentation", {}).items()
+        if key.startswith("segment.")
+    )

@@ -60,7 +60,12 @@ def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tup
     """
     message = decode(DIAGNOSTICS, data, what)
     statuses = (
-        Status(one.name, Level(min(one.level, Level.STALE)), one.message, {value.key: value.value for value in one.values})
+        Status(
+            one.name,
+            Level(min(one.level, Level.STALE)),
+            one.message,
+            {value.key: value.value for value in one.values},
+        )
         for one in message.statuses
     )
     return message.stamp, tuple(statuses)
@@ -79,5 +84,11 @@ def of_template(status: Status, stamp_ns: int) -> Status:
 def template_of(status: Status, stamp_ns: int) -> int:
     """Return the stamp [ns] of the template that a status is about; by default `stamp_ns`, its message's."""
     seconds, point, rest = status.values.get(TEMPLATE, "").partition(".")
-    is_stamp = point and len(rest) == 9 and (seconds + rest).isascii() and (seconds + rest).isdecimal() and len(seconds) < 20
+    is_stamp = (
+        point
+        and len(rest) == 9
+        and (seconds + rest).isascii()
+        and (seconds + rest).isdecimal()
+        and len(seconds) < 20
+    )
     return int(seconds + rest) if is_stamp else stamp_ns

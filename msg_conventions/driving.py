@@ -55,7 +55,9 @@ def encode_twist(speed: float, yaw_rate: float) -> bytes:
     return encode(VELOCITY, twist=(speed, 0.0, 0.0, 0.0, 0.0, yaw_rate))
 
 
-def decode_twist(data: bytes, what: str = "ego/cmd_vel", *, stamped: bool = False) -> tuple[int, str, float, float]:
+def decode_twist(
+    data: bytes, what: str = "ego/cmd_vel", *, stamped: bool = False
+) -> tuple[int, str, float, float]:
     """Return stamp [ns] and frame (0 and "" if not `stamped`), linear.x [m/s] and angular.z [rad/s], finite or not.
 
     Raises:
@@ -89,10 +91,14 @@ def decode_timed_path(data: bytes, what: str = "ego/path") -> Way:
     if not len(rows):
         raise InputError(f"{what} is empty")
     if (np.diff(stamps) <= 0).any():
-        raise InputError(f"{what}: the poses' stamps must ascend: they say when each pose is to be reached")
+        raise InputError(
+            f"{what}: the poses' stamps must ascend: they say when each pose is to be reached"
+        )
     return Way(stamps.astype(np.float64), poses_of(rows, what), frame_id)
 
 
-def encode_local_map(blocked: Bools, resolution: float, origin: Floats, frame_id: str, stamp_ns: int) -> bytes:
+def encode_local_map(
+    blocked: Bools, resolution: float, origin: Floats, frame_id: str, stamp_ns: int
+) -> bytes:
     """Return cells (H, W) that are not free, with their size and the lower-left corner (2,) [m], as an OccupancyGrid."""
     return encode_grid(np.where(blocked, OCCUPIED, 0), resolution, origin, frame_id, stamp_ns)

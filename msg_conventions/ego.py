@@ -56,5 +56,7 @@ def ego_values(slot: EgoSlot | None) -> dict[str, str]:
     """Return the values of `scenarios/info` about the ego: its id, start and goal; none if there is no ego."""
     if slot is None:
         return {}
-    start, goal = (json.dumps([float(value) for value in state]) for state in (slot.start, slot.goal))
+    start, goal = (
+        json.dumps([float(value) for value in state]) for state in (slot.start, slot.goal)
+    )
     return {"ego": token(slot.vehicle.id), "ego_start": start, "ego_goal": goal}

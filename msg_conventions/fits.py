@@ -32,11 +32,18 @@ def anchor_stamps(encounter: Encounter, changepoints: Ints) -> list[int]:
 def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
     """Return the anchors as CDR bytes; `frame_id` is the road's."""
     poses = np.stack([vehicle.anchors for vehicle in fit.fitted])
-    speed = encounter.speed[:, fit.anchor_index] * np.array([[vehicle.scale] for vehicle in fit.fitted])
+    speed = encounter.speed[:, fit.anchor_index] * np.array(
+        [[vehicle.scale] for vehicle in fit.fitted]
+    )
     for k, state in ((0, fit.requested.start), (-1, fit.requested.end)):
         poses[:, k], speed[:, k] = state[:, :3], state[:, 3]
-    time_ns, states = fit.anchor_index * encounter.dt_ns, (poses[..., :2], poses[..., 2], speed, np.zeros_like(speed))
-    return trajectory.encode(Trajectory(encounter.start_ns, frame_id, fit.vehicles, time_ns, *states))
+    time_ns, states = (
+        fit.anchor_index * encounter.dt_ns,
+        (poses[..., :2], poses[..., 2], speed, np.zeros_like(speed)),
+    )
+    return trajectory.encode(
+        Trajectory(encounter.start_ns, frame_id, fit.vehicles, time_ns, *states)
+    )
 
 
 def decode_fit(data: bytes, what: str = "fit") -> tuple[int, str, BoundaryStates, Floats]:
@@ -48,25 +55,40 @@ def decode_fit(data: bytes, what: str = "fit") -> tuple[int, str, BoundaryStates
     message = trajectory.decode(data, what)
     if len(message.time_ns) < 2:
         raise InputError(f"{what}: {len(message.time_ns)} point(s); a start and an end are needed")
-    state = np.concatenate([message.position, message.heading[..., None], message.speed[..., None]], axis=-1)
-    return message.stamp_ns, message.frame_id, BoundaryStates(start=state[:, 0], end=state[:, -1]), state[..., :3]
+    state = np.concatenate(
+        [message.position, message.heading[..., None], message.speed[..., None]], axis=-1
+    )
+    return (
+        message.stamp_ns,
+        message.frame_id,
+        BoundaryStates(start=state[:, 0], end=state[:, -1]),
+        state[..., :3],
+    )
 
 
-def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()) -> tuple[Status, ...]:
+def fit_statuses(
+    fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()
+) -> tuple[Status, ...]:
     """Return the decisions: a status per vehicle, with figures of its route, one for the notes; each with the values `more`."""
     planned = [route.figures() for route in routes] or [{}] * len(fit.fitted)
-    remarks = [route.remarks(vehicle.id) for vehicle, route in zip(fit.vehicles, routes, strict=False)]
+    remarks = [
+        route.remarks(vehicle.id) for vehicle, route in zip(fit.vehicles, routes, strict=False)
+    ]
     per_vehicle = tuple(
         Status(
             f"{node}: fit of {vehicle.id}",
-            Level.OK if float(fitted.moved.max()) < 1.0 and not (remarks and remarks[k]) else Level.WARN,
+            Level.OK
+            if float(fitted.moved.max()) < 1.0 and not (remarks and remarks[k])
+            else Level.WARN,
             f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {float(fitted.moved.max()):.2f} m",
             {
                 "manoeuvre": fitted.manoeuvre,
                 "scale": repr(fitted.scale),
                 "moved_m": json.dumps(fitted.moved.tolist()),
                 "stands": json.dumps([bool(value) for value in fitted.stands]),
-                "turned_rad": json.dumps(list(fitted.turned) if np.isfinite(fitted.turned).all() else None),
+                "turned_rad": json.dumps(
+                    list(fitted.turned) if np.isfinite(fitted.turned).all() else None
+                ),
                 **{key: json.dumps(value) for key, value in planned[k].items()},
                 **(more or {}),
             },
@@ -75,8 +97,13 @@ def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None, rou
     )
     sentences = (*fit.notes, *(remark for each in remarks for remark in each))
     notes = {f"note.{k}": note for k, note in enumerate(sentences)}
-    lost = {f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.message]) for k, loss in enumerate(fit.losses)}
-    message = "recording fitted to the road" + (f"; {len(lost)} of its properties are not kept" if lost else "")
+    lost = {
+        f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.message])
+        for k, loss in enumerate(fit.losses)
+    }
+    message = "recording fitted to the road" + (
+        f"; {len(lost)} of its properties are not kept" if lost else ""
+    )
     level = Level.WARN if any(loss.kind != "arm" for loss in fit.losses) else Level.OK
     return (*per_vehicle, Status(f"{node}: fit", level, message, notes | lost | dict(more or {})))
 
@@ -92,7 +119,9 @@ def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
         if key.startswith("lost."):
             with guarded(f"fit: {key} is damaged"):
                 kind, vehicles, sentence = json.loads(text)
-                found.append(Loss(str(kind), tuple(str(vehicle) for vehicle in vehicles), str(sentence)))
+                found.append(
+                    Loss(str(kind), tuple(str(vehicle) for vehicle in vehicles), str(sentence))
+                )
     return tuple(found)
 
 
@@ -107,7 +136,8 @@ def with_figures(route: Route, statuses: Mapping[str, Mapping[str, str]], vehicl
         return route
     with guarded(f"fit of {vehicle}: damaged"):
         joined, searched = (
-            None if (n := json.loads(values[f"legs_{key}"])) is None else int(n) for key in ("joined", "searched")
+            None if (n := json.loads(values[f"legs_{key}"])) is None else int(n)
+            for key in ("joined", "searched")
         )
         left_out = tuple(int(k) for k in json.loads(values["anchors_left_out"]))
         far = json.loads(values["farthest_from_fit_m"])
@@ -115,7 +145,9 @@ def with_figures(route: Route, statuses: Mapping[str, Mapping[str, str]], vehicl
     return replace(route, joined=joined, searched=searched, left_out=left_out, farthest=farthest)
 
 
-def decode_fitted(anchors: Floats, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> FittedVehicle:
+def decode_fitted(
+    anchors: Floats, statuses: Mapping[str, Mapping[str, str]], vehicle: str
+) -> FittedVehicle:
     """Return the decisions of the fitting for a vehicle.
 
     Args:
@@ -133,6 +165,18 @@ def decode_fitted(anchors: Floats, statuses: Mapping[str, Mapping[str, str]], ve
         scale, manoeuvre = float(values["scale"]), values["manoeuvre"]
         turn = json.loads(values.get("turned_rad", "null")) or (math.nan, math.nan)
         turned = (float(turn[0]), float(turn[1]))
-    if moved.shape != anchors.shape[:1] or stands.ndim != 1 or not np.isfinite(moved).all() or not 0.0 < scale < math.inf:
+    if (
+        moved.shape != anchors.shape[:1]
+        or stands.ndim != 1
+        or not np.isfinite(moved).all()
+        or not 0.0 < scale < math.inf
+    ):
         raise InputError(f"fit of {vehicle}: damaged")
-    return FittedVehicle(anchors=anchors, moved=moved, stands=stands, scale=scale, manoeuvre=manoeuvre, turned=turned)
+    return FittedVehicle(
+        anchors=anchors,
+        moved=moved,
+        stands=stands,
+        scale=scale,
+        manoeuvre=manoeuvre,
+        turned=turned,
+    )

@@ -20,7 +20,9 @@ def encode_frames(poses: Floats, children: Sequence[str], parent: str, stamp_ns:
     """Return the frames `children` at `poses` (N, 3) x [m], y [m], yaw [rad] of `parent`, as CDR bytes."""
     rows = zip(pose_rows(poses), children, strict=True)
     header = {"stamp": stamp_ns, "frame_id": parent}
-    return encode(TRANSFORMS, transforms=[header | {"child": child, "pose": row} for row, child in rows])
+    return encode(
+        TRANSFORMS, transforms=[header | {"child": child, "pose": row} for row, child in rows]
+    )
 
 
 def decode_frames(data: bytes, what: str = "tf") -> list[tuple[int, str, str, Floats]]:
@@ -30,4 +32,6 @@ def decode_frames(data: bytes, what: str = "tf") -> list[tuple[int, str, str, Fl
         InputError: the message is damaged, or a pose is none.
     """
     found = decode(TRANSFORMS, data, what).transforms
-    return [(one.stamp, one.frame_id, one.child, poses_of(one.pose[None], what)[0]) for one in found]
+    return [
+        (one.stamp, one.frame_id, one.child, poses_of(one.pose[None], what)[0]) for one in found
+    ]

@@ -37,7 +37,9 @@ def _timeless(grid: bytes) -> bytes:
     """
     load_time = 16 + int.from_bytes(grid[12:16], "little")  # behind the frame, at a multiple of 4
     load_time += -load_time % 4
-    origin = load_time + 20  # behind resolution, width and height, at a multiple of 8 from the encapsulation on
+    origin = (
+        load_time + 20
+    )  # behind resolution, width and height, at a multiple of 8 from the encapsulation on
     origin += -(origin - 4) % 8
     cells = origin + 60
     end = cells + int.from_bytes(grid[cells - 4 : cells], "little")
@@ -47,12 +49,18 @@ def _timeless(grid: bytes) -> bytes:
 def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
     """Return the key-values that name the template (its `tracks`) and the map in diagnostics and `scenarios/info`."""
     keys = {"tracks": TEMPLATE_HASH, "map": MAP_HASH}
-    return {key: hash_of(topic, messages[topic]) for topic, key in keys.items() if topic in messages}
+    return {
+        key: hash_of(topic, messages[topic]) for topic, key in keys.items() if topic in messages
+    }
 
 
 def encode_hashes(name: str, messages: Mapping[str, bytes], stamp_ns: int) -> bytes:
     """Return as CDR bytes that these messages (by topic) belong together; `name` names their subject."""
-    hashes = {topic: hash_of(topic, data) for topic, data in sorted(messages.items()) if topic not in INFOS}
+    hashes = {
+        topic: hash_of(topic, data)
+        for topic, data in sorted(messages.items())
+        if topic not in INFOS
+    }
     return encode_diagnostics([Status(name, Level.OK, "these belong together", hashes)], stamp_ns)
 
 
@@ -64,6 +72,10 @@ def decode_hashes(data: bytes, what: str) -> dict[str, str]:
     """
     _, statuses = decode_diagnostics(data, what)
     hashes = {topic: text for status in statuses for topic, text in status.values.items()}
-    if not hashes or not all(re.fullmatch(rf"[0-9a-f]{{{DIGITS}}}", text) for text in hashes.values()):
-        raise InputError(f"{what}: it must say by topic which messages belong together, {DIGITS} hexadecimal digits of each")
+    if not hashes or not all(
+        re.fullmatch(rf"[0-9a-f]{{{DIGITS}}}", text) for text in hashes.values()
+    ):
+        raise InputError(
+            f"{what}: it must say by topic which messages belong together, {DIGITS} hexadecimal digits of each"
+        )
     return hashes

@@ -37,32 +37,63 @@ TAIL = 1  # bytes by which the message ends behind a multiple of 4
 def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> bytes:
     """Return the lanes as CDR bytes; None: the road has none."""
     lanes = () if network is None else network.every_lane
-    pairs = [border[np.repeat(np.arange(len(border)), 2)[1:-1]] for lane in lanes for border in (lane.left, lane.right)]
+    pairs = [
+        border[np.repeat(np.arange(len(border)), 2)[1:-1]]
+        for lane in lanes
+        for border in (lane.left, lane.right)
+    ]
     points = np.concatenate(pairs) if pairs else np.zeros((0, 2))
     text = "" if network is None else json.dumps(_document(network), ensure_ascii=False)
-    marker = Marker("lanes", LINE_LIST, ADD if lanes else DELETE, colour=(1.0, 1.0, 1.0, 0.7), points=points, text=text)
+    marker = Marker(
+        "lanes",
+        LINE_LIST,
+        ADD if lanes else DELETE,
+        colour=(1.0, 1.0, 1.0, 0.7),
+        points=points,
+        text=text,
+    )
     return encode(MARKER, **marker.fields(frame_id, stamp_ns))
 
 
 def _document(network: LaneNetwork) -> dict[str, Any]:
     lanes = [
-        {"id": lane.id, "points": len(lane.left), "successors": lane.successors, "beside": lane.beside}
-        | {"speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit, "junction": lane.junction}
+        {
+            "id": lane.id,
+            "points": len(lane.left),
+            "successors": lane.successors,
+            "beside": lane.beside,
+        }
+        | {
+            "speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit,
+            "junction": lane.junction,
+        }
         | ({"users": sorted(lane.users)} if lane.users else {})
         | ({"crossing": True} if lane.crossing else {})
         for lane in network.every_lane
     ]
     for lane, entry in zip(network.every_lane, lanes if network.has_levels else (), strict=False):
-        entry["height"] = [None if math.isnan(height) else round(height, 2) for height in lane.height.tolist()]
+        entry["height"] = [
+            None if math.isnan(height) else round(height, 2) for height in lane.height.tolist()
+        ]
     rules = [
-        {"id": rule.id, "kind": rule.kind, "lanes": rule.lanes, "over": rule.over, "line": rule.line.tolist()}
+        {
+            "id": rule.id,
+            "kind": rule.kind,
+            "lanes": rule.lanes,
+            "over": rule.over,
+            "line": rule.line.tolist(),
+        }
         for rule in network.rules
     ]
     document: dict[str, Any] = {"name": network.name, "notes": network.notes, "lanes": lanes}
     document |= {"rules": rules, "rules_kept": network.rules_kept} if rules else {}
-    document |= ({"drawn": True} if network.drawn else {}) | ({"origin": network.origin} if network.origin else {})
+    document |= ({"drawn": True} if network.drawn else {}) | (
+        {"origin": network.origin} if network.origin else {}
+    )
     aim = network.drawn_for
-    return document | ({} if aim is None else {"drawn_for": {"frame": aim.frame.tolist(), "lanes": aim.lanes}})
+    return document | (
+        {} if aim is None else {"drawn_for": {"frame": aim.frame.tolist(), "lanes": aim.lanes}}
+    )
 
 
 def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | None]:
@@ -80,24 +111,33 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
             f"{what}: a marker of type {found.kind}, action {found.action}; a line list (5) that is added (0) is needed"
         )
     if not (np.abs(points) <= FARTHEST).all():
-        raise InputError(f"{what}: a border has a point that is not finite or more than {FARTHEST:g} m away")
+        raise InputError(
+            f"{what}: a border has a point that is not finite or more than {FARTHEST:g} m away"
+        )
     try:
         document = json.loads(found.text)
         lanes = tuple(_lanes(document["lanes"], points, what))
         notes = tuple(str(note) for note in document["notes"])
         rules = tuple(map(_rule, document.get("rules", ())))
-        kept, drawn = document.get("rules_kept", True) is not False, document.get("drawn", False) is True
+        kept, drawn = (
+            document.get("rules_kept", True) is not False,
+            document.get("drawn", False) is True,
+        )
         aim = _drawn_for(document["drawn_for"]) if "drawn_for" in document else None
         origin = tuple(map(float, document.get("origin", ())))
         network = LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn, aim, origin)
         return frame_id, network.with_lanes(lanes)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InputError(f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}") from None
+        raise InputError(
+            f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}"
+        ) from None
 
 
 def _drawn_for(document: dict[str, Any]) -> DrawnFor:
     x, y, yaw = (float(value) for value in document["frame"])
-    return DrawnFor(np.array([x, y, yaw]), tuple((str(first), str(last)) for first, last in document["lanes"]))
+    return DrawnFor(
+        np.array([x, y, yaw]), tuple((str(first), str(last)) for first, last in document["lanes"])
+    )
 
 
 def _rule(document: dict[str, Any]) -> TrafficRule:
@@ -120,7 +160,10 @@ def _lanes(documents: list[dict[str, Any]], points: Floats, what: str) -> Iterat
         limit = math.nan if document["speed_limit"] is None else float(document["speed_limit"])
         after, beside = (tuple(int(k) for k in document[key]) for key in ("successors", "beside"))
         height = np.array(document.get("height", ()), dtype=np.float64)
-        users, crossing = frozenset(map(str, document.get("users", ()))), document.get("crossing", False) is True
+        users, crossing = (
+            frozenset(map(str, document.get("users", ()))),
+            document.get("crossing", False) is True,
+        )
         name, junction = str(document["id"]), str(document["junction"])
         yield Lane(name, left, right, after, beside, limit, junction, height, users, crossing)
         at += 2 * pairs

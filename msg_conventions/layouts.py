@@ -15,37 +15,100 @@ Layout = dict[str, Any]
 
 HEADER: Layout = {"stamp": "time", "frame_id": "string"}
 POSE, TWIST, COVARIANCE = "7f8", "6f8", "36f8"
-KINEMATICS: Layout = {"pose": POSE, "pose_covariance": COVARIANCE, "twist": TWIST, "twist_covariance": COVARIANCE}
+KINEMATICS: Layout = {
+    "pose": POSE,
+    "pose_covariance": COVARIANCE,
+    "twist": TWIST,
+    "twist_covariance": COVARIANCE,
+}
 
 CLOCK: Layout = {"clock": "time"}
 VELOCITY: Layout = {"twist": TWIST}
 VELOCITY_STAMPED = HEADER | VELOCITY
-FIX = HEADER | {"status": "i1", "service": "u2", "place": "3f8", "covariance": "9f8", "covariance_type": "u1"}
+FIX = HEADER | {
+    "status": "i1",
+    "service": "u2",
+    "place": "3f8",
+    "covariance": "9f8",
+    "covariance_type": "u1",
+}
 POSES = HEADER | {"poses": [POSE]}
 POLYGON = HEADER | {"points": ["3f4"]}  # m
 ODOMETRY = HEADER | {"child": "string"} | KINEMATICS
 TRANSFORMS: Layout = {"transforms": [HEADER | {"child": "string", "pose": POSE}]}
-MAP = HEADER | {"load_time": "time", "resolution": "f4", "size": "2u4", "origin": POSE, "cells": ["i1"]}  # m/cell; width, height
+MAP = HEADER | {
+    "load_time": "time",
+    "resolution": "f4",
+    "size": "2u4",
+    "origin": POSE,
+    "cells": ["i1"],
+}  # m/cell; width, height
 VALUE: Layout = {"key": "string", "value": "string"}
-STATUS: Layout = {"level": "u1", "name": "string", "message": "string", "hardware_id": "string", "values": [VALUE]}
+STATUS: Layout = {
+    "level": "u1",
+    "name": "string",
+    "message": "string",
+    "hardware_id": "string",
+    "values": [VALUE],
+}
 DIAGNOSTICS = HEADER | {"statuses": [STATUS]}
 
-POINT: Layout = {"transforms": [POSE], "velocities": [TWIST], "accelerations": [TWIST], "time": "time"}
+POINT: Layout = {
+    "transforms": [POSE],
+    "velocities": [TWIST],
+    "accelerations": [TWIST],
+    "time": "time",
+}
 TRAJECTORY = HEADER | {"names": ["string"], "count": "u4"}  # then as many points
 
 CLOUD_FIELD: Layout = {"name": "string", "offset": "u4", "datatype": "u1", "count": "u4"}
-CLOUD = HEADER | {"size": "2u4", "fields": [CLOUD_FIELD], "is_bigendian": "u1", "steps": "2u4", "data": ["u1"], "is_dense": "u1"}
+CLOUD = HEADER | {
+    "size": "2u4",
+    "fields": [CLOUD_FIELD],
+    "is_bigendian": "u1",
+    "steps": "2u4",
+    "data": ["u1"],
+    "is_dense": "u1",
+}
 
 IMAGE = HEADER | {"format": "string", "data": ["u1"]}
-MARKER = HEADER | {"name": "string", "id": "i4", "kind": "i4", "action": "i4", "pose": POSE, "scale": "3f8", "colour": "4f4"}
-MARKER |= {"lifetime": "time", "frame_locked": "u1", "points": ["3f8"], "colours": ["4f4"], "texture_resource": "string"}
-MARKER |= {"texture": IMAGE, "uv": ["2f4"], "text": "string", "mesh_resource": "string", "mesh_name": "string", "mesh": ["u1"]}
+MARKER = HEADER | {
+    "name": "string",
+    "id": "i4",
+    "kind": "i4",
+    "action": "i4",
+    "pose": POSE,
+    "scale": "3f8",
+    "colour": "4f4",
+}
+MARKER |= {
+    "lifetime": "time",
+    "frame_locked": "u1",
+    "points": ["3f8"],
+    "colours": ["4f4"],
+    "texture_resource": "string",
+}
+MARKER |= {
+    "texture": IMAGE,
+    "uv": ["2f4"],
+    "text": "string",
+    "mesh_resource": "string",
+    "mesh_name": "string",
+    "mesh": ["u1"],
+}
 MARKER |= {"embedded_materials": "u1"}
 MARKERS: Layout = {"markers": [MARKER]}
 
 SHAPE: Layout = {"type": "u1", "footprint": ["3f4"], "dimensions": "3f8"}  # m
-OBJECT: Layout = {"id": "16u1", "existence": "f4", "classes": [{"label": "u1", "probability": "f4"}], **KINEMATICS}
+OBJECT: Layout = {
+    "id": "16u1",
+    "existence": "f4",
+    "classes": [{"label": "u1", "probability": "f4"}],
+    **KINEMATICS,
+}
 OBJECT |= {"acceleration": "6f8", "acceleration_covariance": COVARIANCE}  # linear [m/s²], angular
 PREDICTION: Layout = {"poses": [POSE], "step": "time", "confidence": "f4"}
 PREDICTED = HEADER | {"objects": [OBJECT | {"paths": [PREDICTION], "shape": SHAPE}]}
-TRACKED = HEADER | {"objects": [OBJECT | {"orientation": "u1", "is_stationary": "u1", "shape": SHAPE}]}
+TRACKED = HEADER | {
+    "objects": [OBJECT | {"orientation": "u1", "is_stationary": "u1", "shape": SHAPE}]
+}

@@ -13,7 +13,13 @@ from scenario_gen.numerics import Floats
 
 TYPE = "visualization_msgs/msg/Marker"
 ARRAY_TYPE = "visualization_msgs/msg/MarkerArray"
-CUBE, CYLINDER, LINE_STRIP, LINE_LIST, TEXT = 1, 3, 4, 5, 9  # types; a text faces who looks, its scale ends in its height
+CUBE, CYLINDER, LINE_STRIP, LINE_LIST, TEXT = (
+    1,
+    3,
+    4,
+    5,
+    9,
+)  # types; a text faces who looks, its scale ends in its height
 ADD, DELETE, DELETE_ALL = 0, 2, 3  # actions
 
 
@@ -44,5 +50,13 @@ class Marker:
     def fields(self, frame_id: str, stamp_ns: int) -> dict[str, Any]:
         """Return the marker's fields, as `layouts.MARKER` has them."""
         points = np.column_stack((self.points, np.zeros(len(self.points))))
-        given = {"stamp": stamp_ns, "frame_id": frame_id, "points": points, "pose": pose_rows(np.array([self.pose]))}
-        return given | {name: getattr(self, name) for name in ("name", "kind", "action", "scale", "colour", "text")}
+        given = {
+            "stamp": stamp_ns,
+            "frame_id": frame_id,
+            "points": points,
+            "pose": pose_rows(np.array([self.pose])),
+        }
+        return given | {
+            name: getattr(self, name)
+            for name in ("name", "kind", "action", "scale", "colour", "text")
+        }

@@ -17,13 +17,17 @@ from scenario_gen.numerics import Floats
 TYPE = "nav_msgs/msg/Odometry"
 
 
-def encode_odometry(state: Floats, yaw_rate: float, child: str, frame_id: str, stamp_ns: int) -> bytes:
+def encode_odometry(
+    state: Floats, yaw_rate: float, child: str, frame_id: str, stamp_ns: int
+) -> bytes:
     """Return a state (4,) of x [m], y [m], yaw [rad], speed [m/s] and the yaw rate [rad/s] as CDR bytes."""
     pose, twist = pose_rows(state[None, :3]), (state[3], 0.0, 0.0, 0.0, 0.0, yaw_rate)
     return encode(ODOMETRY, stamp=stamp_ns, frame_id=frame_id, child=child, pose=pose, twist=twist)
 
 
-def decode_odometry(data: bytes, what: str = "odom", *, framed: bool = False) -> tuple[int, str, str, Floats]:
+def decode_odometry(
+    data: bytes, what: str = "odom", *, framed: bool = False
+) -> tuple[int, str, str, Floats]:
     """Return stamp [ns], frame, child frame and (5,) x [m], y [m], yaw [rad], speed [m/s], yaw rate [rad/s].
 
     Args:

@@ -38,16 +38,25 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
         raise InputError("a path with a value that is not finite cannot be sent")
     seconds, nanoseconds = np.divmod(stamps_ns, NANOSECONDS)
     if np.abs(seconds).max() >= 2**31:
-        raise InputError(f"a path of stamp {stamp_ns} ns cannot be sent: a stamp does not fit a ROS time (until 2038)")
+        raise InputError(
+            f"a path of stamp {stamp_ns} ns cannot be sent: a stamp does not fit a ROS time (until 2038)"
+        )
     text = frame_id.encode() + b"\x00"
     begin = encode(BEGIN, stamp=stamp_ns, frame_id=frame_id, count=count)
     rows = np.zeros(count, dtype=_pose_type(len(text)))
-    rows["sec"], rows["nanosec"], rows["size"], rows["frame"] = seconds, nanoseconds, len(text), text
+    rows["sec"], rows["nanosec"], rows["size"], rows["frame"] = (
+        seconds,
+        nanoseconds,
+        len(text),
+        text,
+    )
     pose = rows["pose"]
     pose[:, :2] = poses[:, :2]
     pose[:, 5], pose[:, 6] = half_angle(poses[:, 2])
     body, used = rows.tobytes(), 12 + len(text)
-    gap = -(len(begin) - len(HEADER) + used) % 8  # before the first pose, which may begin amid 8 bytes
+    gap = (
+        -(len(begin) - len(HEADER) + used) % 8
+    )  # before the first pose, which may begin amid 8 bytes
     return b"".join((begin, body[:used], bytes(gap), body[used + -used % 8 :]))
 
 
@@ -55,7 +64,15 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
 def _pose_type(size: int) -> np.dtype[np.void]:
     """Return the layout of a pose that begins at a multiple of 8 bytes, in a frame of `size` bytes; it also ends at one."""
     frame = size + -(12 + size) % 8
-    return np.dtype([("sec", "<i4"), ("nanosec", "<u4"), ("size", "<u4"), ("frame", f"S{frame}"), ("pose", "<f8", (7,))])
+    return np.dtype(
+        [
+            ("sec", "<i4"),
+            ("nanosec", "<u4"),
+            ("size", "<u4"),
+            ("frame", f"S{frame}"),
+            ("pose", "<f8", (7,)),
+        ]
+    )
 
 
 def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints]:
@@ -71,7 +88,9 @@ def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints
     return stamp_ns, frame_id, poses_of(rows, what), stamps
 
 
-def read_path(data: bytes, what: str, *, framed: bool = False) -> tuple[int, str, Ints, list[str], Floats]:
+def read_path(
+    data: bytes, what: str, *, framed: bool = False
+) -> tuple[int, str, Ints, list[str], Floats]:
     """Return stamp [ns] and frame, and of each pose its stamp [ns], frame and row (7,) as on the wire; `framed` as in `decode`.
 
     Raises:
@@ -100,12 +119,21 @@ def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> byte
         first, last = int(route.anchor[k - 1]), int(route.anchor[k])
         span = route.length[last] - route.length[first]
         inner = np.arange(first + 1, last)
-        share = (route.length[inner] - route.length[first]) / span if span > 0.0 else np.zeros(len(inner))
+        share = (
+            (route.length[inner] - route.length[first]) / span
+            if span > 0.0
+            else np.zeros(len(inner))
+        )
         duration = anchors_ns[k] - anchors_ns[k - 1]
-        planned = np.clip(np.rint(share * duration).astype(np.int64), 1, duration - 1) + anchors_ns[k - 1]
+        planned = (
+            np.clip(np.rint(share * duration).astype(np.int64), 1, duration - 1)
+            + anchors_ns[k - 1]
+        )
         index += [*inner.tolist(), last]
         stamps += [*planned.tolist(), anchors_ns[k]]
-    return encode_path(route.points[index], np.array(stamps, dtype=np.int64), frame_id, anchors_ns[0])
+    return encode_path(
+        route.points[index], np.array(stamps, dtype=np.int64), frame_id, anchors_ns[0]
+    )
 
 
 def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") -> tuple[str, Route]:
@@ -116,16 +144,24 @@ def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") ->
     """
     stamp_ns, frame_id, poses, stamps = decode_path(data, what)
     if stamp_ns != anchors_ns[0]:
-        raise InputError(f"{what}: stamp {stamp_ns} ns is not that of the recording ({anchors_ns[0]} ns)")
+        raise InputError(
+            f"{what}: stamp {stamp_ns} ns is not that of the recording ({anchors_ns[0]} ns)"
+        )
     if len(poses) == 0:
         raise InputError(f"{what}: the path holds no poses")
     if (np.diff(stamps) < 0).any():
         bad = int(np.argmax(np.diff(stamps) < 0))
-        raise InputError(f"{what}: pose {bad + 1} bears an earlier stamp than pose {bad}; planned times must not decrease")
+        raise InputError(
+            f"{what}: pose {bad + 1} bears an earlier stamp than pose {bad}; planned times must not decrease"
+        )
     moved = np.concatenate([[True], (np.diff(poses, axis=0) != 0.0).any(axis=1)])
     at = np.searchsorted(stamps, anchors_ns)
     missing = (at >= len(stamps)) | (stamps[np.minimum(at, len(stamps) - 1)] != anchors_ns)
     if missing.any():
-        raise InputError(f"{what}: no pose bears the stamp of changepoint {int(np.argmax(missing))}; every changepoint needs one")
+        raise InputError(
+            f"{what}: no pose bears the stamp of changepoint {int(np.argmax(missing))}; every changepoint needs one"
+        )
     points = poses[moved]
-    return frame_id, Route(points=points, anchor=(np.cumsum(moved) - 1)[at], length=chord_length(points))
+    return frame_id, Route(
+        points=points, anchor=(np.cumsum(moved) - 1)[at], length=chord_length(points)
+    )

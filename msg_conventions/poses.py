@@ -28,6 +28,8 @@ def poses_of(rows: Floats, what: str) -> Floats:
     if not np.isfinite(rows).all():
         raise InputError(f"{what}: a pose holds a value that is not finite")
     if (np.abs(rows[:, :3]) > FARTHEST).any():
-        raise InputError(f"{what}: a position is {np.abs(rows[:, :3]).max():g}; at most {FARTHEST:g} is read")
+        raise InputError(
+            f"{what}: a position is {np.abs(rows[:, :3]).max():g}; at most {FARTHEST:g} is read"
+        )
     check_quaternions(rows[:, 3:], what)
     return np.column_stack([rows[:, :2], yaw(rows[:, 3:])])

@@ -18,8 +18,13 @@ SCENARIOS = "scenarios"
 
 def footprint_messages(encounter: Encounter) -> Iterator[tuple[str, bytes]]:
     """Yield topic and CDR bytes of the footprint of each vehicle of a template."""
-    for vehicle, name in zip(encounter.vehicles, tokens(vehicle.id for vehicle in encounter.vehicles), strict=True):
-        yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, encounter.start_ns, f"vehicle_{name}")
+    for vehicle, name in zip(
+        encounter.vehicles, tokens(vehicle.id for vehicle in encounter.vehicles), strict=True
+    ):
+        yield (
+            vehicle_topic(name, "footprint"),
+            encode_footprint(vehicle, encounter.start_ns, f"vehicle_{name}"),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +43,9 @@ class RequestMessages:
     node: str
     about: Mapping[str, str] = field(default_factory=dict)
 
-    def of_scenario(self, scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> Iterator[tuple[str, bytes]]:
+    def of_scenario(
+        self, scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None
+    ) -> Iterator[tuple[str, bytes]]:
         """Yield topic and CDR bytes of a scenario's messages: its witness, its paths, its entry.
 
         Args:

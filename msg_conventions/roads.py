@@ -38,12 +38,21 @@ def encode_map(road: Road, stamp_ns: int) -> bytes:
     return encode_grid(cells, road.resolution, road.origin, road.frame_id, stamp_ns)
 
 
-def encode_grid(cells: Ints, resolution: float, origin: Floats, frame_id: str, stamp_ns: int) -> bytes:
+def encode_grid(
+    cells: Ints, resolution: float, origin: Floats, frame_id: str, stamp_ns: int
+) -> bytes:
     """Return cells (H, W) of 0 to 100 or -1, with their size and the lower-left corner (2,) [m], as an OccupancyGrid."""
     height, width = cells.shape
     corner, size = (*origin, 0.0, 0.0, 0.0, 0.0, 1.0), (width, height)
     head = {"stamp": stamp_ns, "frame_id": frame_id, "load_time": stamp_ns}
-    return encode(MAP, **head, resolution=resolution, size=size, origin=corner, cells=cells.astype(np.int8).reshape(-1))
+    return encode(
+        MAP,
+        **head,
+        resolution=resolution,
+        size=size,
+        origin=corner,
+        cells=cells.astype(np.int8).reshape(-1),
+    )
 
 
 def encode_poses(poses: Floats, frame_id: str, stamp_ns: int) -> bytes:
@@ -62,7 +71,11 @@ def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
 
 
 def decode_map(
-    data: bytes, entries: bytes | None = None, exits: bytes | None = None, lanes: bytes | None = None, name: str = "map"
+    data: bytes,
+    entries: bytes | None = None,
+    exits: bytes | None = None,
+    lanes: bytes | None = None,
+    name: str = "map",
 ) -> tuple[int, Road]:
     """Return the stamp [ns] and the road; without entries, exits and lanes it has none (a plain map server sends none).
 
@@ -70,21 +83,43 @@ def decode_map(
         InputError: the message is damaged, the map is rotated or empty, or the frames disagree.
     """
     found = decode(MAP, data, name, framed=True)
-    (width, height), origin, cells, frame_id = found.size.tolist(), found.origin, found.cells, found.frame_id
+    (width, height), origin, cells, frame_id = (
+        found.size.tolist(),
+        found.origin,
+        found.cells,
+        found.frame_id,
+    )
     check_quaternions(origin[3:], f"{name}: info.origin")
     if width * height != len(cells):
         raise InputError(f"{name}: {width} x {height} cells are announced, {len(cells)} are there")
     if not np.isfinite(origin).all() or abs(float(yaw(origin[3:]))) > 1e-9:
         raise InputError(f"{name}: info.origin must be finite and not rotated")
     if (np.abs(origin[:3]) > FARTHEST).any():
-        raise InputError(f"{name}: info.origin is {np.abs(origin[:3]).max():g} m away; at most {FARTHEST:g} is read")
+        raise InputError(
+            f"{name}: info.origin is {np.abs(origin[:3]).max():g} m away; at most {FARTHEST:g} is read"
+        )
     none = (frame_id, np.zeros((0, 3)))
-    ends = [none if end is None else decode_poses(end, topic)[1:] for topic, end in zip(ENDS, (entries, exits), strict=True)]
+    ends = [
+        none if end is None else decode_poses(end, topic)[1:]
+        for topic, end in zip(ENDS, (entries, exits), strict=True)
+    ]
     network = (frame_id, None) if lanes is None else decode_lanes(lanes)
     for what, (frame, _) in zip((*ENDS, LANES), (*ends, network), strict=True):
         if frame != frame_id:
             raise InputError(f"{what}: frame {frame!r} is not the map's ({frame_id!r})")
     drivable = ((cells >= 0) & (cells < OCCUPIED_FROM)).reshape(height, width)
-    obstructed = (cells == OBSTRUCTED).reshape(height, width) if (cells == OBSTRUCTED).any() else None
+    obstructed = (
+        (cells == OBSTRUCTED).reshape(height, width) if (cells == OBSTRUCTED).any() else None
+    )
     (_, inward), (_, outward) = ends
-    return found.stamp, Road(name, drivable, found.resolution, origin[:2], inward, outward, frame_id, network[1], obstructed)
+    return found.stamp, Road(
+        name,
+        drivable,
+        found.resolution,
+        origin[:2],
+        inward,
+        outward,
+        frame_id,
+        network[1],
+        obstructed,
+    )

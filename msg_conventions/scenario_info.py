@@ -23,11 +23,23 @@ from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from scenario_gen.base.documents import parse_json
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.numerics import Floats
-from scenario_gen.types import BoundaryStates, Cause, EgoSlot, FACTS, ORDERS, Scenario, ScenarioSet, Vehicle
+from scenario_gen.types import (
+    BoundaryStates,
+    Cause,
+    EgoSlot,
+    FACTS,
+    ORDERS,
+    Scenario,
+    ScenarioSet,
+    Vehicle,
+)
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
-REACTION, CUT = "reaction.", "reaction.cut."  # who reacts to whom in the template, JSON; those cut because they closed a circle
+REACTION, CUT = (
+    "reaction.",
+    "reaction.cut.",
+)  # who reacts to whom in the template, JSON; those cut because they closed a circle
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
 SIZES = "sizes"  # length and width of its vehicles [m], where they are not those of the template
 FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the requested states
@@ -63,8 +75,12 @@ class ScenarioEntry:
 
     road = _value("road")  # name of the road; "" as in entries of the nodes
     ego = _value("ego")  # token of the vehicle that was left out; "" if none was
-    witness = _value(EGO_WITNESS)  # SHA-256 of the message of its ego's witness; "" where it has none
-    template_hash = _value(TEMPLATE_HASH, None)  # of its template, the `tracks` (hashes.py); None: not known
+    witness = _value(
+        EGO_WITNESS
+    )  # SHA-256 of the message of its ego's witness; "" where it has none
+    template_hash = _value(
+        TEMPLATE_HASH, None
+    )  # of its template, the `tracks` (hashes.py); None: not known
     map_hash = _value(MAP_HASH, None)
 
     @property
@@ -76,7 +92,9 @@ class ScenarioEntry:
         """
         text = self.status.values.get("order", "keep")
         if text not in ORDERS:
-            raise InputError(f"{INFO}: order of {self.status.message} is none of {', '.join(ORDERS)}")
+            raise InputError(
+                f"{INFO}: order of {self.status.message} is none of {', '.join(ORDERS)}"
+            )
         return text
 
     @property
@@ -109,10 +127,14 @@ class ScenarioEntry:
         relaxed = np.zeros((count, 2, 2))
         with guarded(where):
             texts = (self.status.values.get(key, "[]") for key in (FREED, EGO_FREED))
-            own, ego = (np.array(json.loads(text), dtype=np.float64).reshape(-1, 2, 2) for text in texts)
+            own, ego = (
+                np.array(json.loads(text), dtype=np.float64).reshape(-1, 2, 2) for text in texts
+            )
         for key, freed, most in ((FREED, own, count - witness), (EGO_FREED, ego, 1)):
             if len(freed) > most or not np.isfinite(freed).all() or (freed < 0.0).any():
-                raise InputError(f"{where}: {key} is not metres and m/s of at most {most} vehicles")
+                raise InputError(
+                    f"{where}: {key} is not metres and m/s of at most {most} vehicles"
+                )
         relaxed[: len(own)] = own
         relaxed[count - witness :] = ego if witness and len(ego) else 0.0
         return relaxed
@@ -145,11 +167,20 @@ class RequestSummary:
     @property
     def provenance(self) -> dict[str, str]:
         """The values that regenerate it, and its seed: all that are neither its identity nor its outcome."""
-        known = {"request", "requested", "published", "candidates", "chosen_from", MAP_HASH, TEMPLATE_HASH}
+        known = {
+            "request",
+            "requested",
+            "published",
+            "candidates",
+            "chosen_from",
+            MAP_HASH,
+            TEMPLATE_HASH,
+        }
         return {
             key: value
             for key, value in self.values.items()
-            if key not in known and not key.startswith((REFUSED, ADAPTATION, TARGET, REACTION, "ego"))
+            if key not in known
+            and not key.startswith((REFUSED, ADAPTATION, TARGET, REACTION, "ego"))
         }
 
     def result(self, scenarios: tuple[Scenario, ...] = ()) -> ScenarioSet:
@@ -161,15 +192,21 @@ class RequestSummary:
         what = f"{INFO}: {self.status.name!r} is no summary of a request"
         causes = [key.removeprefix(REFUSED) for key in self.values if key.startswith(REFUSED)]
         try:
-            refused = {Cause(cause): _count(self.values, REFUSED + cause, what) for cause in causes}
+            refused = {
+                Cause(cause): _count(self.values, REFUSED + cause, what) for cause in causes
+            }
         except ValueError as error:
-            raise InputError(f"{what} ({error}); it is of another version: generate its scenarios anew") from None
+            raise InputError(
+                f"{what} ({error}); it is of another version: generate its scenarios anew"
+            ) from None
         return ScenarioSet(
             requested=_count(self.values, "requested", what),
             scenarios=scenarios,
             candidates=_count(self.values, "candidates", what),
             refused=Counter(refused),
-            adaptations=tuple(text for key, text in self.values.items() if key.startswith(ADAPTATION)),
+            adaptations=tuple(
+                text for key, text in self.values.items() if key.startswith(ADAPTATION)
+            ),
         )
 
     @property
@@ -182,14 +219,25 @@ class RequestSummary:
         what, found = f"{INFO}: {REACTION} of {self.status.message}", []
         for key, text in self.values.items():
             if key.startswith(REACTION):
-                found.append(parse_json(text, what, {"type": "object", "required": ["words", "lag", "confidence"]}))
+                found.append(
+                    parse_json(
+                        text, what, {"type": "object", "required": ["words", "lag", "confidence"]}
+                    )
+                )
         return tuple(found)
 
     def sentence(self) -> str:
         """Return a sentence on the result of the request."""
-        words = (self.values.get(key, "?") for key in ("request", "published", "requested", "candidates"))
+        words = (
+            self.values.get(key, "?")
+            for key in ("request", "published", "requested", "candidates")
+        )
         text = "by its own summary request {} published {} of {} from {} candidates".format(*words)
-        refused = [f"{key.removeprefix(REFUSED)} {n}" for key, n in self.values.items() if key.startswith(REFUSED) and n != "0"]
+        refused = [
+            f"{key.removeprefix(REFUSED)} {n}"
+            for key, n in self.values.items()
+            if key.startswith(REFUSED) and n != "0"
+        ]
         return f"{text}, refused: {', '.join(refused).replace('_', ' ')}" if refused else text
 
     def of_one_scenario(self) -> "RequestSummary":
@@ -220,7 +268,9 @@ def decode_info(data: bytes, what: str = INFO) -> tuple[Info, ...]:
         if "request" not in values:
             raise InputError(f"{where}: request is missing")
         if "published" in values:
-            found.append(RequestSummary(values["request"], _count(values, "published", where), status))
+            found.append(
+                RequestSummary(values["request"], _count(values, "published", where), status)
+            )
         else:
             found.append(_entry(status, where))
     return tuple(found)
@@ -266,7 +316,10 @@ def scenario_entry(
     several = messages_of(data) if not scenario.all_present else ()
     sizes = [[vehicle.length, vehicle.width] for vehicle in scenario.vehicles]
     drive = scenario.reference_drive
-    spans = [[float(scenario.time[first]), float(scenario.time[last])] for first, last in scenario.present.tolist()]
+    spans = [
+        [float(scenario.time[first]), float(scenario.time[last])]
+        for first, last in scenario.present.tolist()
+    ]
     values = {
         "request": request,
         "index": str(scenario.index),
@@ -275,17 +328,35 @@ def scenario_entry(
         "achieved_start": _states_text(scenario, 0),
         "achieved_end": _states_text(scenario, -1),
         **({} if scenario.all_present else {PRESENT: json.dumps(spans)}),
-        **({SIZES: json.dumps(sizes)} if sizes != [[template[n].length, template[n].width] for n in rows] else {}),
-        **({MESSAGES: json.dumps([digest(message) for message in several])} if len(several) > 1 else {}),
+        **(
+            {SIZES: json.dumps(sizes)}
+            if sizes != [[template[n].length, template[n].width] for n in rows]
+            else {}
+        ),
+        **(
+            {MESSAGES: json.dumps([digest(message) for message in several])}
+            if len(several) > 1
+            else {}
+        ),
         **(about or {}),
         **scenario.facts,
         **ego_values(ego),
-        **({} if drive is None else {EGO_WITNESS: digest(encode_scenario(drive, stamp_of(data, INFO)))}),
+        **(
+            {}
+            if drive is None
+            else {EGO_WITNESS: digest(encode_scenario(drive, stamp_of(data, INFO)))}
+        ),
         "asked_start": json.dumps(asked.start[rows].tolist()),
         "asked_end": json.dumps(asked.end[rows].tolist()),
-        **{key: json.dumps(freed.tolist()) for key, freed in ((FREED, asked.relaxed[rows]), (EGO_FREED, own)) if freed.any()},
+        **{
+            key: json.dumps(freed.tolist())
+            for key, freed in ((FREED, asked.relaxed[rows]), (EGO_FREED, own))
+            if freed.any()
+        },
     }
-    status = Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
+    status = Status(
+        f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values
+    )
     return _entry(status, INFO)
 
 
@@ -320,21 +391,41 @@ def request_summary(
         "requested": str(result.requested),
         "published": str(len(result.scenarios)),
         "candidates": str(result.candidates),
-        **{f"{REFUSED}{cause.value}": str(count) for cause, count in sorted(result.refused.items())},
+        **{
+            f"{REFUSED}{cause.value}": str(count)
+            for cause, count in sorted(result.refused.items())
+        },
         **{f"{ADAPTATION}{k}": text for k, text in enumerate(result.adaptations)},
-        **{f"{key}{k}": json.dumps(edge) for key, found in edges.items() for k, edge in enumerate(found)},
-        **({} if result.reached is None else {f"{TARGET}{key}": text for key, text in result.reached.figures().items()}),
+        **{
+            f"{key}{k}": json.dumps(edge)
+            for key, found in edges.items()
+            for k, edge in enumerate(found)
+        },
+        **(
+            {}
+            if result.reached is None
+            else {f"{TARGET}{key}": text for key, text in result.reached.figures().items()}
+        ),
         **({"chosen_from": str(result.chosen)} if result.chosen else {}),
     }
     level = Level.OK if len(result.scenarios) == result.requested else Level.WARN
     message = f"{len(result.scenarios)} of {result.requested} scenarios from {result.candidates} candidates"
-    return RequestSummary(request, len(result.scenarios), Status(f"{node}: request", level, message, values))
+    return RequestSummary(
+        request, len(result.scenarios), Status(f"{node}: request", level, message, values)
+    )
 
 
 def _states_text(scenario: Scenario, at: int) -> str:
     """Return the vehicles' x, y, yaw, speed at sample `at` as a JSON list, exact to the bit."""
-    rows = zip(scenario.position[:, at], scenario.heading[:, at], scenario.speed[:, at], strict=True)
-    return json.dumps([[*map(float, position), float(heading), float(speed)] for position, heading, speed in rows])
+    rows = zip(
+        scenario.position[:, at], scenario.heading[:, at], scenario.speed[:, at], strict=True
+    )
+    return json.dumps(
+        [
+            [*map(float, position), float(heading), float(speed)]
+            for position, heading, speed in rows
+        ]
+    )
 
 
 def _states(text: str, what: str) -> Floats:

@@ -36,13 +36,21 @@ def encode_scenario(scenario: Scenario, stamp_ns: int) -> bytes:
 def _parts(scenario: Scenario, stamp_ns: int) -> Iterator[Trajectory]:
     """Yield the content of each message: neighbouring vehicles that come and go together."""
     time_ns = np.rint(scenario.time * NANOSECONDS).astype(np.int64)
-    edges = [0, *(1 + np.flatnonzero((np.diff(scenario.present, axis=0) != 0).any(axis=1))).tolist(), len(scenario.vehicles)]
+    edges = [
+        0,
+        *(1 + np.flatnonzero((np.diff(scenario.present, axis=0) != 0).any(axis=1))).tolist(),
+        len(scenario.vehicles),
+    ]
     for begin, end in pairwise(edges):
         first, last = scenario.present[begin].tolist()
         rows, at = slice(begin, end), slice(first, last + 1)
-        heading, speed, acceleration = (each[rows, at] for each in (scenario.heading, scenario.speed, scenario.acceleration))
+        heading, speed, acceleration = (
+            each[rows, at] for each in (scenario.heading, scenario.speed, scenario.acceleration)
+        )
         states = (scenario.position[rows, at], heading, speed, acceleration)
-        yield Trajectory(stamp_ns, scenario.frame_id, scenario.vehicles[rows], time_ns[at], *states)
+        yield Trajectory(
+            stamp_ns, scenario.frame_id, scenario.vehicles[rows], time_ns[at], *states
+        )
 
 
 def messages_of(data: bytes, what: str = "scenarios") -> tuple[bytes, ...]:
@@ -56,7 +64,9 @@ def messages_of(data: bytes, what: str = "scenarios") -> tuple[bytes, ...]:
 
 def _read(data: bytes, what: str) -> Iterator[tuple[Trajectory, bytes]]:
     place = 0
-    while not place or len(data) - place >= len(HEADER):  # a message may be filled up to four bytes
+    while not place or len(data) - place >= len(
+        HEADER
+    ):  # a message may be filled up to four bytes
         found, size = trajectory.decode_first(data[place:] if place else data, what)
         yield found, data[place : place + size]
         place += size
@@ -82,7 +92,9 @@ def decode_scenario(
         if len(part.time_ns) < 2:
             raise InputError(f"{what}: {len(part.time_ns)} point(s); at least 2 are needed")
         if (np.diff(part.time_ns) <= 0).any():
-            raise InputError(f"{what}: a point is not later than the one before; time_from_start must increase from 0")
+            raise InputError(
+                f"{what}: a point is not later than the one before; time_from_start must increase from 0"
+            )
     time_ns = np.unique(np.concatenate([part.time_ns for part in parts]))
     if late and time_ns[0] > 0:
         time_ns = np.concatenate((np.zeros(1, dtype=np.int64), time_ns))
@@ -92,30 +104,54 @@ def decode_scenario(
             "message of its own: the scenario's others are needed too)"
         )
     if time_ns[-1] > trajectory.LONGEST_NS:
-        raise InputError(f"{what}: it lasts {time_ns[-1] * 1e-9:g} s; at most {trajectory.LONGEST_NS * 1e-9:g} s are read")
+        raise InputError(
+            f"{what}: it lasts {time_ns[-1] * 1e-9:g} s; at most {trajectory.LONGEST_NS * 1e-9:g} s are read"
+        )
     return parts[0].stamp_ns, _joined(parts, time_ns, seed, index, what)
 
 
-def _joined(parts: Sequence[Trajectory], time_ns: Ints, seed: int, index: int, what: str) -> Scenario:
+def _joined(
+    parts: Sequence[Trajectory], time_ns: Ints, seed: int, index: int, what: str
+) -> Scenario:
     """Return the scenario of its messages, which have the instants (T,) [ns] between them."""
     head = parts[0]
     ids = [vehicle.id for part in parts for vehicle in part.vehicles]
-    if any((part.stamp_ns, part.frame_id) != (head.stamp_ns, head.frame_id) for part in parts) or len(set(ids)) < len(ids):
-        raise InputError(f"{what}: messages with other stamps or frames, or with the same vehicle, are not one scenario")
+    if any(
+        (part.stamp_ns, part.frame_id) != (head.stamp_ns, head.frame_id) for part in parts
+    ) or len(set(ids)) < len(ids):
+        raise InputError(
+            f"{what}: messages with other stamps or frames, or with the same vehicle, are not one scenario"
+        )
     present, arrays = [], []
     for part in parts:
         first = int(np.searchsorted(time_ns, part.time_ns[0]))
         last = first + len(part.time_ns) - 1
         if last >= len(time_ns) or (time_ns[first : last + 1] != part.time_ns).any():
-            raise InputError(f"{what}: vehicle {part.vehicles[0].id} has other instants than who is there with it")
+            raise InputError(
+                f"{what}: vehicle {part.vehicles[0].id} has other instants than who is there with it"
+            )
         present += [(first, last)] * len(part.vehicles)
         widths = (first, len(time_ns) - 1 - last)
-        values = (part.position[..., 0], part.position[..., 1], part.heading, part.speed, part.acceleration)
+        values = (
+            part.position[..., 0],
+            part.position[..., 1],
+            part.heading,
+            part.speed,
+            part.acceleration,
+        )
         arrays.append(np.stack([np.pad(value, ((0, 0), widths), mode="edge") for value in values]))
     x, y, heading, speed, acceleration = np.concatenate(arrays, axis=1)
     vehicles = tuple(vehicle for part in parts for vehicle in part.vehicles)
     states = (np.stack((x, y), axis=-1), heading, speed, acceleration)
-    return Scenario(vehicles, time_ns / NANOSECONDS, *states, seed, index, head.frame_id, np.array(present, dtype=np.int64))
+    return Scenario(
+        vehicles,
+        time_ns / NANOSECONDS,
+        *states,
+        seed,
+        index,
+        head.frame_id,
+        np.array(present, dtype=np.int64),
+    )
 
 
 def digest(data: bytes) -> str:

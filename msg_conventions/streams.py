@@ -25,7 +25,9 @@ def encode_fix(latitude: float, longitude: float, stamp_ns: int, frame_id: str) 
 
 def encode_speed(speed: float, stamp_ns: int, frame_id: str) -> bytes:
     """Return a TwistStamped of m/s along the vehicle as CDR bytes."""
-    return encode(VELOCITY_STAMPED, stamp=stamp_ns, frame_id=frame_id, twist=(speed, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return encode(
+        VELOCITY_STAMPED, stamp=stamp_ns, frame_id=frame_id, twist=(speed, 0.0, 0.0, 0.0, 0.0, 0.0)
+    )
 
 
 def decode_fix(data: bytes, what: str = "fix") -> tuple[int, float, float]:
@@ -35,7 +37,9 @@ def decode_fix(data: bytes, what: str = "fix") -> tuple[int, float, float]:
         InputError: the message is damaged.
     """
     found = decode(FIX, data, what)
-    latitude, longitude, _altitude = found.place.tolist() if found.status >= FIXED else [math.nan] * 3
+    latitude, longitude, _altitude = (
+        found.place.tolist() if found.status >= FIXED else [math.nan] * 3
+    )
     return found.stamp, latitude, longitude
 
 

@@ -28,7 +28,9 @@ TWIST_TYPE = "geometry_msgs/msg/TwistStamped"
 
 LATCHED = Quality()
 MANY = Quality(depth=1000)
-MANY_HEARD = Quality(depth=1000, keep_all=True)  # for subscribers that must not lose any: paced publishers then wait for them
+MANY_HEARD = Quality(
+    depth=1000, keep_all=True
+)  # for subscribers that must not lose any: paced publishers then wait for them
 STREAM = Quality(depth=1000, transient_local=False)
 LIVE = Quality(depth=100, transient_local=False)
 NEWEST = Quality(depth=1, transient_local=False)
@@ -59,7 +61,11 @@ _TABLE: tuple[tuple[str, Quality, str], ...] = (
     (frames.TYPE, LIVE, "tf"),
     (diagnostics.TYPE, LATCHED, "road/info fit/info report"),
     (diagnostics.TYPE, MANY, "scenarios/info verdicts"),
-    (diagnostics.TYPE, Quality(depth=100), "diagnostics"),  # in a bag written without nodes: one message, which is latched
+    (
+        diagnostics.TYPE,
+        Quality(depth=100),
+        "diagnostics",
+    ),  # in a bag written without nodes: one message, which is latched
     (diagnostics.TYPE, LIVE, "/diagnostics"),  # all is repeated every second
 )
 TOPICS = {topic: (kind, quality) for kind, quality, topics in _TABLE for topic in topics.split()}
@@ -78,6 +84,8 @@ def topic_entry(topic: str) -> tuple[str, Quality]:
         KeyError: it is no topic of the suite.
     """
     for pattern in sorted(TOPICS, key=len, reverse=True):
-        if re.search(rf"(^|/){re.escape(pattern).replace(re.escape('*'), '[0-9A-Za-z_]+')}$", topic):
+        if re.search(
+            rf"(^|/){re.escape(pattern).replace(re.escape('*'), '[0-9A-Za-z_]+')}$", topic
+        ):
             return TOPICS[pattern]
     raise KeyError(topic)

@@ -29,10 +29,22 @@ def encode_tracks(encounter: Encounter) -> bytes:
 def encode_samples(encounter: Encounter, at: Ints) -> bytes:
     """Return the states at samples `at` (K,) of the encounter as CDR bytes."""
     acceleration = np.gradient(encounter.speed, encounter.dt, axis=1)
-    states = (encounter.position[:, at], encounter.heading[:, at], encounter.speed[:, at], acceleration[:, at])
+    states = (
+        encounter.position[:, at],
+        encounter.heading[:, at],
+        encounter.speed[:, at],
+        acceleration[:, at],
+    )
     there = None if encounter.all_present else encounter.there[:, at]
     return trajectory.encode(
-        Trajectory(encounter.start_ns, FRAME, encounter.vehicles, at * encounter.dt_ns, *states, there=there)
+        Trajectory(
+            encounter.start_ns,
+            FRAME,
+            encounter.vehicles,
+            at * encounter.dt_ns,
+            *states,
+            there=there,
+        )
     )
 
 
@@ -44,24 +56,33 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
     """
     message = trajectory.decode(data, name)
     if len(message.time_ns) < 2:
-        raise InputError(f"{name}: {len(message.time_ns)} sample(s); at least 2 are needed to say how anybody drives")
+        raise InputError(
+            f"{name}: {len(message.time_ns)} sample(s); at least 2 are needed to say how anybody drives"
+        )
     steps = np.diff(message.time_ns)
     if message.time_ns[0] != 0:
-        raise InputError(f"{name}: the first sample is at {message.time_ns[0] * 1e-9:g} s; time_from_start must count from 0")
+        raise InputError(
+            f"{name}: the first sample is at {message.time_ns[0] * 1e-9:g} s; time_from_start must count from 0"
+        )
     if (uneven := (steps <= 0) | (steps != steps[0])).any():
         at = int(np.argmax(uneven))
         raise InputError(
             f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the one before, sample 1 {steps[0] * 1e-9:g} s; "
             "time_from_start must count in even steps; resample the tracks (10 Hz is usual)"
         )
-    if not SHORTEST_STEP_NS <= steps[0] <= LONGEST_STEP_NS or message.time_ns[-1] > trajectory.LONGEST_NS:
+    if (
+        not SHORTEST_STEP_NS <= steps[0] <= LONGEST_STEP_NS
+        or message.time_ns[-1] > trajectory.LONGEST_NS
+    ):
         raise InputError(
             f"{name}: {len(steps)} steps of {steps[0] * 1e-9:g} s; steps of 0.001 to 10 s and at most "
             f"{trajectory.LONGEST_NS * 1e-9:g} s in all are read"
         )
     states = (message.position, message.heading, message.speed)
     present = ALWAYS if message.there is None else _spans(message.there, message.vehicles, name)
-    return Encounter(name, message.vehicles, message.stamp_ns, int(steps[0]), *states, present=present)
+    return Encounter(
+        name, message.vehicles, message.stamp_ns, int(steps[0]), *states, present=present
+    )
 
 
 def _spans(there: Bools, vehicles: tuple[Vehicle, ...], name: str) -> Ints:
@@ -73,5 +94,7 @@ def _spans(there: Bools, vehicles: tuple[Vehicle, ...], name: str) -> Ints:
     found = [runs(row) for row in there]
     for vehicle, own in zip(vehicles, found, strict=True):
         if len(own) != 1:
-            raise InputError(f"{name}: vehicle {vehicle.id} is there {len(own)} times (z tells); a vehicle comes and goes once")
+            raise InputError(
+                f"{name}: vehicle {vehicle.id} is there {len(own)} times (z tells); a vehicle comes and goes once"
+            )
     return np.array([(begin, end - 1) for ((begin, end),) in found], dtype=np.int64)

@@ -31,7 +31,11 @@ FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
 FASTEST = 1e4  # m/s: no vehicle is faster, and sums of squares stay finite
 MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
 LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
-SEQUENCES = {"transforms": 7, "velocities": 6, "accelerations": 6}  # of a point, and the numbers of an entry
+SEQUENCES = {
+    "transforms": 7,
+    "velocities": 6,
+    "accelerations": 6,
+}  # of a point, and the numbers of an entry
 SMALLEST, LARGEST = 0.01, 1000.0  # metres of a footprint
 ABSENT = -1000.0  # m: z of a vehicle that is not there
 
@@ -66,7 +70,10 @@ def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
     """
     names = tokens(vehicle.id for vehicle in vehicles)
     types = ("" if one.type == usual_type(one.length) else f":{one.type}" for one in vehicles)
-    return tuple(f"{name}:{one.length!r}x{one.width!r}{kind}" for name, one, kind in zip(names, vehicles, types, strict=True))
+    return tuple(
+        f"{name}:{one.length!r}x{one.width!r}{kind}"
+        for name, one, kind in zip(names, vehicles, types, strict=True)
+    )
 
 
 def vehicle_of(joint_name: str) -> Vehicle:
@@ -112,8 +119,14 @@ def encode(trajectory: Trajectory) -> bytes:
     values = (trajectory.position, trajectory.heading, trajectory.speed, trajectory.acceleration)
     if not all(np.isfinite(value).all() for value in values):
         raise InputError("a trajectory with a value that is not finite cannot be sent")
-    stamp, frame, names = trajectory.stamp_ns, trajectory.frame_id, joint_names(trajectory.vehicles)
-    begin = encode_fields(layouts.TRAJECTORY, stamp=stamp, frame_id=frame, names=names, count=count)
+    stamp, frame, names = (
+        trajectory.stamp_ns,
+        trajectory.frame_id,
+        joint_names(trajectory.vehicles),
+    )
+    begin = encode_fields(
+        layouts.TRAJECTORY, stamp=stamp, frame_id=frame, names=names, count=count
+    )
     points = np.zeros(count, dtype=_point_type(n))
     for name in SEQUENCES:
         points["n_" + name] = n
@@ -150,21 +163,38 @@ def decode_first(data: bytes, what: str) -> tuple[Trajectory, int]:
     n, count = len(vehicles), head.count
     if not n:
         raise InputError(f"{what}: joint_names is empty; at least one vehicle is needed")
-    time_ns, pose, velocity, acceleration = _uniform(reader, n, count) or _one_by_one(reader, what, n, count)
+    time_ns, pose, velocity, acceleration = _uniform(reader, n, count) or _one_by_one(
+        reader, what, n, count
+    )
     if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
         raise InputError(f"{what}: the message holds a value that is not finite")
-    bounds = (("position", pose[..., :2], FARTHEST), ("speed", velocity, FASTEST), ("quaternion", pose[..., 3:], 2.0))
+    bounds = (
+        ("position", pose[..., :2], FARTHEST),
+        ("speed", velocity, FASTEST),
+        ("quaternion", pose[..., 3:], 2.0),
+    )
     for name, values, most in bounds:
         if (np.abs(values) > most).any():
-            raise InputError(f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read")
+            raise InputError(
+                f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read"
+            )
     check_quaternions(pose[..., 3:], what)
     there = pose[..., 2].T > 0.5 * ABSENT
-    states = (pose[..., :2].swapaxes(0, 1), yaw(pose[..., 3:]).T, velocity[..., 0].T, acceleration[..., 0].T)
-    found = Trajectory(head.stamp, head.frame_id, vehicles, time_ns, *states, there=None if there.all() else there)
+    states = (
+        pose[..., :2].swapaxes(0, 1),
+        yaw(pose[..., 3:]).T,
+        velocity[..., 0].T,
+        acceleration[..., 0].T,
+    )
+    found = Trajectory(
+        head.stamp, head.frame_id, vehicles, time_ns, *states, there=None if there.all() else there
+    )
     return found, len(HEADER) + reader.place
 
 
-Points = tuple[Ints, Floats, Floats, Floats]  # times (T,) [ns], poses (T, N, 7), velocities and accelerations (T, N, 6)
+Points = tuple[
+    Ints, Floats, Floats, Floats
+]  # times (T,) [ns], poses (T, N, 7), velocities and accelerations (T, N, 6)
 
 
 def _uniform(reader: CdrReader, n: int, count: int) -> Points | None:
@@ -177,7 +207,12 @@ def _uniform(reader: CdrReader, n: int, count: int) -> Points | None:
         reader.place = place
         return None
     pose, velocity, acceleration = (np.ascontiguousarray(points[name]) for name in SEQUENCES)
-    return points["sec"].astype(np.int64) * NANOSECONDS + points["nanosec"], pose, velocity, acceleration
+    return (
+        points["sec"].astype(np.int64) * NANOSECONDS + points["nanosec"],
+        pose,
+        velocity,
+        acceleration,
+    )
 
 
 def _one_by_one(reader: CdrReader, what: str, n: int, count: int) -> Points:

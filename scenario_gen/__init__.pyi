@@ -9,7 +9,11 @@ from scenario_gen.base.errors import (
     RefusedError as RefusedError,
     ScenarioGenError as ScenarioGenError,
 )
-from scenario_gen.closed_loop.trials import rates as rates, run_trials as run_trials, trials_of as trials_of
+from scenario_gen.closed_loop.trials import (
+    rates as rates,
+    run_trials as run_trials,
+    trials_of as trials_of,
+)
 from scenario_gen.corpus.many import generate_many as generate_many
 from scenario_gen.logs import LogConfig as LogConfig, read_log as read_log
 from scenario_gen.logs.read import LogResult as LogResult
@@ -20,10 +24,22 @@ from scenario_gen.method.evaluation import (
     evaluate_scenarios as evaluate_scenarios,
     EvaluationConfig as EvaluationConfig,
 )
-from scenario_gen.method.fitting import fit_template as fit_template, FittingConfig as FittingConfig
-from scenario_gen.method.recombination import recombinations as recombinations, recombined as recombined
-from scenario_gen.method.routing import plan_routes as plan_routes, PlanningConfig as PlanningConfig
-from scenario_gen.method.sampling import sample_scenarios as sample_scenarios, SamplingConfig as SamplingConfig
+from scenario_gen.method.fitting import (
+    fit_template as fit_template,
+    FittingConfig as FittingConfig,
+)
+from scenario_gen.method.recombination import (
+    recombinations as recombinations,
+    recombined as recombined,
+)
+from scenario_gen.method.routing import (
+    plan_routes as plan_routes,
+    PlanningConfig as PlanningConfig,
+)
+from scenario_gen.method.sampling import (
+    sample_scenarios as sample_scenarios,
+    SamplingConfig as SamplingConfig,
+)
 from scenario_gen.method.segmentation import (
     segment as segment,
     segment_track as segment_track,

@@ -15,9 +15,13 @@ from scenario_gen.base.interrupts import leave, SIGNALS
 
 def command() -> None:
     """Run the command line in a process that goes on."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: matrices are small here, and threads only wait
+    os.environ.setdefault(
+        "OPENBLAS_NUM_THREADS", "1"
+    )  # before numpy is loaded: matrices are small here, and threads only wait
     for number in SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as for nohup, or a job in the background
+        if (
+            signal.getsignal(number) is not signal.SIG_IGN
+        ):  # as for nohup, or a job in the background
             signal.signal(number, leave)
     try:
         needs("cli", "rich", "typer")
@@ -26,7 +30,9 @@ def command() -> None:
     except MissingExtraError as error:
         sys.exit(f"error: {error}")
 
-    sys.warnoptions.append("ignore:resource_tracker")  # of the processes of a killed one: it removes what they left, and says so
+    sys.warnoptions.append(
+        "ignore:resource_tracker"
+    )  # of the processes of a killed one: it removes what they left, and says so
     sweep_beside(sys.argv[1:])  # what killed commands left
     run()
 

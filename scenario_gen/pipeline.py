@@ -17,7 +17,14 @@ from scenario_gen.method.sampling import Callbacks, Progress
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
 from scenario_gen.roads import road_and_template
-from scenario_gen.types import causes_in_words, Encounter, GenerationResult, Request, Road, Scenario
+from scenario_gen.types import (
+    causes_in_words,
+    Encounter,
+    GenerationResult,
+    Request,
+    Road,
+    Scenario,
+)
 
 __all__ = ["PipelineConfig", "generate"]
 
@@ -54,19 +61,35 @@ def generate(
     """
     encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter
     if road == AUTO:
-        again = partial(generate, config=config, count=count, seed=seed, request=request, progress=progress, accepts=accepts)
-        return on_first_suitable_road(partial(again, [encounter, *population]), encounter, config, seed)
+        again = partial(
+            generate,
+            config=config,
+            count=count,
+            seed=seed,
+            request=request,
+            progress=progress,
+            accepts=accepts,
+        )
+        return on_first_suitable_road(
+            partial(again, [encounter, *population]), encounter, config, seed
+        )
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
-    chain = Chain(encounter, segmentation, road, config, request, count, seed, population=population)
+    chain = Chain(
+        encounter, segmentation, road, config, request, count, seed, population=population
+    )
     planned = replace(chain.plan(), provenance=what_makes_it_again(config, request))
     result = chain.sample(planned, Callbacks(progress, accepts=partial(accepts, road)))
     if not result.generated.scenarios:
-        causes = ", ".join(f"{count} × {cause}" for cause, count in causes_in_words(result.generated.refused))
+        causes = ", ".join(
+            f"{count} × {cause}" for cause, count in causes_in_words(result.generated.refused)
+        )
         why = "; ".join((causes or "none was drawn", *result.generated.adaptations))
         raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {why}")
     if parents := encounter.parents:
-        result = result.noted(f"recombined of {parents[0]} and {parents[1]}: this encounter was not recorded")
+        result = result.noted(
+            f"recombined of {parents[0]} and {parents[1]}: this encounter was not recorded"
+        )
     if config.evaluation.compare:
         result = with_references(result, config, request, population)
     result = replace(result, replay=replay(encounter, result.road_and_fit()[1], road.frame_id))

@@ -15,7 +15,9 @@ from lengths import DATA, LONG
 import pytest
 from skips import MAY_SKIP, NO_RECORDS
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when numpy is loaded; threads of several workers wait for one another
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # read when numpy is loaded; threads of several workers wait for one another
 
 JUDGES = ("made", pytest.param("recorded", marks=pytest.mark.recorded))
 """By what a test is run: what the tests make themselves, always; what was recorded, where `-m recorded` asks for it."""
@@ -43,7 +45,9 @@ def made_once(factory: pytest.TempPathFactory, name: str, write: Callable[[Path]
 
 
 @pytest.fixture(scope="session")
-def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], Path]], Path]:
+def once(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[[str, Callable[[Path], Path]], Path]:
     """What gives a folder that is written once, by name and by what writes it."""
     return partial(made_once, tmp_path_factory)
 
@@ -67,7 +71,9 @@ def made_crashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session", params=JUDGES)
 def data(request: pytest.FixtureRequest) -> Path:
     """The folder of data, first made here, then recorded."""
-    return request.getfixturevalue("made_data") if request.param == "made" else recorded_folder(DATA)
+    return (
+        request.getfixturevalue("made_data") if request.param == "made" else recorded_folder(DATA)
+    )
 
 
 @pytest.fixture(scope="session")
@@ -83,7 +89,9 @@ def file(request: pytest.FixtureRequest) -> Path:
     return path if path.is_absolute() else request.getfixturevalue("made_crashes") / path
 
 
-untimed = settings(database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow])  # a machine may be busy
+untimed = settings(
+    database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)  # a machine may be busy
 settings.register_profile("same", untimed, derandomize=True)
 settings.register_profile("new", untimed, print_blob=True)
 settings.load_profile(
@@ -125,14 +133,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return
     for item in items:
         if not item.get_closest_marker("spread"):
-            needed = getattr(item, "fixturenames", ())  # items of launch_testing and other plugins need not have any
-            item.add_marker(pytest.mark.xdist_group("browser" if "browser" in needed else item.path.stem))
+            needed = getattr(
+                item, "fixturenames", ()
+            )  # items of launch_testing and other plugins need not have any
+            item.add_marker(
+                pytest.mark.xdist_group("browser" if "browser" in needed else item.path.stem)
+            )
     items.sort(key=_place)
 
 
 def _place(item: pytest.Item) -> int:
     group = item.get_closest_marker("xdist_group")
-    return ORDER.get((group.args[0] if group else item.path.stem).removeprefix("test_"), len(ORDER))
+    return ORDER.get(
+        (group.args[0] if group else item.path.stem).removeprefix("test_"), len(ORDER)
+    )
 
 
 def pytest_collection_finish() -> None:

@@ -9,7 +9,9 @@ from pathlib import Path
 LONG = os.environ.get("SCENARIO_GEN_TESTS") == "long"
 """Whether this is the long form: also what is marked `long`, and larger counts."""
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 """Where recorded data lies, if it does; the fixture `data` gives it, or a folder laid out alike."""
 
 VEHICLES = {

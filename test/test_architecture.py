@@ -18,7 +18,18 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last: a room is a folder or a module of scenario_gen, and imports none that stands behind it.
 FOUNDATION = {"base", "numerics", "types"}
-ROOMS = ("base", "numerics", "types", "bags", "logs", "template", "roads", "method", "pipeline", "output")
+ROOMS = (
+    "base",
+    "numerics",
+    "types",
+    "bags",
+    "logs",
+    "template",
+    "roads",
+    "method",
+    "pipeline",
+    "output",
+)
 ROOMS += ("closed_loop", "corpus", "ros", "cli", "__main__")
 # The same of the stages, folders or modules of scenario_gen/method.
 STAGES = (
@@ -43,14 +54,20 @@ CONCEPTS = {
     ),
     "gap of two motions in space and time": ("logs/gap.py", r"def \w*space_time_gap\("),
     "growing of groups": ("logs/growing.py", r"class Growth\b|def \w*grow_groups?\("),
-    "least squares of a placement": ("template/starts.py", r"def \w*(?:least_squares|solve_starts)\("),
+    "least squares of a placement": (
+        "template/starts.py",
+        r"def \w*(?:least_squares|solve_starts)\(",
+    ),
     "RRT*-Connect": ("method/routing/search/growth.py", r"def _?cheapest_parent\("),
     "fit, plan, sample": ("method/chain.py", r"(?s)\A(?=.*\bfit_template\()(?=.*\bplan_routes\()"),
     "latitude and longitude": ("logs/geodesy.py", r"(?:import|from) pyproj|6_?378_?137|6_?371_?0"),
     "folders that replace others": ("base/folders/", r"renameat2|RENAME_EXCHANGE"),
     "object stores": ("base/stores.py", r"(?:import|from) fsspec"),
     "cells of a polygon": ("roads/vector/raster.py", r"rasteri[sz]e\(|np\.add\.at\(winding"),
-    "lanes of a road that is drawn": ("roads/drawn.py", r"LaneNetwork\([^()]*(?:\([^()]*\)[^()]*)*drawn=True, drawn_for"),
+    "lanes of a road that is drawn": (
+        "roads/drawn.py",
+        r"LaneNetwork\([^()]*(?:\([^()]*\)[^()]*)*drawn=True, drawn_for",
+    ),
     "what is painted on a road": ("types/markings.py", r"class Marking\b"),
     "files of bags": ("bags/storage/", r"(?:import|from) (?:rosbags|mcap)\b"),
 }
@@ -82,7 +99,9 @@ def stage(path: Path) -> str:
 def rooms_imported() -> dict[str, set[str]]:
     """Return which rooms each room imports."""
     found: dict[str, set[str]] = {name: set() for name in ROOMS}
-    for path in (path for path in PYTHON_FILES if PACKAGE in path.parents and room(path) != "__init__"):
+    for path in (
+        path for path in PYTHON_FILES if PACKAGE in path.parents and room(path) != "__init__"
+    ):
         names = {name.split(".")[1] for name in imported(path) if name.startswith("scenario_gen.")}
         found[room(path)] |= (names & set(ROOMS)) - {room(path)}
     return found
@@ -90,14 +109,23 @@ def rooms_imported() -> dict[str, set[str]]:
 
 def test_no_room_imports_what_stands_behind_it():
     found = rooms_imported()
-    assert not [(name, other) for name, others in found.items() for other in others if ROOMS.index(other) > ROOMS.index(name)]
+    assert not [
+        (name, other)
+        for name, others in found.items()
+        for other in others
+        if ROOMS.index(other) > ROOMS.index(name)
+    ]
 
 
 def test_no_stage_imports_what_stands_behind_it():
     for path in (path for path in (PACKAGE / "method").rglob("*.py") if stage(path) != "__init__"):
         parts = [name.split(".") for name in imported(path)]
-        used = {part[2] for part in parts if part[:2] == ["scenario_gen", "method"] and len(part) > 2}
-        assert not [other for other in used if STAGES.index(other) > STAGES.index(stage(path))], path
+        used = {
+            part[2] for part in parts if part[:2] == ["scenario_gen", "method"] and len(part) > 2
+        }
+        assert not [other for other in used if STAGES.index(other) > STAGES.index(stage(path))], (
+            path
+        )
 
 
 def test_every_concept_has_one_home():
@@ -115,19 +143,26 @@ def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():
     for path in PYTHON_FILES:
         names = [name.split(".") for name in imported(path)]
         if PACKAGE not in path.parents:
-            assert {parts[1] for parts in names if parts[0] == "scenario_gen" and len(parts) > 1} <= FOUNDATION, path
+            assert {
+                parts[1] for parts in names if parts[0] == "scenario_gen" and len(parts) > 1
+            } <= FOUNDATION, path
         elif room(path) not in ("bags", "ros"):
             assert "msg_conventions" not in {parts[0] for parts in names}, path
 
 
 def test_no_modules_import_each_other_in_a_circle():
     """Imports inside of functions and those for type checkers count; the public names are looked up lazily, and do not."""
-    files = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in PYTHON_FILES}
+    files = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in PYTHON_FILES
+    }
     del files["scenario_gen"]
     graph = {}
     for name, path in files.items():
         known = imported(path) & set(files) - {name}  # of `from package import module`, the module
-        graph[name] = {one for one in known if not any(other.startswith(f"{one}.") for other in known)}
+        graph[name] = {
+            one for one in known if not any(other.startswith(f"{one}.") for other in known)
+        }
     TopologicalSorter(graph).prepare()  # a CycleError names the circle
 
 
@@ -139,9 +174,22 @@ def test_rclpy_is_imported_only_in_the_nodes():
 
 def test_the_command_line_loads_no_library_before_a_command_needs_it():
     """Else `scenario-gen --help` takes seconds."""
-    heavy = {"numpy", "scipy", "numba", "pandas", "shapely", "jinja2", "rosbags", "yaml", "duckdb", "distributed"}
+    heavy = {
+        "numpy",
+        "scipy",
+        "numba",
+        "pandas",
+        "shapely",
+        "jinja2",
+        "rosbags",
+        "yaml",
+        "duckdb",
+        "distributed",
+    }
     program = "import sys, scenario_gen.__main__, scenario_gen.cli.commands; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
     assert not heavy & set(loaded)
 
 
@@ -152,14 +200,20 @@ def test_no_file_needs_a_map():
 
 def test_nothing_of_this_machine_and_no_registry_is_named():
     """Tracked text names no absolute home or work path and no package registry's host."""
-    files = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    files = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     if files.returncode:
         pytest.skip("not a git checkout")
     hosts = "|".join((r"py" r"pi\.org", r"python" r"hosted", r"npm" r"js\.org", r"index.url"))
     leak = re.compile(rf"(?<![\w.])/(?:work|root|home/\w+)/|{hosts}", re.IGNORECASE)
     for name in files.stdout.split():
         path = ROOT / name
-        if path == Path(__file__) or not path.is_file() or path.suffix in {".mcap", ".png", ".db3"}:
+        if (
+            path == Path(__file__)
+            or not path.is_file()
+            or path.suffix in {".mcap", ".png", ".db3"}
+        ):
             continue
         found = leak.search(path.read_text(errors="replace"))
         assert not found, f"{name}: {found.group() if found else ''}"

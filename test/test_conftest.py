@@ -16,12 +16,36 @@ def test_a_worker_that_crashes_ends_the_run_and_its_test_is_named(tmp_path):
         (tmp_path / name).write_text(Path(__file__).with_name(name).read_text())
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  recorded\n  spread\n  long\n")
     (tmp_path / "test_crash.py").write_text("import os\ndef test_crash(): os.abort()\n")
-    (tmp_path / "test_skip.py").write_text("import pytest\ndef test_skip(): pytest.skip('no disk')\n")
-    words = re.search(r"^PYTEST := .* pytest (.*)$", (Path(__file__).parents[1] / "Makefile").read_text(), re.MULTILINE)[1]
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words.split(), "-n", "2", str(tmp_path)]
+    (tmp_path / "test_skip.py").write_text(
+        "import pytest\ndef test_skip(): pytest.skip('no disk')\n"
+    )
+    words = re.search(
+        r"^PYTEST := .* pytest (.*)$",
+        (Path(__file__).parents[1] / "Makefile").read_text(),
+        re.MULTILINE,
+    )[1]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-p",
+        "no:cacheprovider",
+        *words.split(),
+        "-n",
+        "2",
+        str(tmp_path),
+    ]
     variables = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}
     variables |= {"PYTHONPATH": str(tmp_path), "CI": "true"}
-    run = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False, timeout=300)
+    run = subprocess.run(
+        command,
+        cwd=tmp_path,
+        env=variables,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
     assert run.returncode == 1, run.stdout + run.stderr
     assert {"FAILED test_crash.py::test_crash", "FAILED test_skip.py::test_skip"} <= set(
         re.findall(r"FAILED [\w.:]+", run.stdout)

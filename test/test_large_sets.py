@@ -24,7 +24,14 @@ from scenario_gen.method import reference_sets
 from scenario_gen.method.evaluation import EvaluationConfig, MEASURED
 from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.sampling import Plan, regenerate, sample, sampler
-from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, index_of, LEVEL_SIZE, LEVELS, place_of
+from scenario_gen.method.sampling.sampler import (
+    BLOCK,
+    DIRECTED,
+    index_of,
+    LEVEL_SIZE,
+    LEVELS,
+    place_of,
+)
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
@@ -46,7 +53,9 @@ def made(chain, count):
 
 
 def same(one, other):
-    return one.index == other.index and all(np.allclose(getattr(one, f), getattr(other, f), atol=1e-6) for f in FIELDS)
+    return one.index == other.index and all(
+        np.allclose(getattr(one, f), getattr(other, f), atol=1e-6) for f in FIELDS
+    )
 
 
 def test_drawn_again_are_the_same_bits(chain, monkeypatch):
@@ -54,10 +63,16 @@ def test_drawn_again_are_the_same_bits(chain, monkeypatch):
     monkeypatch.setattr(sample, "KEPT", 20)
     again = made(chain, 70)
     assert isinstance(kept.scenarios, tuple) and not isinstance(again.scenarios, tuple)
-    assert (again.requested, again.candidates, again.refused) == (kept.requested, kept.candidates, kept.refused)
+    assert (again.requested, again.candidates, again.refused) == (
+        kept.requested,
+        kept.candidates,
+        kept.refused,
+    )
     assert len(again.scenarios) == 70
     assert all(same(*pair) for pair in zip(kept.scenarios, again.scenarios, strict=True))
-    assert all(same(*pair) for pair in zip(kept.scenarios[5:60:3], again.scenarios[5:60:3], strict=True))
+    assert all(
+        same(*pair) for pair in zip(kept.scenarios[5:60:3], again.scenarios[5:60:3], strict=True)
+    )
     assert same(kept.scenarios[-1], again.scenarios[-1])
 
 
@@ -81,10 +96,18 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     assert len(beyond.scenarios) == 200
     assert len({s.index for s in beyond.scenarios}) == 200
     assert max(s.index for s in beyond.scenarios) >= sampler.LEVEL_SLOTS * 2 * BLOCK
-    assert all(a.position.tobytes() == b.position.tobytes() for a, b in zip(plain.scenarios, beyond.scenarios, strict=True))
+    assert all(
+        a.position.tobytes() == b.position.tobytes()
+        for a, b in zip(plain.scenarios, beyond.scenarios, strict=True)
+    )
     last = beyond.scenarios[-1]
-    placed, waits = answer(chain, Request(), count=1), waits_to_keep(chain.encounter, chain.segmentation)
-    plan = Plan(chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.requested, waits)
+    placed, waits = (
+        answer(chain, Request(), count=1),
+        waits_to_keep(chain.encounter, chain.segmentation),
+    )
+    plan = Plan(
+        chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.requested, waits
+    )
     assert same(regenerate(plan, chain.sampling, seed=chain.seed, index=last.index), last)
 
 
@@ -130,6 +153,8 @@ def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
     case = pipeline.generate(chain.encounter, "t_intersection", config, count=24, seed=7)
     rows = {row["name"]: row for row in json.loads(case.evaluation.to_json())["rows"]}
     assert [rows[name]["samples"] for name in (WITH, WITHOUT, UNIFORM)] == [10, 10, 10]
-    (said,) = [note for note in rows[WITH]["notes"] if note.startswith("measured on 10 of 24 scenarios")]
+    (said,) = [
+        note for note in rows[WITH]["notes"] if note.startswith("measured on 10 of 24 scenarios")
+    ]
     assert not rows[WITHOUT]["notes"][1:] and said in render(ReportInput([case]))
     assert len(case.references[WITHOUT].scenarios) == 10

@@ -25,14 +25,20 @@ ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
 COUNT = 50 if LONG else 5
 CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=1000 if LONG else 10))
-NARROW = replace(CONFIG, sampling=replace(CONFIG.sampling, variety="narrow"), evaluation=replace(CONFIG.evaluation, compare=True))
+NARROW = replace(
+    CONFIG,
+    sampling=replace(CONFIG.sampling, variety="narrow"),
+    evaluation=replace(CONFIG.evaluation, compare=True),
+)
 pytestmark = pytest.mark.spread
 
 
 def recheck(case: GenerationResult) -> dict[str, str]:
     """Return what an independent checker finds wrong with the published scenarios, and the first of each kind."""
     account = Account()
-    own = Recheck(case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size))
+    own = Recheck(
+        case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size)
+    )
     own.check(case.generated.scenarios, account)
     return account.first
 
@@ -48,9 +54,14 @@ def assert_sound(case: GenerationResult) -> None:
 
 def assert_nearer(case: GenerationResult, figure: str) -> None:
     """Scenarios with changepoints are more like the template than those without."""
-    with_, without = case.evaluation.value(case.row_name, figure), case.evaluation.value(WITHOUT, figure)
+    with_, without = (
+        case.evaluation.value(case.row_name, figure),
+        case.evaluation.value(WITHOUT, figure),
+    )
     if without >= 0.03:
-        assert with_ < without, f"{figure}: {with_:.3f} with, {without:.3f} without changepoints on {case.road.name}"
+        assert with_ < without, (
+            f"{figure}: {with_:.3f} with, {without:.3f} without changepoints on {case.road.name}"
+        )
 
 
 def at_the_recorded_pace(case: GenerationResult) -> GenerationResult:
@@ -60,9 +71,15 @@ def at_the_recorded_pace(case: GenerationResult) -> GenerationResult:
     than changepoints do.
     """
     fast = replace(NARROW.sampling, bend_acceleration=10.0)
-    config = replace(NARROW, sampling=fast, limits=replace(CONFIG.limits, car=Dynamics(max_lateral_acceleration=14.4)))
+    config = replace(
+        NARROW,
+        sampling=fast,
+        limits=replace(CONFIG.limits, car=Dynamics(max_lateral_acceleration=14.4)),
+    )
     made = generate(case.encounter, case.road, config, count=COUNT, seed=7)
-    assert made.generated.scenarios and not any("the pace is lowered" in sentence for sentence in made.generated.adaptations)
+    assert made.generated.scenarios and not any(
+        "the pace is lowered" in sentence for sentence in made.generated.adaptations
+    )
     return made
 
 
@@ -89,7 +106,13 @@ def test_generates_valid_scenarios_on_at_least_two_roads(name, data):
 def test_ngsim_encounters_run_on_their_own_map(name, data):
     (encounter,) = read_log(data / "trajectories" / name).encounters
     own = next(one for one in OWN_MAPS if one.split("-")[0].removeprefix("USA_") in name)
-    case = generate(encounter, str(data / "maps" / "occupancy_grids" / f"{own}.yaml"), NARROW, count=COUNT, seed=7)
+    case = generate(
+        encounter,
+        str(data / "maps" / "occupancy_grids" / f"{own}.yaml"),
+        NARROW,
+        count=COUNT,
+        seed=7,
+    )
     assert_sound(case)
     assert_nearer(case, "e_speed")
     slowed = any("the pace is lowered" in sentence for sentence in case.generated.adaptations)
@@ -100,7 +123,16 @@ def test_ngsim_encounters_run_on_their_own_map(name, data):
 def test_same_seed_same_scenarios_and_another_seed_others(data):
     (path,) = data.glob("trajectories/*/encounter_b*.csv")
     (encounter,) = read_log(path).encounters
-    first, again, other = (generate(encounter, "corridor", CONFIG, count=3, seed=seed) for seed in (7, 7, 8))
-    for a, b, c in zip(first.generated.scenarios, again.generated.scenarios, other.generated.scenarios, strict=True):
-        assert a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
+    first, again, other = (
+        generate(encounter, "corridor", CONFIG, count=3, seed=seed) for seed in (7, 7, 8)
+    )
+    for a, b, c in zip(
+        first.generated.scenarios,
+        again.generated.scenarios,
+        other.generated.scenarios,
+        strict=True,
+    ):
+        assert (
+            a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
+        )
         assert a.position.shape != c.position.shape or not np.array_equal(a.position, c.position)

@@ -39,7 +39,9 @@ def driven(points, speeds):
     reached = np.concatenate(([0.0], np.cumsum(np.hypot(*step.T))))
     yaw = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
     x, y = (np.interp(along, reached, column) for column in points.T)
-    return np.column_stack((x, y, np.interp(along, (reached[1:] + reached[:-1]) / 2.0, yaw), speeds))
+    return np.column_stack(
+        (x, y, np.interp(along, (reached[1:] + reached[:-1]) / 2.0, yaw), speeds)
+    )
 
 
 def straight(start, end):
@@ -49,7 +51,13 @@ def straight(start, end):
 def left_turn(radius, before):
     angle = np.linspace(0.0, np.pi / 2.0, 60)
     arc = np.column_stack((radius * np.sin(angle), radius * (1.0 - np.cos(angle))))
-    return np.concatenate((straight((-before, 0.0), (0.0, 0.0))[:-1], arc, straight(arc[-1], arc[-1] + (0.0, 80.0))[1:]))
+    return np.concatenate(
+        (
+            straight((-before, 0.0), (0.0, 0.0))[:-1],
+            arc,
+            straight(arc[-1], arc[-1] + (0.0, 80.0))[1:],
+        )
+    )
 
 
 def standing(speed, begin, end):
@@ -63,7 +71,12 @@ def log_of(**road_users):
     for name, (kind, states) in road_users.items():
         length, width = SIZES.get(kind, (VEHICLE_TYPES[kind].length, VEHICLE_TYPES[kind].width))
         columns = dict(zip(("x", "y", "heading", "speed"), states.T, strict=True))
-        rows.append(pd.DataFrame({"id": name, "agent_type": kind, "t": T, "length": length, "width": width} | columns))
+        rows.append(
+            pd.DataFrame(
+                {"id": name, "agent_type": kind, "t": T, "length": length, "width": width}
+                | columns
+            )
+        )
     return pd.concat(rows)
 
 
@@ -102,10 +115,18 @@ def proven(scenario, limits=Limits()):
     """Whether a scenario keeps to the limits of each type and no footprints overlap, at its instants alone."""
     for n, vehicle in enumerate(scenario.vehicles):
         own, there = limits.of(vehicle.type), scenario.there[n]
-        step, speed, turn = np.diff(scenario.time[there]), scenario.speed[n, there], np.diff(scenario.heading[n, there])
+        step, speed, turn = (
+            np.diff(scenario.time[there]),
+            scenario.speed[n, there],
+            np.diff(scenario.heading[n, there]),
+        )
         way = np.hypot(*np.diff(scenario.position[n, there], axis=0).T)
         rate = np.diff(speed) / step
-        kept = speed.max() <= own.max_speed and -own.max_deceleration <= rate.min() and rate.max() <= own.max_acceleration
+        kept = (
+            speed.max() <= own.max_speed
+            and -own.max_deceleration <= rate.min()
+            and rate.max() <= own.max_acceleration
+        )
         kept &= bool((np.abs(turn) <= min(own.sharpest, 1e6) * way + 2e-4).all())
         if not kept:
             return False
@@ -116,7 +137,8 @@ def proven(scenario, limits=Limits()):
 
 
 @pytest.mark.parametrize(
-    ("road", "name"), [("corridor", name) for name in WORLDS] + [("four_way", "a car waits for a pedestrian")]
+    ("road", "name"),
+    [("corridor", name) for name in WORLDS] + [("four_way", "a car waits for a pedestrian")],
 )
 def test_road_users_of_all_types_are_generated_within_their_limits(road, name):
     table, edge = WORLDS[name]
@@ -124,15 +146,22 @@ def test_road_users_of_all_types_are_generated_within_their_limits(road, name):
     assert [vehicle.type for vehicle in encounter.vehicles] == list(
         dict(zip(table["id"], table["agent_type"], strict=True)).values()
     )
-    edges = [(encounter.vehicles[one.who].id, encounter.vehicles[one.whom].id, one.kind) for one in reactions_of(encounter).edges]
+    edges = [
+        (encounter.vehicles[one.who].id, encounter.vehicles[one.whom].id, one.kind)
+        for one in reactions_of(encounter).edges
+    ]
     assert edge is None or edge in edges
     case, account = generate(encounter, road, count=5, seed=1), Account()
     made = case.generated.scenarios
     assert len(made) == 5 and all(proven(scenario) for scenario in made)
-    judge = Recheck(case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size))
+    judge = Recheck(
+        case.encounter, case.road, case.fit.requested, bool(case.segmentation.changepoints.size)
+    )
     judge.check(made, account)  # pedestrians may be off the lanes, all others not
     assert account.found == {}
-    judge.check([replace(one, position=np.add(one.position, (0.0, 12.0))) for one in made], account)
+    judge.check(
+        [replace(one, position=np.add(one.position, (0.0, 12.0))) for one in made], account
+    )
     assert account.found["off_road"] >= 5 or road != "corridor"
     assert {tuple(vehicle.type for vehicle in scenario.vehicles) for scenario in made} == {
         tuple(v.type for v in encounter.vehicles)
@@ -152,16 +181,27 @@ def test_pedestrians_stop_and_go_within_a_step_and_walk_as_people_do():
     begin, end, braking, step = 4.0, 8.0, 3.0, 0.8
     speeds = np.clip(np.where(begin > T, braking * (begin - T), braking * (T - end)), 0.0, 1.4)
     walks = driven(straight((0.0, -7.5), (0.0, 40.0)), speeds)
-    table = log_of(c=("car", driven(straight((-40.0, 0.0), (120.0, 0.0)), np.full(len(T), 8.0))), p=("pedestrian", walks))
-    made = generate(read_log(table).encounters[0], "corridor", count=60, seed=1).generated.scenarios
+    table = log_of(
+        c=("car", driven(straight((-40.0, 0.0), (120.0, 0.0)), np.full(len(T), 8.0))),
+        p=("pedestrian", walks),
+    )
+    made = generate(
+        read_log(table).encounters[0], "corridor", count=60, seed=1
+    ).generated.scenarios
     walker = [vehicle.id for vehicle in made[0].vehicles].index("p")
     speed = [scenario.speed[walker] for scenario in made]
     waits = np.array([0.1 * np.count_nonzero(one < 0.05) for one in speed])
     assert 3.0 < waits.mean() < 4.5 and waits.std() > 0.6 and waits.min() > 1.5
-    starts = [0.1 * one[(one > 0.05) & (one < 1.0)].sum() for one in speed]  # metres, of stopping and starting together
+    starts = [
+        0.1 * one[(one > 0.05) & (one < 1.0)].sum() for one in speed
+    ]  # metres, of stopping and starting together
     assert max(starts) < 2.0 * step
     steady = np.concatenate([one[one > 1.0] for one in speed])
-    assert (np.percentile(steady, [1, 99]) < 2.0).all() and 1.2 < steady.mean() < 1.5 and steady.std() > 0.1
+    assert (
+        (np.percentile(steady, [1, 99]) < 2.0).all()
+        and 1.2 < steady.mean() < 1.5
+        and steady.std() > 0.1
+    )
     assert np.mean([np.percentile(one[one > 0.05], 20) > 0.5 for one in speed]) > 0.9
 
 
@@ -171,12 +211,19 @@ def test_a_bus_of_12_m_drives_its_own_curves(road):
     made = generate(encounter, road, count=3, seed=1)
     (bus,) = (n for n, vehicle in enumerate(made.encounter.vehicles) if vehicle.type == "bus")
     drive = ClosedLoop(made.generated.scenarios[0], bus).limits
-    assert (drive.max_curvature, drive.max_acceleration) == (0.125, 3.0)  # a bus as ego turns and speeds up like one
+    assert (drive.max_curvature, drive.max_acceleration) == (
+        0.125,
+        3.0,
+    )  # a bus as ego turns and speeds up like one
     bend = np.abs(np.diff(made.routes[bus].points[:, 2]) / np.diff(made.routes[bus].length))
-    assert bend.max() <= VEHICLE_TYPES["bus"].dynamics.planned.max_curvature and all(map(proven, made.generated.scenarios))
+    assert bend.max() <= VEHICLE_TYPES["bus"].dynamics.planned.max_curvature and all(
+        map(proven, made.generated.scenarios)
+    )
     across, along = (np.linspace(-0.5, 0.5, count) for count in (9, 41))
     for scenario in made.generated.scenarios:  # all of its footprint, not its outline alone
-        ahead = np.stack((np.cos(scenario.heading[bus]), np.sin(scenario.heading[bus])), axis=-1)[:, None, None]
+        ahead = np.stack((np.cos(scenario.heading[bus]), np.sin(scenario.heading[bus])), axis=-1)[
+            :, None, None
+        ]
         left = np.stack((-ahead[..., 1], ahead[..., 0]), axis=-1)
         size = scenario.vehicles[bus]
         swept = scenario.position[bus][:, None, None] + along[:, None, None] * size.length * ahead
@@ -186,7 +233,9 @@ def test_a_bus_of_12_m_drives_its_own_curves(road):
 @pytest.mark.parametrize("road", ["straight", "t_intersection", "curve"])
 def test_who_walks_makes_no_arm_of_a_road(road):
     (encounter,) = read_log(WORLDS["a car waits for a pedestrian"][0]).encounters
-    made = generate(encounter, road, PipelineConfig(road=RoadConfig(crossing="zebra")), count=3, seed=1)
+    made = generate(
+        encounter, road, PipelineConfig(road=RoadConfig(crossing="zebra")), count=3, seed=1
+    )
     assert len(made.generated.scenarios) == 3 and all(map(proven, made.generated.scenarios))
     walked = made.generated.scenarios[0].position[1]
     assert not made.road.drivable_at(walked[[0, -1]]).any()  # from kerb to kerb, beyond both
@@ -196,7 +245,9 @@ def test_a_corridor_has_its_crossing_across_the_road_and_no_cycle_lane():
     (encounter,) = read_log(WORLDS["a car waits for a pedestrian"][0]).encounters
     (walk,) = build_road("corridor", encounter, RoadConfig(crossing="zebra")).lanes.others
     width = VEHICLE_TYPES["car"].width + 2.0 * RoadConfig().corridor_margin
-    assert walk.crossing and np.hypot(*(walk.centre[-1] - walk.centre[0])) == pytest.approx(width, abs=0.5)
+    assert walk.crossing and np.hypot(*(walk.centre[-1] - walk.centre[0])) == pytest.approx(
+        width, abs=0.5
+    )
     with pytest.raises(RefusedError, match="road corridor is drawn without cycle lanes"):
         build_road("corridor", encounter, RoadConfig(cycle_lane=1.5))
 
@@ -204,43 +255,71 @@ def test_a_corridor_has_its_crossing_across_the_road_and_no_cycle_lane():
 def overtaken():
     """A car that passes a bicycle on its right."""
     bicycle = driven(straight((20.0, -2.4), (300.0, -2.4)), np.full(len(T), 4.5))
-    return log_of(a=("car", driven(straight((0.0, 0.0), (300.0, 0.0)), np.full(len(T), 9.0))), b=("bicycle", bicycle))
+    return log_of(
+        a=("car", driven(straight((0.0, 0.0), (300.0, 0.0)), np.full(len(T), 9.0))),
+        b=("bicycle", bicycle),
+    )
 
 
 @pytest.mark.parametrize(
-    ("road", "table"), [("straight", overtaken()), ("four_way", meeting("bicycle", 8.0)), ("t_intersection", overtaken())]
+    ("road", "table"),
+    [
+        ("straight", overtaken()),
+        ("four_way", meeting("bicycle", 8.0)),
+        ("t_intersection", overtaken()),
+    ],
 )
 def test_a_bicycle_is_on_the_cycle_lane_where_there_is_one(tmp_path, road, table):
     (encounter,) = read_log(table).encounters
-    made = generate(encounter, road, PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=3, seed=1)
+    made = generate(
+        encounter, road, PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=3, seed=1
+    )
     (n,) = (n for n, vehicle in enumerate(made.encounter.vehicles) if vehicle.type == "bicycle")
     own = cells_of(made.road, made.road.lanes.others)
-    row, column, _ = made.road.cells(np.concatenate([scenario.position[n] for scenario in made.generated.scenarios]))
+    row, column, _ = made.road.cells(
+        np.concatenate([scenario.position[n] for scenario in made.generated.scenarios])
+    )
     assert own[row, column].all()
-    row, column, _ = made.road.cells(np.concatenate([scenario.position[1 - n] for scenario in made.generated.scenarios]))
+    row, column, _ = made.road.cells(
+        np.concatenate([scenario.position[1 - n] for scenario in made.generated.scenarios])
+    )
     assert made.road.drivable[row, column].all() and all(map(proven, made.generated.scenarios))
     write_results(tmp_path / "out", [made], title="", quality=(), provenance={})
-    for trial in read_trials(tmp_path / "out" / "bag", encounter.vehicles[n].id):  # as the ego it is on the road there, too
+    for trial in read_trials(
+        tmp_path / "out" / "bag", encounter.vehicles[n].id
+    ):  # as the ego it is on the road there, too
         loop = ClosedLoop(trial.scenario, trial.ego, trial.road)
-        assert loop.road.drivable_at(trial.scenario.position[loop.ego])[trial.scenario.there[loop.ego]].all()
+        assert loop.road.drivable_at(trial.scenario.position[loop.ego])[
+            trial.scenario.there[loop.ego]
+        ].all()
 
 
 def test_who_follows_a_bicycle_still_does_where_there_is_a_cycle_lane():
     (encounter,) = read_log(WORLDS["a car follows a bicycle"][0]).encounters
-    made = generate(encounter, "straight", PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=1, seed=1)
+    made = generate(
+        encounter, "straight", PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=1, seed=1
+    )
     assert not made.fit.losses and {edge.kind for edge in made.generated.graph.edges} == {"follow"}
 
 
 def test_a_road_too_tight_for_a_bus_says_where_and_what_it_needs(tmp_path):
     bus = driven(left_turn(6.25, 25.0) * (1.0, -1.0), np.full(len(T), 4.0))
-    table = log_of(u=("bus", bus), c=("car", driven(straight((6.25, 52.0), (6.25, -80.0)), np.full(len(T), 3.5))))
+    table = log_of(
+        u=("bus", bus),
+        c=("car", driven(straight((6.25, 52.0), (6.25, -80.0)), np.full(len(T), 3.5))),
+    )
     (encounter,) = read_log(table).encounters
-    long = PipelineConfig(planning=PlanningConfig(iterations=500), limits=Limits(bus=Dynamics(max_curvature=0.07)))
+    long = PipelineConfig(
+        planning=PlanningConfig(iterations=500), limits=Limits(bus=Dynamics(max_curvature=0.07))
+    )
     with pytest.raises(RefusedError) as refused:
         generate(encounter, str(write(tmp_path, ".xodr")), long, count=1)
     said = str(refused.value)
     assert "too tight for a bus of 12 m by 2.55 m: at (" in said and "\n" not in said
-    assert re.search(r"bend with 0\.\d+ 1/m \(radius \d+\.\d m\)", said) and "at most 0.063 1/m (15.9 m)" in said
+    assert (
+        re.search(r"bend with 0\.\d+ 1/m \(radius \d+\.\d m\)", said)
+        and "at most 0.063 1/m (15.9 m)" in said
+    )
 
 
 def test_a_limit_binds_all_stages_and_a_refusal_names_it():
@@ -260,7 +339,14 @@ def test_cars_that_wait_for_pedestrians_are_found():
     generator = np.random.default_rng(3)
     found = 0
     for _ in range(20):
-        walks, drives, away = generator.uniform(0.8, 1.8), generator.uniform(5.0, 10.0), generator.uniform(8.0, 9.5)
+        walks, drives, away = (
+            generator.uniform(0.8, 1.8),
+            generator.uniform(5.0, 10.0),
+            generator.uniform(8.0, 9.5),
+        )
         (encounter,) = read_log(waits_for_pedestrian(walks, drives, away)).encounters
-        found += any(edge.kind == "yield" and encounter.vehicles[edge.who].id == "c" for edge in reactions_of(encounter).edges)
+        found += any(
+            edge.kind == "yield" and encounter.vehicles[edge.who].id == "c"
+            for edge in reactions_of(encounter).edges
+        )
     assert found >= 18

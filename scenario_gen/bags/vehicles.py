@@ -29,7 +29,16 @@ from scenario_gen.base.errors import guarded
 from scenario_gen.types import Encounter
 
 FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, odometry.TYPE, trajectory.TYPE
-KINDS = ("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian")  # by label
+KINDS = (
+    "unknown",
+    "car",
+    "truck",
+    "bus",
+    "trailer",
+    "motorcycle",
+    "bicycle",
+    "pedestrian",
+)  # by label
 UNAVAILABLE, SIGN_UNKNOWN = 0, 1  # of orientation_availability
 _SLOW = 0.5  # m/s: below, a velocity does not tell which way an object faces
 
@@ -74,12 +83,18 @@ def decode_sample(data: bytes, kind: str, what: str) -> Sample:
     message, stamp = _decode(data, kind, what)
     if kind == FIX:
         known = message.status.status >= 0
-        return Sample(stamp, (message.latitude, message.longitude) if known else (math.nan, math.nan))
+        return Sample(
+            stamp, (message.latitude, message.longitude) if known else (math.nan, math.nan)
+        )
     if kind == TWIST:
         return Sample(stamp, speed=speed_of(message.twist.linear.x, message.twist.linear.y))
     pose, linear = message.pose.pose, message.twist.twist.linear  # the speed is in the body frame
     return Sample(
-        stamp, (pose.position.x, pose.position.y), _heading(pose), np.hypot(linear.x, linear.y), message.header.frame_id
+        stamp,
+        (pose.position.x, pose.position.y),
+        _heading(pose),
+        np.hypot(linear.x, linear.y),
+        message.header.frame_id,
     )
 
 
@@ -116,10 +131,15 @@ def _heading(pose: Any) -> float:
 
 
 def _object(entry: Any) -> TrackedObject:
-    best = max(entry.classification, key=lambda candidate: float(candidate.probability), default=None)
+    best = max(
+        entry.classification, key=lambda candidate: float(candidate.probability), default=None
+    )
     label = int(best.label) if best is not None else 0
     kinematics = entry.kinematics
-    pose, linear = kinematics.pose_with_covariance.pose, kinematics.twist_with_covariance.twist.linear
+    pose, linear = (
+        kinematics.pose_with_covariance.pose,
+        kinematics.twist_with_covariance.twist.linear,
+    )
     heading = _heading(pose)
     known = int(kinematics.orientation_availability)
     if known == UNAVAILABLE or (known == SIGN_UNKNOWN and abs(linear.x) < _SLOW):

@@ -12,12 +12,16 @@ from typing import Any, NoReturn
 
 from scenario_gen.base.errors import guarded, InputError
 
-MOST_YAML = 512 * 1024  # bytes; the parameters of all stages take 9 kB, the metadata of a bag of 1000 topics 500 kB
+MOST_YAML = (
+    512 * 1024
+)  # bytes; the parameters of all stages take 9 kB, the metadata of a bag of 1000 topics 500 kB
 MOST_JSON = 8 * 1024 * 1024  # bytes; the figures of one case take 9 kB
 DEEPEST = 32  # nested lists and mappings
 WHOLE = 2**63  # bound of the integers that parameters and stamps can be
 LARGEST = 1e300  # of a number in JSON: finite, also after some arithmetic
-PLAIN = frozenset(f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map"))
+PLAIN = frozenset(
+    f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")
+)
 NUMBER = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
 COUNT = {"type": "integer", "minimum": 0, "maximum": WHOLE - 1}
 
@@ -38,7 +42,9 @@ def _loader() -> Any:
         def construct_yaml_int(self, node: Any) -> int:
             value: int = super().construct_yaml_int(node)
             if not -WHOLE <= value < WHOLE:
-                raise yaml.constructor.ConstructorError(None, None, "an integer of more than 64 bits", node.start_mark)
+                raise yaml.constructor.ConstructorError(
+                    None, None, "an integer of more than 64 bits", node.start_mark
+                )
             return value
 
     Loader.add_constructor("tag:yaml.org,2002:int", Loader.construct_yaml_int)
@@ -64,8 +70,15 @@ def parse_yaml(text: str, what: str) -> Any:
         return yaml.load(text, Loader=_loader())
     except yaml.YAMLError as error:
         raise InputError(f"{what}: {_yaml_problem(error)}") from error
-    except (ValueError, KeyError, IndexError, AttributeError) as error:  # PyYAML's own constructors, of `!!int ""` or `!!bool x`
-        raise InputError(f"{what}: a value does not suit its tag ({type(error).__name__})") from error
+    except (
+        ValueError,
+        KeyError,
+        IndexError,
+        AttributeError,
+    ) as error:  # PyYAML's own constructors, of `!!int ""` or `!!bool x`
+        raise InputError(
+            f"{what}: a value does not suit its tag ({type(error).__name__})"
+        ) from error
 
 
 def _check_events(text: str, what: str) -> None:
@@ -80,20 +93,32 @@ def _check_events(text: str, what: str) -> None:
     for event in yaml.parse(text, Loader=_loader()):
         place = f"{what}, line {event.start_mark.line + 1}, column {event.start_mark.column + 1}"
         if isinstance(event, yaml.AliasEvent):
-            raise InputError(f"{place}: the alias *{event.anchor} is not read; write the value out")
+            raise InputError(
+                f"{place}: the alias *{event.anchor} is not read; write the value out"
+            )
         tag = getattr(event, "tag", None)
         if tag not in (None, "!") and tag not in PLAIN:
-            raise InputError(f"{place}: the tag {tag} is not read; write plain text, numbers, lists and mappings")
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            raise InputError(
+                f"{place}: the tag {tag} is not read; write plain text, numbers, lists and mappings"
+            )
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
+            event, yaml.CollectionEndEvent
+        )
         if depth > DEEPEST:
-            raise InputError(f"{place}: lists or mappings nested more than {DEEPEST} deep are not read")
+            raise InputError(
+                f"{place}: lists or mappings nested more than {DEEPEST} deep are not read"
+            )
 
 
 def _yaml_problem(error: Exception) -> str:
     """Return place and problem in one line."""
     mark = getattr(error, "problem_mark", None)
     place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-    problem = getattr(error, "problem", None) or getattr(error, "reason", None) or " ".join(str(error).split())
+    problem = (
+        getattr(error, "problem", None)
+        or getattr(error, "reason", None)
+        or " ".join(str(error).split())
+    )
     return f"not YAML ({place}{problem})"
 
 
@@ -104,12 +129,16 @@ def read_bytes(path: Path, most: int, what: str, remedy: str = "") -> bytes:
         InputError: it cannot be read, is no regular file, or is too large.
     """
     try:
-        if not stat.S_ISREG(path.stat().st_mode):  # before it is opened: a pipe would wait for its writer
+        if not stat.S_ISREG(
+            path.stat().st_mode
+        ):  # before it is opened: a pipe would wait for its writer
             raise InputError(f"{what}: not a regular file")
         with path.open("rb") as file:
             data = file.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a name with a null byte
-        raise InputError(f"{what}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+        raise InputError(
+            f"{what}: cannot be read ({getattr(error, 'strerror', None) or error})"
+        ) from error
     if len(data) > most:
         raise InputError(f"{what}: {path.stat().st_size} bytes; at most {most} are read{remedy}")
     return data
@@ -179,9 +208,13 @@ def _check_schema(value: Any, what: str, schema: Mapping[str, Any]) -> None:
         error = next(jsonschema.Draft202012Validator(schema).iter_errors(value), None)
     if error is None:
         return
-    place = "".join(f"[{key}]" if isinstance(key, int) else f".{shown(key, 40)}" for key in error.absolute_path).lstrip(".")
+    place = "".join(
+        f"[{key}]" if isinstance(key, int) else f".{shown(key, 40)}" for key in error.absolute_path
+    ).lstrip(".")
     rule = f"{error.validator} {shown(error.validator_value, 120)}"
-    raise InputError(f"{what}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for {rule}")
+    raise InputError(
+        f"{what}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for {rule}"
+    )
 
 
 def check_shape(value: Any, shape: tuple[int, ...], what: str) -> None:

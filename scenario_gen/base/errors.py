@@ -53,7 +53,9 @@ def needs(extra: str, *modules: str) -> None:
     """
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
-        raise MissingExtraError(f"{', '.join(missing)} not installed; `pip install 'scenario_gen[{extra}]'` brings it")
+        raise MissingExtraError(
+            f"{', '.join(missing)} not installed; `pip install 'scenario_gen[{extra}]'` brings it"
+        )
 
 
 def presentable(text: str, longest: int = LONGEST) -> str:
@@ -102,13 +104,19 @@ def of_system(error: OSError, name: object = None, advice: str = "") -> InputErr
     place = "" if file is None else f"{file}: "
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         advice = advice or ROOM
-    reason = "is a folder; name a file" if isinstance(error, IsADirectoryError) else error.strerror or error
+    reason = (
+        "is a folder; name a file"
+        if isinstance(error, IsADirectoryError)
+        else error.strerror or error
+    )
     return InputError(f"{place}{reason}{advice}")
 
 
 def printable(text: str) -> str:
     """Return the text with characters that control a terminal (also bidi marks) written as in Python source."""
-    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
+    )
 
 
 def shown_error(error: Exception) -> str:
@@ -142,7 +150,9 @@ def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[N
     except ScenarioGenError:
         raise
     except turned as error:
-        raise InputError(f"{where}: {describe(error)}" + (f"; {remedy}" if remedy else "")) from error
+        raise InputError(
+            f"{where}: {describe(error)}" + (f"; {remedy}" if remedy else "")
+        ) from error
 
 
 @contextmanager

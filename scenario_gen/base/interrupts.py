@@ -50,7 +50,11 @@ def hear() -> None:
     if _hearing == os.getpid():
         return
     _hearing = os.getpid()
-    heard = {number for number in SIGNALS if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN}
+    heard = {
+        number
+        for number in SIGNALS
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN
+    }
     signal.pthread_sigmask(signal.SIG_BLOCK, heard)
     for number in heard:  # an ignored signal (of a job in the background, say) would never come
         signal.signal(number, lambda number, _: _take(number))  # for threads that started earlier

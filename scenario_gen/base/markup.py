@@ -13,10 +13,14 @@ from xml.parsers import expat
 from scenario_gen.base.documents import read_bytes, shown
 from scenario_gen.base.errors import InputError
 
-MOST_BYTES = 128 * 1024 * 1024  # of a map; a town of 100 roads takes 0.5 MB in OpenDRIVE, a district in Lanelet2 20 MB
+MOST_BYTES = (
+    128 * 1024 * 1024
+)  # of a map; a town of 100 roads takes 0.5 MB in OpenDRIVE, a district in Lanelet2 20 MB
 MOST_ELEMENTS = 2_000_000
 DEEPEST = 64
-LARGEST = 1e8  # of a coordinate or length: metres from a frame's origin, more than any geodetic grid has
+LARGEST = (
+    1e8  # of a coordinate or length: metres from a frame's origin, more than any geodetic grid has
+)
 
 
 @dataclass(slots=True)
@@ -100,7 +104,9 @@ def finite(text: str, where: str) -> float:
     except ValueError:
         number = math.nan
     if not abs(number) <= LARGEST:
-        raise InputError(f"{where}: {shown(text, 40)!r} is no number from -{LARGEST:g} to {LARGEST:g}")
+        raise InputError(
+            f"{where}: {shown(text, 40)!r} is no number from -{LARGEST:g} to {LARGEST:g}"
+        )
     return number
 
 
@@ -126,7 +132,9 @@ def read_xml(path: Path, what: str, skip: frozenset[str] = frozenset()) -> Eleme
     data = read_bytes(path, MOST_BYTES, what, ": cut the map")
     if not data.strip():
         raise InputError(f"{what} is empty")
-    if above := re.match(rb"((?:\s|<!--.*?-->)+)(<\?xml.*?\?>)", data, re.DOTALL):  # moves below it: lines keep their numbers
+    if above := re.match(
+        rb"((?:\s|<!--.*?-->)+)(<\?xml.*?\?>)", data, re.DOTALL
+    ):  # moves below it: lines keep their numbers
         data = above[2] + above[1] + data[above.end() :]
     return parse_xml(data, what, skip)
 
@@ -172,15 +180,23 @@ def parse_xml(data: bytes, what: str, skip: frozenset[str] = frozenset()) -> Ele
             stack[-1].text += data
 
     def refuse(name: str, *_: Any) -> None:
-        raise InputError(f"{place()}: the document type {shown(name, 40)!r} is not read, for it can declare entities; delete it")
+        raise InputError(
+            f"{place()}: the document type {shown(name, 40)!r} is not read, for it can declare entities; delete it"
+        )
 
-    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, text
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = (
+        start,
+        end,
+        text,
+    )
     parser.StartDoctypeDeclHandler = refuse
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         problem = expat.errors.messages.get(error.code, str(error))
-        raise InputError(f"{what}, line {error.lineno}, column {error.offset + 1}: not XML ({problem})") from error
+        raise InputError(
+            f"{what}, line {error.lineno}, column {error.offset + 1}: not XML ({problem})"
+        ) from error
     except (ValueError, LookupError) as error:  # an encoding that Python lacks
         raise InputError(f"{what}: not XML that can be read ({error})") from error
     return root.children[0]

@@ -39,7 +39,14 @@ def parameter(
         choices: the texts allowed, none for any.
         group: of entry points, whose names are allowed beside `choices` (see `base.registry`).
     """
-    meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "group": group}
+    meta = {
+        "meaning": meaning,
+        "unit": unit,
+        "low": low,
+        "high": high,
+        "choices": choices,
+        "group": group,
+    }
     return field(default=default, metadata=meta)
 
 
@@ -87,9 +94,13 @@ def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
         if not math.isfinite(value):
             raise InputError(f"parameter {name} is {value}; give a finite number")
         if meta["low"] is not None and value < meta["low"]:
-            raise InputError(f"parameter {name} is {value}; it must be at least {meta['low']} {meta['unit']}".rstrip())
+            raise InputError(
+                f"parameter {name} is {value}; it must be at least {meta['low']} {meta['unit']}".rstrip()
+            )
         if meta["high"] is not None and value > meta["high"]:
-            raise InputError(f"parameter {name} is {value}; it must be at most {meta['high']} {meta['unit']}".rstrip())
+            raise InputError(
+                f"parameter {name} is {value}; it must be at most {meta['high']} {meta['unit']}".rstrip()
+            )
 
 
 def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]]:
@@ -132,11 +143,17 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     changes: dict[str, Any] = {}
     nested: dict[str, dict[str, Any]] = {}
     known = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
-    inside: dict[str, Any] = {name: part for name in known if is_dataclass(part := getattr(config, name))}
+    inside: dict[str, Any] = {
+        name: part for name in known if is_dataclass(part := getattr(config, name))
+    }
     inside.update(_of_plugins(config))
     for name, value in values.items():
         head, _, rest = name.partition(".")
-        if head not in inside if rest else head in inside or head not in known or not known[head].metadata:
+        if (
+            head not in inside
+            if rest
+            else head in inside or head not in known or not known[head].metadata
+        ):
             raise InputError(_unknown(config, name, prefix))
         if rest:
             nested.setdefault(head, {})[rest] = value
@@ -148,7 +165,10 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
         if head in known:
             changes[head] = part
         else:
-            changes["plugins"] = (*changes.get("plugins", getattr(config, "plugins", ())), (head, part))
+            changes["plugins"] = (
+                *changes.get("plugins", getattr(config, "plugins", ())),
+                (head, part),
+            )
     return replace(config, **changes)  # type: ignore[type-var]
 
 
@@ -192,7 +212,11 @@ def read_parameter_file(path: Path) -> dict[str, Any]:
         InputError: the file cannot be read or is not of that form.
     """
     document = read_yaml(path)
-    body = next(iter(document.values())) if isinstance(document, dict) and len(document) == 1 else None
+    body = (
+        next(iter(document.values()))
+        if isinstance(document, dict) and len(document) == 1
+        else None
+    )
     nested = body.get("ros__parameters") if isinstance(body, dict) else None
     if not isinstance(nested, dict):
         raise InputError(f"{path}: not a parameter file of the form '/**: ros__parameters: ...'")
@@ -203,5 +227,9 @@ def _dotted(nested: dict[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
     """Flatten nested mappings to (dotted name, value) pairs."""
     pairs: list[tuple[str, Any]] = []
     for name, value in nested.items():
-        pairs += _dotted(value, f"{prefix}{name}.") if isinstance(value, dict) else [(f"{prefix}{name}", value)]
+        pairs += (
+            _dotted(value, f"{prefix}{name}.")
+            if isinstance(value, dict)
+            else [(f"{prefix}{name}", value)]
+        )
     return pairs

@@ -15,7 +15,9 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten, updated
 
 Config = TypeVar("Config")
-RECORDING = "recording"  # the name of the recording that a template is of; of a recombined one of both
+RECORDING = (
+    "recording"  # the name of the recording that a template is of; of a recombined one of both
+)
 
 
 def versions() -> dict[str, str]:
@@ -43,11 +45,21 @@ def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what:
     """
     values: dict[str, Any] = {}
     for name, (entry, _) in flatten(config).items():
-        text = texts.get(prefix + name, texts.get(prefix + name.rpartition(".")[2]))  # older bags: a limit of all types
+        text = texts.get(
+            prefix + name, texts.get(prefix + name.rpartition(".")[2])
+        )  # older bags: a limit of all types
         if text is None:
-            raise InputError(f"{what}: parameter {prefix}{name} is not there, so it cannot be made again")
+            raise InputError(
+                f"{what}: parameter {prefix}{name} is not there, so it cannot be made again"
+            )
         kind = type(entry.default)
-        values[name] = text if kind is str else yaml.safe_load(text.lower()) if kind is bool else _number(kind, text)
+        values[name] = (
+            text
+            if kind is str
+            else yaml.safe_load(text.lower())
+            if kind is bool
+            else _number(kind, text)
+        )
     return updated(config, values)
 
 

@@ -24,7 +24,9 @@ def installed(group: str) -> Mapping[str, EntryPoint]:
     found: dict[str, EntryPoint] = {}
     for entry in sorted(entry_points(group=group), key=lambda entry: (entry.name, _source(entry))):
         if entry.name in found:
-            raise InputError(f"plugins: {_source(found[entry.name])} and {_source(entry)} both have {group} {entry.name!r}")
+            raise InputError(
+                f"plugins: {_source(found[entry.name])} and {_source(entry)} both have {group} {entry.name!r}"
+            )
         found[entry.name] = entry
     return found
 
@@ -83,7 +85,9 @@ class Registry(Generic[T]):
         try:
             loaded = entry.load()
         except (Exception, SystemExit) as error:
-            raise InputError(f"plugin {name!r} of {_source(entry)} cannot be loaded: {describe(error)}") from error
+            raise InputError(
+                f"plugin {name!r} of {_source(entry)} cannot be loaded: {describe(error)}"
+            ) from error
         if not (callable(loaded) if self.kind is None else isinstance(loaded, self.kind)):
             kind = "function" if self.kind is None else self.kind.__name__
             raise InputError(f"plugin {name!r} of {_source(entry)} is no {kind}: {entry.value}")

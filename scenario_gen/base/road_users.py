@@ -18,7 +18,9 @@ from scenario_gen.base.registry import Registry
 
 CAR, TRUCK, OTHER = "car", "truck", "other"
 TRUCK_LENGTH = 7.0  # m, from which on a vehicle of unknown type counts as a truck
-LANE_USERS = frozenset((CAR, "van", TRUCK, "bus", "motorcycle", "bicycle", "pedestrian"))  # whom lanes can be for
+LANE_USERS = frozenset(
+    (CAR, "van", TRUCK, "bus", "motorcycle", "bicycle", "pedestrian")
+)  # whom lanes can be for
 ON_THE_SPOT = 2.0  # 1/m: who turns on the spot is planned to walk so sharp a curve
 
 
@@ -29,9 +31,14 @@ class Dynamics(Parameters):
     max_speed: float = parameter(45.0, "highest speed", unit="m/s", low=0.0)
     max_acceleration: float = parameter(5.0, "strongest speeding up", unit="m/s²", low=0.0)
     max_deceleration: float = parameter(9.0, "strongest braking", unit="m/s²", low=0.0)
-    max_lateral_acceleration: float = parameter(6.0, "largest product of speed and yaw rate", unit="m/s²", low=0.0)
+    max_lateral_acceleration: float = parameter(
+        6.0, "largest product of speed and yaw rate", unit="m/s²", low=0.0
+    )
     max_curvature: float = parameter(
-        0.25, "largest change of heading per metre driven; 0: turns on the spot", unit="1/m", low=0.0
+        0.25,
+        "largest change of heading per metre driven; 0: turns on the spot",
+        unit="1/m",
+        low=0.0,
     )
 
     @property
@@ -140,7 +147,10 @@ VEHICLE_TYPES = Registry[VehicleType](
 """By name; those of installed packages come last."""
 
 
-OF_CARS = {entry.name: f"limits.{CAR}.{entry.name} (or that of another type)" for entry in fields(Dynamics)}
+OF_CARS = {
+    entry.name: f"limits.{CAR}.{entry.name} (or that of another type)"
+    for entry in fields(Dynamics)
+}
 """Names that parameters of all vehicles had, in several configurations, and the parameters of cars."""
 _BUILT_IN = VEHICLE_TYPES.built_in
 
@@ -168,7 +178,11 @@ class TypeLimits(Parameters):
     @property
     def of_plugins(self) -> Mapping[str, Dynamics]:
         """Those of types of installed packages."""
-        return {name: self.of(name) for name in VEHICLE_TYPES.names() if name not in VEHICLE_TYPES.built_in}
+        return {
+            name: self.of(name)
+            for name in VEHICLE_TYPES.names()
+            if name not in VEHICLE_TYPES.built_in
+        }
 
     def of(self, name: str) -> Dynamics:
         """Return the limits of a type.
@@ -176,7 +190,9 @@ class TypeLimits(Parameters):
         Raises:
             InputError: there is no type of this name.
         """
-        own: Dynamics | None = getattr(self, name, None) if name in VEHICLE_TYPES.built_in else None
+        own: Dynamics | None = (
+            getattr(self, name, None) if name in VEHICLE_TYPES.built_in else None
+        )
         return own or dict(self.plugins).get(name) or VEHICLE_TYPES[name].dynamics
 
 
@@ -187,4 +203,6 @@ def usual_type(length: float) -> str:
 
 def words() -> Mapping[str, str]:
     """Return what logs call types, of installed packages too, and the types."""
-    return {word: name for name in VEHICLE_TYPES.names() for word in (name, *VEHICLE_TYPES[name].words)}
+    return {
+        word: name for name in VEHICLE_TYPES.names() for word in (name, *VEHICLE_TYPES[name].words)
+    }

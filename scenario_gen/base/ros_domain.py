@@ -36,7 +36,11 @@ def free_domain() -> Iterator[int]:
         RefusedError: none is free.
     """
     for domain in reversed(DOMAINS):
-        lock = FileLock(Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock", blocking=False, thread_local=False)
+        lock = FileLock(
+            Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock",
+            blocking=False,
+            thread_local=False,
+        )
         try:
             lock.acquire()
         except (OSError, Timeout):  # held, or another user's, whose domain is passed over
@@ -47,7 +51,9 @@ def free_domain() -> Iterator[int]:
                 return
         finally:
             lock.release()
-    raise RefusedError(f"no free ROS domain among {DOMAINS.start} to {DOMAINS.stop - 1}; end other ROS processes")
+    raise RefusedError(
+        f"no free ROS domain among {DOMAINS.start} to {DOMAINS.stop - 1}; end other ROS processes"
+    )
 
 
 @contextmanager
@@ -79,5 +85,11 @@ def this_host_only(environment: Mapping[str, str] = os.environ) -> dict[str, str
     if not environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps").startswith("rmw_fastrtps"):
         return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     profile = str(Path(__file__).resolve().parents[1] / "resources" / "loopback.xml")
-    names = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # of Jazzy's Fast DDS, and of the next
-    return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", **dict.fromkeys(names, profile)}  # all is left to the profile
+    names = (
+        "FASTRTPS_DEFAULT_PROFILES_FILE",
+        "FASTDDS_DEFAULT_PROFILES_FILE",
+    )  # of Jazzy's Fast DDS, and of the next
+    return {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",
+        **dict.fromkeys(names, profile),
+    }  # all is left to the profile

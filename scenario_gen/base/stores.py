@@ -25,7 +25,9 @@ from scenario_gen.base.errors import describe, guarded, InputError, needs, Scena
 from scenario_gen.base.folders import naming, scratch
 
 Result = TypeVar("Result")
-URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL)  # one slash: a Path drops the second
+URL = re.compile(
+    r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL
+)  # one slash: a Path drops the second
 WRITTEN, READ = ("s3", "gs", "gcs", "abfs", "abfss", "az"), ("http", "https")
 S3 = {
     "max_concurrency": 2,  # parts of a long object in memory at a time, 50 MiB each
@@ -87,7 +89,9 @@ class Remote:
             system.invalidate_cache()
         return system, path
 
-    def asked(self, operation: Callable[[Any, str], Result], missing: Callable[[], Result] | None = None) -> Result:
+    def asked(
+        self, operation: Callable[[Any, str], Result], missing: Callable[[], Result] | None = None
+    ) -> Result:
         """Return what an operation on file system and path returns; the library of the store tries again what fails for a while.
 
         Args:
@@ -124,7 +128,9 @@ class Remote:
         if self.size >= 0:
             return self
         facts: dict[str, Any] = self.asked(lambda system, path: system.info(path))
-        if facts.get("type") == "directory" or str(facts.get("mimetype")).startswith("text/html"):  # the list of a web server
+        if facts.get("type") == "directory" or str(facts.get("mimetype")).startswith(
+            "text/html"
+        ):  # the list of a web server
             return self
         if facts.get("size") is None:
             raise InputError(f"{self}: the server does not say how long it is; download it first")
@@ -133,10 +139,17 @@ class Remote:
     def rglob(self, pattern: str) -> Iterator["Remote"]:
         """Yield the objects below, at any depth, whose names match, in order; none where there is nothing."""
         root = self.there()[1]
-        listed: dict[str, Any] = self.asked(lambda system, path: system.find(path, detail=True), missing=dict)
+        listed: dict[str, Any] = self.asked(
+            lambda system, path: system.find(path, detail=True), missing=dict
+        )
         for path, facts in sorted(listed.items()):
             own = path.removeprefix(root).lstrip("/")
-            if own and facts.get("type") != "directory" and not path.endswith("/") and fnmatch(PurePosixPath(path).name, pattern):
+            if (
+                own
+                and facts.get("type") != "directory"
+                and not path.endswith("/")
+                and fnmatch(PurePosixPath(path).name, pattern)
+            ):
                 size = facts.get("size")
                 yield Remote(f"{self}/{own}", -1 if size is None else int(size)).looked_up()
 
@@ -175,7 +188,11 @@ def place(text: str | Path, *, to_write: bool = False) -> Place:
     if not url or scheme == "file":
         return Path("/" + rest.lstrip("/")) if url else Path(text)
     if not rest or scheme not in WRITTEN + (() if to_write else READ):
-        why = f"{scheme} is only read" if scheme in READ else f"{scheme} is not read or written, or a bucket's name is missing"
+        why = (
+            f"{scheme} is only read"
+            if scheme in READ
+            else f"{scheme} is not read or written, or a bucket's name is missing"
+        )
         raise InputError(f"{url}: {why}; name a file or folder, or a place in s3, gs or abfs")
     return Remote(url)
 
@@ -226,7 +243,9 @@ def download(parts: Iterable[Part]) -> None:
         with naming(part.target):
             part.target.touch()
         starts = range(part.begin, part.end, BLOCK_BYTES)
-        blocks += [part._replace(begin=begin, end=min(begin + BLOCK_BYTES, part.end)) for begin in starts]
+        blocks += [
+            part._replace(begin=begin, end=min(begin + BLOCK_BYTES, part.end)) for begin in starts
+        ]
     with ThreadPoolExecutor(REQUESTS) as pool:
         for _ in pool.map(_copy, blocks):  # the first that fails ends the others
             pass
@@ -234,12 +253,16 @@ def download(parts: Iterable[Part]) -> None:
 
 def _copy(part: Part) -> None:
     source, begin, end, target = part
-    whole = begin == 0 and end == source.size  # is read without a range, which not all servers know
+    whole = (
+        begin == 0 and end == source.size
+    )  # is read without a range, which not all servers know
     bounds = {} if whole else {"start": begin, "end": end}
     data = source.asked(lambda system, path: bytes(system.cat_file(path, **bounds)))
     if len(data) != end - begin:
         why = "it has changed, or the server reads no parts of files; start again, or download it first"
-        raise InputError(f"{source} gave {len(data)} bytes where {end - begin} were asked for: {why}")
+        raise InputError(
+            f"{source} gave {len(data)} bytes where {end - begin} were asked for: {why}"
+        )
     with naming(target), target.open("r+b") as file:
         file.seek(begin)
         file.write(data)
@@ -273,7 +296,9 @@ def fetched(places: Sequence[Place]) -> Iterator[list[Path]]:
         local: dict[Remote, Path] = {}
         parts: list[Part] = []
         for found in remote:
-            folder = folders.setdefault(found.parent.url, own / str(len(folders)) / (found.parent.name or "store"))
+            folder = folders.setdefault(
+                found.parent.url, own / str(len(folders)) / (found.parent.name or "store")
+            )
             local[found] = folder / found.name
             objects = [found] if found.size >= 0 else found.rglob("*")
             parts += [Part(one, 0, one.size, local[found] / below(one, found)) for one in objects]
@@ -282,7 +307,9 @@ def fetched(places: Sequence[Place]) -> Iterator[list[Path]]:
             yield [local[found] if isinstance(found, Remote) else found for found in places]
 
 
-_copies: dict[str, str] = {}  # {path: URL} of files that stand for objects; paths are never used twice
+_copies: dict[
+    str, str
+] = {}  # {path: URL} of files that stand for objects; paths are never used twice
 
 
 @contextmanager

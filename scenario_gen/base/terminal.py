@@ -8,7 +8,15 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.text import Text
 
 from scenario_gen.base.errors import printable
@@ -32,7 +40,9 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
     columns = (*what, TimeElapsedColumn(), TextColumn("left:"), TimeRemainingColumn())
     tasks: dict[str, TaskID] = {}
     console = Terminal(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bars:
 
         def advance(name: str, done: int, total: int) -> None:
             if name not in tasks:

@@ -55,7 +55,10 @@ class Worker:
         self._running: dict[str, tuple[threading.Event, float]] = {}  # since when
         self._changed = threading.Condition()
         self.closed = False
-        self._threads = [threading.Thread(target=self._run, daemon=True, name=f"worker of {owner}") for _ in range(threads)]
+        self._threads = [
+            threading.Thread(target=self._run, daemon=True, name=f"worker of {owner}")
+            for _ in range(threads)
+        ]
         for thread in self._threads:
             thread.start()
 
@@ -70,7 +73,10 @@ class Worker:
                     self._running[name][0].set()
                 self._changed.notify()
         if full:
-            self._failed(name, RefusedError(f"{MOST_WAITING} jobs wait already; ask again when some are done"))
+            self._failed(
+                name,
+                RefusedError(f"{MOST_WAITING} jobs wait already; ask again when some are done"),
+            )
             self._do(name, job, lambda: True)
 
     def cancel(self, only: str | None = None) -> list[str]:
@@ -82,7 +88,11 @@ class Worker:
             running = [name for name in self._running if only in (None, name)]
             for name in running:
                 self._running[name][0].set()
-            waiting = [(name, self._waiting.pop(name)[0]) for name in list(self._waiting) if only in (None, name)]
+            waiting = [
+                (name, self._waiting.pop(name)[0])
+                for name in list(self._waiting)
+                if only in (None, name)
+            ]
         for name, job in waiting:
             self._do(name, job, lambda: True)
         return running + [name for name, _ in waiting]

@@ -20,8 +20,16 @@ commands = Commands("Look at a bag of scenarios")
 
 @commands.command()
 def evaluate(
-    bag: Annotated[Path, typer.Argument(help="A bag with the topics `tracks` and `scenarios`, from this suite or another.")],
-    out: Annotated[Path | None, typer.Option(help="Folder for report.html, evaluation.json and evaluation.md.")] = None,
+    bag: Annotated[
+        Path,
+        typer.Argument(
+            help="A bag with the topics `tracks` and `scenarios`, from this suite or another."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for report.html, evaluation.json and evaluation.md."),
+    ] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
@@ -37,7 +45,13 @@ def evaluate(
     inputs = [bag, *([parameter_file] if parameter_file else ())]
     with nullcontext() if out is None else replaced_folder(out, EVALUATED, inputs) as folder:
         with bars() as advance:
-            cases = bag_results(bag, config.evaluation, config.limits, bag=config.bag, progress=partial(advance, "scenarios"))
+            cases = bag_results(
+                bag,
+                config.evaluation,
+                config.limits,
+                bag=config.bag,
+                progress=partial(advance, "scenarios"),
+            )
         if folder is not None:
             write_evaluation(folder, cases, bag, config.bag)
     give(cases=[json.loads(case.evaluation.to_json()) for case in cases], folder=out)
@@ -46,16 +60,29 @@ def evaluate(
 
 @commands.command()
 def report(
-    bag: Annotated[Path, typer.Argument(help="A bag with the topics `tracks` and `scenarios`, or a folder of `generate`.")],
-    out: Annotated[Path | None, typer.Option(help="Folder for the page. Default: BAG_report beside the bag.")] = None,
-    browse: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
+    bag: Annotated[
+        Path,
+        typer.Argument(
+            help="A bag with the topics `tracks` and `scenarios`, or a folder of `generate`."
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the page. Default: BAG_report beside the bag.")
+    ] = None,
+    browse: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
+    ] = True,
 ) -> None:
     """Write the page of a bag and open it."""
     from scenario_gen.output.results import BAG, REPORT
     from scenario_gen.output.review.evaluation import write_page
 
-    folders = [place for place in (bag.resolve(), bag.resolve().parent) if (place / REPORT).is_file()]
-    if out is None and folders and bag.resolve() in (folders[0], folders[0] / BAG):  # `generate` wrote it already
+    folders = [
+        place for place in (bag.resolve(), bag.resolve().parent) if (place / REPORT).is_file()
+    ]
+    if (
+        out is None and folders and bag.resolve() in (folders[0], folders[0] / BAG)
+    ):  # `generate` wrote it already
         page = folders[0] / REPORT
     else:
         remind(bag)
@@ -69,7 +96,9 @@ def report(
 
 @commands.command()
 def validate(
-    bag: Annotated[Path, typer.Argument(help="A bag with the topic `scenarios`, from this suite or another.")],
+    bag: Annotated[
+        Path, typer.Argument(help="A bag with the topic `scenarios`, from this suite or another.")
+    ],
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
@@ -80,16 +109,26 @@ def validate(
     config = configured(parameter_file, assignments)
     remind(bag)
     with bars() as advance:
-        found = validate_bag(bag, config.limits, config.bag, progress=partial(advance, "scenarios"))
+        found = validate_bag(
+            bag, config.limits, config.bag, progress=partial(advance, "scenarios")
+        )
     give(valid=not any(one.invalid for one in found), namespaces=found)
     for one in found:
-        say(f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid")
+        say(
+            f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid"
+        )
         if one.found:
-            rows = [(cause, str(entry.count), str(entry.scenario), entry.message) for cause, entry in one.found.items()]
+            rows = [
+                (cause, str(entry.count), str(entry.scenario), entry.message)
+                for cause, entry in one.found.items()
+            ]
             say_rows(("cause", "scenarios", "first", "what"), rows)
         if one.unaccounted:
             say(f"  {one.unaccounted} without an entry: {NO_ENTRY}")
-        for sentence in (*(f"{message}: {count} scenarios" for message, count in one.proven.items()), *one.missing):
+        for sentence in (
+            *(f"{message}: {count} scenarios" for message, count in one.proven.items()),
+            *one.missing,
+        ):
             say(f"  {sentence}")
         for sentence, count in one.left_out.items():
             say(f"  not checked in {count}: {sentence}")
@@ -99,24 +138,46 @@ def validate(
 
 @commands.command("export", panel="Other formats")
 def export_scenarios(
-    bag: Annotated[Path, typer.Argument(help="A bag with the topic `scenarios`, from this suite or another.")],
-    to: Annotated[str, typer.Option(help="commonroad, openscenario (with OpenDRIVE), autoware or scenarionet (MetaDrive).")],
-    out: Annotated[Path | None, typer.Option(help="Folder for the files. Default: BAG_commonroad etc. beside the bag.")] = None,
-    index: Annotated[
-        list[int] | None, typer.Option(min=0, help="Number of a scenario, as on its page. Repeatable; default: all.")
+    bag: Annotated[
+        Path, typer.Argument(help="A bag with the topic `scenarios`, from this suite or another.")
+    ],
+    to: Annotated[
+        str,
+        typer.Option(
+            help="commonroad, openscenario (with OpenDRIVE), autoware or scenarionet (MetaDrive)."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the files. Default: BAG_commonroad etc. beside the bag."),
     ] = None,
-    namespace: Annotated[str | None, typer.Option(help="Only the scenarios in this namespace.")] = None,
-    ego: Annotated[str, typer.Option(help="Id of the vehicle that becomes the ego, e.g. CommonRoad's planning problem.")] = "",
+    index: Annotated[
+        list[int] | None,
+        typer.Option(
+            min=0, help="Number of a scenario, as on its page. Repeatable; default: all."
+        ),
+    ] = None,
+    namespace: Annotated[
+        str | None, typer.Option(help="Only the scenarios in this namespace.")
+    ] = None,
+    ego: Annotated[
+        str,
+        typer.Option(
+            help="Id of the vehicle that becomes the ego, e.g. CommonRoad's planning problem."
+        ),
+    ] = "",
     road_map: Annotated[
         str,
         typer.Option(
-            "--map", help="openscenario: the map the scenarios were made on (.xodr, .osm). It is copied and named as their road."
+            "--map",
+            help="openscenario: the map the scenarios were made on (.xodr, .osm). It is copied and named as their road.",
         ),
     ] = "",
     options: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", help="Set run_out, step, goal_length, goal_width, goal_late, late, following or bag.…, as name=value."
+            "--set",
+            help="Set run_out, step, goal_length, goal_width, goal_late, late, following or bag.…, as name=value.",
         ),
     ] = None,
 ) -> None:
@@ -126,15 +187,27 @@ def export_scenarios(
     from scenario_gen.output.exchange.export import export_bag, EXPORTS
 
     if to not in EXPORTS:
-        raise InputError(f"--to {to}: choose one of {', '.join(EXPORTS.names())}{did_you_mean(to, EXPORTS.names())}")
+        raise InputError(
+            f"--to {to}: choose one of {', '.join(EXPORTS.names())}{did_you_mean(to, EXPORTS.names())}"
+        )
     of_bag = [option for option in options or [] if option.startswith("bag.")]
     bag_config = assigned_all(BagConfig(), [option.removeprefix("bag.") for option in of_bag])
-    config = assigned_all(ExportConfig(ego=ego, map=road_map), [option for option in options or [] if option not in of_bag])
+    config = assigned_all(
+        ExportConfig(ego=ego, map=road_map),
+        [option for option in options or [] if option not in of_bag],
+    )
     remind(bag)
     folder = out or beside(bag, f"{bag.resolve().name}_{to}")
     with bars() as advance:
         result = export_bag(
-            bag, folder, to, config, bag_config, namespace=namespace, indices=index or (), progress=partial(advance, "scenarios")
+            bag,
+            folder,
+            to,
+            config,
+            bag_config,
+            namespace=namespace,
+            indices=index or (),
+            progress=partial(advance, "scenarios"),
         )
     give(scenarios=result.scenarios, folder=folder, notes=result.notes)
     say("\n".join((*result.notes, f"{result.scenarios} scenarios: {folder}")))
@@ -142,8 +215,15 @@ def export_scenarios(
 
 @commands.command("reindex")
 def save_bag(
-    bag: Annotated[Path, typer.Argument(help="Folder of a bag that was not closed or is damaged, or one of its MCAP files.")],
-    out: Annotated[Path | None, typer.Option(help="Folder for the new bag. Default: BAG_reindexed.")] = None,
+    bag: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder of a bag that was not closed or is damaged, or one of its MCAP files."
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the new bag. Default: BAG_reindexed.")
+    ] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:

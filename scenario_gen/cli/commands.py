@@ -11,7 +11,13 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from scenario_gen.base.errors import did_you_mean, InputError, of_system, ScenarioGenError, shown_error
+from scenario_gen.base.errors import (
+    did_you_mean,
+    InputError,
+    of_system,
+    ScenarioGenError,
+    shown_error,
+)
 from scenario_gen.cli import bags, corpus, generation, output, testing
 
 app = typer.Typer(
@@ -41,14 +47,28 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
     ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Of any command: print errors only.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Of any command: print errors only.")
+    ] = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Of `generate` and `demo`: routes and the comparison with the recording, too.")
+        bool,
+        typer.Option(
+            "--verbose",
+            "-v",
+            help="Of `generate` and `demo`: routes and the comparison with the recording, too.",
+        ),
     ] = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Of any command: print one JSON object to standard output, messages to standard error.")
+        bool,
+        typer.Option(
+            "--json",
+            help="Of any command: print one JSON object to standard output, messages to standard error.",
+        ),
     ] = False,
 ) -> None:
     """Turn recorded encounters of vehicles into new, valid ones on other roads."""
@@ -66,7 +86,10 @@ def parameters() -> None:
     known = flatten(PipelineConfig())
     keys = ("meaning", "unit", "low", "high", "choices")
     output.give(
-        parameters={name: {"default": value} | {key: e.metadata[key] for key in keys} for name, (e, value) in known.items()}
+        parameters={
+            name: {"default": value} | {key: e.metadata[key] for key in keys}
+            for name, (e, value) in known.items()
+        }
     )
     for name, (entry, value) in known.items():
         meta = entry.metadata
@@ -89,7 +112,13 @@ def doctor() -> None:
     raise typer.Exit(int(any(finding.level == ERROR for finding in findings)))
 
 
-for commands in (generation.commands, bags.commands, testing.commands, corpus.commands, installation):
+for commands in (
+    generation.commands,
+    bags.commands,
+    testing.commands,
+    corpus.commands,
+    installation,
+):
     app.add_typer(commands)
 
 
@@ -142,7 +171,12 @@ def of_usage(error: Any) -> InputError:
     path = error.ctx.command_path if error.ctx else "scenario-gen"
     unknown, known = getattr(error, "option_name", ""), []
     if unknown and error.ctx:
-        known = [name for entry in error.ctx.command.get_params(error.ctx) for name in entry.opts if name.startswith("--")]
+        known = [
+            name
+            for entry in error.ctx.command.get_params(error.ctx)
+            for name in entry.opts
+            if name.startswith("--")
+        ]
         message = f"there is no option {unknown}{did_you_mean(unknown, known)}"
         if unknown[1:].isdecimal():
             message = f"{unknown}: a number here must not be negative"
@@ -156,7 +190,9 @@ def fail(error: ScenarioGenError) -> NoReturn:
     from scenario_gen.base.terminal import Terminal
 
     with suppress(OSError):
-        Terminal(stderr=True).print(Text("error:", style="bold red"), shown_error(error), soft_wrap=True)
+        Terminal(stderr=True).print(
+            Text("error:", style="bold red"), shown_error(error), soft_wrap=True
+        )
     try:
         sys.stdout.flush()
     except OSError:  # the disk is full or the reader has gone: what is left to print is dropped

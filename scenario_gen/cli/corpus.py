@@ -22,9 +22,14 @@ if TYPE_CHECKING:
 
 commands = Commands("Archives of recordings")
 
-WorkersOption = Annotated[int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")]
+WorkersOption = Annotated[
+    int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")
+]
 SchedulerOption = Annotated[
-    str, typer.Option(help="Address of a Dask scheduler, e.g. tcp://host:8786, to use instead of local processes.")
+    str,
+    typer.Option(
+        help="Address of a Dask scheduler, e.g. tcp://host:8786, to use instead of local processes."
+    ),
 ]
 
 
@@ -46,20 +51,30 @@ def conclude(summary: list[str], failed: Sequence[str], out: Place, **files: Pla
     give(summary=summary, **files, out=out, failed=failed)
     say(*summary, *(f"{name}: {path}" for name, path in files.items()), sep="\n")
     if failed:
-        raise RefusedError(f"{len(failed)} tasks failed, see above; the rest is in {out}; the same command tries them again")
+        raise RefusedError(
+            f"{len(failed)} tasks failed, see above; the rest is in {out}; the same command tries them again"
+        )
 
 
 @commands.command(urls=("archive", "out"))
 def mine(
     archive: Annotated[
         list[Path],
-        typer.Argument(help="Folders of SPMD files, tables and bags, or single files, or s3://, gs://, abfs://. Repeatable."),
+        typer.Argument(
+            help="Folders of SPMD files, tables and bags, or single files, or s3://, gs://, abfs://. Repeatable."
+        ),
     ],
-    out: Annotated[Path, typer.Option(help="Folder for the corpus, or s3://…. An unfinished corpus is continued.")],
+    out: Annotated[
+        Path,
+        typer.Option(help="Folder for the corpus, or s3://…. An unfinished corpus is continued."),
+    ],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     assignments: Annotated[
-        list[str] | None, typer.Option("--set", help="Set memory, range_size, interaction, log.proximity, …, as name=value.")
+        list[str] | None,
+        typer.Option(
+            "--set", help="Set memory, range_size, interaction, log.proximity, …, as name=value."
+        ),
     ] = None,
 ) -> None:
     """Find the encounters in an archive of any size."""
@@ -78,16 +93,32 @@ class Batch:
     """The options of `batch`."""
 
     corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote, or s3://….")]
-    roads: Annotated[list[str], typer.Option(help="Roads, as for `generate`: separated by commas, or repeated.")]
-    out: Annotated[Path, typer.Option(help="Folder for tables and bags, or s3://…. An unfinished batch is continued.")]
-    count: Annotated[int, typer.Option(min=1, max=100_000, help="Scenarios per encounter and road.")] = 50
-    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 0
-    templates: Annotated[int, typer.Option(min=0, help="Use the first so many encounters of the corpus. 0: all.")] = 0
+    roads: Annotated[
+        list[str], typer.Option(help="Roads, as for `generate`: separated by commas, or repeated.")
+    ]
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Folder for tables and bags, or s3://…. An unfinished batch is continued."
+        ),
+    ]
+    count: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Scenarios per encounter and road.")
+    ] = 50
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")
+    ] = 0
+    templates: Annotated[
+        int, typer.Option(min=0, help="Use the first so many encounters of the corpus. 0: all.")
+    ] = 0
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
     assignments: Annotated[
         list[str] | None,
-        typer.Option("--set", help="Set one parameter, as name=value (repeatable). `scenario-gen parameters` lists them."),
+        typer.Option(
+            "--set",
+            help="Set one parameter, as name=value (repeatable). `scenario-gen parameters` lists them.",
+        ),
     ] = None
 
 
@@ -98,7 +129,10 @@ def batch(options: Batch) -> None:
     from scenario_gen.corpus.batch import BatchRequest, run_batch
     from scenario_gen.method.config import PipelineConfig
 
-    config, out = assigned_all(PipelineConfig(), options.assignments), place(options.out, to_write=True)
+    config, out = (
+        assigned_all(PipelineConfig(), options.assignments),
+        place(options.out, to_write=True),
+    )
     names = [name for text in options.roads for name in text.split(",") if name]
     with workers_of(options.workers, options.scheduler) as who:
         result = run_batch(
@@ -117,15 +151,27 @@ def shown(value: object) -> str:
 
 @commands.command(urls=("batch",))
 def find(
-    batch: Annotated[Path, typer.Argument(help="A batch, finished or not, or a corpus that `mine` wrote; or s3://….")],
-    condition: Annotated[str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")] = "true",
+    batch: Annotated[
+        Path,
+        typer.Argument(help="A batch, finished or not, or a corpus that `mine` wrote; or s3://…."),
+    ],
+    condition: Annotated[
+        str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")
+    ] = "true",
     limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list here. 0: all.")] = 20,
     bag: Annotated[
-        Path | None, typer.Option(help="Write the scenarios found to this bag, with their recordings and roads.")
+        Path | None,
+        typer.Option(
+            help="Write the scenarios found to this bag, with their recordings and roads."
+        ),
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Folder for the page of that bag.")] = None,
     again: Annotated[
-        bool, typer.Option("--again", help="Generate each scenario found again and check that it is byte-identical.")
+        bool,
+        typer.Option(
+            "--again",
+            help="Generate each scenario found again and check that it is byte-identical.",
+        ),
     ] = False,
 ) -> None:
     """Find scenarios of a batch, or recorded encounters of a corpus, by kind, road, PET, time to collision, …."""
@@ -133,14 +179,23 @@ def find(
     from scenario_gen.output.review.evaluation import write_page
 
     if report is not None and bag is None:
-        raise InputError("--report needs --bag: the page shows the bag of the scenarios found; give both")
+        raise InputError(
+            "--report needs --bag: the page shows the bag of the scenarios found; give both"
+        )
     source = place(batch)
     found = finding.find(source, condition)
     give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
     listed = found.rows[: limit or None]
-    titles = [f"{name} [{finding.UNITS[name]}]" if name in finding.UNITS else name for name in finding.COLUMNS]
+    titles = [
+        f"{name} [{finding.UNITS[name]}]" if name in finding.UNITS else name
+        for name in finding.COLUMNS
+    ]
     say_rows(titles, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3)
-    rest = f", the first {len(listed)} are listed; --limit 0 lists all" if len(listed) < len(found.rows) else ""
+    rest = (
+        f", the first {len(listed)} are listed; --limit 0 lists all"
+        if len(listed) < len(found.rows)
+        else ""
+    )
     say(f"{len(found.rows)} found{rest}; a ttc above evaluation.ttc_horizon (10 s) counts as this")
     say(*finding.coverage_lines(found, source), sep="\n")
     if again:
@@ -159,15 +214,25 @@ def find(
 
 @commands.command(urls=("corpus",))
 def library(
-    corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote. The library goes to CORPUS/library.")],
+    corpus: Annotated[
+        Path,
+        typer.Argument(help="A corpus that `mine` wrote. The library goes to CORPUS/library."),
+    ],
     most: Annotated[
-        int, typer.Option(min=4, help="Most pairs of vehicles that are fitted. The others are assigned to the result.")
+        int,
+        typer.Option(
+            min=4,
+            help="Most pairs of vehicles that are fitted. The others are assigned to the result.",
+        ),
     ] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same library.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed. The same seed gives the same library.")
+    ] = 0,
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     assignments: Annotated[
-        list[str] | None, typer.Option("--set", help="Set a parameter of the segmentation, as name=value.")
+        list[str] | None,
+        typer.Option("--set", help="Set a parameter of the segmentation, as name=value."),
     ] = None,
 ) -> None:
     """Segment the encounters of a corpus together; write the primitives that they share."""
@@ -181,11 +246,18 @@ def library(
 
 @commands.command()
 def coverage(
-    bags: Annotated[list[Path], typer.Argument(help="Bags of `generate`, of at least two recordings.")],
+    bags: Annotated[
+        list[Path], typer.Argument(help="Bags of `generate`, of at least two recordings.")
+    ],
     templates: Annotated[
-        list[int] | None, typer.Option(min=1, help="Recorded encounters to draw as templates. Repeatable; default: 5, 10, 20.")
+        list[int] | None,
+        typer.Option(
+            min=1, help="Recorded encounters to draw as templates. Repeatable; default: 5, 10, 20."
+        ),
     ] = None,
-    draws: Annotated[int, typer.Option(min=1, help="Draws of templates, for the intervals.")] = 200,
+    draws: Annotated[
+        int, typer.Option(min=1, help="Draws of templates, for the intervals.")
+    ] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Random seed of the draws.")] = 0,
     out: Annotated[Path, typer.Option(help="The page to write, HTML.")] = Path("coverage.html"),
 ) -> None:
@@ -193,7 +265,9 @@ def coverage(
     from scenario_gen.corpus.coverage import results_of, write_coverage
     from scenario_gen.method.evaluation.population import population_of
 
-    if out.suffix.lower() != ".html" or (out.exists() and not out.read_bytes()[:15].lower().startswith(b"<!doctype html>")):
+    if out.suffix.lower() != ".html" or (
+        out.exists() and not out.read_bytes()[:15].lower().startswith(b"<!doctype html>")
+    ):
         raise InputError(f"--out {out}: name a new file that ends with .html")
     results = results_of(bags)
     found = population_of(results, templates or (5, 10, 20), draws=draws, seed=seed)

@@ -48,11 +48,16 @@ def run_demo(
     config = PipelineConfig(evaluation=EvaluationConfig(compare=True))
     jobs = [((bundled(case),), (road,)) for case, road in ROADS.items()]
     record = recorder(config, count, seed, status) if ros else None
-    return generate_folder(out, FolderRequest(jobs, config, count, seed, TITLE), record=record, progress=progress)
+    return generate_folder(
+        out, FolderRequest(jobs, config, count, seed, TITLE), record=record, progress=progress
+    )
 
 
 def recorder(
-    config: PipelineConfig, count: int, seed: int, status: Callable[[], AbstractContextManager[Callable[[str], None]]]
+    config: PipelineConfig,
+    count: int,
+    seed: int,
+    status: Callable[[], AbstractContextManager[Callable[[str], None]]],
 ) -> Callable[[Path, Sequence[GenerationResult]], None]:
     """Return what has the ROS suite record a bag, one namespace per case, and compares it with the cases of this process.
 
@@ -62,11 +67,16 @@ def recorder(
     try:
         from scenario_gen.ros.plumbing.suite import Job, run_suite
     except ImportError as error:
-        raise InputError(f"ROS 2 is not available ({error}); run `make install`, or leave out --ros") from error
+        raise InputError(
+            f"ROS 2 is not available ({error}); run `make install`, or leave out --ros"
+        ) from error
 
     def record(bag: Path, cases: Sequence[GenerationResult]) -> None:
         names = namespaces(len(ROADS))
-        jobs = [Job(name, bundled(case), road) for name, (case, road) in zip(names, ROADS.items(), strict=True)]
+        jobs = [
+            Job(name, bundled(case), road)
+            for name, (case, road) in zip(names, ROADS.items(), strict=True)
+        ]
         with status() as say:
             run_suite(jobs, config, count=count, seed=seed, bag=bag, progress=say)
         compare_with_nodes(cases, bag)
@@ -80,8 +90,15 @@ def compare_with_nodes(cases: Sequence[GenerationResult], bag: Path) -> None:
     Raises:
         ScenarioGenError: they differ, which is a fault of ours.
     """
-    recorded = {name: found.data(SCENARIOS) for name, found in read_recording(bag, topics=(SCENARIOS,)).namespaces.items()}
+    recorded = {
+        name: found.data(SCENARIOS)
+        for name, found in read_recording(bag, topics=(SCENARIOS,)).namespaces.items()
+    }
     for case, namespace in zip(cases, namespaces(len(cases)), strict=True):
-        own = [scenario_bytes(scenario, case.encounter)[0] for scenario in case.generated.scenarios]
+        own = [
+            scenario_bytes(scenario, case.encounter)[0] for scenario in case.generated.scenarios
+        ]
         if own != recorded.get(namespace, []):
-            raise ScenarioGenError(f"the nodes' scenarios of {case.encounter.name} differ from those made in this process")
+            raise ScenarioGenError(
+                f"the nodes' scenarios of {case.encounter.name} differ from those made in this process"
+            )

@@ -28,7 +28,10 @@ LINES = 8  # of what the planner wrote last, that an error shows
 
 
 def drive_over_dds(
-    trials: Sequence[Trial], command: str, config: ClosedLoopConfig, progress: Callable[[int, int], None]
+    trials: Sequence[Trial],
+    command: str,
+    config: ClosedLoopConfig,
+    progress: Callable[[int, int], None],
 ) -> list[Outcome]:
     """Drive the node that a command starts through every trial; results are in the order of the trials.
 
@@ -44,10 +47,14 @@ def drive_over_dds(
     """
     words = shlex.split(command)
     if not words:
-        raise InputError("--planner is empty; with --ros, give the command that starts the planner's node")
+        raise InputError(
+            "--planner is empty; with --ros, give the command that starts the planner's node"
+        )
     with own_domain(), tempfile.TemporaryFile() as output:
         try:
-            process = subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT, start_new_session=True)
+            process = subprocess.Popen(
+                words, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
+            )
         except OSError as error:
             raise InputError(f"--planner {command}: {error}") from error
 

@@ -107,17 +107,25 @@ def generate_folder(
         InputError: a log cannot be read, an encounter is unknown, or `out` may not be replaced.
         RefusedError: nothing could be generated.
     """
-    with replaced_folder(out, GENERATED, [*requested.logs, *map(Path, requested.roads), *requested.also_read]) as folder:
+    with replaced_folder(
+        out, GENERATED, [*requested.logs, *map(Path, requested.roads), *requested.also_read]
+    ) as folder:
         readings = read_logs(requested, progress, tell)
         sources = sources_of(readings)
         taken = chosen([source.encounter for source in sources.values()], requested.encounters)
         if requested.recombine:
             taken += recombine(taken, sources, requested, tell)
-        pairs = [(encounter, road) for encounter in taken for road in sources[encounter.name].roads]
+        pairs = [
+            (encounter, road) for encounter in taken for road in sources[encounter.name].roads
+        ]
         with progress() as advance:
             cases, refusals = generate_all(pairs, requested, advance)
         cases = [
-            replace(case, provenance={**case.provenance, RECORDING: sources[case.encounter.name].recording}) for case in cases
+            replace(
+                case,
+                provenance={**case.provenance, RECORDING: sources[case.encounter.name].recording},
+            )
+            for case in cases
         ]
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
@@ -140,7 +148,12 @@ def generate_folder(
             quality=[*quality, *refusals, *untested],
             provenance=({"recombine": str(requested.recombine)} if requested.recombine else {})
             | provenance_of(
-                requested.logs, requested.seed, requested.count, requested.roads, requested.config, requested.request
+                requested.logs,
+                requested.seed,
+                requested.count,
+                requested.roads,
+                requested.config,
+                requested.request,
             ),
         )
     return cases, refusals
@@ -160,21 +173,32 @@ def sources_of(readings: Sequence[tuple[LogResult, Sequence[str]]]) -> dict[str,
 
 
 def recombine(
-    recorded: Sequence[Encounter], sources: dict[str, Source], requested: FolderRequest, tell: Callable[[str], None]
+    recorded: Sequence[Encounter],
+    sources: dict[str, Source],
+    requested: FolderRequest,
+    tell: Callable[[str], None],
 ) -> list[Encounter]:
     """Return encounters recombined of recorded ones, which are put among the sources; tell how many, and why not more."""
     made, refused = recombinations(recorded, requested.recombine, requested.seed)
     for encounter in made:
         one, other = (sources[name] for name in encounter.parents)
-        sources[encounter.name] = Source(encounter, one.roads, ", ".join(dict.fromkeys((one.recording, other.recording))))
+        sources[encounter.name] = Source(
+            encounter, one.roads, ", ".join(dict.fromkeys((one.recording, other.recording)))
+        )
     why = "; ".join(f"{count} × {cause}" for cause, count in refused.most_common())
-    why = f" ({why or 'no more pairs are of one kind; --recording adds some'})" if len(made) < requested.recombine else ""
+    why = (
+        f" ({why or 'no more pairs are of one kind; --recording adds some'})"
+        if len(made) < requested.recombine
+        else ""
+    )
     tell(f"recombined encounters: {len(made)} of {requested.recombine}{why}")
     return made
 
 
 def read_logs(
-    requested: FolderRequest, progress: Callable[[], AbstractContextManager[Advance]], tell: Callable[[str], None]
+    requested: FolderRequest,
+    progress: Callable[[], AbstractContextManager[Advance]],
+    tell: Callable[[str], None],
 ) -> list[tuple[LogResult, Sequence[str]]]:
     """Return each log with the roads for its encounters; of several logs, those without an encounter are told and left out.
 
@@ -198,22 +222,37 @@ def read_logs(
 
 def faults_of(cases: Sequence[GenerationResult]) -> list[str]:
     """Return what was left out of the cases' maps, because it is faulty."""
-    maps = {case.road.name: case.road.lanes.notes for case in cases if case.road is not None and case.road.lanes is not None}
-    return [f"map {name}: {note}" for name, notes in maps.items() for note in notes if FAULTY in note]
+    maps = {
+        case.road.name: case.road.lanes.notes
+        for case in cases
+        if case.road is not None and case.road.lanes is not None
+    }
+    return [
+        f"map {name}: {note}" for name, notes in maps.items() for note in notes if FAULTY in note
+    ]
 
 
 def notes_of(readings: Sequence[LogResult]) -> list[str]:
     """Return what there is to say about how logs were read, at most `NOTES` lines; the report has all."""
     notes = [f"{log.quality.name}: {note}" for log in readings for note in log.quality.remarks()]
     more = len(notes) - NOTES
-    return notes if more <= 0 else [*notes[:NOTES], f"{more} more notes on the log are in the report"]
+    return (
+        notes if more <= 0 else [*notes[:NOTES], f"{more} more notes on the log are in the report"]
+    )
 
 
 def generate_all(
-    pairs: Sequence[tuple[Encounter, str]], requested: FolderRequest, advance: Advance = lambda *_: None
+    pairs: Sequence[tuple[Encounter, str]],
+    requested: FolderRequest,
+    advance: Advance = lambda *_: None,
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
-    config, count, seed, request = requested.config, requested.count, requested.seed, requested.request
+    config, count, seed, request = (
+        requested.config,
+        requested.count,
+        requested.seed,
+        requested.request,
+    )
     population = [encounter for encounter, _ in pairs if not encounter.parents]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
@@ -224,7 +263,9 @@ def generate_all(
         def report(done: int, total: int, _candidates: int, name: str = name) -> None:
             advance(name, done, total)
 
-        def testing(wanted: Request, encounter: Encounter = encounter, road: str = road) -> "Testing":
+        def testing(
+            wanted: Request, encounter: Encounter = encounter, road: str = road
+        ) -> "Testing":
             from scenario_gen.closed_loop.reacting import Testing
 
             return Testing(encounter, road, config, wanted, seed)
@@ -237,7 +278,9 @@ def generate_all(
                 case = testing(own).run(count, report)
             else:
                 template = [encounter, *population]
-                case = generate(template, road, config, count=count, seed=seed, request=own, progress=report)
+                case = generate(
+                    template, road, config, count=count, seed=seed, request=own, progress=report
+                )
         except RefusedError as error:
             named = replace(own, ego="") if own.ego == EGO_AUTO else own
             answer = answer_refusal(error, encounter, road, config, named, count, seed)
@@ -246,9 +289,14 @@ def generate_all(
         cases.append(case)
         n_scenarios, refused = len(case.generated.scenarios), case.generated.refused
         if n_scenarios < count:
-            causes = ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
+            causes = (
+                ", ".join(f"{number} × {cause}" for cause, number in refused.most_common())
+                or "no candidate was drawn"
+            )
             causes = case.generated.adaptations[-1] if requested.for_testing else causes
-            refusals.append(f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}")
+            refusals.append(
+                f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}"
+            )
     return cases, refusals
 
 
@@ -260,7 +308,9 @@ def chosen(encounters: Sequence[Encounter], names: Sequence[str]) -> list[Encoun
     """
     known = {encounter.name: encounter for encounter in encounters}
     for unknown in (name for name in names if name not in known):
-        raise InputError(f"the log has no encounter {unknown!r}; it has {', '.join(known)}{did_you_mean(unknown, known)}")
+        raise InputError(
+            f"the log has no encounter {unknown!r}; it has {', '.join(known)}{did_you_mean(unknown, known)}"
+        )
     return [known[name] for name in names] or list(encounters)
 
 

@@ -25,7 +25,10 @@ class Generate:
     """The options of `generate`."""
 
     log: Annotated[
-        list[Path], typer.Argument(help="The recording: CSV, Parquet or SPMD files, or a bag (MCAP, SQLite or ROS 1).")
+        list[Path],
+        typer.Argument(
+            help="The recording: CSV, Parquet or SPMD files, or a bag (MCAP, SQLite or ROS 1)."
+        ),
     ]
     road: Annotated[
         list[str],
@@ -36,12 +39,22 @@ class Generate:
             "draws a map with the places that fit. Repeatable."
         ),
     ]
-    count: Annotated[int, typer.Option(min=1, max=MAX_COUNT, help="Scenarios per encounter and road.")] = 50
-    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 0
+    count: Annotated[
+        int, typer.Option(min=1, max=MAX_COUNT, help="Scenarios per encounter and road.")
+    ] = 50
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")
+    ] = 0
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/generated")
-    encounter: Annotated[list[str] | None, typer.Option(help="Name of an encounter in the log. Repeatable; default: all.")] = None
+    encounter: Annotated[
+        list[str] | None,
+        typer.Option(help="Name of an encounter in the log. Repeatable; default: all."),
+    ] = None
     recording: Annotated[
-        list[Path] | None, typer.Option(help="A further recording, on a clock of its own, for the same roads. Repeatable.")
+        list[Path] | None,
+        typer.Option(
+            help="A further recording, on a clock of its own, for the same roads. Repeatable."
+        ),
     ] = None
     recombine: Annotated[
         int,
@@ -59,9 +72,15 @@ class Generate:
         ),
     ] = ""
     start: Annotated[
-        list[str] | None, typer.Option(help=r"Start state of a vehicle on the road, 'id: x y yaw \[speed]'. Repeatable.")
+        list[str] | None,
+        typer.Option(
+            help=r"Start state of a vehicle on the road, 'id: x y yaw \[speed]'. Repeatable."
+        ),
     ] = None
-    goal: Annotated[list[str] | None, typer.Option(help="End state of a vehicle, in the same form. Repeatable.")] = None
+    goal: Annotated[
+        list[str] | None,
+        typer.Option(help="End state of a vehicle, in the same form. Repeatable."),
+    ] = None
     target: Annotated[
         list[str] | None,
         typer.Option(
@@ -69,7 +88,10 @@ class Generate:
             "Repeatable."
         ),
     ] = None
-    choose: Annotated[str, typer.Option(help="natural: as sampled. diverse: the valid candidates that differ most.")] = "natural"
+    choose: Annotated[
+        str,
+        typer.Option(help="natural: as sampled. diverse: the valid candidates that differ most."),
+    ] = "natural"
     for_testing: Annotated[
         bool,
         typer.Option(
@@ -87,7 +109,10 @@ class Generate:
         ),
     ] = False
     order: Annotated[
-        str, typer.Option(help="Who goes first. keep: as recorded. free: anyone. swap: the other one at the closest crossing.")
+        str,
+        typer.Option(
+            help="Who goes first. keep: as recorded. free: anyone. swap: the other one at the closest crossing."
+        ),
     ] = "keep"
     allow: Annotated[
         str,
@@ -98,7 +123,9 @@ class Generate:
     ] = ""
     obstacle: Annotated[
         list[str] | None,
-        typer.Option(help="Obstacle on the road, e.g. a parked car: 'x y yaw length width'. Repeatable."),
+        typer.Option(
+            help="Obstacle on the road, e.g. a parked car: 'x y yaw length width'. Repeatable."
+        ),
     ] = None
     assignments: SetOption = None
     parameter_file: ParametersOption = None
@@ -115,13 +142,27 @@ def generate(options: Generate) -> None:
 
     allowed = [f"fitting.allow={options.allow}"] if options.allow else []
     compared = ["evaluation.compare=true"] if options.compare else []
-    config = configured(options.parameter_file, [*(options.assignments or []), *allowed, *compared])
+    config = configured(
+        options.parameter_file, [*(options.assignments or []), *allowed, *compared]
+    )
     for text in options.obstacle or []:
         read_obstacles(text, "--obstacle")
-    config = updated(config, {"road.obstacles": join_pieces(filter(None, [config.road.obstacles, *(options.obstacle or [])]))})
-    starts, goals, targets = (join_pieces(texts or []) for texts in (options.start, options.goal, options.target))
+    config = updated(
+        config,
+        {
+            "road.obstacles": join_pieces(
+                filter(None, [config.road.obstacles, *(options.obstacle or [])])
+            )
+        },
+    )
+    starts, goals, targets = (
+        join_pieces(texts or []) for texts in (options.start, options.goal, options.target)
+    )
     request = FolderRequest(
-        jobs=[(files, options.road) for files in (options.log, *([path] for path in options.recording or []))],
+        jobs=[
+            (files, options.road)
+            for files in (options.log, *([path] for path in options.recording or []))
+        ],
         config=config,
         count=options.count,
         seed=options.seed,
@@ -136,9 +177,20 @@ def generate(options: Generate) -> None:
 
 @commands.command()
 def roads(
-    road: Annotated[str, typer.Argument(help="A map, or the name of a built-in road; without it all of these are listed.")] = "",
-    log: Annotated[Path | None, typer.Option(help="A recording: the roads or places that fit its encounter are named.")] = None,
-    encounter: Annotated[list[str] | None, typer.Option(help="Name of the encounter in the log; default: the first.")] = None,
+    road: Annotated[
+        str,
+        typer.Argument(
+            help="A map, or the name of a built-in road; without it all of these are listed."
+        ),
+    ] = "",
+    log: Annotated[
+        Path | None,
+        typer.Option(help="A recording: the roads or places that fit its encounter are named."),
+    ] = None,
+    encounter: Annotated[
+        list[str] | None,
+        typer.Option(help="Name of the encounter in the log; default: the first."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="The picture to write, SVG.")] = Path("roads.svg"),
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
@@ -154,13 +206,19 @@ def roads(
     from scenario_gen.roads import BUILT_IN
 
     config = configured(parameter_file, assignments)
-    template = None if log is None else chosen(read_log(log, config.log).encounters, encounter or [])[0]
+    template = (
+        None if log is None else chosen(read_log(log, config.log).encounters, encounter or [])[0]
+    )
     if not road:
         names = [*BUILT_IN, "corridor"]
         if template is not None:
-            names = list(suitable_roads(template, segment(template, config.segmentation, 0), config))
+            names = list(
+                suitable_roads(template, segment(template, config.segmentation, 0), config)
+            )
         give(roads=names)
-        say(f"{'roads' if template is None else f'roads that take {template.name}'}: {', '.join(names)}")
+        say(
+            f"{'roads' if template is None else f'roads that take {template.name}'}: {', '.join(names)}"
+        )
         return
     if out.suffix.lower() != ".svg":
         raise InputError(f"--out {out}: name a file that ends with .svg")
@@ -177,11 +235,19 @@ def roads(
 def regenerate(
     bag: Annotated[Path, typer.Argument(help="A bag that `generate` or the ROS nodes wrote.")],
     index: Annotated[int, typer.Argument(help="Number of the scenario, as on its page.", min=0)],
-    out: Annotated[Path | None, typer.Option(help="Folder for a bag with this scenario, its recording and its road.")] = None,
-    namespace: Annotated[str | None, typer.Option(help="Namespace of the scenario, if several have that number.")] = None,
-    request: Annotated[str | None, typer.Option(help="Id of the request, if several have that number.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for a bag with this scenario, its recording and its road."),
+    ] = None,
+    namespace: Annotated[
+        str | None, typer.Option(help="Namespace of the scenario, if several have that number.")
+    ] = None,
+    request: Annotated[
+        str | None, typer.Option(help="Id of the request, if several have that number.")
+    ] = None,
     log: Annotated[
-        Path | None, typer.Option(help="Start from this raw log instead of the bag's tracks and changepoints.")
+        Path | None,
+        typer.Option(help="Start from this raw log instead of the bag's tracks and changepoints."),
     ] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
@@ -191,7 +257,9 @@ def regenerate(
 
     remind(bag)
     config = configured(parameter_file, assignments).bag
-    result = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log, config=config)
+    result = regenerate_scenario(
+        bag, index, namespace=namespace, request=request, log=log, config=config
+    )
     give(index=index, bytes=len(result.data), sha256=result.sha256, apart_m=result.distance)
     say(f"scenario {index}: {result.comparison}, {len(result.data)} bytes, sha256 {result.sha256}")
     if out is not None:
@@ -203,9 +271,13 @@ def regenerate(
 @commands.command()
 def demo(
     count: Annotated[int, typer.Option(min=1, max=MAX_COUNT, help="Scenarios per case.")] = 50,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")] = 7,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")
+    ] = 7,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo"),
-    ros: Annotated[bool, typer.Option("--ros", help="Let the ROS nodes generate the scenarios, over DDS.")] = False,
+    ros: Annotated[
+        bool, typer.Option("--ros", help="Let the ROS nodes generate the scenarios, over DDS.")
+    ] = False,
 ) -> None:
     """Generate scenarios from three bundled encounters: a left turn that waits, a follower, and an all-way stop."""
     from scenario_gen.cli.demo import run_demo
@@ -226,7 +298,13 @@ def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) ->
     from scenario_gen.output.report.summary import summary
     from scenario_gen.output.results import BAG, FIGURES, REPORT
 
-    give(report=out / REPORT, bag=out / BAG, figures=out / FIGURES, cases=[case_of(case) for case in cases], refusals=refusals)
+    give(
+        report=out / REPORT,
+        bag=out / BAG,
+        figures=out / FIGURES,
+        cases=[case_of(case) for case in cases],
+        refusals=refusals,
+    )
     say(summary(cases, verbose=is_verbose()), wrap=True)
     say(f"report: {out / REPORT}\nbag:    {out / BAG}")
     say("next:   open the report; `scenario-gen drive --help` tests a planner on the bag")

@@ -22,7 +22,16 @@ from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import check_value, flatten, parameter, Parameters
 from scenario_gen.ros.plumbing import node_parameters
 
-NODES = ("recorder", "road_server", "segmenter", "planner", "gp_sampler", "evaluator", "preview", "log_player")
+NODES = (
+    "recorder",
+    "road_server",
+    "segmenter",
+    "planner",
+    "gp_sampler",
+    "evaluator",
+    "preview",
+    "log_player",
+)
 """Who listens comes first."""
 LIVE = "live"
 LEVELS = ("debug", "info", "warn", "error", "fatal")
@@ -36,7 +45,9 @@ class OfEveryNode(Parameters):
     """Parameters that several nodes of the suite, or all, declare for themselves."""
 
     ego: str = parameter("", "id of the vehicle to leave out for a planner under test")
-    starts: str = parameter("", "start states on the road, `id:x y yaw [speed]`, vehicles separated by `;`")
+    starts: str = parameter(
+        "", "start states on the road, `id:x y yaw [speed]`, vehicles separated by `;`"
+    )
     goals: str = parameter("", "end states, in the same form")
     use_sim_time: bool = parameter(False, "the nodes follow /clock")
     autostart: bool = parameter(True, "the nodes configure and activate themselves")
@@ -66,10 +77,13 @@ _OF_NODES = (
 _DRIVE = flatten(node_parameters.TrafficParameters())
 Arguments = Mapping[str, tuple[str, "Field[Any]"]]
 SUITE: Arguments = {
-    OTHER_NAMES.get(name, name): (name, entry) for config in _OF_NODES for name, (entry, _) in flatten(config).items()
+    OTHER_NAMES.get(name, name): (name, entry)
+    for config in _OF_NODES
+    for name, (entry, _) in flatten(config).items()
 }
 DRIVE: Arguments = {  # of two of one name, the node's own
-    name.removeprefix("drive."): (name, _DRIVE[name][0]) for name in sorted(_DRIVE, key=lambda name: "." not in name)
+    name.removeprefix("drive."): (name, _DRIVE[name][0])
+    for name in sorted(_DRIVE, key=lambda name: "." not in name)
 }
 LAUNCH = {name: entry for name, (entry, _) in flatten(OfLaunch()).items()}
 
@@ -102,7 +116,10 @@ class Launch:
 
 def meanings(arguments: Arguments) -> dict[str, str]:
     """Return what `ros2 launch --show-args` says of each argument."""
-    return {name: f"{entry.metadata['meaning']} (default: {entry.default!r})" for name, entry in _entries(arguments).items()}
+    return {
+        name: f"{entry.metadata['meaning']} (default: {entry.default!r})"
+        for name, entry in _entries(arguments).items()
+    }
 
 
 def _entries(arguments: Arguments) -> dict[str, "Field[Any]"]:
@@ -123,14 +140,24 @@ def read(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
     for name, text in texts.items():
         if name in known and text:
             try:
-                values[name] = _unquoted(text) if isinstance(known[name].default, str) else parse_yaml(text, "its value")
+                values[name] = (
+                    _unquoted(text)
+                    if isinstance(known[name].default, str)
+                    else parse_yaml(text, "its value")
+                )
                 check_value(name, known[name], values[name])
             except InputError as error:
                 raise InputError(f"{name}:={shown(text)}: {error}") from error
         elif text and (near := did_you_mean(name, known)):
-            raise InputError(f"{name}:= is no argument of this launch file{near} There are {', '.join(known)}")
+            raise InputError(
+                f"{name}:= is no argument of this launch file{near} There are {', '.join(known)}"
+            )
     launch = Launch(
-        {arguments[name][0]: value for name, value in values.items() if name in arguments and (name, value) != ("log", LIVE)},
+        {
+            arguments[name][0]: value
+            for name, value in values.items()
+            if name in arguments and (name, value) != ("log", LIVE)
+        },
         OfLaunch(**{name: value for name, value in values.items() if name in LAUNCH}),
     )
     _check(launch, of_suite="log" in arguments)
@@ -150,18 +177,30 @@ def _check(launch: Launch, *, of_suite: bool) -> None:
     """Raise InputError if the namespace, a path or a node that is to be left out cannot be."""
     own, given = launch.own, launch.given
     if own.namespace and not NAMESPACE.fullmatch(own.namespace):
-        raise InputError(f"namespace:={shown(own.namespace)}: write names of letters, digits and underscores, separated by /")
+        raise InputError(
+            f"namespace:={shown(own.namespace)}: write names of letters, digits and underscores, separated by /"
+        )
     written = "bag" if of_suite else "results"
-    for name, path in (("params", own.params), ("log", given.get("log_path")), ("bag", "" if of_suite else given.get("bag"))):
+    for name, path in (
+        ("params", own.params),
+        ("log", given.get("log_path")),
+        ("bag", "" if of_suite else given.get("bag")),
+    ):
         if path and not Path(path).exists():
-            raise InputError(f"{name}:={shown(path)}: it does not exist; check the name and the folder")
+            raise InputError(
+                f"{name}:={shown(path)}: it does not exist; check the name and the folder"
+            )
     if path := given.get(written):
         _check_folder(f"{written}:={shown(path)}", Path(path), new=of_suite)
-    if own.params and "ros__parameters" not in Path(own.params).read_text(encoding="utf-8", errors="replace"):
+    if own.params and "ros__parameters" not in Path(own.params).read_text(
+        encoding="utf-8", errors="replace"
+    ):
         raise InputError(f"params:={own.params}: not a parameter file; it has no ros__parameters")
     for name in launch.left_out:
         if name not in NODES:
-            raise InputError(f"without:={name}: choose of {', '.join(NODES)}{did_you_mean(name, NODES)}")
+            raise InputError(
+                f"without:={name}: choose of {', '.join(NODES)}{did_you_mean(name, NODES)}"
+            )
 
 
 def _check_folder(what: str, folder: Path, *, new: bool) -> None:

@@ -20,10 +20,14 @@ Options = TypeVar("Options")
 Config = TypeVar("Config")
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Set one parameter, as name=value (repeatable). `scenario-gen parameters` lists them."),
+    typer.Option(
+        "--set",
+        help="Set one parameter, as name=value (repeatable). `scenario-gen parameters` lists them.",
+    ),
 ]
 ParametersOption = Annotated[
-    Path | None, typer.Option("--params", help="Read parameters from a YAML file such as config/default.yaml.")
+    Path | None,
+    typer.Option("--params", help="Read parameters from a YAML file such as config/default.yaml."),
 ]
 
 
@@ -62,7 +66,9 @@ def configured(file: Path | None, assignments: list[str] | None) -> "PipelineCon
     from scenario_gen.base.parameters import loaded
     from scenario_gen.pipeline import PipelineConfig
 
-    return assigned_all(PipelineConfig() if file is None else loaded(PipelineConfig(), file), assignments)
+    return assigned_all(
+        PipelineConfig() if file is None else loaded(PipelineConfig(), file), assignments
+    )
 
 
 def remind(bag: Path) -> None:

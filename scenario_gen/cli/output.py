@@ -44,7 +44,9 @@ class Program(TyperGroup):
         """Take the flags of all commands, wherever they stand before a `--`."""
         end = args.index("--") if "--" in args else len(args)
         flags = [word for word in args[:end] if word in FLAGS]
-        return super().parse_args(ctx, [*flags, *(word for word in args[:end] if word not in FLAGS), *args[end:]])
+        return super().parse_args(
+            ctx, [*flags, *(word for word in args[:end] if word not in FLAGS), *args[end:]]
+        )
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; with --json, print its results as the last line of standard output, also after an error."""
@@ -95,7 +97,9 @@ class Commands(typer.Typer):
                 with places.as_files(values, paths) as local:
                     function(**local)
 
-            super(Commands, self).command(name, rich_help_panel=panel or self.panel, **options)(run)
+            super(Commands, self).command(name, rich_help_panel=panel or self.panel, **options)(
+                run
+            )
             return function
 
         return of
@@ -165,11 +169,18 @@ def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int =
     table = Table(*columns, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)
-    if terminal.measure(table, options=terminal.options.update(width=10_000)).maximum <= terminal.width:
+    if (
+        terminal.measure(table, options=terminal.options.update(width=10_000)).maximum
+        <= terminal.width
+    ):
         say(table)
         return
     for row in rows:
-        pairs = [f"{name}\N{NO-BREAK SPACE}{text}" for name, text in zip(columns[names:], row[names:], strict=True) if text]
+        pairs = [
+            f"{name}\N{NO-BREAK SPACE}{text}"
+            for name, text in zip(columns[names:], row[names:], strict=True)
+            if text
+        ]
         say(", ".join([" ".join(row[:names]), *pairs]), wrap=True)
 
 
@@ -194,13 +205,17 @@ def beside(path: Path, name: str) -> Path:
         InputError: the input is the copy of an object, beside which nothing would stay.
     """
     if (url := renamed(str(path))) != str(path):
-        raise InputError(f"--out is missing: name a folder or a place in a store, for nothing is written beside {url}")
+        raise InputError(
+            f"--out is missing: name a folder or a place in a store, for nothing is written beside {url}"
+        )
     return path.resolve().with_name(name)
 
 
 def open_page(page: Path) -> bool:
     """Open a page in a browser if somebody sits at this terminal and there is a display; return whether it was opened."""
-    has_display = sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    has_display = sys.platform == "darwin" or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
     is_copy = renamed(str(page)) != str(page)
     if is_copy or _current.as_json or _current.quiet or not (sys.stdout.isatty() and has_display):
         return False

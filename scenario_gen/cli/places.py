@@ -12,9 +12,21 @@ import typer
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.folders import scratch
-from scenario_gen.base.stores import fetched, naming_objects, place, Remote, temporary, upload, url_of
+from scenario_gen.base.stores import (
+    fetched,
+    naming_objects,
+    place,
+    Remote,
+    temporary,
+    upload,
+    url_of,
+)
 
-READ = ("log", "parameter_file", "against")  # options that name an input; those of all other options are written
+READ = (
+    "log",
+    "parameter_file",
+    "against",
+)  # options that name an input; those of all other options are written
 
 
 def paths_of(command: Callable[..., None], own: Sequence[str]) -> dict[str, bool]:
@@ -23,7 +35,9 @@ def paths_of(command: Callable[..., None], own: Sequence[str]) -> dict[str, bool
     for name, annotation in get_type_hints(command, include_extras=True).items():
         kind, info = (*get_args(annotation), None, None)[:2]
         if name not in own and (kind is Path or Path in get_args(kind)):
-            found[name] = name == "out" or (type(info) is type(typer.Option()) and name not in READ)
+            found[name] = name == "out" or (
+                type(info) is type(typer.Option()) and name not in READ
+            )
     return found
 
 
@@ -61,7 +75,9 @@ def as_files(values: Mapping[str, Any], written: Mapping[str, bool]) -> Iterator
         for name, to_write in written.items():
             value = values[name]
             several = [
-                local(one, to_write=to_write) for one in (value if isinstance(value, list) else [value]) if one is not None
+                local(one, to_write=to_write)
+                for one in (value if isinstance(value, list) else [value])
+                if one is not None
             ]
             files[name] = several if isinstance(value, list) else several[0] if several else None
         refused: Exception | None = None

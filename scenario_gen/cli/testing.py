@@ -31,32 +31,48 @@ class Drive:
     bag: Annotated[Path, typer.Argument(help="A bag of this suite with scenarios.")]
     planner: Annotated[
         str,
-        typer.Option(help="MODULE:CLASS of the planner, e.g. mine:MyPlanner. With --ros: the command that starts its node."),
+        typer.Option(
+            help="MODULE:CLASS of the planner, e.g. mine:MyPlanner. With --ros: the command that starts its node."
+        ),
     ]
     ego: Annotated[
-        str, typer.Option(help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first.")
+        str,
+        typer.Option(
+            help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first."
+        ),
     ] = ""
     ros: Annotated[
         bool,
         typer.Option(
-            "--ros", help="The planner is a ROS 2 node that answers each odometry message with a command, over DDS in lock-step."
+            "--ros",
+            help="The planner is a ROS 2 node that answers each odometry message with a command, over DDS in lock-step.",
         ),
     ] = False
     count: Annotated[int, typer.Option(min=0, help="Most scenarios to drive. 0: all.")] = 0
-    workers: Annotated[int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")] = 0
+    workers: Annotated[
+        int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")
+    ] = 0
     against: Annotated[
         Path | None,
-        typer.Option(help="drives.json of another planner on the same bag. Exit code 1 if this planner is worse."),
+        typer.Option(
+            help="drives.json of another planner on the same bag. Exit code 1 if this planner is worse."
+        ),
     ] = None
     baseline: Annotated[
-        bool, typer.Option(help="Also drive the non-reactive baseline, to show how many scenarios need no reaction.")
+        bool,
+        typer.Option(
+            help="Also drive the non-reactive baseline, to show how many scenarios need no reaction."
+        ),
     ] = True
     unlooking: Annotated[bool, typer.Option(hidden=True)] = True  # earlier name of --baseline
-    out: Annotated[Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")] = Path("out/drives")
+    out: Annotated[
+        Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")
+    ] = Path("out/drives")
     assignments: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", help="Set a parameter of the drive (step, policy, …) or a threshold (bars.collisions, …), as name=value."
+            "--set",
+            help="Set a parameter of the drive (step, policy, …) or a threshold (bars.collisions, …), as name=value.",
         ),
     ] = None
 
@@ -69,7 +85,14 @@ def drive(options: Drive) -> None:
 
     remind(options.bag)
     planner, processes = options.planner, in_processes(options.workers)
-    request = DriveRequest(options.bag, planner, options.ego, options.count, options.assignments or [], options.against)
+    request = DriveRequest(
+        options.bag,
+        planner,
+        options.ego,
+        options.count,
+        options.assignments or [],
+        options.against,
+    )
     with bars() as advance:
         result = drive_bag(
             request,
@@ -104,7 +127,9 @@ def _report(drives: "Drives", out: Path) -> None:
     if took.count:
         slow = f"{took.slow} of {took.count} slower than decision_time, the longest {took.longest:.3f} s"
         say(f"decisions: {slow} (depends on this machine, so no file has it)")
-    failed = [drives.outcomes[k] for k in drives.by_severity() if not drives.outcomes[k].verdict.passed]
+    failed = [
+        drives.outcomes[k] for k in drives.by_severity() if not drives.outcomes[k].verdict.passed
+    ]
     for outcome in failed[:WORST]:
         say(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
     say(*map(str, files), sep="\n")
@@ -119,7 +144,9 @@ def _over_dds() -> "RunTrials":
     try:
         from scenario_gen.cli.drive import drive_over_dds
     except ImportError as error:
-        raise InputError(f"ROS 2 is not available ({error}); source its setup file, or leave out --ros") from error
+        raise InputError(
+            f"ROS 2 is not available ({error}); source its setup file, or leave out --ros"
+        ) from error
     return drive_over_dds
 
 
@@ -129,32 +156,65 @@ class Search:
 
     source: Annotated[
         Path,
-        typer.Argument(help="A bag of `generate`: the search uses its recording, road and parameters. Or a log, with --road."),
+        typer.Argument(
+            help="A bag of `generate`: the search uses its recording, road and parameters. Or a log, with --road."
+        ),
     ]
     planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. mine:MyPlanner.")]
     budget: Annotated[
-        int, typer.Option(min=1, max=10_000_000, help="Most drives. A larger budget continues an earlier search.")
+        int,
+        typer.Option(
+            min=1, max=10_000_000, help="Most drives. A larger budget continues an earlier search."
+        ),
     ] = 1000
     road: Annotated[str, typer.Option(help="Road, if the source is a log.")] = ""
-    encounter: Annotated[str, typer.Option(help="Name of the encounter, if the source is a log of several.")] = ""
+    encounter: Annotated[
+        str, typer.Option(help="Name of the encounter, if the source is a log of several.")
+    ] = ""
     objective: Annotated[
-        str, typer.Option(help="What counts as a failure: at_fault, collision, off_road, goal, or e.g. 'ttc<1.5', 'pet<1' (s).")
+        str,
+        typer.Option(
+            help="What counts as a failure: at_fault, collision, off_road, goal, or e.g. 'ttc<1.5', 'pet<1' (s)."
+        ),
     ] = "at_fault"
     ego: Annotated[
-        str, typer.Option(help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first.")
+        str,
+        typer.Option(
+            help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first."
+        ),
     ] = ""
-    worst: Annotated[bool, typer.Option("--worst", help="Look for the worst failure instead of the failure rate.")] = False
+    worst: Annotated[
+        bool,
+        typer.Option("--worst", help="Look for the worst failure instead of the failure rate."),
+    ] = False
     max_rate: Annotated[
-        float | None, typer.Option(min=0.0, max=1.0, help="Exit code 1 if the failure rate's upper bound (95 %) is above this.")
+        float | None,
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            help="Exit code 1 if the failure rate's upper bound (95 %) is above this.",
+        ),
     ] = None
-    namespace: Annotated[str | None, typer.Option(help="Namespace of the scenarios, if the bag has several.")] = None
-    seed: Annotated[int, typer.Option(min=0, help="Random seed. The same seed gives the same search.")] = 0
-    workers: Annotated[int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")] = 0
-    out: Annotated[Path, typer.Option(help="Folder for search.json, search.html, junit.xml and the bag of failures.")] = Path(
-        "out/search"
-    )
+    namespace: Annotated[
+        str | None, typer.Option(help="Namespace of the scenarios, if the bag has several.")
+    ] = None
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed. The same seed gives the same search.")
+    ] = 0
+    workers: Annotated[
+        int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")
+    ] = 0
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Folder for search.json, search.html, junit.xml and the bag of failures."
+        ),
+    ] = Path("out/search")
     assignments: Annotated[
-        list[str] | None, typer.Option("--set", help="Set a parameter of the drive (step, policy, …), as name=value.")
+        list[str] | None,
+        typer.Option(
+            "--set", help="Set a parameter of the drive (step, policy, …), as name=value."
+        ),
     ] = None
 
 
@@ -173,12 +233,20 @@ def drawn_from(options: Search) -> "Replanned":
     if not options.road:
         return replanned(options.source, options.namespace)
     names = [options.encounter] if options.encounter else []
-    request = FolderRequest([([options.source], [options.road])], PipelineConfig(), count=1, seed=options.seed, encounters=names)
+    request = FolderRequest(
+        [([options.source], [options.road])],
+        PipelineConfig(),
+        count=1,
+        seed=options.seed,
+        encounters=names,
+    )
     with TemporaryDirectory() as place:
         cases, _ = generate_folder(Path(place) / "one", request)
         if len(cases) > 1:
             known = " or ".join(case.encounter.name for case in cases)
-            raise InputError(f"{options.source}: {len(cases)} encounters; choose one: --encounter {known}")
+            raise InputError(
+                f"{options.source}: {len(cases)} encounters; choose one: --encounter {known}"
+            )
         return replanned(Path(place) / "one" / BAG, options.namespace)
 
 
@@ -190,7 +258,9 @@ def search(options: Search) -> None:
     from scenario_gen.closed_loop.search.objective import Objective
 
     if options.worst and options.max_rate is not None:
-        raise InputError("--max-rate: a search for the worst gives no rate; leave out --worst, or --max-rate")
+        raise InputError(
+            "--max-rate: a search for the worst gives no rate; leave out --worst, or --max-rate"
+        )
     remind(options.source)
     source = drawn_from(options)
     request = SearchRequest(
@@ -206,16 +276,30 @@ def search(options: Search) -> None:
         options.worst,
         options.assignments or [],
     )
-    say(f"Drives are kept in {options.out}{JOURNAL}. The same command continues a search that was stopped.")
+    say(
+        f"Drives are kept in {options.out}{JOURNAL}. The same command continues a search that was stopped."
+    )
     with bars() as advance:
         result = search_failures(
-            request, options.out, workers=options.workers, progress=lambda done, total: advance("drives", done, total)
+            request,
+            options.out,
+            workers=options.workers,
+            progress=lambda done, total: advance("drives", done, total),
         )
-    give(rate=result.estimate.rate, failures=len(result.findings), sentences=result.sentences(), files=result.written)
+    give(
+        rate=result.estimate.rate,
+        failures=len(result.findings),
+        sentences=result.sentences(),
+        files=result.written,
+    )
     say(*result.sentences(), sep="\n")
     if result.findings:
         rows = [
-            (kind, str(len(own)), f"drive {own[0].trial.name}: {own[0].outcome.verdict.sentence()}")
+            (
+                kind,
+                str(len(own)),
+                f"drive {own[0].trial.name}: {own[0].outcome.verdict.sentence()}",
+            )
             for kind, own in result.kinds.items()
         ]
         say_rows(("kind of failure", "kept", "likeliest"), rows)
@@ -224,5 +308,7 @@ def search(options: Search) -> None:
         again = f"scenario-gen drive {options.out / 'bag'} --planner {options.planner} --ego {request.ego_id()}"
         say(f"as a regression test: {again}")
     if options.max_rate is not None and not result.estimate.bound <= options.max_rate:
-        say(f"the failure rate may be above {options.max_rate:g}: its bound is {result.estimate.bound:.3g} (95 %)")
+        say(
+            f"the failure rate may be above {options.max_rate:g}: its bound is {result.estimate.bound:.3g} (95 %)"
+        )
         raise typer.Exit(1)

@@ -6,7 +6,16 @@
 import numpy as np
 
 from scenario_gen.closed_loop.certified import pose_at, WORLD, World
-from scenario_gen.closed_loop.driver import ACCELERATION, CLOCK, EGO_CLOCK, HELD, MANNER, Manner, RATE, WAITED
+from scenario_gen.closed_loop.driver import (
+    ACCELERATION,
+    CLOCK,
+    EGO_CLOCK,
+    HELD,
+    MANNER,
+    Manner,
+    RATE,
+    WAITED,
+)
 from scenario_gen.closed_loop.others import react
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
@@ -23,7 +32,9 @@ PUNCTUAL = 0.15  # seconds by which an ego that stands with its witness may be l
 
 
 @kernel(inline=True)
-def locate(now: float, time: Floats, motion: Floats, body: Floats, before: float, out: Floats) -> None:
+def locate(
+    now: float, time: Floats, motion: Floats, body: Floats, before: float, out: Floats
+) -> None:
     """Write the ego's clock on its witness' path, the rate at which it runs, and whether it is on that path (1 or 0).
 
     Args:
@@ -78,12 +89,24 @@ def place(time: Floats, motion: Floats, drivers: Floats, out: Floats) -> None:
     pose = np.empty(5)
     for i in range(out.shape[0]):
         pose_at(time, motion[i], drivers[i, CLOCK], pose)
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = pose[0], pose[1], pose[2], pose[3] * drivers[i, RATE]
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = (
+            pose[0],
+            pose[1],
+            pose[2],
+            pose[3] * drivers[i, RATE],
+        )
 
 
 @kernel(WORLD, MANNER, F, F2, OUT2, OUT2, OUT2, OUTB1)
 def advance(
-    world: World, manner: Manner, now: float, before: Floats, seen: Floats, after: Floats, vehicles: Floats, here: Bools
+    world: World,
+    manner: Manner,
+    now: float,
+    before: Floats,
+    seen: Floats,
+    after: Floats,
+    vehicles: Floats,
+    here: Bools,
 ) -> None:
     """Move everyone one step on.
 
@@ -106,7 +129,12 @@ def advance(
     else:
         after[:] = 0.0
         after[:, CLOCK], after[:, RATE] = min(now, time[-1]), 1.0
-    after[ego, CLOCK], after[ego, RATE], after[ego, WAITED], after[ego, HELD] = witness[0], witness[1], 0.0, 0.0
+    after[ego, CLOCK], after[ego, RATE], after[ego, WAITED], after[ego, HELD] = (
+        witness[0],
+        witness[1],
+        0.0,
+        0.0,
+    )
     place(time, motion, after, vehicles)
     vehicles[ego] = body[:4]
     for i in range(len(motion)):
@@ -116,11 +144,16 @@ def advance(
         speed, was, clock = vehicles[i, 3], before[i, ACCELERATION], after[i, CLOCK]
         gained = (speed - before[i, RATE] * pose[3]) / h
         if after[i, HELD] > 0.0:
-            hard, sudden = gained + manner.strongest[i] + HARDER / h, gained - min(was, 0.0) + manner.jerk * h + SUDDEN / h
+            hard, sudden = (
+                gained + manner.strongest[i] + HARDER / h,
+                gained - min(was, 0.0) + manner.jerk * h + SUDDEN / h,
+            )
             after[i, HELD] = 1.0 if min(hard, sudden) < 0.0 else 0.0
         if after[i, HELD] == 0.0 or speed == 0.0:
             after[i, ACCELERATION] = gained if speed > 0.0 else 0.0
-        after[i, ACCELERATION] = min(max(after[i, ACCELERATION], -manner.strongest[i]), manner.acceleration)
+        after[i, ACCELERATION] = min(
+            max(after[i, ACCELERATION], -manner.strongest[i]), manner.acceleration
+        )
         begin, end = world.spans[i]
         here[i] = i == ego or (clock >= begin and not (world.leaves[i] and clock >= end))
 
@@ -129,7 +162,9 @@ def advance(
 def ego_hits(vehicles: Floats, half: Floats, here: Bools, ego: int) -> bool:
     """Whether the ego overlaps another that is here; vehicles (N, 4) x, y, yaw, speed, half sizes (N, 2)."""
     mine, other = np.empty(7), np.empty(7)
-    fill_box(vehicles[ego, 0], vehicles[ego, 1], vehicles[ego, 2], half[ego, 0], half[ego, 1], mine)
+    fill_box(
+        vehicles[ego, 0], vehicles[ego, 1], vehicles[ego, 2], half[ego, 0], half[ego, 1], mine
+    )
     for i in range(vehicles.shape[0]):
         if i != ego and here[i]:
             fill_box(vehicles[i, 0], vehicles[i, 1], vehicles[i, 2], half[i, 0], half[i, 1], other)

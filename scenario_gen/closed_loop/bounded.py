@@ -20,7 +20,9 @@ from types import FrameType
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import Observation, Planner, Task
 
-INTERRUPT_AGAIN_S = 1.0  # seconds after which a planner that goes on nevertheless is interrupted again
+INTERRUPT_AGAIN_S = (
+    1.0  # seconds after which a planner that goes on nevertheless is interrupted again
+)
 GRACE = 5.0  # seconds beyond the limit after which a process that no interrupt reaches is ended
 
 
@@ -62,7 +64,9 @@ class Timed:
         began = perf_counter()
         asked = self._planner.act(observation)
         took, known = perf_counter() - began, self.found
-        self.found = Decisions(known.count + 1, known.slow + (took > self._limit), max(known.longest, took))
+        self.found = Decisions(
+            known.count + 1, known.slow + (took > self._limit), max(known.longest, took)
+        )
         return asked
 
 

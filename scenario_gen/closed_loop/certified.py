@@ -27,7 +27,9 @@ CELL = 0.1  # seconds of a certified clock that are taken together
 ROOM = 0.05  # metres by which the box of a cell is larger than its ends ask for: what bends between them, and a little distance
 BESIDE_LANE = 0.75  # metres beside the footprints of all that drive which belong to their lanes: 3.4 m of a car's
 PARKED = 1.0  # metres; who drives less stands on no lane of its own
-STANDS = 0.5  # m/s; who is slower at the end of a scenario stands there, who is faster leaves the scene
+STANDS = (
+    0.5  # m/s; who is slower at the end of a scenario stands there, who is faster leaves the scene
+)
 
 
 class World(NamedTuple):
@@ -77,16 +79,24 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
     ids = [vehicle.id for vehicle in scenario.vehicles]
     if isinstance(ego, str):
         if ego not in ids:
-            raise InputError(f"scenario {scenario.index} has no vehicle {ego!r} to be the ego; it has {', '.join(ids)}")
+            raise InputError(
+                f"scenario {scenario.index} has no vehicle {ego!r} to be the ego; it has {', '.join(ids)}"
+            )
         ego = ids.index(ego)
     if not 0 <= ego < len(ids):
-        raise InputError(f"scenario {scenario.index} has no vehicle number {ego} to be the ego; it has {len(ids)}")
+        raise InputError(
+            f"scenario {scenario.index} has no vehicle number {ego} to be the ego; it has {len(ids)}"
+        )
     time = scenario.time
     if len(time) < 2 or time[0] != 0.0:
-        raise InputError(f"scenario {scenario.index} must start at 0 s and have two samples at least")
+        raise InputError(
+            f"scenario {scenario.index} must start at 0 s and have two samples at least"
+        )
     speed, yaw = scenario.speed, scenario.heading
     velocity = speed[..., None] * unit(yaw)
-    motion = frozen(np.concatenate([scenario.position, yaw[..., None], speed[..., None], velocity], axis=2))
+    motion = frozen(
+        np.concatenate([scenario.position, yaw[..., None], speed[..., None], velocity], axis=2)
+    )
     half = frozen([vehicle.half for vehicle in scenario.vehicles])
     n, count = len(ids), int(np.ceil(time[-1] / CELL - 1e-9))
     cells, order = np.empty((n, count, 8)), np.empty((n, n, count))
@@ -98,9 +108,25 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
         if ego not in (who, whom):
             _keep_waiting(scenario, who, whom, order[who, whom])
     leaves = np.asarray((speed[:, -1] >= STANDS) | (spans[:, 1] < time[-1]))
-    walks, kerbs = np.array([vehicle.kind.walks for vehicle in scenario.vehicles]), np.full((n, count), np.inf)
+    walks, kerbs = (
+        np.array([vehicle.kind.walks for vehicle in scenario.vehicles]),
+        np.full((n, count), np.inf),
+    )
     fill_kerbs(cells, walks, CELL, kerbs)
-    return World(step, time, motion, half, spans, leaves, frozen(cells), CELL, frozen(order), ego, walks, frozen(kerbs))
+    return World(
+        step,
+        time,
+        motion,
+        half,
+        spans,
+        leaves,
+        frozen(cells),
+        CELL,
+        frozen(order),
+        ego,
+        walks,
+        frozen(kerbs),
+    )
 
 
 def _keep_waiting(scenario: Scenario, who: int, whom: int, order: Floats) -> None:
@@ -151,7 +177,9 @@ FAR = 1e15  # metres; where the boxes are of a vehicle that is not on the scene
 
 
 @kernel(F1, F3, F2, F2, F, OUT3)
-def fill_cells(time: Floats, motion: Floats, half: Floats, spans: Floats, cell: float, out: Floats) -> None:
+def fill_cells(
+    time: Floats, motion: Floats, half: Floats, spans: Floats, cell: float, out: Floats
+) -> None:
     """Fill `cells` (N, K, 8) of `World`, from the motion (N, T, 6), half sizes (N, 2) [m], spans and the cells' length [s].
 
     The box stands at the middle pose, is longer and wider by what the ends ask for, by what the turn adds, and by ROOM.
@@ -169,8 +197,14 @@ def fill_cells(time: Floats, motion: Floats, half: Floats, spans: Floats, cell: 
             pose_at(time, motion[i], end, b)
             pose_at(time, motion[i], 0.5 * (start + end), m)
             c, s = np.cos(m[2]), np.sin(m[2])
-            ahead = max(abs((a[0] - m[0]) * c + (a[1] - m[1]) * s), abs((b[0] - m[0]) * c + (b[1] - m[1]) * s))
-            aside = max(abs((a[1] - m[1]) * c - (a[0] - m[0]) * s), abs((b[1] - m[1]) * c - (b[0] - m[0]) * s))
+            ahead = max(
+                abs((a[0] - m[0]) * c + (a[1] - m[1]) * s),
+                abs((b[0] - m[0]) * c + (b[1] - m[1]) * s),
+            )
+            aside = max(
+                abs((a[1] - m[1]) * c - (a[0] - m[0]) * s),
+                abs((b[1] - m[1]) * c - (b[0] - m[0]) * s),
+            )
             turn = max(abs(a[2] - m[2]), abs(b[2] - m[2]))
             length = half[i, 0] + ahead + half[i, 1] * turn + ROOM
             width = half[i, 1] + aside + half[i, 0] * turn + ROOM

@@ -15,7 +15,15 @@ from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_ot
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import origins_of, Trial
 from scenario_gen.closed_loop.results import DRIVEN, Drives
-from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, rates, read_trials, run_trials, with_origins
+from scenario_gen.closed_loop.trials import (
+    Bars,
+    broken_bars,
+    Outcome,
+    rates,
+    read_trials,
+    run_trials,
+    with_origins,
+)
 
 Progress = Callable[[int, int], None]  # of drives done, of how many
 RunTrials = Callable[[Sequence[Trial], str, ClosedLoopConfig, Progress], list[Outcome]]
@@ -33,7 +41,9 @@ class DriveCommandConfig:
 
 def in_processes(workers: int = 0) -> RunTrials:
     """Return what drives trials in so many processes; 0: one for each core."""
-    return lambda trials, planner, config, progress: run_trials(trials, planner, config, workers or os.cpu_count() or 1, progress)
+    return lambda trials, planner, config, progress: run_trials(
+        trials, planner, config, workers or os.cpu_count() or 1, progress
+    )
 
 
 @dataclass(frozen=True)
@@ -62,7 +72,10 @@ class DriveRequest:
         Raises:
             InputError: a name is unknown, or a value does not suit.
         """
-        named = (one if one.startswith(("bars.", "drive.")) else f"drive.{one}" for one in self.assignments)
+        named = (
+            one if one.startswith(("bars.", "drive.")) else f"drive.{one}"
+            for one in self.assignments
+        )
         return reduce(assigned, named, DriveCommandConfig())
 
 
@@ -90,10 +103,17 @@ def drive_bag(
     earlier = read_drives(request.against) if request.against is not None else None
     trials = read_trials(request.bag, request.ego, request.count)
     if earlier is not None:  # before there is work that could not be compared
-        digests = {trial.name: origin.digest for trial, origin in zip(trials, origins_of(trials), strict=True)}
+        digests = {
+            trial.name: origin.digest
+            for trial, origin in zip(trials, origins_of(trials), strict=True)
+        }
         refuse_others(digests, config.drive, earlier)
-    with replaced_folder(out, DRIVEN, [request.bag]) as folder:  # before there is work that might not be kept
-        outcomes = with_origins((run or in_processes())(trials, planner, config.drive, progress), trials)
+    with replaced_folder(
+        out, DRIVEN, [request.bag]
+    ) as folder:  # before there is work that might not be kept
+        outcomes = with_origins(
+            (run or in_processes())(trials, planner, config.drive, progress), trials
+        )
         comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
         broken = broken_bars(rates(outcomes), config.bars)
         if comparison is not None and comparison.worse:

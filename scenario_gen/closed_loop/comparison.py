@@ -22,7 +22,11 @@ from scenario_gen.types import Interval
 LONGEST = 64 * 1024 * 1024  # bytes of a drives.json; a drive takes 2 kB
 _DRIVE = {
     "type": "object",
-    "properties": {"name": {"type": "string"}, "scenario": {"type": "string"}, "passed": {"type": "boolean"}},
+    "properties": {
+        "name": {"type": "string"},
+        "scenario": {"type": "string"},
+        "passed": {"type": "boolean"},
+    },
     "required": ["name", "scenario", "passed"],
 }
 DRIVES = {
@@ -72,7 +76,10 @@ class Comparison:
 
     def sentence(self) -> str:
         """Say it in words."""
-        value, low, high = (f"{100.0 * x:+.1f}" for x in (self.difference.value, self.difference.low, self.difference.high))
+        value, low, high = (
+            f"{100.0 * x:+.1f}"
+            for x in (self.difference.value, self.difference.low, self.difference.high)
+        )
         changed = f"{len(self.now_fail)} now fail, {len(self.now_pass)} now pass"
         return f"against {self.planner}: failures {value} % ({low} to {high}) on the same {self.of} scenarios; {changed}"
 
@@ -111,7 +118,9 @@ def refuse_others(digests: Mapping[str, str], config: ClosedLoopConfig, earlier:
     names = (own.keys() | earlier.parameters.keys()) - OF_THE_MACHINE
     differ = sorted(name for name in names if own.get(name) != earlier.parameters.get(name))
     if differ:
-        raise InputError(f"--against: driven with other parameters ({', '.join(differ)}); give the same, or drive it again")
+        raise InputError(
+            f"--against: driven with other parameters ({', '.join(differ)}); give the same, or drive it again"
+        )
     known = {name: digest for name, (digest, _) in earlier.drives.items()}
     if digests != known:
         both = digests.keys() | known.keys()
@@ -122,7 +131,9 @@ def refuse_others(digests: Mapping[str, str], config: ClosedLoopConfig, earlier:
         )
 
 
-def compared(outcomes: Sequence[Outcome], config: ClosedLoopConfig, earlier: Earlier) -> Comparison:
+def compared(
+    outcomes: Sequence[Outcome], config: ClosedLoopConfig, earlier: Earlier
+) -> Comparison:
     """Compare the outcomes of a planner with those of an earlier one, scenario by scenario.
 
     Raises:
@@ -132,6 +143,18 @@ def compared(outcomes: Sequence[Outcome], config: ClosedLoopConfig, earlier: Ear
     before = [not earlier.drives[outcome.name][1] for outcome in outcomes]
     now = [not outcome.verdict.passed for outcome in outcomes]
     difference = np.array(now, dtype=np.float64) - np.array(before, dtype=np.float64)
-    unit, encounters = units_of([outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes])
-    sides = [tuple(one.name for one, d in zip(outcomes, difference.tolist(), strict=True) if d == side) for side in (1.0, -1.0)]
-    return Comparison(earlier.planner, paired_difference(difference, unit, LEVEL), sides[0], sides[1], len(outcomes), encounters)
+    unit, encounters = units_of(
+        [outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes]
+    )
+    sides = [
+        tuple(one.name for one, d in zip(outcomes, difference.tolist(), strict=True) if d == side)
+        for side in (1.0, -1.0)
+    ]
+    return Comparison(
+        earlier.planner,
+        paired_difference(difference, unit, LEVEL),
+        sides[0],
+        sides[1],
+        len(outcomes),
+        encounters,
+    )

@@ -45,29 +45,76 @@ class ClosedLoopConfig(Parameters):
         low=0.0,
         high=5.0,
     )
-    headway: float = parameter(1.2, "time gap that reactive vehicles keep (IDM)", unit="s", low=0.0, high=5.0)
-    standstill_gap: float = parameter(2.0, "gap at which the others stop behind another (IDM)", unit="m", low=0.0, high=20.0)
-    acceleration: float = parameter(2.0, "acceleration back to their certified speed", unit="m/s²", low=0.1, high=10.0)
-    comfortable_braking: float = parameter(3.0, "braking of the others where it suffices", unit="m/s²", low=0.1, high=10.0)
-    strongest_braking: float = parameter(8.0, "strongest braking of the others for the ego", unit="m/s²", low=0.5, high=12.0)
-    jerk: float = parameter(9.8, "largest jerk of the others, unless the order needs more", unit="m/s³", low=1.0, high=1e6)
+    headway: float = parameter(
+        1.2, "time gap that reactive vehicles keep (IDM)", unit="s", low=0.0, high=5.0
+    )
+    standstill_gap: float = parameter(
+        2.0, "gap at which the others stop behind another (IDM)", unit="m", low=0.0, high=20.0
+    )
+    acceleration: float = parameter(
+        2.0, "acceleration back to their certified speed", unit="m/s²", low=0.1, high=10.0
+    )
+    comfortable_braking: float = parameter(
+        3.0, "braking of the others where it suffices", unit="m/s²", low=0.1, high=10.0
+    )
+    strongest_braking: float = parameter(
+        8.0, "strongest braking of the others for the ego", unit="m/s²", low=0.5, high=12.0
+    )
+    jerk: float = parameter(
+        9.8,
+        "largest jerk of the others, unless the order needs more",
+        unit="m/s³",
+        low=1.0,
+        high=1e6,
+    )
     patience: float = parameter(
-        5.0, "time after which a vehicle that waits for an ego that hardly moves goes first", unit="s", low=0.0, high=1e6
+        5.0,
+        "time after which a vehicle that waits for an ego that hardly moves goes first",
+        unit="s",
+        low=0.0,
+        high=1e6,
     )
     limits: TypeLimits = field(default_factory=TypeLimits)
     ego_curvature_rate: float = parameter(
-        0.3, "how fast the ego's curvature changes: the rate of its steering", unit="1/(m s)", low=0.001, high=20.0
+        0.3,
+        "how fast the ego's curvature changes: the rate of its steering",
+        unit="1/(m s)",
+        low=0.001,
+        high=20.0,
     )
-    overtime: float = parameter(1.5, "a drive ends after so many times the scenario's duration, and 5 s", low=1.0, high=10.0)
-    goal_width: float = parameter(2.0, "the goal is passed within this distance beside it", unit="m", low=0.1, high=50.0)
-    horizon: float = parameter(8.0, "longest time to collision that is counted", unit="s", low=0.1, high=60.0)
-    hard_braking: float = parameter(4.0, "braking that is counted as hard", unit="m/s²", low=0.1, high=20.0)
+    overtime: float = parameter(
+        1.5,
+        "a drive ends after so many times the scenario's duration, and 5 s",
+        low=1.0,
+        high=10.0,
+    )
+    goal_width: float = parameter(
+        2.0, "the goal is passed within this distance beside it", unit="m", low=0.1, high=50.0
+    )
+    horizon: float = parameter(
+        8.0, "longest time to collision that is counted", unit="s", low=0.1, high=60.0
+    )
+    hard_braking: float = parameter(
+        4.0, "braking that is counted as hard", unit="m/s²", low=0.1, high=20.0
+    )
     off_road_depth: float = parameter(
-        0.1, "a footprint is off the road from this depth outside what is drivable", unit="m", low=0.0, high=5.0
+        0.1,
+        "a footprint is off the road from this depth outside what is drivable",
+        unit="m",
+        low=0.0,
+        high=5.0,
     )
     decision_time: float = parameter(
-        1.0, "a planner's decision that takes longer is counted; that changes no verdict", unit="s", low=0.001, high=600.0
+        1.0,
+        "a planner's decision that takes longer is counted; that changes no verdict",
+        unit="s",
+        low=0.001,
+        high=600.0,
     )
     drive_time: float = parameter(
-        600.0, "a planner that takes longer for one drive has failed, and the command ends", unit="s", low=0.1, high=1e6
+        600.0,
+        "a planner that takes longer for one drive has failed, and the command ends",
+        unit="s",
+        low=0.1,
+        high=1e6,
     )

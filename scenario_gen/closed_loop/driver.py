@@ -65,7 +65,16 @@ def _eased(short: float, jerk: float, h: float) -> float:
 
 
 @kernel(inline=True)
-def rate_after(manner: Manner, r: float, v: float, a: float, was: float, braking: float, floor: float, h: float) -> float:
+def rate_after(
+    manner: Manner,
+    r: float,
+    v: float,
+    a: float,
+    was: float,
+    braking: float,
+    floor: float,
+    h: float,
+) -> float:
     """Rate of a clock after a step in which its driver brakes, as far as its foot gets: acceleration changes by the jerk at most.
 
     With nothing in the way the rate goes back to 1; at 1 the motion is the certified one, whatever jerk that has.
@@ -86,7 +95,9 @@ def rate_after(manner: Manner, r: float, v: float, a: float, was: float, braking
     end = max(v + r * a * h, STAND)  # certified speed where the step ends, about
     on = 1.0
     if r < 1.0:
-        gain = min(max(manner.acceleration, r * r * a), r * a + _eased(v - u, jerk, h), was + jerk * h)
+        gain = min(
+            max(manner.acceleration, r * r * a), r * a + _eased(v - u, jerk, h), was + jerk * h
+        )
         on = min(max((u + gain * h) / end, 0.0), 1.0)
     if braking <= FREE:
         return on
@@ -116,7 +127,9 @@ def gap_ahead(world: World, i: int, clock: float, box: Floats, here: Floats) -> 
                 break
             low, high = max(k * cell, clock), (k + 1) * cell
             pose, mine = np.empty(5), np.empty(7)
-            for _ in range(HALVINGS):  # where in the cell, so that the gap does not change by leaps
+            for _ in range(
+                HALVINGS
+            ):  # where in the cell, so that the gap does not change by leaps
                 middle = 0.5 * (low + high)
                 pose_at(world.time, world.motion[i], middle, pose)
                 fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], mine)
@@ -137,13 +150,24 @@ def _idm(gap: float, u: float, ahead: float, manner: Manner) -> float:
     Source: intelligent driver model, Treiber, Hennecke & Helbing 2000; its braking term, for the free one is the certificate.
     """
     a, b = manner.acceleration, manner.comfortable
-    wanted = manner.standstill + max(0.0, u * manner.headway + u * (u - ahead) / (2.0 * np.sqrt(a * b)))
+    wanted = manner.standstill + max(
+        0.0, u * manner.headway + u * (u - ahead) / (2.0 * np.sqrt(a * b))
+    )
     share = wanted / max(gap, 0.1)
     return float(min(max(a * (share * share - 1.0), 0.0), b))
 
 
 @kernel(inline=True)
-def minded(world: World, manner: Manner, me: Self, pose: Floats, j: int, box: Floats, speed: float, later: float) -> float:
+def minded(
+    world: World,
+    manner: Manner,
+    me: Self,
+    pose: Floats,
+    j: int,
+    box: Floats,
+    speed: float,
+    later: float,
+) -> float:
     """Braking [m/s²] of a driver at its certified pose (5,) for j, whose box (7,) and speed [m/s] are given, if on its path.
 
     FREE if j is no nearer than in the certified execution at the same clock; `later` [s] than its own is what is given of j.

@@ -66,7 +66,9 @@ def misplaced(fault: str) -> bool:
     return fault.startswith((JUMPED, NO_PLACE))
 
 
-def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig, limits: Dynamics) -> Moved:
+def move(
+    ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig, limits: Dynamics
+) -> Moved:
     """Return the ego one step later.
 
     A command is cut to the body's limits. Nothing asked, or something that is not finite, is a fault: the ego then brakes at its
@@ -77,11 +79,15 @@ def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig, 
         InputError: what is asked is neither a command nor a pose, or not of numbers.
     """
     if asked is not None and not isinstance(asked, Command | Pose):
-        raise InputError(f"a planner's `act` returns Command, Pose or None; it returned {type(asked).__name__}")
+        raise InputError(
+            f"a planner's `act` returns Command, Pose or None; it returned {type(asked).__name__}"
+        )
     try:
         finite = asked is not None and np.isfinite(np.array(asked, dtype=np.float64)).all()
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"a planner's `act` returned a {type(asked).__name__} that is not of numbers: {error}") from error
+        raise InputError(
+            f"a planner's `act` returned a {type(asked).__name__} that is not of numbers: {error}"
+        ) from error
     if isinstance(asked, Pose):
         return _placed(ego, asked, config.step, limits)
     fault = ""
@@ -101,7 +107,9 @@ def _placed(ego: EgoState, pose: Pose, step: float, limits: Dynamics) -> Moved:
     turn = angle_between(pose.yaw, ego.yaw)  # the yaw stays continuous
     curvature = 0.0 if far or way < 0.01 else turn / way
     acceleration = (pose.speed - ego.speed) / step
-    state = EgoState(pose.x, pose.y, ego.yaw + turn, max(pose.speed, 0.0), float(curvature), acceleration)
+    state = EgoState(
+        pose.x, pose.y, ego.yaw + turn, max(pose.speed, 0.0), float(curvature), acceleration
+    )
     return Moved(state, f"{JUMPED} {way:.1f} m" if far else "")
 
 
@@ -111,7 +119,11 @@ def _driven(ego: EgoState, asked: Command, config: ClosedLoopConfig, limits: Dyn
     Source: kinematic bicycle, e.g. Rajamani 2012, section 2.2, with the reference point where there is no slip.
     """
     step, speed, change = config.step, ego.speed, config.ego_curvature_rate * config.step
-    a = min(max(float(asked.acceleration), -limits.max_deceleration), limits.max_acceleration, (limits.max_speed - speed) / step)
+    a = min(
+        max(float(asked.acceleration), -limits.max_deceleration),
+        limits.max_acceleration,
+        (limits.max_speed - speed) / step,
+    )
     k = min(max(float(asked.curvature), ego.curvature - change), ego.curvature + change)
     k = min(max(k, -limits.sharpest), limits.sharpest)
     end = speed + a * step

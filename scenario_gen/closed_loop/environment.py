@@ -40,7 +40,11 @@ AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route 
 LOOKED_AT = np.array((0.0, *AHEAD))
 OWN, EACH = 5, 7  # numbers about the ego, and about each other
 REACH = 100.0  # metres beyond which nobody is seen
-FARTHEST, LONGEST, FASTEST = 1000.0, 50.0, 100.0  # bounds of what is seen: metres to the goal, metres of a length, m/s
+FARTHEST, LONGEST, FASTEST = (
+    1000.0,
+    50.0,
+    100.0,
+)  # bounds of what is seen: metres to the goal, metres of a length, m/s
 ID = "scenario_gen/Drive-v0"
 
 Seen = npt.NDArray[np.float32]
@@ -79,9 +83,13 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
             InputError: the bag cannot be read, there is nothing to drive in, or the render mode is not known.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(f"render_mode {render_mode!r} is not known; take {', '.join(self.metadata['render_modes'])} or None")
+            raise InputError(
+                f"render_mode {render_mode!r} is not known; take {', '.join(self.metadata['render_modes'])} or None"
+            )
         self.render_mode = render_mode
-        self.trials = read_trials(Path(trials), ego) if isinstance(trials, Path | str) else list(trials)
+        self.trials = (
+            read_trials(Path(trials), ego) if isinstance(trials, Path | str) else list(trials)
+        )
         if not self.trials:
             raise InputError("there is no scenario to drive in")
         self.config = config
@@ -89,7 +97,9 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
         self._loops: dict[int, ClosedLoop] = {}
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Seen, dict[str, Any]]:
         """Begin a drive: the scenario `options["index"]`, else one drawn by the seed.
 
         Raises:
@@ -122,18 +132,26 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
             InputError: a number of the action is not finite.
         """
         if not np.isfinite(action).all():
-            raise InputError(f"action {np.asarray(action).tolist()}: both numbers must be finite, from -1 to 1")
+            raise InputError(
+                f"action {np.asarray(action).tolist()}: both numbers must be finite, from -1 to 1"
+            )
         pedal, wheel = (min(max(float(value), -1.0), 1.0) for value in action)
         config, loop, limits = self.config, self._loop, self._loop.limits
-        acceleration = pedal * (limits.max_acceleration if pedal > 0.0 else limits.max_deceleration)
+        acceleration = pedal * (
+            limits.max_acceleration if pedal > 0.0 else limits.max_deceleration
+        )
         before = self._station
-        self._states.append(loop.step(self._states[-1], Command(acceleration, wheel * self.sharpest)))
+        self._states.append(
+            loop.step(self._states[-1], Command(acceleration, wheel * self.sharpest))
+        )
         state = self._states[-1]
         seen, reward = self._observed(), self._station - before
         info: dict[str, Any] = {"time": state.time}
         at_goal = loop.at_goal(state)
         pose, half = state.vehicles[loop.ego, :3], loop.scenario.vehicles[loop.ego].half
-        off_road = loop.road is not None and is_off_road(loop.road, pose, half, config.off_road_depth)
+        off_road = loop.road is not None and is_off_road(
+            loop.road, pose, half, config.off_road_depth
+        )
         hit = loop.hit(state)
         terminated = at_goal or off_road or hit
         truncated = not terminated and state.step >= loop.last_step
@@ -170,11 +188,19 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         away = np.hypot(place[:, 0], place[:, 1])
         nearest = [k for k in np.argsort(away, kind="stable")[:OTHERS] if away[k] <= REACH]
         others = np.zeros((OTHERS, EACH))
-        facts = (np.ones(len(away)), place, unit(found.others[:, 2] - ego.yaw), found.others[:, 3], found.sizes[:, 0])
+        facts = (
+            np.ones(len(away)),
+            place,
+            unit(found.others[:, 2] - ego.yaw),
+            found.others[:, 3],
+            found.sizes[:, 0],
+        )
         others[: len(nearest)] = np.column_stack(facts)[nearest]
         own = np.array((ego.speed, ego.curvature, offset, angle, left))
         seen = np.concatenate([own, ahead.ravel(), others.ravel()]).astype(np.float32)
-        within: Seen = np.minimum(np.maximum(seen, self.observation_space.low), self.observation_space.high)
+        within: Seen = np.minimum(
+            np.maximum(seen, self.observation_space.low), self.observation_space.high
+        )
         return within
 
 

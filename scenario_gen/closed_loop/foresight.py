@@ -8,7 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.certified import pose_at, World
-from scenario_gen.closed_loop.driver import EGO_CLOCK, EGO_RATE, FREE, Manner, ON_PATH, rate_after, Self
+from scenario_gen.closed_loop.driver import (
+    EGO_CLOCK,
+    EGO_RATE,
+    FREE,
+    Manner,
+    ON_PATH,
+    rate_after,
+    Self,
+)
 from scenario_gen.closed_loop.order import limit, PARTS
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
@@ -54,7 +62,13 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
         ago: how many steps ago that was.
         out: (M, 4).
     """
-    h, time, motion, pose, s = world.step, world.time, world.motion[world.ego], np.empty(5), seen[3]
+    h, time, motion, pose, s = (
+        world.step,
+        world.time,
+        world.motion[world.ego],
+        np.empty(5),
+        seen[3],
+    )
     cos, sin = np.cos(seen[2]), np.sin(seen[2])
     usual = 0.0  # the witness' own braking there, in the step that is over and after it
     for back in range(3):
@@ -78,11 +92,18 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
         if on_path:
             out[m, :3], out[m, 3] = pose[:3], seen[EGO_RATE] * pose[3] if keeps else s
         else:
-            out[m, 0], out[m, 1], out[m, 2], out[m, 3] = seen[0] + way * cos, seen[1] + way * sin, seen[2], s
+            out[m, 0], out[m, 1], out[m, 2], out[m, 3] = (
+                seen[0] + way * cos,
+                seen[1] + way * sin,
+                seen[2],
+                s,
+            )
 
 
 @kernel(inline=True)
-def weakest(world: World, manner: Manner, me: Self, least: float, foreseen: Foreseen, others: bool) -> float:
+def weakest(
+    world: World, manner: Manner, me: Self, least: float, foreseen: Foreseen, others: bool
+) -> float:
     """The weakest braking [m/s²], `least` or more, with which a driver meets nothing that it foresees; the strongest if none.
 
     Looked for between a few brakings first, for more is not always better: who brakes more may be there when the ego is.
@@ -108,14 +129,24 @@ def weakest(world: World, manner: Manner, me: Self, least: float, foreseen: Fore
 
 
 @kernel(inline=True)
-def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: Foreseen, others: bool) -> bool:
+def _clear(
+    world: World, manner: Manner, me: Self, braking: float, foreseen: Foreseen, others: bool
+) -> bool:
     """Whether a driver, braking so, stays clear of the ego ahead of it, and keeps to what the order is foreseen to let it do."""
-    h, time, motion, cell, order = world.step, world.time, world.motion[me.i], world.cell, world.order[me.i]
+    h, time, motion, cell, order = (
+        world.step,
+        world.time,
+        world.motion[me.i],
+        world.cell,
+        world.order[me.i],
+    )
     pose, mine, ego, half = np.empty(5), np.empty(7), np.empty(7), world.half
     t, r, was = me.clock, me.rate, me.was
     spare = max(foreseen.aside, SPARE) if braking > FREE else foreseen.aside
     length, width = half[me.i, 0] + spare, half[me.i, 1] + spare
-    reach = np.sqrt(length**2 + width**2) + np.sqrt(half[world.ego, 0] ** 2 + half[world.ego, 1] ** 2)
+    reach = np.sqrt(length**2 + width**2) + np.sqrt(
+        half[world.ego, 0] ** 2 + half[world.ego, 1] ** 2
+    )
     pose_at(time, motion, t, pose)
     for m in range(foreseen.ego.shape[0] - 1):
         u = r * pose[3]
@@ -134,7 +165,11 @@ def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: For
             if dx * mine[2] + dy * mine[3] > 0.0 and boxes_meet(mine, ego):
                 return False
         passed = foreseen.clock + foreseen.rate * m * h
-        if manner.yields and foreseen.rate >= 0.0 and t > limit(order[world.ego], cell, passed) + LATE:
+        if (
+            manner.yields
+            and foreseen.rate >= 0.0
+            and t > limit(order[world.ego], cell, passed) + LATE
+        ):
             return False
         if others:
             for j in range(foreseen.coming.shape[0]):

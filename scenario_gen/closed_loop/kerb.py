@@ -10,7 +10,15 @@ time passes, and it stops late, as walkers do, not from afar as drivers do.
 import numpy as np
 
 from scenario_gen.closed_loop.certified import pose_at, World
-from scenario_gen.closed_loop.driver import EGO_CLOCK, EGO_RATE, FREE, Manner, ON_PATH, rate_after, Self
+from scenario_gen.closed_loop.driver import (
+    EGO_CLOCK,
+    EGO_RATE,
+    FREE,
+    Manner,
+    ON_PATH,
+    rate_after,
+    Self,
+)
 from scenario_gen.closed_loop.foresight import Foreseen, LATE, SPARE
 from scenario_gen.closed_loop.order import limit
 from scenario_gen.numerics import Floats
@@ -69,15 +77,24 @@ def foresee_fast_ego(world: World, seen: Floats, out: Floats) -> None:
 def beyond_kerb(world: World, me: Self, foreseen: Foreseen) -> Foreseen:
     """What one expects who waits for the ego at the kerb, not where the order ends its way on the lane."""
     rate = -1.0 if before_kerb(world, me) else foreseen.rate
-    return Foreseen(foreseen.ego, foreseen.clock, rate, foreseen.coming, foreseen.aside, foreseen.heeds)
+    return Foreseen(
+        foreseen.ego, foreseen.clock, rate, foreseen.coming, foreseen.aside, foreseen.heeds
+    )
 
 
 @kernel(inline=True)
-def braking_at_kerb(world: World, manner: Manner, me: Self, pose: Floats, foreseen: Foreseen) -> float:
+def braking_at_kerb(
+    world: World, manner: Manner, me: Self, pose: Floats, foreseen: Foreseen
+) -> float:
     """Braking [m/s²] of one before the kerb, at its certified pose (5,); FREE if it need not wait, or not brake yet."""
     if not _must_wait(world, manner, me, foreseen):
         return FREE
-    way, cell, k, onto = world.cells[me.i, :, 7], world.cell, int(me.clock / world.cell), _cell(world, _next_kerb(world, me))
+    way, cell, k, onto = (
+        world.cells[me.i, :, 7],
+        world.cell,
+        int(me.clock / world.cell),
+        _cell(world, _next_kerb(world, me)),
+    )
     walked = way[k] + (way[k + 1] - way[k]) * (me.clock / cell - k)
     room, u = way[onto] - walked - SPARE, me.rate * pose[3]
     reached = min(u + manner.acceleration * world.step, pose[3])
@@ -100,7 +117,11 @@ def _must_wait(world: World, manner: Manner, me: Self, foreseen: Foreseen) -> bo
         r = after
         pose_at(world.time, world.motion[me.i], t, pose)
         was = (r * pose[3] - u) / h
-        if manner.yields and foreseen.rate >= 0.0 and t > limit(order, world.cell, foreseen.clock + foreseen.rate * m * h) + LATE:
+        if (
+            manner.yields
+            and foreseen.rate >= 0.0
+            and t > limit(order, world.cell, foreseen.clock + foreseen.rate * m * h) + LATE
+        ):
             return True
         there, aside = foreseen.ego[m], foreseen.aside
         fill_box(pose[0], pose[1], pose[2], half[me.i, 0] + aside, half[me.i, 1] + aside, mine)

@@ -23,7 +23,9 @@ from scenario_gen.roads import clearance_in_cells, distance_transform, footprint
 from scenario_gen.types import once_per_object, Road, Scenario
 
 FARTHEST = 10.0  # metres; margins and depths beyond are told as this
-APART = 0.05  # metres that a point of the footprint moves at most between two poses that are looked at
+APART = (
+    0.05  # metres that a point of the footprint moves at most between two poses that are looked at
+)
 SPACING = 0.1  # metres between the points of the footprint that are looked at, at most
 CORNER = 0.7072  # cells; from a cell's centre to its corner, rounded up
 PARTS = 200  # of a step, to which the beginning of anything is told
@@ -50,10 +52,16 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
     if road is None or drive.driven < 2:
         return RoadUse(math.nan, 0.0, math.nan)
     motion, ego, until = drive.motion, [drive.ego], slice(drive.driven)
-    half, time, heading = motion.vehicles[drive.ego].half, motion.time[until], motion.heading[ego, until]
+    half, time, heading = (
+        motion.vehicles[drive.ego].half,
+        motion.time[until],
+        motion.heading[ego, until],
+    )
     control, out = np.empty((1, len(time) - 1, 4, 2)), np.empty((1, 2))
     control_points(time, motion.position[ego, until], heading, motion.speed[ego, until], control)
-    inside.first_exits(time, control, heading, np.array([half]), inside.Ground.of(road), RESOLUTION, out)
+    inside.first_exits(
+        time, control, heading, np.array([half]), inside.Ground.of(road), RESOLUTION, out
+    )
     if out[0, 0] == inside.PROVEN:
         poses = np.column_stack([motion.position[drive.ego, until], heading[0]])
         room = _measured(road, poses, half, outside=False)[:, 0].min()
@@ -63,7 +71,12 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
         parts = np.linspace(0.0, 1.0, _parts(motion, drive.ego, k) + 1)
         found = _measured(road, poses_in(motion, ego, k, parts)[0], half, outside=True)
         if math.isnan(begin) and (found[:, 0] > 0.0).any() and found[:, 0].max() >= limit:
-            fine = _measured(road, poses_in(motion, ego, k, np.linspace(0.0, 1.0, PARTS + 1))[0], half, outside=True)[:, 0]
+            fine = _measured(
+                road,
+                poses_in(motion, ego, k, np.linspace(0.0, 1.0, PARTS + 1))[0],
+                half,
+                outside=True,
+            )[:, 0]
             reached = (fine >= limit) & (fine > 0.0)
             part = int(np.argmax(reached)) / PARTS if reached.any() else 1.0
             begin = float(motion.time[k] + part * (motion.time[k + 1] - motion.time[k]))
@@ -93,9 +106,15 @@ def poses_in(motion: Scenario, rows: list[int], k: int, u: Floats) -> Floats:
 def _parts(motion: Scenario, ego: int, k: int) -> int:
     """Return into how many parts step k is cut."""
     way = float(edge_lengths(motion.position[ego, k : k + 2])[0])
-    way = max(way, float(motion.speed[ego, k : k + 2].max() * (motion.time[k + 1] - motion.time[k])))
+    way = max(
+        way, float(motion.speed[ego, k : k + 2].max() * (motion.time[k + 1] - motion.time[k]))
+    )
     vehicle = motion.vehicles[ego]
-    turn = abs(float(motion.heading[ego, k + 1] - motion.heading[ego, k])) * 0.5 * (vehicle.length + vehicle.width)
+    turn = (
+        abs(float(motion.heading[ego, k + 1] - motion.heading[ego, k]))
+        * 0.5
+        * (vehicle.length + vehicle.width)
+    )
     return min(max(math.ceil((way + turn) / APART), 1), PARTS)
 
 
@@ -115,7 +134,14 @@ def _measured(road: Road, poses: Floats, half: tuple[float, float], *, outside: 
         measure(solid, near, grid, points, np.array((FARTHEST / res, float(edge), 1.0)), out)
         out[:, 1] *= 4.0 * half[0] * half[1] / len(points)
     else:
-        measure(road.drivable, clearance_in_cells(road), grid, points, np.array((FARTHEST / res, 0.0, -1.0)), out)
+        measure(
+            road.drivable,
+            clearance_in_cells(road),
+            grid,
+            points,
+            np.array((FARTHEST / res, 0.0, -1.0)),
+            out,
+        )
         out[:, 1] = 0.0
     out[:, 0] *= res
     return out
@@ -132,7 +158,9 @@ def _blocked(road: Road) -> tuple[Bools, Floats, int]:
 
 
 @kernel(B2, F2, F2, F2, F1, OUT2)
-def measure(solid: Bools, near: Floats, poses: Floats, points: Floats, how: Floats, out: Floats) -> None:
+def measure(
+    solid: Bools, near: Floats, poses: Floats, points: Floats, how: Floats, out: Floats
+) -> None:
     """Write how deep the points of a footprint lie in solid cells, for each pose.
 
     Args:
@@ -149,12 +177,19 @@ def measure(solid: Bools, near: Floats, poses: Floats, points: Floats, how: Floa
         c, s = np.cos(poses[p, 2]), np.sin(poses[p, 2])
         found = 0.0 if largest else most
         count = 0
-        for m in range(2 * points.shape[0]):  # once by the distances of centres, then exactly where that leaves it open
+        for m in range(
+            2 * points.shape[0]
+        ):  # once by the distances of centres, then exactly where that leaves it open
             rough = m < points.shape[0]
             x, y = points[m % points.shape[0], 0], points[m % points.shape[0], 1]
             u, v = poses[p, 0] + c * x - s * y, poses[p, 1] + s * x + c * y
-            aside, above = max(rim - u, u - (width - rim), 0.0), max(rim - v, v - (height - rim), 0.0)
-            if not aside * aside + above * above < most * most:  # farther from the grid than is told
+            aside, above = (
+                max(rim - u, u - (width - rim), 0.0),
+                max(rim - v, v - (height - rim), 0.0),
+            )
+            if (
+                not aside * aside + above * above < most * most
+            ):  # farther from the grid than is told
                 found = most if largest else 0.0
                 count += rough
                 continue

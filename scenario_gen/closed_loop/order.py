@@ -76,7 +76,10 @@ def _ordered(world: World, c: Clocks, i: int, j: int) -> bool:
                 return False
             first = _slope(c, j, h, start) - _slope(c, i, h, start)
             last = _slope(c, j, h, part) - _slope(c, i, h, part)
-            if first < 0.0 < last and b0 - a0 - 0.5 * first * first / (last - first) * h / PARTS < 0.0:
+            if (
+                first < 0.0 < last
+                and b0 - a0 - 0.5 * first * first / (last - first) * h / PARTS < 0.0
+            ):
                 return False
         a0, b0 = a, b
     return True
@@ -96,7 +99,13 @@ def keep_order(world: World, c: Clocks) -> None:
         changed = False
         for i in range(n):
             for j in range(n):
-                if i in (j, ego) or j == ego or not c.goes[i] or not c.goes[j] or c.forced[i] > 1.0:
+                if (
+                    i in (j, ego)
+                    or j == ego
+                    or not c.goes[i]
+                    or not c.goes[j]
+                    or c.forced[i] > 1.0
+                ):
                     continue
                 if _ordered(world, c, i, j):
                     continue
@@ -109,7 +118,9 @@ def keep_order(world: World, c: Clocks) -> None:
                 room = np.inf
                 for k in range(n):
                     if k not in (i, ego) and c.goes[k]:
-                        room = min(room, limit(world.order[i, k], world.cell, c.begin[k]) - c.begin[i])
+                        room = min(
+                            room, limit(world.order[i, k], world.cell, c.begin[k]) - c.begin[i]
+                        )
                 c.end[i] = c.begin[i] + max(min(c.end[i] - c.begin[i], room), 0.0)
                 c.end_rate[i] = min(c.end_rate[i], (c.end[i] - c.begin[i]) / h)
                 c.forced[i] = 2.0
@@ -132,7 +143,13 @@ def _go_together(world: World, c: Clocks, wanted: Floats, wanted_rate: Floats) -
             later = c.begin[i]
     held = np.empty(n, dtype=np.bool_)
     for i in range(n):
-        held[i] = i != ego and c.goes[i] and c.begin[i] == least and c.end[i] == least and wanted[i] > least
+        held[i] = (
+            i != ego
+            and c.goes[i]
+            and c.begin[i] == least
+            and c.end[i] == least
+            and wanted[i] > least
+        )
     changed, until = True, least
     while changed:
         changed, until = False, later
@@ -141,7 +158,9 @@ def _go_together(world: World, c: Clocks, wanted: Floats, wanted_rate: Floats) -
                 until = min(until, wanted[i])
         for i in range(n):
             for j in range(n):
-                at_once = held[i] and not held[j] and j != ego and c.goes[j] and c.begin[j] == least
+                at_once = (
+                    held[i] and not held[j] and j != ego and c.goes[j] and c.begin[j] == least
+                )
                 if at_once and until > limit(world.order[i, j], world.cell, least):
                     held[i], changed = False, True
     for i in range(n):

@@ -70,14 +70,26 @@ def origins_of(trials: Sequence[Trial]) -> list[Origin]:
 def _shape(scenario: Scenario, ego: int) -> Floats:
     """Return where all are, seen from the ego's start, at some instants, and when that is [s]: two roads give one shape."""
     when = np.linspace(0.0, float(scenario.time[-1]), INSTANTS)
-    away = ahead_and_left(scenario.position - scenario.position[ego, 0], float(scenario.heading[ego, 0]))
-    return np.concatenate([*(np.interp(when, scenario.time, each) for part in away for each in part), when])
+    away = ahead_and_left(
+        scenario.position - scenario.position[ego, 0], float(scenario.heading[ego, 0])
+    )
+    return np.concatenate(
+        [*(np.interp(when, scenario.time, each) for part in away for each in part), when]
+    )
 
 
 def digest_of(scenario: Scenario, ego: int) -> str:
     """Return the SHA-256 of a scenario's vehicles and motion, and of who is the ego."""
-    found = hashlib.sha256(repr((ego, [(v.id, v.length, v.width) for v in scenario.vehicles])).encode())
-    for part in (scenario.time, scenario.position, scenario.heading, scenario.speed, scenario.present):
+    found = hashlib.sha256(
+        repr((ego, [(v.id, v.length, v.width) for v in scenario.vehicles])).encode()
+    )
+    for part in (
+        scenario.time,
+        scenario.position,
+        scenario.heading,
+        scenario.speed,
+        scenario.present,
+    ):
         found.update(np.ascontiguousarray(part).tobytes())
     return found.hexdigest()
 
@@ -91,4 +103,6 @@ def units_of(names: Sequence[str], several: Sequence[Origin]) -> tuple[Ints, int
     if len(encounters) > 1:
         return unit, len(encounters)
     place = {name: k for k, name in enumerate(names)}
-    return np.array([place.get(one.copy_of, k) for k, one in enumerate(several)], dtype=np.int64), len(encounters)
+    return np.array(
+        [place.get(one.copy_of, k) for k, one in enumerate(several)], dtype=np.int64
+    ), len(encounters)

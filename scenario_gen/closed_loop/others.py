@@ -38,7 +38,12 @@ from scenario_gen.closed_loop.driver import (
     WAITED,
 )
 from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, Foreseen, weakest
-from scenario_gen.closed_loop.kerb import before_kerb, beyond_kerb, braking_at_kerb, foresee_fast_ego
+from scenario_gen.closed_loop.kerb import (
+    before_kerb,
+    beyond_kerb,
+    braking_at_kerb,
+    foresee_fast_ego,
+)
 from scenario_gen.closed_loop.order import Clocks, keep_order, limit
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
@@ -98,7 +103,9 @@ def react(world: World, manner: Manner, seen: Floats, drivers: Floats, after: Fl
                 foresee_self(world, manner, _me(now, i), level[i], now.coming[i])
         for i in range(n):
             if i != world.ego and now.here[i]:
-                rate[i] = _regard_others(world, manner, now, i, level[i], rate[i], after[i, WAITED])
+                rate[i] = _regard_others(
+                    world, manner, now, i, level[i], rate[i], after[i, WAITED]
+                )
     _move(world, now, rate, after)
 
 
@@ -162,7 +169,12 @@ def _spent(world: World, manner: Manner, now: Now, i: int) -> float:
     u, box = now.drivers[i, RATE] * now.pose[i, 3], np.empty(7)
     if spent == np.inf:
         return spent
-    if u > CREEP or now.drivers[i, RATE] >= 1.0 or now.pose[i, 3] < STAND or now.ahead[i, 0, 3] > CREEPS:
+    if (
+        u > CREEP
+        or now.drivers[i, RATE] >= 1.0
+        or now.pose[i, 3] < STAND
+        or now.ahead[i, 0, 3] > CREEPS
+    ):
         return 0.0
     spent += world.step
     for m in (0, now.ahead.shape[1] - 1):
@@ -174,7 +186,9 @@ def _spent(world: World, manner: Manner, now: Now, i: int) -> float:
 
 
 @kernel(inline=True)
-def _regard_ego(world: World, manner: Manner, now: Now, level: Floats, rate: Floats, after: Floats) -> None:
+def _regard_ego(
+    world: World, manner: Manner, now: Now, level: Floats, rate: Floats, after: Floats
+) -> None:
     """Write each driver's braking with regard to the ego alone [m/s²], its rate after the step, and its patience spent."""
     last, box = -1, np.empty(7)
     for i in range(level.shape[0]):
@@ -209,7 +223,9 @@ def _for_ego(world: World, manner: Manner, now: Now, i: int, least: float, spent
 
 
 @kernel(inline=True)
-def _regard_others(world: World, manner: Manner, now: Now, i: int, level: float, rate: float, spent: float) -> float:
+def _regard_others(
+    world: World, manner: Manner, now: Now, i: int, level: float, rate: float, spent: float
+) -> float:
     """Rate of driver i after the step with regard to the others, too; `rate` is that with its braking for the ego, `level`."""
     me, v, a, box, least = _me(now, i), now.pose[i, 3], now.pose[i, 4], np.empty(7), level
     for j in range(now.pose.shape[0]):
@@ -217,10 +233,14 @@ def _regard_others(world: World, manner: Manner, now: Now, i: int, level: float,
             other, speed = now.pose[j], now.drivers[j, RATE] * now.pose[j, 3]
             fill_box(other[0], other[1], other[2], world.half[j, 0], world.half[j, 1], box)
             least = max(least, minded(world, manner, me, now.pose[i], j, box, speed, 0.0))
-    least = weakest(world, manner, me, least, beyond_kerb(world, me, _expected(world, now, i, spent)), True)
+    least = weakest(
+        world, manner, me, least, beyond_kerb(world, me, _expected(world, now, i, spent)), True
+    )
     if least <= level:
         return rate
-    return min(rate, rate_after(manner, me.rate, v, a, me.was, least, _creep(world, now, i), world.step))
+    return min(
+        rate, rate_after(manner, me.rate, v, a, me.was, least, _creep(world, now, i), world.step)
+    )
 
 
 @kernel(inline=True)
@@ -244,7 +264,12 @@ def _creep(world: World, now: Now, i: int) -> float:
 @kernel(inline=True)
 def _move(world: World, now: Now, rate: Floats, after: Floats) -> None:
     """Move the clocks as the drivers want, as far as the order lets them."""
-    n, h, clock, before = rate.shape[0], world.step, now.drivers[:, CLOCK].copy(), now.drivers[:, RATE].copy()
+    n, h, clock, before = (
+        rate.shape[0],
+        world.step,
+        now.drivers[:, CLOCK].copy(),
+        now.drivers[:, RATE].copy(),
+    )
     clocks = Clocks(now.goes, clock, before, clock.copy(), rate.copy(), np.zeros(n))
     for i in range(n):
         if i != world.ego and now.goes[i] and (now.here[i] or rate[i] > 0.0):
@@ -253,5 +278,8 @@ def _move(world: World, now: Now, rate: Floats, after: Floats) -> None:
     for i in range(n):
         end = max(now.pose[i, 3] + before[i] * now.pose[i, 4] * h, 0.0)
         after[i, CLOCK] = min(clocks.end[i], world.time[-1]) if now.goes[i] else clocks.end[i]
-        after[i, RATE], after[i, ACCELERATION] = clocks.end_rate[i], (rate[i] * end - before[i] * now.pose[i, 3]) / h
+        after[i, RATE], after[i, ACCELERATION] = (
+            clocks.end_rate[i],
+            (rate[i] * end - before[i] * now.pose[i, 3]) / h,
+        )
         after[i, HELD] = 1.0 if clocks.end_rate[i] < rate[i] or clocks.forced[i] > 0.0 else 0.0

@@ -37,7 +37,11 @@ def _ground(loop: ClosedLoop, centre: Floats) -> npt.NDArray[np.uint8]:
     """Return the road (SIZE, SIZE, 3) around a place (2,) in metres."""
     rows, columns = (np.indices((SIZE, SIZE)) + 0.5 - 0.5 * SIZE) / SCALE
     places = centre + np.stack([columns, -rows], axis=-1)
-    asphalt = np.ones((SIZE, SIZE), dtype=np.bool_) if loop.road is None else loop.road.drivable_at(places)
+    asphalt = (
+        np.ones((SIZE, SIZE), dtype=np.bool_)
+        if loop.road is None
+        else loop.road.drivable_at(places)
+    )
     return np.where(asphalt[..., None], ASPHALT, GROUND).astype(np.uint8)
 
 

@@ -10,7 +10,13 @@ import numpy as np
 
 from scenario_gen.closed_loop.ego import Command, EgoState, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Task
-from scenario_gen.method.evaluation import BRAKING, free_acceleration, PULLS_AWAY, STANDS, wanted_speeds
+from scenario_gen.method.evaluation import (
+    BRAKING,
+    free_acceleration,
+    PULLS_AWAY,
+    STANDS,
+    wanted_speeds,
+)
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 
@@ -73,11 +79,16 @@ class IdmFollower(RouteFollower):
         wanted = 0.0  # without a way it is where it is to be
         if self.route is not None:
             stops = bool(self.task.goal[3] < STANDS)  # the witness stands at its goal
-            wanted = float(wanted_speeds(self.route, np.array([station]), self.speed, stops=stops)[0])
+            wanted = float(
+                wanted_speeds(self.route, np.array([station]), self.speed, stops=stops)[0]
+            )
         gap, ahead = self._nearest(observation, station)
         closing = ego.speed * (ego.speed - ahead) / (2.0 * math.sqrt(self.acceleration * BRAKING))
         share = (self.standstill + max(0.0, ego.speed * self.headway + closing)) / max(gap, 0.1)
-        acceleration = free_acceleration(ego.speed, wanted, self.acceleration) - self.acceleration * share * share
+        acceleration = (
+            free_acceleration(ego.speed, wanted, self.acceleration)
+            - self.acceleration * share * share
+        )
         return Command(max(acceleration, -self.task.limits.max_deceleration), curvature)
 
     def _nearest(self, seen: Observation, station: float) -> tuple[float, float]:
@@ -95,11 +106,20 @@ class IdmFollower(RouteFollower):
         along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
         length, width = 0.5 * seen.sizes[:, 0:1], 0.5 * seen.sizes[:, 1:2]
         gap = at.reshape(along.shape) - station - own - length * along - width * across
-        beside = np.abs(aside.reshape(along.shape)) - 0.5 * self.task.vehicle.width - length * across - width * along
+        beside = (
+            np.abs(aside.reshape(along.shape))
+            - 0.5 * self.task.vehicle.width
+            - length * across
+            - width * along
+        )
         same_way = np.cos(turn[:, 0])
-        comes = (when == 0.0) | ((same_way[:, None] < 0.7) & (seen.ego.speed * when < gap + 4.0 * own))
+        comes = (when == 0.0) | (
+            (same_way[:, None] < 0.7) & (seen.ego.speed * when < gap + 4.0 * own)
+        )
         counts = (beside < self.room) & (gap > -own) & comes
-        first = np.where(counts.any(axis=1), gap[np.arange(len(gap)), counts.argmax(axis=1)], math.inf)
+        first = np.where(
+            counts.any(axis=1), gap[np.arange(len(gap)), counts.argmax(axis=1)], math.inf
+        )
         k = int(first.argmin())
         return max(float(first[k]), 0.0), float(seen.others[k, 3]) * max(float(same_way[k]), 0.0)
 
@@ -115,7 +135,11 @@ class NonReactive(IdmFollower):
 
     def act(self, observation: Observation) -> Command:
         """Drive as if nobody else were there."""
-        return super().act(replace(observation, ids=(), others=observation.others[:0], sizes=observation.sizes[:0]))
+        return super().act(
+            replace(
+                observation, ids=(), others=observation.others[:0], sizes=observation.sizes[:0]
+            )
+        )
 
 
 class ReferenceFollower:
@@ -131,7 +155,9 @@ class ReferenceFollower:
     def act(self, observation: Observation) -> Pose:
         """Be where the reference drive is next."""
         s, n = self.scenario, self.ego
-        k = min(round((self.begin + observation.time + self.step) / float(s.time[1])), len(s.time) - 1)
+        k = min(
+            round((self.begin + observation.time + self.step) / float(s.time[1])), len(s.time) - 1
+        )
         x, y = s.position[n, k].tolist()
         return Pose(x, y, float(s.heading[n, k]), float(s.speed[n, k]))
 

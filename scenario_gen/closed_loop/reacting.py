@@ -18,13 +18,27 @@ from scenario_gen.method.sampling import Progress, TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import suitable_roads
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types import Encounter, GenerationResult, join_ego, join_pieces, Request, Road, Scenario
+from scenario_gen.types import (
+    Encounter,
+    GenerationResult,
+    join_ego,
+    join_pieces,
+    Request,
+    Road,
+    Scenario,
+)
 
 MAX_BASELINE_DRIVES = 50  # scenarios of a set that are driven to say how many need no reaction
 PROBED = 12  # scenarios by which it is told who has to react
 ROADS_TRIED = 2  # that are tried where nobody has to react
 EASY = 0.9  # share of a set that the baseline passes, from which on the set hardly tests
-FREER = {"arrival_sigma": 3.0, "wait_sigma": 2.0, "pace_sigma": 0.12, "end_speed_sigma": 2.0, "longitudinal_sigma": 6.0}
+FREER = {
+    "arrival_sigma": 3.0,
+    "wait_sigma": 2.0,
+    "pace_sigma": 0.12,
+    "end_speed_sigma": 2.0,
+    "longitudinal_sigma": 6.0,
+}
 """Parameters of sampling where those given leave no scenario that tests."""
 
 
@@ -64,14 +78,21 @@ class Testing:
             with suppress(TargetError):
                 case = tried.generate(count, progress)
                 if tried is not self:
-                    freer = ", ".join(f"sampling.{name}={getattr(tried.config.sampling, name):g}" for name in FREER)
+                    freer = ", ".join(
+                        f"sampling.{name}={getattr(tried.config.sampling, name):g}"
+                        for name in FREER
+                    )
                     case = _noted(case, f"drawn with more freedom: {freer}")
                 if most is None or len(case.generated) > len(most.generated):
                     most = case
                 if len(case.generated) == count:
                     return case
         ego, kept = self.request.ego, 0 if most is None else len(most.generated)
-        others = ", ".join(f"{other} in {found} of {PROBED}" for other, found in self.who_reacts().items() if other != ego)
+        others = ", ".join(
+            f"{other} in {found} of {PROBED}"
+            for other, found in self.who_reacts().items()
+            if other != ego
+        )
         advice = f"has to react as ego: {others}" if others else self.elsewhere()
         said = f"for testing ego {ego}: {kept} of {count} scenarios found in which it has to react; {advice}"
         if most is None:
@@ -90,7 +111,9 @@ class Testing:
         targets = join_pieces(filter(None, [f"baseline_margin[{ego}]=..0", self.request.target]))
 
         def accepts(road: Road, whole: Scenario) -> bool:
-            return needs_reaction(ClosedLoop(whole, ego, road, ClosedLoopConfig(limits=self.config.limits)))
+            return needs_reaction(
+                ClosedLoop(whole, ego, road, ClosedLoopConfig(limits=self.config.limits))
+            )
 
         return generate(
             self.encounter, self.road, updated(self.config, {"sampling.ego": "free"}), count=count, seed=self.seed,
@@ -109,9 +132,18 @@ class Testing:
         found: dict[str, tuple[int, float]] = {}
         for vehicle in self.encounter.vehicles:
             with suppress(TargetError):
-                drawn = replace(self, request=replace(self.request, ego=vehicle.id)).generate(PROBED).generated
-                found[vehicle.id] = len(drawn), drawn.reached.share if drawn.reached is not None else 0.0
-        return {ego: found[ego][0] for ego in sorted(found, key=lambda ego: found[ego], reverse=True)}
+                drawn = (
+                    replace(self, request=replace(self.request, ego=vehicle.id))
+                    .generate(PROBED)
+                    .generated
+                )
+                found[vehicle.id] = (
+                    len(drawn),
+                    drawn.reached.share if drawn.reached is not None else 0.0,
+                )
+        return {
+            ego: found[ego][0] for ego in sorted(found, key=lambda ego: found[ego], reverse=True)
+        }
 
     def who_reacts_most(self) -> str:
         """Return the vehicle that has to react in most scenarios if it is the ego.
@@ -123,24 +155,37 @@ class Testing:
         for tried in self.attempts():
             for ego in tried.who_reacts():
                 return ego
-        raise TargetError(f"--ego auto: nobody has to react in any scenario that was found; {self.elsewhere()}")
+        raise TargetError(
+            f"--ego auto: nobody has to react in any scenario that was found; {self.elsewhere()}"
+        )
 
     def elsewhere(self) -> str:
         """Say on which other roads somebody has to react."""
         segmentation = segment(self.encounter, self.config.segmentation, self.seed)
-        names = (name for name in suitable_roads(self.encounter, segmentation, self.config) if name != self.road)
+        names = (
+            name
+            for name in suitable_roads(self.encounter, segmentation, self.config)
+            if name != self.road
+        )
         found: list[str] = []
         for name in islice(names, ROADS_TRIED):
             with suppress(RefusedError):
-                found += [f"--road {name} --ego {ego}" for ego in islice(replace(self, road=name).who_reacts(), 1)]
+                found += [
+                    f"--road {name} --ego {ego}"
+                    for ego in islice(replace(self, road=name).who_reacts(), 1)
+                ]
         return (
-            f"possible: {' or '.join(found)}" if found else "take an encounter in which somebody yields, or follows more closely"
+            f"possible: {' or '.join(found)}"
+            if found
+            else "take an encounter in which somebody yields, or follows more closely"
         )
 
 
 def _noted(case: GenerationResult, note: str) -> GenerationResult:
     """Return a result with one more note on how it was drawn."""
-    return replace(case, generated=replace(case.generated, adaptations=(*case.generated.adaptations, note)))
+    return replace(
+        case, generated=replace(case.generated, adaptations=(*case.generated.adaptations, note))
+    )
 
 
 def hardly_tests(passed: int, driven: int) -> str:
@@ -156,7 +201,10 @@ def baseline_passes(case: GenerationResult, config: ClosedLoopConfig = ClosedLoo
     if drawn.ego is None or not drawn.scenarios:
         return ""
     ego = drawn.ego.vehicle.id
-    loops = [ClosedLoop(join_ego(scenario), ego, case.road, config) for scenario in drawn.scenarios[:MAX_BASELINE_DRIVES]]
+    loops = [
+        ClosedLoop(join_ego(scenario), ego, case.road, config)
+        for scenario in drawn.scenarios[:MAX_BASELINE_DRIVES]
+    ]
     passed = sum(judge(loop, loop.drive(NonReactive())).passed for loop in loops)
     said = f"the non-reactive baseline, in place of {ego}, passes {passed} of {len(loops)}"
     return f"{case.title}: {hardly_tests(passed, len(loops)) or said}"

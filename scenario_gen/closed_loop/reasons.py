@@ -27,7 +27,10 @@ SAME_WAY = 0.7  # cosine of the angle between two headings, from which on they d
 TOUCHING = 0.02  # metres from the other's footprint within which the ego's own counts as the place of the contact
 # Responsibility-sensitive safety (Shalev-Shwartz, Shammah & Shashua 2017), equation 2; who is behind does not speed up meanwhile.
 RESPONSE = 1.0  # s
-BRAKES_AT_LEAST, BRAKES_AT_MOST = 6.0, 9.0  # m/s²: who is behind (as UN R157 assumes), who is ahead (the body's limit)
+BRAKES_AT_LEAST, BRAKES_AT_MOST = (
+    6.0,
+    9.0,
+)  # m/s²: who is behind (as UN R157 assumes), who is ahead (the body's limit)
 R157_DELAY = 0.35  # s; UN Regulation 157, 5.2.5.3: a cut-in can be answered from a TTC of Δv / (2 · 6 m/s²) + 0.35 s on
 
 
@@ -47,7 +50,9 @@ class Reason(StrEnum):
     OUT_OF_ORDER = "out_of_order"  # the witness goes second where they cross or merge, the ego went before the other had left
     HEAD_ON = "head_on"  # the ego was beside its witness' path, against the other's direction
     OUT_OF_PATH = "out_of_path"  # the ego was beside its witness' path otherwise: it drifted, strayed or stood there
-    CUT_IN = "cut_in"  # the ego came in ahead of the other and left less than the safe gap from then on
+    CUT_IN = (
+        "cut_in"  # the ego came in ahead of the other and left less than the safe gap from then on
+    )
     REAR_END = "rear_end"  # the ego ran into one that stood, or drove ahead on the same way
     STANDING = "standing"  # the ego stood, on its path and in its turn
     PRIORITY = "priority"  # the ways cross or merge, and the ego goes first by the certificate
@@ -94,11 +99,19 @@ def state_at(drive: Drive, vehicle: int, time: float) -> At:
     columns = (*motion.position[vehicle].T, motion.heading[vehicle], motion.speed[vehicle])
     x, y, yaw, speed = (float(np.interp(time, motion.time, column)) for column in columns)
     k = min(int(np.searchsorted(motion.time, time, side="right")), len(motion.time) - 1)
-    moved, _ = ahead_and_left(motion.position[vehicle, k] - motion.position[vehicle, max(k - 1, 0)], yaw)
-    return At(x, y, yaw, min(speed, float(moved) / float(motion.time[1]))) if moved < -1e-6 else At(x, y, yaw, speed)
+    moved, _ = ahead_and_left(
+        motion.position[vehicle, k] - motion.position[vehicle, max(k - 1, 0)], yaw
+    )
+    return (
+        At(x, y, yaw, min(speed, float(moved) / float(motion.time[1])))
+        if moved < -1e-6
+        else At(x, y, yaw, speed)
+    )
 
 
-def reason_of(loop: ClosedLoop, drive: Drive, who: int, time: float) -> tuple[Reason, CutIn | None]:
+def reason_of(
+    loop: ClosedLoop, drive: Drive, who: int, time: float
+) -> tuple[Reason, CutIn | None]:
     """Say what was behind the contact of the ego with vehicle `who` at a time [s], and how the ego came in ahead, if it did."""
     ego, other = state_at(drive, drive.ego, time), state_at(drive, who, time)
     along = math.cos(other.yaw - ego.yaw)
@@ -108,7 +121,11 @@ def reason_of(loop: ClosedLoop, drive: Drive, who: int, time: float) -> tuple[Re
         return Reason.JUMP, entry
     if ego.speed < 0.0:
         return Reason.REVERSING, entry
-    if conflict is not None and conflict.second == drive.ego and _goes_first(loop, drive, conflict, time):
+    if (
+        conflict is not None
+        and conflict.second == drive.ego
+        and _goes_first(loop, drive, conflict, time)
+    ):
         return Reason.OUT_OF_ORDER, entry
     beside = conflict is None or _beside_path(loop, drive, who, time)
     if beside and along < -SAME_WAY:
@@ -126,7 +143,9 @@ def reason_of(loop: ClosedLoop, drive: Drive, who: int, time: float) -> tuple[Re
         return (Reason.REAR_END if came is None or came.safe else Reason.PRIORITY), entry
     if ego.speed < STANDS:
         return Reason.STANDING, entry
-    return (Reason.PRIORITY if its_turn and along <= SAME_WAY else Reason.OTHER_RAN_INTO_EGO), entry
+    return (
+        Reason.PRIORITY if its_turn and along <= SAME_WAY else Reason.OTHER_RAN_INTO_EGO
+    ), entry
 
 
 def _goes_first(loop: ClosedLoop, drive: Drive, conflict: Conflict, time: float) -> bool:
@@ -141,18 +160,25 @@ def _goes_first(loop: ClosedLoop, drive: Drive, conflict: Conflict, time: float)
         return False
     if conflict.following:
         return bool(conflict.entry_second > loop.begin + loop.scenario.time[1])
-    return float(np.interp(time, drive.motion.time, drive.clock[conflict.first])) < conflict.exit_first
+    return (
+        float(np.interp(time, drive.motion.time, drive.clock[conflict.first]))
+        < conflict.exit_first
+    )
 
 
 def _beside_path(loop: ClosedLoop, drive: Drive, who: int, time: float) -> bool:
     """Whether most of that part of the ego's footprint which touches the other is where its witness' never is."""
     own, its = (
-        shapely.Polygon(corners(np.array([state_at(drive, n, time)]), vehicle.length, vehicle.width)[0])
+        shapely.Polygon(
+            corners(np.array([state_at(drive, n, time)]), vehicle.length, vehicle.width)[0]
+        )
         for n, vehicle in ((n, drive.motion.vehicles[n]) for n in (drive.ego, who))
     )
     touching = own.intersection(its.buffer(own.distance(its) + TOUCHING))
     path = loop.world.motion[drive.ego, :, :3]
-    beyond = place(path[-1:], np.arange(0.0, BEYOND, 1.0), 0.0)  # the goal may be passed straight on
+    beyond = place(
+        path[-1:], np.arange(0.0, BEYOND, 1.0), 0.0
+    )  # the goal may be passed straight on
     poses = np.concatenate([path, np.column_stack([beyond, np.full(len(beyond), path[-1, 2])])])
     vehicle = drive.motion.vehicles[drive.ego]
     swept = shapely.polygons(corners(poses, vehicle.length, vehicle.width))
@@ -162,7 +188,10 @@ def _beside_path(loop: ClosedLoop, drive: Drive, who: int, time: float) -> bool:
 
 def safe_gap(behind: Floats | float, ahead: Floats | float) -> Floats:
     """Return the gap [m] that RSS asks of two speeds [m/s]: who is behind can stop behind who brakes as hard as it can."""
-    stop, its = np.square(behind) / (2.0 * BRAKES_AT_LEAST), np.square(ahead) / (2.0 * BRAKES_AT_MOST)
+    stop, its = (
+        np.square(behind) / (2.0 * BRAKES_AT_LEAST),
+        np.square(ahead) / (2.0 * BRAKES_AT_MOST),
+    )
     return np.maximum(np.asarray(behind) * RESPONSE + stop - its, 0.0)
 
 
@@ -177,7 +206,11 @@ def cut_in(loop: ClosedLoop, drive: Drive, pair: tuple[int, int], time: float) -
     if len(rows) == 0 or edge_lengths(path).sum() < STANDS:
         return None
     way, vehicle, its = Curve.through(path), motion.vehicles[one], motion.vehicles[other]
-    footprint = corners(np.column_stack([motion.position[one], motion.heading[one]])[rows], vehicle.length, vehicle.width)
+    footprint = corners(
+        np.column_stack([motion.position[one], motion.heading[one]])[rows],
+        vehicle.length,
+        vehicle.width,
+    )
     station, aside = (each.reshape(-1, 4) for each in way.project(footprint.reshape(-1, 2)))
     at, _ = way.project(motion.position[other, rows])
     clear = (aside.min(axis=1) > 0.5 * its.width) | (aside.max(axis=1) < -0.5 * its.width)
@@ -187,7 +220,10 @@ def cut_in(loop: ClosedLoop, drive: Drive, pair: tuple[int, int], time: float) -
     since = slice(int(before[-1]) + 1, None)
     gap = (station.min(axis=1) - at - 0.5 * its.length)[since]
     turn = motion.heading[one, rows] - way.at(station.mean(axis=1))[:, 2]
-    ahead, behind = (motion.speed[one, rows] * np.cos(turn))[since], motion.speed[other, rows][since]
+    ahead, behind = (
+        (motion.speed[one, rows] * np.cos(turn))[since],
+        motion.speed[other, rows][since],
+    )
     asked, closing = safe_gap(behind, np.maximum(ahead, 0.0)), float(behind[0] - ahead[0])
     ttc = max(float(gap[0]), 0.0) / closing if closing > 0.0 else None
     least = max(closing, 0.0) / (2.0 * BRAKES_AT_LEAST) + R157_DELAY

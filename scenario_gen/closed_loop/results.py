@@ -58,7 +58,9 @@ class Drives:
     def by_severity(self) -> list[int]:
         """Return the indices of the outcomes, the worst first."""
         order = range(len(self.outcomes))
-        return sorted(order, key=lambda k: (*(-value for value in self.outcomes[k].verdict.severity), k))
+        return sorted(
+            order, key=lambda k: (*(-value for value in self.outcomes[k].verdict.severity), k)
+        )
 
     @property
     def easy(self) -> str:
@@ -68,7 +70,10 @@ class Drives:
     def scores(self) -> dict[str, float]:
         """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""
         terms = [outcome.verdict.document()["terms"] for outcome in self.outcomes]
-        return {name: math.fsum(each[name] for each in terms) / len(terms) for name in (terms[0] if terms else ())}
+        return {
+            name: math.fsum(each[name] for each in terms) / len(terms)
+            for name in (terms[0] if terms else ())
+        }
 
     def notes(self) -> list[str]:
         """Return what the figures are to be read with, in sentences."""
@@ -76,22 +81,39 @@ class Drives:
         copies = len([outcome for outcome in self.outcomes if outcome.origin.copy_of])
         messages = []
         if len(encounters) == 1:
-            messages.append(f"all scenarios are of one encounter ({encounters[0]}): the intervals hold for that encounter only")
+            messages.append(
+                f"all scenarios are of one encounter ({encounters[0]}): the intervals hold for that encounter only"
+            )
         elif encounters:
             drawn = f"encounters drawn as these {len(encounters)} were"
             messages.append(f"intervals are for {drawn}: drives of one encounter are alike")
         if copies:
-            messages.append(f"{copies} of {len(self.outcomes)} scenarios are copies of another scenario of the same encounter")
+            messages.append(
+                f"{copies} of {len(self.outcomes)} scenarios are copies of another scenario of the same encounter"
+            )
         if self.baseline:
-            sets = {name: [one for one in self.baseline if one.origin.encounter == name] for name in encounters}
-            each = [f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}" for name, own in sets.items() if own]
+            sets = {
+                name: [one for one in self.baseline if one.origin.encounter == name]
+                for name in encounters
+            }
+            each = [
+                f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}"
+                for name, own in sets.items()
+                if own
+            ]
             parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
             hardly = "these scenarios hardly test a planner: " if self.easy else ""
-            messages.append(f"{hardly}the non-reactive baseline passes {passed_of(self.baseline)}{parts}")
+            messages.append(
+                f"{hardly}the non-reactive baseline passes {passed_of(self.baseline)}{parts}"
+            )
         if self.comparison is not None:
             messages.append(self.comparison.sentence())
         if found := self.scores():
-            terms = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in found.items() if name not in ("nuplan", "pdms")]
+            terms = [
+                f"{name.replace('_', ' ')} {value:.3f}"
+                for name, value in found.items()
+                if name not in ("nuplan", "pdms")
+            ]
             scores = f"nuPlan's score {found['nuplan']:.3f}, NAVSIM's PDMS {found['pdms']:.3f}"
             messages.append(f"{scores} (means; {', '.join(terms)})")
         return messages
@@ -132,7 +154,10 @@ class Drives:
             drawings(self.outcomes, self.trials, order[:MOST_DRAWN]),
             planner=self.planner,
             found=rates(self.outcomes),
-            rows=[(number if number < MOST_DRAWN else None, self.outcomes[k]) for number, k in enumerate(order)],
+            rows=[
+                (number if number < MOST_DRAWN else None, self.outcomes[k])
+                for number, k in enumerate(order)
+            ],
             broken=self.broken,
             notes=self.notes(),
             comparison=self.comparison,
@@ -157,7 +182,12 @@ def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str]
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
     suite = ElementTree.Element(
-        "testsuite", name=planner, tests=str(len(outcomes)), failures=str(len(failed)), errors="0", time=f"{lasted:.3f}"
+        "testsuite",
+        name=planner,
+        tests=str(len(outcomes)),
+        failures=str(len(failed)),
+        errors="0",
+        time=f"{lasted:.3f}",
     )
     properties = ElementTree.SubElement(suite, "properties")
     for name, value in facts.items():
@@ -165,20 +195,32 @@ def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str]
     for outcome in outcomes:
         verdict = outcome.verdict
         case = ElementTree.SubElement(
-            suite, "testcase", classname=planner, name=f"scenario {outcome.name}", time=f"{verdict.duration:.3f}"
+            suite,
+            "testcase",
+            classname=planner,
+            name=f"scenario {outcome.name}",
+            time=f"{verdict.duration:.3f}",
         )
         if not verdict.passed:
-            ElementTree.SubElement(case, "failure", type=verdict.failure, message=verdict.sentence())
+            ElementTree.SubElement(
+                case, "failure", type=verdict.failure, message=verdict.sentence()
+            )
         message = ElementTree.SubElement(case, "system-out")
         message.text = json.dumps(verdict.document(), ensure_ascii=False)
     ElementTree.indent(suite)
     for element in suite.iter():  # XML has no form for control characters
         element.attrib.update({name: printable(value) for name, value in element.attrib.items()})
         element.text = printable(element.text) if element.text else None
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, encoding="unicode") + "\n"
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        + ElementTree.tostring(suite, encoding="unicode")
+        + "\n"
+    )
 
 
-def drawings(outcomes: Sequence[Outcome], trials: Sequence[Trial], drawn: Sequence[int]) -> dict[str, Any]:
+def drawings(
+    outcomes: Sequence[Outcome], trials: Sequence[Trial], drawn: Sequence[int]
+) -> dict[str, Any]:
     """Return what a page replays: the drives of some indices, and their roads."""
     roads = {id(trials[k].road): trials[k].road for k in drawn}
     place = {key: number for number, key in enumerate(roads)}
@@ -192,7 +234,9 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
     drive, verdict = outcome.drive, outcome.verdict
     motion = drive.motion
     frames = max(2, min(MAX_FRAMES, int(np.ceil(verdict.duration / FRAME_PERIOD)) + 1))
-    spans = [motion.time[here][[0, -1]].tolist() if here.any() else [0.0, -1.0] for here in drive.here]
+    spans = [
+        motion.time[here][[0, -1]].tolist() if here.any() else [0.0, -1.0] for here in drive.here
+    ]
     witness = trial.scenario
     return {
         "name": outcome.name,
@@ -200,11 +244,16 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
         "road": road,
         "ego": drive.ego,
         "vehicles": [
-            {"id": v.id, "type": v.type, "length": round(v.length, 3), "width": round(v.width, 3)} for v in motion.vehicles
+            {"id": v.id, "type": v.type, "length": round(v.length, 3), "width": round(v.width, 3)}
+            for v in motion.vehicles
         ],
-        "motion": {"states": pack(states(motion, frames)[None]), "durations": [round(verdict.duration, 3)]},
+        "motion": {
+            "states": pack(states(motion, frames)[None]),
+            "durations": [round(verdict.duration, 3)],
+        },
         "witness": [
-            [round(x, 2), round(y, 2)] for x, y in witness.position[drive.ego, :: max(1, len(witness.time) // 100)].tolist()
+            [round(x, 2), round(y, 2)]
+            for x, y in witness.position[drive.ego, :: max(1, len(witness.time) // 100)].tolist()
         ],
         "spans": [[round(time, 3) for time in span] for span in spans],
         "hit": round(verdict.collision.time, 3) if verdict.collision else None,

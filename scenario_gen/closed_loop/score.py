@@ -31,7 +31,9 @@ from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Vehicle
 
 OUTSIDE = 0.3  # m; nuPlan's `max_violation_threshold` of drivable_area_compliance
-LEAST_TTC = 0.95  # s; nuPlan's `least_min_ttc` of time_to_collision_within_bound; PDMS looks ahead 1 s
+LEAST_TTC = (
+    0.95  # s; nuPlan's `least_min_ttc` of time_to_collision_within_bound; PDMS looks ahead 1 s
+)
 LEAST_PROGRESS = 0.2  # nuPlan's `min_progress_threshold` of ego_is_making_progress
 STOPPED = 0.05  # m/s; nuPlan's `stopped_speed_threshold`
 BEHIND = 150.0  # degrees from the ego's heading; nuPlan's `is_agent_behind`
@@ -40,7 +42,10 @@ BUMPER = 0.05  # metres within which a contact is at the front
 SPEEDING_UP, BRAKING, SIDEWAYS = 2.40, 4.05, 4.89
 JERK, JERK_ALONG = 8.37, 4.13
 YAW_RATE, YAW_ACCELERATION = 0.95, 1.93
-SMOOTHED, DERIVED = 0.4, 0.7  # s to each side: nuPlan's Savitzky-Golay windows of 8 and 15 samples at 0.1 s, quadratic
+SMOOTHED, DERIVED = (
+    0.4,
+    0.7,
+)  # s to each side: nuPlan's Savitzky-Golay windows of 8 and 15 samples at 0.1 s, quadratic
 WEIGHTS = {"ttc": 5.0, "progress": 5.0, "comfort": 2.0}
 
 
@@ -68,7 +73,9 @@ class Terms:
     @property
     def pdms(self) -> float:
         """NAVSIM's score."""
-        weighted = np.average([getattr(self, name) for name in WEIGHTS], weights=list(WEIGHTS.values()))
+        weighted = np.average(
+            [getattr(self, name) for name in WEIGHTS], weights=list(WEIGHTS.values())
+        )
         return self.no_at_fault_collision * self.drivable_area * float(weighted)
 
     @property
@@ -77,7 +84,9 @@ class Terms:
         return self.making_progress * self.pdms
 
 
-def terms(drive: Drive, hit: tuple[int, float] | None, margin: float, progress: float, ttc: float) -> Terms:
+def terms(
+    drive: Drive, hit: tuple[int, float] | None, margin: float, progress: float, ttc: float
+) -> Terms:
     """Return the terms of a drive.
 
     Args:
@@ -88,7 +97,9 @@ def terms(drive: Drive, hit: tuple[int, float] | None, margin: float, progress: 
         ttc: least time to collision with one that is not behind [s].
     """
     return Terms(
-        no_at_fault_collision=float(hit is None or not _at_fault(drive, *hit, off_road=margin < 0.0)),
+        no_at_fault_collision=float(
+            hit is None or not _at_fault(drive, *hit, off_road=margin < 0.0)
+        ),
         drivable_area=float(not margin < -OUTSIDE),
         making_progress=float(progress >= LEAST_PROGRESS),
         ttc=float(ttc >= LEAST_TTC),
@@ -100,7 +111,9 @@ def terms(drive: Drive, hit: tuple[int, float] | None, margin: float, progress: 
 def not_behind(drive: Drive, other: int) -> Floats:
     """Return (T,) whether another is not behind the ego: within 150 degrees of its heading."""
     motion, ego = drive.motion, drive.ego
-    ahead, left = ahead_and_left(motion.position[other] - motion.position[ego], motion.heading[ego])
+    ahead, left = ahead_and_left(
+        motion.position[other] - motion.position[ego], motion.heading[ego]
+    )
     return np.asarray(ahead >= math.cos(math.radians(BEHIND)) * np.hypot(ahead, left))
 
 

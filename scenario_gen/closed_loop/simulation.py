@@ -161,7 +161,10 @@ def reaction_time(scenario: Scenario, vehicle: str, mean: float) -> float:
 
     It follows from the scenario's seed and index and from the vehicle's id, whoever the ego is and whatever it does.
     """
-    words = [number % 2**32 for number in (scenario.seed, scenario.seed >> 32, scenario.index, crc32(vehicle.encode()))]
+    words = [
+        number % 2**32
+        for number in (scenario.seed, scenario.seed >> 32, scenario.index, crc32(vehicle.encode()))
+    ]
     return mean * (0.5 + float(np.random.default_rng(words).random()))
 
 
@@ -169,7 +172,11 @@ class ClosedLoop:
     """A scenario that can be driven."""
 
     def __init__(
-        self, scenario: Scenario, ego: int | str, road: Road | None = None, config: ClosedLoopConfig = ClosedLoopConfig()
+        self,
+        scenario: Scenario,
+        ego: int | str,
+        road: Road | None = None,
+        config: ClosedLoopConfig = ClosedLoopConfig(),
     ) -> None:
         """Prepare.
 
@@ -183,7 +190,9 @@ class ClosedLoop:
             InputError: the scenario has no such vehicle, or the road is in another frame.
         """
         if road is not None and road.frame_id != scenario.frame_id:
-            raise InputError(f"scenario {scenario.index} is in frame {scenario.frame_id!r}, its road in {road.frame_id!r}")
+            raise InputError(
+                f"scenario {scenario.index} is in frame {scenario.frame_id!r}, its road in {road.frame_id!r}"
+            )
         self.scenario, self.world = scenario, world_of(scenario, ego, config.step)
         self.ego = self.world.ego
         self.road = road and ground_for(road, scenario.vehicles[self.ego])
@@ -191,7 +200,9 @@ class ClosedLoop:
         reactive = config.policy != REPLAY
         self.reactions = np.array(
             [
-                reaction_time(scenario, vehicle.id, config.reaction * (reactive and not vehicle.kind.walks))
+                reaction_time(
+                    scenario, vehicle.id, config.reaction * (reactive and not vehicle.kind.walks)
+                )
                 for vehicle in scenario.vehicles
             ]
         )
@@ -200,7 +211,12 @@ class ClosedLoop:
             config.standstill_gap,
             config.acceleration,
             config.comfortable_braking,
-            np.array([min(config.strongest_braking, config.limits.of(one.type).max_deceleration) for one in scenario.vehicles]),
+            np.array(
+                [
+                    min(config.strongest_braking, config.limits.of(one.type).max_deceleration)
+                    for one in scenario.vehicles
+                ]
+            ),
             config.jerk,
             config.patience,
             FORESIGHT.get(config.policy, 0.0),
@@ -222,7 +238,17 @@ class ClosedLoop:
         own = self.world.motion[self.ego]
         route = own[np.concatenate([[True], edge_lengths(own[:, :2]) > 1e-3]), :3]
         vehicle, config = self.scenario.vehicles[self.ego], self.config
-        return Task(vehicle, own[0, :4], own[-1, :4], route, self.road, config.step, config, float(own[:, 3].max()), self.limits)
+        return Task(
+            vehicle,
+            own[0, :4],
+            own[-1, :4],
+            route,
+            self.road,
+            config.step,
+            config,
+            float(own[:, 3].max()),
+            self.limits,
+        )
 
     def start(self) -> State:
         """Return the first instant: where everyone is when the ego's witness comes onto the scene."""
@@ -230,10 +256,23 @@ class ClosedLoop:
         first = int(self.scenario.present[self.ego, 0])
         vehicles = known.motion[:, first, :4].copy()
         n = len(vehicles)
-        here = (known.spans[:, 0] <= self.begin) & ~(known.leaves & (known.spans[:, 1] <= self.begin))
+        here = (known.spans[:, 0] <= self.begin) & ~(
+            known.leaves & (known.spans[:, 1] <= self.begin)
+        )
         ego = EgoState(*vehicles[self.ego].tolist())
         seen = np.array([(*ego, self.begin, 1.0, 1.0)])  # before that it drove as its witness
-        return State(0, 0.0, ego, vehicles, here, np.full(n, self.begin), np.ones(n), np.zeros(n), np.zeros(n), seen)
+        return State(
+            0,
+            0.0,
+            ego,
+            vehicles,
+            here,
+            np.full(n, self.begin),
+            np.ones(n),
+            np.zeros(n),
+            np.zeros(n),
+            seen,
+        )
 
     def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
         """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
@@ -249,7 +288,20 @@ class ClosedLoop:
         advance(self.world, self._manner, self.begin + time, before, seen, after, vehicles, here)
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
-        return State(number, time, ego, vehicles, here, clock, rate, acceleration, waited, seen, count, note or moved.fault)
+        return State(
+            number,
+            time,
+            ego,
+            vehicles,
+            here,
+            clock,
+            rate,
+            acceleration,
+            waited,
+            seen,
+            count,
+            note or moved.fault,
+        )
 
     def observe(self, state: State) -> Observation:
         """Return what a planner sees."""
@@ -293,7 +345,9 @@ class ClosedLoop:
         if self._waits:
             return np.asarray((time >= self.duration - 1e-9) & (np.hypot(ahead, left) <= width))
         turn = np.abs(wrap_angle(poses[:, 2] - goal[2]))
-        return np.asarray((ahead >= -AT) & (ahead <= BEYOND) & (np.abs(left) <= width) & (turn <= GOAL_TURN))
+        return np.asarray(
+            (ahead >= -AT) & (ahead <= BEYOND) & (np.abs(left) <= width) & (turn <= GOAL_TURN)
+        )
 
     def record(self, states: list[State]) -> Drive:
         """Return the drive of these instants."""

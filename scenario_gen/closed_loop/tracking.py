@@ -46,5 +46,9 @@ class Track:
         wanted = max(float(10.0 * pace + CATCH_UP * (behind - ego.speed * step)), 0.0)
         ahead, left = ahead_and_left(target[:2] - place, ego.yaw)
         square = ahead * ahead + left * left
-        turn = angle_between(target[2], ego.yaw) / max(ego.speed * LOOK_AHEAD, 1.0)  # where it is too near to aim at
-        return Command((wanted - ego.speed) / step, float(2.0 * left / square if square > 1.0 else turn))
+        turn = angle_between(target[2], ego.yaw) / max(
+            ego.speed * LOOK_AHEAD, 1.0
+        )  # where it is too near to aim at
+        return Command(
+            (wanted - ego.speed) / step, float(2.0 * left / square if square > 1.0 else turn)
+        )

@@ -20,7 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.bags.recordings.read import INFO, read_recording, ScenarioEntry, SCENARIOS, WITNESS
+from scenario_gen.bags.recordings.read import (
+    INFO,
+    read_recording,
+    ScenarioEntry,
+    SCENARIOS,
+    WITNESS,
+)
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
@@ -32,7 +38,15 @@ from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge
 from scenario_gen.method.evaluation import clustered_wilson
-from scenario_gen.types import GenerationResult, Interval, join_ego, once_per_object, Road, Scenario, token
+from scenario_gen.types import (
+    GenerationResult,
+    Interval,
+    join_ego,
+    once_per_object,
+    Road,
+    Scenario,
+    token,
+)
 
 MakePlanner = Callable[[], Planner]
 
@@ -60,11 +74,21 @@ class Outcome:
 class Bars(Parameters):
     """What a planner must keep to pass."""
 
-    collisions: float = parameter(0.0, "largest share of drives with a collision", low=0.0, high=1.0)
-    off_road: float = parameter(0.0, "largest share of drives that leave the road", low=0.0, high=1.0)
-    goals: float = parameter(1.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
-    at_fault: float = parameter(0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0)
-    jumps: float = parameter(0.0, "largest share of drives in which the ego teleports", low=0.0, high=1.0)
+    collisions: float = parameter(
+        0.0, "largest share of drives with a collision", low=0.0, high=1.0
+    )
+    off_road: float = parameter(
+        0.0, "largest share of drives that leave the road", low=0.0, high=1.0
+    )
+    goals: float = parameter(
+        1.0, "smallest share of drives that reach the goal", low=0.0, high=1.0
+    )
+    at_fault: float = parameter(
+        0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0
+    )
+    jumps: float = parameter(
+        0.0, "largest share of drives in which the ego teleports", low=0.0, high=1.0
+    )
     progress: float = parameter(
         0.9, "smallest share of drives with progress: 20 % of the reference drive's path, as in nuPlan; who never moves has none",
         low=0.0, high=1.0,
@@ -79,24 +103,36 @@ def find_planner(name: str) -> MakePlanner:
     """
     module, colon, attribute = name.partition(":")
     if not (colon and module and attribute):
-        raise InputError(f"--planner {name}: write it as MODULE:CLASS, e.g. scenario_gen.closed_loop.planners:IdmFollower")
+        raise InputError(
+            f"--planner {name}: write it as MODULE:CLASS, e.g. scenario_gen.closed_loop.planners:IdmFollower"
+        )
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     try:
         found: Any = pkgutil.resolve_name(name)
     except ImportError as error:
-        raise InputError(f"--planner {name}: {error}; run in the folder of the module, or put it on PYTHONPATH") from error
+        raise InputError(
+            f"--planner {name}: {error}; run in the folder of the module, or put it on PYTHONPATH"
+        ) from error
     except AttributeError as error:
-        near = did_you_mean(attribute, [one for one in vars(sys.modules[module]) if one[:1].isupper()])
-        raise InputError(f"--planner {name}: {error}; name a class of that module{near}") from error
+        near = did_you_mean(
+            attribute, [one for one in vars(sys.modules[module]) if one[:1].isupper()]
+        )
+        raise InputError(
+            f"--planner {name}: {error}; name a class of that module{near}"
+        ) from error
     except (Exception, SystemExit) as error:  # the module runs
         raise InputError(f"--planner {name}: {type(error).__name__}: {error}") from error
     if not callable(found):
-        raise InputError(f"--planner {name}: that is no class; a planner has reset(task) and act(observation)")
+        raise InputError(
+            f"--planner {name}: that is no class; a planner has reset(task) and act(observation)"
+        )
     return found  # type: ignore[no-any-return]
 
 
-def read_trials(bag: Path, ego: str = "", count: int = 0, config: BagConfig = BagConfig()) -> list[Trial]:
+def read_trials(
+    bag: Path, ego: str = "", count: int = 0, config: BagConfig = BagConfig()
+) -> list[Trial]:
     """Return the scenarios of a bag, in order, each on its road.
 
     Args:
@@ -110,22 +146,37 @@ def read_trials(bag: Path, ego: str = "", count: int = 0, config: BagConfig = Ba
     """
     trials: list[Trial] = []
     with within(bag):
-        for namespace in read_recording(bag, config, ("map", "road/lanes", "fit/info", SCENARIOS, INFO)).namespaces.values():
+        for namespace in read_recording(
+            bag, config, ("map", "road/lanes", "fit/info", SCENARIOS, INFO)
+        ).namespaces.values():
             for k in range(len(namespace.hashes)):
                 if count and len(trials) >= count:
                     break
                 stamp, scenario = namespace.scenario(k)
                 entry = namespace.entry(k)
                 where = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
-                name = f"{namespace.name} {scenario.index}" if namespace.name else str(scenario.index)
-                trial = trial_of(name, scenario, entry, namespace.road_of(entry, stamp), ego, where)
+                name = (
+                    f"{namespace.name} {scenario.index}" if namespace.name else str(scenario.index)
+                )
+                trial = trial_of(
+                    name, scenario, entry, namespace.road_of(entry, stamp), ego, where
+                )
                 trials.append(replace(trial, encounter=_encounter_of(entry)))
     if not trials:
-        raise InputError(f"{bag}: no topic `scenarios` in any namespace; there is nothing to drive in")
+        raise InputError(
+            f"{bag}: no topic `scenarios` in any namespace; there is nothing to drive in"
+        )
     return trials
 
 
-def trial_of(name: str, scenario: Scenario, entry: ScenarioEntry | None, road: Road | None, ego: str, where: str) -> Trial:
+def trial_of(
+    name: str,
+    scenario: Scenario,
+    entry: ScenarioEntry | None,
+    road: Road | None,
+    ego: str,
+    where: str,
+) -> Trial:
     """Return the trial of a scenario, with its witness among the vehicles where it has one.
 
     Args:
@@ -139,7 +190,9 @@ def trial_of(name: str, scenario: Scenario, entry: ScenarioEntry | None, road: R
     Raises:
         InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
     """
-    return Trial(name, join_ego(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road)
+    return Trial(
+        name, join_ego(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road
+    )
 
 
 def trials_of(result: GenerationResult, ego: str = "") -> list[Trial]:
@@ -149,7 +202,10 @@ def trials_of(result: GenerationResult, ego: str = "") -> list[Trial]:
         InputError: a scenario has no vehicle `ego`, or a slot for another.
     """
     name = result.encounter.name
-    trials = [trial_of(str(one.index), one, None, result.road, ego, f"scenario {one.index}") for one in result]
+    trials = [
+        trial_of(str(one.index), one, None, result.road, ego, f"scenario {one.index}")
+        for one in result
+    ]
     return [replace(trial, encounter=name) for trial in trials]
 
 
@@ -173,7 +229,9 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     if scenario.reference_drive is not None:
         own = scenario.reference_drive.vehicles[0].id
         if asked and not named_vehicle([own], asked):
-            raise InputError(f"{where}: it was made for ego {own!r}; leave --ego out, or name that one")
+            raise InputError(
+                f"{where}: it was made for ego {own!r}; leave --ego out, or name that one"
+            )
         return own
     ids = [vehicle.id for vehicle in scenario.vehicles]
     if slot and asked in ("", slot):
@@ -183,13 +241,18 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
         )
     wanted = named_vehicle(ids, asked or ids[0])
     if not wanted:
-        raise InputError(f"{where}: no vehicle {asked!r} to be the ego; it has {', '.join(ids)}{did_you_mean(asked, ids)}")
+        raise InputError(
+            f"{where}: no vehicle {asked!r} to be the ego; it has {', '.join(ids)}{did_you_mean(asked, ids)}"
+        )
     return wanted
 
 
 def with_origins(outcomes: Sequence[Outcome], trials: Sequence[Trial]) -> list[Outcome]:
     """Return the outcomes with the whole origin of their scenarios: encounter, digest, and which are copies."""
-    return [replace(outcome, origin=origin) for outcome, origin in zip(outcomes, origins_of(trials), strict=True)]
+    return [
+        replace(outcome, origin=origin)
+        for outcome, origin in zip(outcomes, origins_of(trials), strict=True)
+    ]
 
 
 RunTrials = Callable[[Sequence[Trial]], Iterator["Outcome"]]
@@ -215,7 +278,10 @@ def run_trials(
         InputError: the planner is not found, or fails; the message names the scenario.
     """
     outcomes: list[Outcome] = []
-    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run, saying_what_was_before(outcomes):
+    with (
+        trial_runner(planner, config, min(workers, max(len(trials), 1))) as run,
+        saying_what_was_before(outcomes),
+    ):
         for outcome in run(trials):
             outcomes.append(outcome)
             progress(len(outcomes), len(trials))
@@ -243,7 +309,9 @@ def too_long(trial: Trial, config: ClosedLoopConfig) -> InputError:
 
 
 @contextmanager
-def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: int) -> Iterator[RunTrials]:
+def trial_runner(
+    planner: MakePlanner | str, config: ClosedLoopConfig, workers: int
+) -> Iterator[RunTrials]:
     """Yield what drives trials, in their order, again and again with the same processes; arguments as in `run_trials`.
 
     Raises:
@@ -259,9 +327,19 @@ def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: 
     with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
 
         def run(trials: Sequence[Trial]) -> Iterator[Outcome]:
-            tasks = ((replace(trial, road=None), _packed(trial.road) if trial.road else b"", planner, config) for trial in trials)
+            tasks = (
+                (
+                    replace(trial, road=None),
+                    _packed(trial.road) if trial.road else b"",
+                    planner,
+                    config,
+                )
+                for trial in trials
+            )
             with starting():
-                results = pool.map(_run_packed, tasks, chunksize=min(max(len(trials) // workers, 1), 4))
+                results = pool.map(
+                    _run_packed, tasks, chunksize=min(max(len(trials) // workers, 1), 4)
+                )
             done = 0
             try:
                 for outcome in results:
@@ -308,8 +386,13 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
         raise InputError(f"scenario {trial.name}: {error}") from error
     except ScenarioGenError:
         raise
-    except (Exception, SystemExit) as error:  # one that leaves would take its exit code for the result
-        raise InputError(f"scenario {trial.name}: the planner failed: {type(error).__name__}: {error}") from error
+    except (
+        Exception,
+        SystemExit,
+    ) as error:  # one that leaves would take its exit code for the result
+        raise InputError(
+            f"scenario {trial.name}: the planner failed: {type(error).__name__}: {error}"
+        ) from error
     finally:
         if os.getpid() != process:  # the planner has forked: there is one result of this drive
             os._exit(1)
@@ -364,7 +447,9 @@ def passed_of(outcomes: Sequence[Outcome]) -> Rate:
 
 
 def _rate(outcomes: Sequence[Outcome], flags: Sequence[bool]) -> Rate:
-    unit, encounters = units_of([outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes])
+    unit, encounters = units_of(
+        [outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes]
+    )
     hits = np.array(flags, dtype=np.bool_)
     return Rate(sum(flags), len(flags), clustered_wilson(hits, unit, LEVEL), encounters)
 
@@ -379,5 +464,7 @@ def broken_bars(found: dict[str, Rate], bars: Bars) -> list[str]:
         value = found[name].share.value
         if (value < wanted) if name in LEAST else (value > wanted):
             side = "at least" if name in LEAST else "at most"
-            messages.append(f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is required")
+            messages.append(
+                f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is required"
+            )
     return messages

@@ -24,7 +24,9 @@ from scenario_gen.types import Scenario
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
 
 JERK_OVER = 0.5  # seconds over which the change of acceleration is taken
-STANDING = 5.0  # seconds at its end for which a drive has stood, if that is why the goal was missed
+STANDING = (
+    5.0  # seconds at its end for which a drive has stood, if that is why the goal was missed
+)
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,12 @@ class DriveVerdict:
     @property
     def passed(self) -> bool:
         """Whether the ego came to its goal on the road, by driving there, and without a collision."""
-        return self.collision is None and math.isnan(self.off_road) and not math.isnan(self.goal) and not self.jumps
+        return (
+            self.collision is None
+            and math.isnan(self.off_road)
+            and not math.isnan(self.goal)
+            and not self.jumps
+        )
 
     @property
     def at_fault(self) -> bool:
@@ -139,7 +146,13 @@ class DriveVerdict:
     def severity(self) -> tuple[float, ...]:
         """Sorts verdicts, the worst last: collision by speed, off-road, goal not reached, then the least time to collision."""
         hit = self.collision.speed if self.collision else -1.0
-        return (hit, float(not math.isnan(self.off_road)), float(math.isnan(self.goal)), -self.min_ttc, -self.min_gap)
+        return (
+            hit,
+            float(not math.isnan(self.off_road)),
+            float(math.isnan(self.goal)),
+            -self.min_ttc,
+            -self.min_gap,
+        )
 
     def sentence(self) -> str:
         """Say in words what it came to."""
@@ -150,7 +163,9 @@ class DriveVerdict:
                 Runner.OTHER: f"{hit.vehicle} ran into the ego",
                 Runner.BOTH: f"the ego and {hit.vehicle} ran into each other",
             }
-            messages.append(f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({hit.why})")
+            messages.append(
+                f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({hit.why})"
+            )
         if not math.isnan(self.off_road):
             depth = f"{-self.road_margin:.2f} m deep, {self.off_road_area:.1f} m² of its footprint"
             messages.append(f"left the road at {self.off_road:.2f} s ({depth})")
@@ -158,7 +173,9 @@ class DriveVerdict:
             messages.append(f"{self.jumps} teleport(s): poses that cannot be reached in a step")
         if math.isnan(self.goal):
             stands = ", stood at the end" if self.stood >= STANDING else ""
-            messages.append(f"did not reach its goal, {100.0 * self.progress:.0f} % of the route{stands}")
+            messages.append(
+                f"did not reach its goal, {100.0 * self.progress:.0f} % of the route{stands}"
+            )
         elif not messages:
             messages.append(f"reached its goal at {self.goal:.1f} s")
         if self.faults:
@@ -167,10 +184,17 @@ class DriveVerdict:
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON's types; null for what there is not."""
-        plain = asdict(self) | {"passed": self.passed, "at_fault": self.at_fault, "fault": self.fault}
+        plain = asdict(self) | {
+            "passed": self.passed,
+            "at_fault": self.at_fault,
+            "fault": self.fault,
+        }
         plain["sentence"] = self.sentence()
         plain["terms"] |= {"nuplan": self.terms.nuplan, "pdms": self.terms.pdms}
-        return {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in plain.items()}
+        return {
+            key: None if isinstance(value, float) and math.isnan(value) else value
+            for key, value in plain.items()
+        }
 
 
 def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
@@ -188,10 +212,17 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     first, who = min(((at, i) for at, i in hits if at is not None), default=(math.nan, -1))
     goal = _goal_time(loop, drive)
     driven = Motion(motion.vehicles, config.step, motion.position, motion.heading, motion.speed)
-    to_contact = {i: np.where(drive.here[i], time_to_collision(driven, ego, i), np.inf) for i in others}
+    to_contact = {
+        i: np.where(drive.here[i], time_to_collision(driven, ego, i), np.inf) for i in others
+    }
     ttc = [float(each.min()) for each in to_contact.values()]
-    close = [float(np.where(not_behind(drive, i), each, np.inf).min()) for i, each in to_contact.items()]
-    gap = [float(np.where(drive.here[i], footprint_distance(driven, ego, i), np.inf).min()) for i in others]
+    close = [
+        float(np.where(not_behind(drive, i), each, np.inf).min()) for i, each in to_contact.items()
+    ]
+    gap = [
+        float(np.where(drive.here[i], footprint_distance(driven, ego, i), np.inf).min())
+        for i in others
+    ]
     braking = np.maximum(-drive.accelerations, 0.0)
     way = known.cells[ego, :, 7]
     reached = float(np.interp(drive.clock[ego, -1], np.arange(len(way)) * known.cell, way))
@@ -211,11 +242,15 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         min_gap=min(gap, default=math.nan),
         min_pet=_pet(drive),
         hardest_braking=float(braking.max()),
-        hard_braking=round(int(np.count_nonzero(braking[1:] >= config.hard_braking)) * config.step, 9),
+        hard_braking=round(
+            int(np.count_nonzero(braking[1:] >= config.hard_braking)) * config.step, 9
+        ),
         jerk=_jerk(drive.accelerations, config.step),
         progress=progress,
         faults=len(drive.faults),
-        among_others=len([1 for (i, j), at in contacts.items() if ego not in (i, j) and at is not None]),
+        among_others=len(
+            [1 for (i, j), at in contacts.items() if ego not in (i, j) and at is not None]
+        ),
         forced=drive.forced,
         road_known=loop.road is not None,
         road_margin=road.margin,
@@ -223,7 +258,13 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         off_road_area=road.area,
         jumps=len(drive.jumps),
         stood=_stood(motion.speed[ego], config.step),
-        terms=terms(drive, None if who < 0 else (who, first), road.margin, progress, min(close, default=math.inf)),
+        terms=terms(
+            drive,
+            None if who < 0 else (who, first),
+            road.margin,
+            progress,
+            min(close, default=math.inf),
+        ),
     )
 
 
@@ -237,7 +278,11 @@ def _contact(drive: Drive, i: int, j: int) -> float | None:
     """Time [s] of the first contact of two vehicles while both are on the scene, None if they never touch."""
     both = np.flatnonzero(drive.here[i] & drive.here[j])
     parts = np.split(both, np.searchsorted(both, drive.jumps)) if drive.ego in (i, j) else [both]
-    times = (_contact_in(drive.motion, [i, j], slice(part[0], part[-1] + 1)) for part in parts if len(part))
+    times = (
+        _contact_in(drive.motion, [i, j], slice(part[0], part[-1] + 1))
+        for part in parts
+        if len(part)
+    )
     return next((time for time in times if time is not None), None)
 
 
@@ -245,8 +290,16 @@ def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
     """Return the time [s] of the first contact of two vehicles in a span of instants, None if they do not touch in it."""
     vehicles = (motion.vehicles[pair[0]], motion.vehicles[pair[1]])
     if span.stop - span.start < 2:
-        there = Motion(vehicles, 1.0, motion.position[pair][:, span], motion.heading[pair][:, span], motion.speed[pair][:, span])
-        return float(motion.time[span.start]) if footprint_distance(there, 0, 1)[0] <= 0.0 else None
+        there = Motion(
+            vehicles,
+            1.0,
+            motion.position[pair][:, span],
+            motion.heading[pair][:, span],
+            motion.speed[pair][:, span],
+        )
+        return (
+            float(motion.time[span.start]) if footprint_distance(there, 0, 1)[0] <= 0.0 else None
+        )
     time, position = motion.time[span], motion.position[pair][:, span]
     heading, speed = motion.heading[pair][:, span], motion.speed[pair][:, span]
     control, out = np.empty((2, len(time) - 1, 4, 2)), np.empty((1, 3))
@@ -272,9 +325,17 @@ def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision
     away = np.subtract(other[:2], ego[:2])
     towards = away / max(math.hypot(*away), 1e-9)
     mine, its = float(velocity @ towards), float(-its_velocity @ towards)
-    ran = Runner.EGO if mine > 2.0 * max(its, 0.0) else Runner.OTHER if its > 2.0 * max(mine, 0.0) else Runner.BOTH
+    ran = (
+        Runner.EGO
+        if mine > 2.0 * max(its, 0.0)
+        else Runner.OTHER
+        if its > 2.0 * max(mine, 0.0)
+        else Runner.BOTH
+    )
     speed = math.hypot(*(velocity - its_velocity))
-    return Collision(at, drive.motion.vehicles[who].id, speed, ran, *reason_of(loop, drive, who, at))
+    return Collision(
+        at, drive.motion.vehicles[who].id, speed, ran, *reason_of(loop, drive, who, at)
+    )
 
 
 def _goal_time(loop: ClosedLoop, drive: Drive) -> float:

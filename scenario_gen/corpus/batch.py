@@ -42,7 +42,9 @@ from scenario_gen.types import GenerationResult, most_exposed
 BATCH = "batch.json"
 TEMPLATES = 10  # of one task
 LONGEST_CAUSE = 80  # characters under which refusals are counted
-LOST_CONFLICT = "lost conflict"  # the cause of every case whose encounter is lost, whatever the road
+LOST_CONFLICT = (
+    "lost conflict"  # the cause of every case whose encounter is lost, whatever the road
+)
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,17 @@ class Batch:
 
     def lines(self) -> list[str]:
         """Return the summary for people."""
-        lines = [f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (encounter and road)"]
-        lines += [f"{count} cases without any: {cause}" for cause, count in Counter(self.failures).most_common()]
-        lines += [f"{count} candidates refused: {cause}" for cause, count in Counter(self.refused).most_common()]
+        lines = [
+            f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (encounter and road)"
+        ]
+        lines += [
+            f"{count} cases without any: {cause}"
+            for cause, count in Counter(self.failures).most_common()
+        ]
+        lines += [
+            f"{count} candidates refused: {cause}"
+            for cause, count in Counter(self.refused).most_common()
+        ]
         return lines + self.failed
 
 
@@ -165,12 +175,16 @@ def run_batch(
         return summary(out, go(generate_part, undone(parts(rows, roads, out, request))))
 
 
-def parts(rows: Sequence[tuple[Place, int]], roads: Sequence[str], out: Place, request: BatchRequest) -> list[PartTask]:
+def parts(
+    rows: Sequence[tuple[Place, int]], roads: Sequence[str], out: Place, request: BatchRequest
+) -> list[PartTask]:
     """Return the tasks: ten templates on one road each, whatever the number of workers."""
     tokens = tokens_of(roads)
     return [
         PartTask(tuple(templates), road, token, number, out, request)
-        for number, templates in enumerate(rows[k : k + TEMPLATES] for k in range(0, len(rows), TEMPLATES))
+        for number, templates in enumerate(
+            rows[k : k + TEMPLATES] for k in range(0, len(rows), TEMPLATES)
+        )
         for road, token in zip(roads, tokens, strict=True)
     ]
 
@@ -226,33 +240,54 @@ def _generate_case(
         encounter = encounter_of(row, table)
         road, encounter = road_and_template(task.road, encounter, request.config.road)
         segmentation = segment(encounter, request.config.segmentation, seed)
-        result = Chain(encounter, segmentation, road, request.config, count=request.count, seed=seed).run()
+        result = Chain(
+            encounter, segmentation, road, request.config, count=request.count, seed=seed
+        ).run()
     except (RefusedError, InputError) as error:
         message = LOST_CONFLICT if isinstance(error, LostEncounterError) else str(error)
         cause = message if isinstance(error, RefusedError) else "input"
         return case | {"cause": _cause(cause), "why": str(error)}, None
     generated = result.generated
-    facts = {"template": row["name"], "roads": task.road, "seed": str(seed), "count": str(request.count)}
+    facts = {
+        "template": row["name"],
+        "roads": task.road,
+        "seed": str(seed),
+        "count": str(request.count),
+    }
     provenance = facts | versions() | parameter_texts(request.config)
     finished = case | {
         "published": len(generated.scenarios),
         "candidates": generated.candidates,
-        "refused": json.dumps({str(cause): number for cause, number in sorted(generated.refused.items()) if number}),
+        "refused": json.dumps(
+            {str(cause): number for cause, number in sorted(generated.refused.items()) if number}
+        ),
         "changepoints": len(segmentation.changepoints),
         "cause": "" if len(generated.scenarios) else "no valid candidate",
     }
     return finished, GenerationResult(
-        encounter, segmentation, road, result.fit, result.routes, generated, seed, provenance=provenance
+        encounter,
+        segmentation,
+        road,
+        result.fit,
+        result.routes,
+        generated,
+        seed,
+        provenance=provenance,
     )
 
 
 def _cause(text: str) -> str:
     """A reason without the numbers and names that make each its own, and without what explains it."""
-    words = [word if not any(c.isdigit() for c in word) else "…" for word in re.split(r"[:;(]", text)[0].split()]
+    words = [
+        word if not any(c.isdigit() for c in word) else "…"
+        for word in re.split(r"[:;(]", text)[0].split()
+    ]
     return shorten(" ".join(words), LONGEST_CAUSE, placeholder=" …")
 
 
-def _scenario_rows(case: Mapping[str, Any], result: GenerationResult, task: PartTask) -> list[dict[str, Any]]:
+def _scenario_rows(
+    case: Mapping[str, Any], result: GenerationResult, task: PartTask
+) -> list[dict[str, Any]]:
     """A row for each scenario of a case."""
     rows = []
     for scenario in result.generated.scenarios:
@@ -277,7 +312,9 @@ SCENARIO_COLUMNS = {
 }
 CASE_COLUMNS = {
     **dict.fromkeys(("template", "kind", "namespace", "refused", "cause", "why"), "string"),
-    **dict.fromkeys(("vehicles", "seed", "wanted", "published", "candidates", "part", "changepoints"), "int64"),
+    **dict.fromkeys(
+        ("vehicles", "seed", "wanted", "published", "candidates", "part", "changepoints"), "int64"
+    ),
 }
 
 
@@ -288,6 +325,8 @@ def summary(out: Place, failed: list[str]) -> Batch:
     refused: Counter[str] = Counter()
     for case in cases:
         refused.update(json.loads(case["refused"]))
-    scenarios, requested = (sum(int(case[name]) for case in cases) for name in ("published", "wanted"))
+    scenarios, requested = (
+        sum(int(case[name]) for case in cases) for name in ("published", "wanted")
+    )
     failures = Counter(case["cause"] for case in cases if not case["published"])
     return Batch(len(cases), scenarios, requested, dict(failures), dict(refused), failed)

@@ -13,12 +13,31 @@ from scenario_gen.logs import INTERACTS_M, LogConfig
 class CorpusConfig(Parameters):
     """How an archive is mined, and how the work is spread."""
 
-    range_size: int = parameter(512, "bytes of text that one task parses, several seconds' work", unit="MiB", low=1, high=4096)
-    task_rows: int = parameter(10_000_000, "rows whose hours one task searches, so that none is shorter than its start", low=1000)
+    range_size: int = parameter(
+        512,
+        "bytes of text that one task parses, several seconds' work",
+        unit="MiB",
+        low=1,
+        high=4096,
+    )
+    task_rows: int = parameter(
+        10_000_000,
+        "rows whose hours one task searches, so that none is shorter than its start",
+        low=1000,
+    )
     task_encounters: int = parameter(100, "encounters that one task cleans", low=1, high=100_000)
-    memory: int = parameter(400, "memory that the database of one task takes before it spills to disk", unit="MiB", low=100)
+    memory: int = parameter(
+        400,
+        "memory that the database of one task takes before it spills to disk",
+        unit="MiB",
+        low=100,
+    )
     slack: float = parameter(
-        10.0, "metres beyond the proximity within which a coarse position still makes a candidate", unit="m", low=0.0, high=100.0
+        10.0,
+        "metres beyond the proximity within which a coarse position still makes a candidate",
+        unit="m",
+        low=0.0,
+        high=100.0,
     )
     interaction: float = parameter(
         INTERACTS_M,

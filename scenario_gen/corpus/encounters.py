@@ -90,15 +90,30 @@ def clean_found(task: CleanTask) -> None:
     from pyarrow import parquet
 
     parts = [part_of(task.corpus, number) for number, _, _ in task.found]
-    with fetched([*parts, *(task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours)]) as here:
-        listed = [one for path, (_, *rows) in zip(here, task.found, strict=False) for one in read_found(path, *rows)]
-        first, last = min(one.start for one in listed) - MARGIN, max(one.end for one in listed) + MARGIN
+    with fetched(
+        [*parts, *(task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours)]
+    ) as here:
+        listed = [
+            one
+            for path, (_, *rows) in zip(here, task.found, strict=False)
+            for one in read_found(path, *rows)
+        ]
+        first, last = (
+            min(one.start for one in listed) - MARGIN,
+            max(one.end for one in listed) + MARGIN,
+        )
         wanted = sorted({device for one in listed for device in one.devices})
         filters = [("t", ">=", first), ("t", "<=", last), ("device", "in", wanted)]
-        tables = [parquet.read_table(path, filters=filters).to_pandas() for path in here[len(parts) :]]
+        tables = [
+            parquet.read_table(path, filters=filters).to_pandas() for path in here[len(parts) :]
+        ]
     import pandas as pd
 
-    messages = pd.concat(tables).drop_duplicates().sort_values(["device", "t", "lat", "lon"], kind="stable")
+    messages = (
+        pd.concat(tables)
+        .drop_duplicates()
+        .sort_values(["device", "t", "lat", "lon"], kind="stable")
+    )
     by_device = dict(tuple(messages.groupby("device")))
     rows, refused = [], []
     for found in listed:
@@ -122,10 +137,21 @@ def _raw(found: Found, by_device: Mapping[int, Any]) -> RawLog:
         speed = own["speed"].to_numpy(np.float64)
         heading = np.pi / 2.0 - own["heading"].to_numpy(np.float64) * (np.pi / 180.0)
         vehicles.append(
-            Observations(label(device), stamps, own[["lat", "lon"]].to_numpy() / DEGREE, numbers, heading, stamps, speed, numbers)
+            Observations(
+                label(device),
+                stamps,
+                own[["lat", "lon"]].to_numpy() / DEGREE,
+                numbers,
+                heading,
+                stamps,
+                speed,
+                numbers,
+            )
         )
         begin += len(own)
-    return RawLog(found.name, True, tuple(vehicles), begin, (Segment(0, found.name, "message", 1),))
+    return RawLog(
+        found.name, True, tuple(vehicles), begin, (Segment(0, found.name, "message", 1),)
+    )
 
 
 def read_one_log(task: LogTask) -> None:
@@ -138,7 +164,9 @@ def read_one_log(task: LogTask) -> None:
         with fetched(task.paths) as here:
             result = read_log(here, task.config.log)
     except (NoEncounterError, UnknownFormatError) as error:  # a result: the log is not read again
-        write_encounters(task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []})
+        write_encounters(
+            task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []}
+        )
         return
     source = ", ".join(path.name for path in task.paths)
     rows = [row_of(encounter, source, task.config) for encounter in result.encounters]
@@ -153,8 +181,17 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         if len(both) < 2:
             continue
         apart = np.linalg.norm(encounter.position[i, both] - encounter.position[j, both], axis=1)
-        both = both[apart < config.log.proximity] if (apart < config.log.proximity).sum() > 1 else both
-        a, b = (Motion(encounter.position[n, both], encounter.heading[n, both], encounter.speed[n, both]) for n in (i, j))
+        both = (
+            both[apart < config.log.proximity]
+            if (apart < config.log.proximity).sum() > 1
+            else both
+        )
+        a, b = (
+            Motion(
+                encounter.position[n, both], encounter.heading[n, both], encounter.speed[n, both]
+            )
+            for n in (i, j)
+        )
         gap, _, _ = space_time_gap(a.position, b.position, encounter.dt)
         pairs.append((gap, i, j, kind_of(a, b, encounter.dt)))
     pairs.sort()
@@ -165,7 +202,12 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "source": source,
         "kind": pairs[0][3],
         "reactions": json.dumps(reactions_of(encounter).document(encounter.vehicles)),
-        "kinds": json.dumps({f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind for _, i, j, kind in pairs}),
+        "kinds": json.dumps(
+            {
+                f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind
+                for _, i, j, kind in pairs
+            }
+        ),
         "vehicles": [vehicle.id for vehicle in encounter.vehicles],
         "count": len(encounter.vehicles),
         "start_ns": encounter.start_ns,
@@ -181,7 +223,9 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
     }
 
 
-def write_encounters(target: Place, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]) -> None:
+def write_encounters(
+    target: Place, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]
+) -> None:
     """Write a table of encounters; the account stands in its metadata."""
     write_table(target, rows, COLUMNS, account=account)
 
@@ -194,7 +238,9 @@ def tables_of(corpus: Place) -> list[Place]:
     """
     found: list[Place] = sorted((corpus / "encounters").glob("*.parquet"), key=str)
     if not found:
-        raise InputError(f"{corpus} holds no encounters/*.parquet; write it with `scenario-gen mine ARCHIVE --out {corpus}`")
+        raise InputError(
+            f"{corpus} holds no encounters/*.parquet; write it with `scenario-gen mine ARCHIVE --out {corpus}`"
+        )
     return found
 
 
@@ -224,7 +270,9 @@ def encounter_of(row: Mapping[str, Any], table: object = "an encounter's row") -
     """
     for name, kind in ROW.items():
         if name not in row or not isinstance(row[name], kind):
-            raise InputError(f"{table}: column {name} holds {shown(row.get(name))}; `mine` writes it anew")
+            raise InputError(
+                f"{table}: column {name} holds {shown(row.get(name))}; `mine` writes it anew"
+            )
     origin = None if row["lat"] is None or row["lon"] is None else (row["lat"], row["lon"])
     try:
         return replace(tracks_of(row["tracks"], row["name"], origin), name=row["name"])

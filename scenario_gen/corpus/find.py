@@ -20,14 +20,38 @@ from scenario_gen.corpus.messages import database, quoted
 from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerated
 
 MEMORY = 500  # MiB
-COLUMNS = ("template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet", "speed", "braking")
-UNITS = {"seconds": "s", "distance": "m", "ttc": "s", "pet": "s", "speed": "m/s", "braking": "m/s²"}
+COLUMNS = (
+    "template",
+    "kind",
+    "road",
+    "vehicles",
+    "index",
+    "type",
+    "seconds",
+    "distance",
+    "ttc",
+    "pet",
+    "speed",
+    "braking",
+)
+UNITS = {
+    "seconds": "s",
+    "distance": "m",
+    "ttc": "s",
+    "pet": "s",
+    "speed": "m/s",
+    "braking": "m/s²",
+}
 RECORDED = (  # an encounter's columns, with the names of a scenario's
     "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index, NULL AS type, seconds, distance, "
     "ttc, pet, speed, NULL AS braking, gap"
 )
 PET = (0.0, 1.0, 2.0, 4.0)  # s: bounds of the classes of the table of coverage
-CLASSES = "CASE WHEN pet IS NULL THEN 'none' " + " ".join(f"WHEN pet < {b:g} THEN '< {b:g} s'" for b in PET) + " ELSE 'more' END"
+CLASSES = (
+    "CASE WHEN pet IS NULL THEN 'none' "
+    + " ".join(f"WHEN pet < {b:g} THEN '< {b:g} s'" for b in PET)
+    + " ELSE 'more' END"
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +79,9 @@ def find(batch: Place, condition: str = "true") -> Hits:
     generated = [table for table in listed if below(table, batch / "scenarios") in done]
     tables: list[Place] = generated or sorted((batch / "encounters").glob("*.parquet"), key=str)
     if not tables:
-        raise InputError(f"{batch} holds no scenarios; write them with `scenario-gen batch DIR --roads … --out {batch}`")
+        raise InputError(
+            f"{batch} holds no scenarios; write them with `scenario-gen batch DIR --roads … --out {batch}`"
+        )
     columns = f"the columns are {', '.join(COLUMNS)}, types, seed, sha256{'' if generated else '; mine a corpus of before anew'}"
     what = f"{batch}: condition {condition!r}"
     with fetched(tables) as here, database(workplace(batch), MEMORY, what, columns) as base:
@@ -64,7 +90,11 @@ def find(batch: Place, condition: str = "true") -> Hits:
             f"read_parquet([{quoted(list(map(str, here)))}], hive_partitioning=true, hive_types_autocast=false)"
         )
         base.execute("SET enable_external_access = false")  # a condition reads no files
-        found = base.table("scenarios").filter(condition).order("pet NULLS LAST, ttc, template, road, index")  # one expression
+        found = (
+            base.table("scenarios")
+            .filter(condition)
+            .order("pet NULLS LAST, ttc, template, road, index")
+        )  # one expression
         names = found.columns
         rows = [dict(zip(names, row, strict=True)) for row in found.fetchall()]
         counts = f"SELECT kind, road, {CLASSES} AS pet, count(*) FROM scenarios GROUP BY ALL ORDER BY ALL"
@@ -76,11 +106,17 @@ def coverage_lines(hits: Hits, batch: Place) -> list[str]:
     """Return the coverage for people: of each kind on each road the scenarios by class of PET, without empty classes."""
     classes = [*(f"< {bound:g} s" for bound in PET), "more", "none"]
     kinds = sorted({kind for kind, *_ in hits.coverage})
-    roads = {table.parent.name.partition("=")[2] for table in (batch / "cases").rglob("*.parquet")} or {"recorded"}
+    roads = {
+        table.parent.name.partition("=")[2] for table in (batch / "cases").rglob("*.parquet")
+    } or {"recorded"}
     cells = {(kind, road, pet): count for kind, road, pet, count in hits.coverage}
-    lines = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
+    lines = [
+        f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"
+    ]
     for kind, road in product(kinds, sorted(roads)):
-        counts = ", ".join(f"{pet}: {cells[kind, road, pet]}" for pet in classes if (kind, road, pet) in cells)
+        counts = ", ".join(
+            f"{pet}: {cells[kind, road, pet]}" for pet in classes if (kind, road, pet) in cells
+        )
         lines.append(f"  {kind} on {road}: {f'PET {counts}' if counts else 'no scenario'}")
     return lines
 
@@ -98,11 +134,15 @@ def make_again(batch: Place, row: Mapping[str, Any]) -> Regenerated:
         ScenarioGenError: it comes out differently; the message names what differs.
     """
     if row["index"] is None:
-        raise InputError(f"{batch} holds recordings; for a bag write scenarios with `scenario-gen batch {batch} --roads …`")
+        raise InputError(
+            f"{batch} holds recordings; for a bag write scenarios with `scenario-gen batch {batch} --roads …`"
+        )
     with fetched([bag_of(batch, row)]) as (bag,):
         result = regenerate_scenario(bag, row["index"], namespace=row["namespace"])
     if result.sha256 != row["sha256"]:
-        raise ScenarioGenError(f"{bag_of(batch, row)}: scenario {row['index']} of {row['namespace']} is not that of the table")
+        raise ScenarioGenError(
+            f"{bag_of(batch, row)}: scenario {row['index']} of {row['namespace']} is not that of the table"
+        )
     return result
 
 
@@ -113,7 +153,9 @@ def export_hits(batch: Place, rows: Sequence[Mapping[str, Any]], folder: Path) -
         InputError: there is no row, a bag is missing or damaged, or `folder` is something else.
     """
     if not rows:
-        raise InputError("no scenario meets the condition, so there is nothing to export; use a wider condition")
+        raise InputError(
+            "no scenario meets the condition, so there is nothing to export; use a wider condition"
+        )
     with atomic_bag(folder) as bag:
         for k, row in enumerate(rows):
             for message in make_again(batch, row).messages:

@@ -110,8 +110,13 @@ def label(device: int) -> str:
 
 def group(meetings: Sequence[Meeting], config: LogConfig) -> list[Found]:
     """Return the encounters, in order of time."""
-    growth = Growth[Meeting](round(config.min_duration * 1e6), round(config.min_presence * 1e6), config.max_vehicles)
-    found = [Found(tuple(sorted(one.spans)), one.start, one.end, one.meetings) for one in growth.groups(meetings)]
+    growth = Growth[Meeting](
+        round(config.min_duration * 1e6), round(config.min_presence * 1e6), config.max_vehicles
+    )
+    found = [
+        Found(tuple(sorted(one.spans)), one.start, one.end, one.meetings)
+        for one in growth.groups(meetings)
+    ]
     return sorted(found, key=lambda one: (one.start, one.devices))
 
 
@@ -122,7 +127,10 @@ def group_partition(task: GroupTask) -> None:
     names = ("gap", "start", "a", "b", "end", "kind", "distance", "lat", "lon")
     inside = [("start", ">=", task.begin), ("start", "<", task.end)]
     with fetched([task.corpus / "hours" / f"hour-{hour}.parquet" for hour in task.hours]) as here:
-        tables = [parquet.read_table(path, columns=list(names), filters=inside).to_pylist() for path in here]
+        tables = [
+            parquet.read_table(path, columns=list(names), filters=inside).to_pylist()
+            for path in here
+        ]
     rows = [
         {
             "name": one.name, "devices": list(one.devices), "start": one.start, "end": one.end, "kind": one.meetings[0].kind,
@@ -138,5 +146,9 @@ def read_found(table: Path, first: int, last: int) -> list[Found]:
     """Return the encounters in rows `first` to before `last` of a table, without their meetings."""
     from pyarrow import parquet
 
-    rows = parquet.read_table(table, columns=["devices", "start", "end"]).slice(first, last - first).to_pylist()
+    rows = (
+        parquet.read_table(table, columns=["devices", "start", "end"])
+        .slice(first, last - first)
+        .to_pylist()
+    )
     return [Found(tuple(row["devices"]), row["start"], row["end"]) for row in rows]

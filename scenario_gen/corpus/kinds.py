@@ -59,7 +59,10 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
     path, others = path_of(one), path_of(other)
     quarter = max(len(one.speed) // 4, 1)
     early, late = (
-        max(float(_on_path(motion.part(own), way).mean()) for motion, way in ((one, others), (other, path)))
+        max(
+            float(_on_path(motion.part(own), way).mean())
+            for motion, way in ((one, others), (other, path))
+        )
         for own in (slice(None, quarter), slice(-quarter, None))
     )
     if late >= MOSTLY:
@@ -69,7 +72,11 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
     if _intersect(one, other):
         return "crossing"
     nearest = np.hypot(*(one.position - other.position).T).argmin()
-    return "opposing" if abs(angle_between(one.heading[nearest], other.heading[nearest])) >= AGAINST else "other"
+    return (
+        "opposing"
+        if abs(angle_between(one.heading[nearest], other.heading[nearest])) >= AGAINST
+        else "other"
+    )
 
 
 def turned(motion: Motion) -> float:
@@ -98,13 +105,21 @@ def _on_path(motion: Motion, path: Floats) -> Bools:
     at = np.arange(len(nearest))
     _, left = ahead_and_left(away[at, nearest], path[nearest, 2])
     alike = np.abs(wrap_angle(motion.heading - path[nearest, 2])) < ALIKE
-    return np.asarray((np.abs(left) < BESIDE) & alike & (squares[at, nearest] < (STEP_M + BESIDE) ** 2))
+    return np.asarray(
+        (np.abs(left) < BESIDE) & alike & (squares[at, nearest] < (STEP_M + BESIDE) ** 2)
+    )
 
 
 def _intersect(one: Motion, other: Motion) -> bool:
     """Whether the ways driven cross each other at 30° to 150°."""
-    (p, u), (q, v) = ((motion.position[:-1], np.diff(motion.position, axis=0)) for motion in (one, other))
+    (p, u), (q, v) = (
+        (motion.position[:-1], np.diff(motion.position, axis=0)) for motion in (one, other)
+    )
     t, s, cross = meeting_shares(p[:, None], u[:, None], q, v)
-    meet = (np.abs(cross) >= PARALLEL) & (np.abs(t - 0.5) <= 0.5 + MEETS) & (np.abs(s - 0.5) <= 0.5 + MEETS)
+    meet = (
+        (np.abs(cross) >= PARALLEL)
+        & (np.abs(t - 0.5) <= 0.5 + MEETS)
+        & (np.abs(s - 0.5) <= 0.5 + MEETS)
+    )
     angle = np.abs(wrap_angle(one.heading[:-1, None] - other.heading[:-1]))
     return bool((meet & (angle > ALIKE) & (angle < AGAINST)).any())

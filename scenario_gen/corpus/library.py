@@ -48,7 +48,13 @@ from scenario_gen.template import reactions_of
 from scenario_gen.types import Encounter, FOLLOW, YIELD
 
 LIBRARY = Kind("primitive library")
-NAME, SEGMENTS, PAGE, SUMMARY, REQUEST = "library.json", "segments", "library.html", "summary.json", "request.json"
+NAME, SEGMENTS, PAGE, SUMMARY, REQUEST = (
+    "library.json",
+    "segments",
+    "library.html",
+    "summary.json",
+    "request.json",
+)
 SHORTEST_S = 2.0  # s that a pair must be there together
 LEGEND = "Lines are paths, dots their starts; the thick part is the primitive, vehicle 0 is the first of a pair (blue)."
 EXAMPLES = 2
@@ -91,7 +97,9 @@ class Built:
             f"pairs assigned agree with the fit to {self.agreement:.2f} (adjusted Rand)",
         ]
         if self.r_hat > USUAL_R_HAT:
-            lines.append("R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps")
+            lines.append(
+                "R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps"
+            )
         if 0 < self.limit <= self.primitives:
             lines.append(f"all {self.limit} states are in use: raise sampler.states")
         return [*lines, *self.failed]
@@ -110,7 +118,9 @@ def pair_encounters(encounter: Encounter, interaction: float) -> Iterator[Encoun
         if (last - first) * encounter.dt < SHORTEST_S:
             continue
         own = slice(first, last + 1)
-        gap, when_a, when_b = space_time_gap(encounter.position[i, own], encounter.position[j, own], encounter.dt)
+        gap, when_a, when_b = space_time_gap(
+            encounter.position[i, own], encounter.position[j, own], encounter.dt
+        )
         if gap > interaction and len(encounter.vehicles) > 2:
             continue
         faster = float(encounter.speed[j, own].mean()) > float(encounter.speed[i, own].mean())
@@ -145,11 +155,17 @@ def build(
     """
     tables = tables_of(corpus)
     encounters = (encounter_of(row, table) for table in tables for row in rows_of([table]))
-    pairs = [pair for encounter in encounters for pair in pair_encounters(encounter, CorpusConfig().interaction)]
+    pairs = [
+        pair
+        for encounter in encounters
+        for pair in pair_encounters(encounter, CorpusConfig().interaction)
+    ]
     pairs.sort(key=lambda pair: sha256(pair.name.encode()).digest())
     sample = pairs[:most]
     if not sample:
-        raise InputError(f"{corpus} holds no two vehicles that have to do with each other for {SHORTEST_S:g} s")
+        raise InputError(
+            f"{corpus} holds no two vehicles that have to do with each other for {SHORTEST_S:g} s"
+        )
     library, assignments = build_library(sample, config, seed)
     labels = _labels(assignments, sample)
     again = _labels(build_library(sample, config, seed + 1)[1], sample)
@@ -158,7 +174,10 @@ def build(
     with _replaced(corpus / "library", request) as folder, spread(workers) as go:
         with arriving(folder / NAME) as part:
             library.save(part)
-        tasks = [AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config) for table in tables]
+        tasks = [
+            AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config)
+            for table in tables
+        ]
         failed = go(assign_table, undone(tasks))
         if isinstance(folder, Path):
             sweep_tree(folder)  # what killed workers left
@@ -166,7 +185,9 @@ def build(
         rows = list(rows_of(segments))
         assigned = {row["pair"]: row for row in rows}
         own = [(assigned[pair.name], pair) for pair in sample]
-        fresh = np.concatenate([labels_of(row["changepoints"], row["primitives"], pair) for row, pair in own])
+        fresh = np.concatenate(
+            [labels_of(row["changepoints"], row["primitives"], pair) for row, pair in own]
+        )
         built = Built(
             primitives=len(library.means),
             fitted=len(sample),
@@ -200,7 +221,9 @@ def _replaced(folder: Place, request: Mapping[str, Any]) -> Iterator[Place]:
     yield folder
 
 
-def labels_of(points: Sequence[int] | Ints, primitives: Sequence[int] | Ints, pair: Encounter) -> Ints:
+def labels_of(
+    points: Sequence[int] | Ints, primitives: Sequence[int] | Ints, pair: Encounter
+) -> Ints:
     """(T,) primitive of each sample, from the changepoints (K,) and the primitive (K + 1,) of each segment."""
     edges = np.array([0, *points, len(pair.time)])
     return np.repeat(np.asarray(primitives, dtype=np.int64), np.diff(edges))
@@ -228,7 +251,9 @@ def assign_table(task: AssignTask) -> None:
                 "changepoints": found.segmentation.changepoints.tolist(), "primitives": found.primitives.tolist(),
             })  # fmt: skip
     texts, ints = dict.fromkeys(("encounter", "kind", "pair", "reactions"), "string"), "int64[]"
-    write_table(task.target, rows, {**texts, "seconds": "double", "changepoints": ints, "primitives": ints})
+    write_table(
+        task.target, rows, {**texts, "seconds": "double", "changepoints": ints, "primitives": ints}
+    )
 
 
 def adjusted_rand(one: Ints, other: Ints) -> float:
@@ -238,16 +263,26 @@ def adjusted_rand(one: Ints, other: Ints) -> float:
     def choices(counts: Ints) -> float:
         return float((counts * (counts - 1) // 2).sum())
 
-    together, rows, columns = choices(table), choices(table.sum(axis=1)), choices(table.sum(axis=0))
+    together, rows, columns = (
+        choices(table),
+        choices(table.sum(axis=1)),
+        choices(table.sum(axis=0)),
+    )
     expected, most = rows * columns / choices(np.array([len(one)])), (rows + columns) / 2.0
     return 1.0 if most == expected else (together - expected) / (most - expected)
 
 
 def _write_page(
-    path: Path, library: PrimitiveLibrary, rows: Sequence[Mapping[str, Any]], pairs: Mapping[str, Encounter], built: Built
+    path: Path,
+    library: PrimitiveLibrary,
+    rows: Sequence[Mapping[str, Any]],
+    pairs: Mapping[str, Encounter],
+    built: Built,
 ) -> None:
     """Write the page of primitives: how frequent, how long, what follows, and examples."""
-    segments: dict[int, list[tuple[str, str, int, int]]] = {}  # pair, kind, begin and end of each, by primitive
+    segments: dict[
+        int, list[tuple[str, str, int, int]]
+    ] = {}  # pair, kind, begin and end of each, by primitive
     follows: Counter[tuple[int, int]] = Counter()
     for row in rows:
         edges = pairwise([0, *row["changepoints"], len(pairs[row["pair"]].time)])
@@ -260,17 +295,31 @@ def _write_page(
     for k, own in sorted(segments.items(), key=lambda item: -len(item[1])):
         lasts = sum(end - begin for _, _, begin, end in own)
         kinds = Counter(kind for _, kind, _, _ in own).most_common(4)
-        answers = Counter(answer for name, *_ in own for answer in _answers(pairs[name])).most_common()
-        after = sorted(((n, to) for (start, to), n in follows.items() if start == k), reverse=True)[:3]
+        answers = Counter(
+            answer for name, *_ in own for answer in _answers(pairs[name])
+        ).most_common()
+        after = sorted(
+            ((n, to) for (start, to), n in follows.items() if start == k), reverse=True
+        )[:3]
         lines = [
             f"{len(own)} segments, {100.0 * lasts / total:.1f} % of the time, {lasts * dt / len(own):.1f} s each",
             "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds),
             "; ".join(f"{message} in {n} of them" for message, n in answers),
-            "followed by " + (", ".join(f"primitive {to} ({n} ×)" for n, to in after) or "nothing"),
-            *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, _, begin, end in own[:EXAMPLES]),
+            "followed by "
+            + (", ".join(f"primitive {to} ({n} ×)" for n, to in after) or "nothing"),
+            *(
+                f"{name}, {begin * dt:.1f} to {end * dt:.1f} s"
+                for name, _, begin, end in own[:EXAMPLES]
+            ),
         ]
         pictures = [sketch(pairs[name], (begin, end)) for name, _, begin, end in own[:EXAMPLES]]
-        cards.append({"title": f"primitive {k}: {library.descriptions[k]}", "lines": lines, "pictures": pictures})
+        cards.append(
+            {
+                "title": f"primitive {k}: {library.descriptions[k]}",
+                "lines": lines,
+                "pictures": pictures,
+            }
+        )
     first, *rest = built.lines()
     write_page(path, "Primitives of pairs of vehicles", f"{first}. {LEGEND}", cards, rest)
 
@@ -278,4 +327,6 @@ def _write_page(
 def _answers(pair: Encounter) -> set[str]:
     """Return who reacts in a pair, and how."""
     edges = reactions_of(pair).edges
-    return {f"the {('first', 'second')[edge.who]} {VERBS[edge.kind]}" for edge in edges} or {"nobody reacts"}
+    return {f"the {('first', 'second')[edge.who]} {VERBS[edge.kind]}" for edge in edges} or {
+        "nobody reacts"
+    }

@@ -16,7 +16,12 @@ Answer = GenerationResult | RefusedError
 
 
 def generate_many(
-    cases: Iterable[Case], config: PipelineConfig = PipelineConfig(), *, count: int = 50, seed: int = 0, workers: int = 0
+    cases: Iterable[Case],
+    config: PipelineConfig = PipelineConfig(),
+    *,
+    count: int = 50,
+    seed: int = 0,
+    workers: int = 0,
 ) -> list[Answer]:
     """Generate each case in a process of its own; the number of workers does not change the results.
 

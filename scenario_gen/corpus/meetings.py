@@ -21,7 +21,16 @@ from scenario_gen.base.stores import fetched, Place, workplace
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR, quoted, write_messages
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.corpus.tracks import FASTEST_MPS, LONGITUDE, meetings, METRES, NORTH, runs_of, tell_apart, tracks_of
+from scenario_gen.corpus.tracks import (
+    FASTEST_MPS,
+    LONGITUDE,
+    meetings,
+    METRES,
+    NORTH,
+    runs_of,
+    tell_apart,
+    tracks_of,
+)
 from scenario_gen.logs import METRES_PER_SECOND_APART, OUT_OF_RANGE_S, shortest
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, named
@@ -49,7 +58,16 @@ class HourTask:
 
 def overlap(config: CorpusConfig) -> int:
     """Microseconds before and after an hour that its task sees: an encounter at its longest, with what windows may add."""
-    return round(1e6 * (config.log.max_duration + config.log.min_duration + OUT_OF_RANGE_S + config.log.longest_gap + 1.0))
+    return round(
+        1e6
+        * (
+            config.log.max_duration
+            + config.log.min_duration
+            + OUT_OF_RANGE_S
+            + config.log.longest_gap
+            + 1.0
+        )
+    )
 
 
 def search_hours(task: HourTask) -> None:
@@ -63,14 +81,25 @@ def search_hours(task: HourTask) -> None:
         return
     own = task.folder.parent
     tables = sorted({path for _, files in left for path in files}, key=str)
-    with fetched(tables) as here, database(workplace(own), task.config.memory, f"{task.name} of {own}") as base:
+    with (
+        fetched(tables) as here,
+        database(workplace(own), task.config.memory, f"{task.name} of {own}") as base,
+    ):
         local = dict(zip(tables, here, strict=True))
         for hour, files in left:
             with base.cursor() as cursor:  # its tables end with it
-                _search(cursor, hour, [local[path] for path in files], task.folder / f"hour-{hour}.parquet", task.config)
+                _search(
+                    cursor,
+                    hour,
+                    [local[path] for path in files],
+                    task.folder / f"hour-{hour}.parquet",
+                    task.config,
+                )
 
 
-def _search(base: Any, hour: int, files: Sequence[Path], target: Place, config: CorpusConfig) -> None:
+def _search(
+    base: Any, hour: int, files: Sequence[Path], target: Place, config: CorpusConfig
+) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -87,22 +116,34 @@ def _search(base: Any, hour: int, files: Sequence[Path], target: Place, config: 
     tracks = tracks_of(rows)
     found = [
         meeting
-        for a, b, first, last in zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)
+        for a, b, first, last in zip(
+            *(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True
+        )
         if a in tracks and b in tracks
-        for meeting in meetings(tracks[a], tracks[b], ((first - 2) * BIN, (last + 3) * BIN), config)
+        for meeting in meetings(
+            tracks[a], tracks[b], ((first - 2) * BIN, (last + 3) * BIN), config
+        )
         if hour * HOUR <= meeting["start"] < (hour + 1) * HOUR
     ]
     found.sort(key=lambda one: (one["start"], one["a"], one["b"]))
     numbers = dict.fromkeys(("gap", "distance", "travel", "lat", "lon"), pa.float64())
-    kinds = {**dict.fromkeys(("a", "b", "start", "end"), pa.int64()), **numbers, "kind": pa.string()}
+    kinds = {
+        **dict.fromkeys(("a", "b", "start", "end"), pa.int64()),
+        **numbers,
+        "kind": pa.string(),
+    }
     table = pa.Table.from_pylist(found, schema=pa.schema(list(kinds.items())))
     wanted = _excerpt(rows, found)
     excerpt = {name: values[wanted] for name, values in rows.items()}
-    excerpt |= {name: np.rint(excerpt[name] * DEGREE).astype(np.int32) for name in ("lat", "lon")}  # exactly what was read
+    excerpt |= {
+        name: np.rint(excerpt[name] * DEGREE).astype(np.int32) for name in ("lat", "lon")
+    }  # exactly what was read
     with arriving(target.with_suffix(".rows.parquet")) as part:
         write_messages(pa.table(excerpt).to_reader(GROUP), part)
     with arriving(target) as part:
-        parquet.write_table(table.replace_schema_metadata({"shared": json.dumps(shared)}), part, compression="zstd")
+        parquet.write_table(
+            table.replace_schema_metadata({"shared": json.dumps(shared)}), part, compression="zstd"
+        )
 
 
 def _messages(base: Any, source: str) -> dict[str, Any]:
@@ -112,7 +153,11 @@ def _messages(base: Any, source: str) -> dict[str, Any]:
     ).fetchnumpy()
     order = in_order(rows)
     device, t = rows["device"][order], rows["t"][order]
-    order = order[np.concatenate([np.ones(min(len(t), 1), dtype=bool), (np.diff(t) != 0) | (np.diff(device) != 0)])]
+    order = order[
+        np.concatenate(
+            [np.ones(min(len(t), 1), dtype=bool), (np.diff(t) != 0) | (np.diff(device) != 0)]
+        )
+    ]
     return {name: np.asarray(values[order]) for name, values in rows.items()}
 
 
@@ -124,7 +169,9 @@ def in_order(rows: dict[str, Any]) -> Ints:
     same[1:-1] = (np.diff(t) == 0) & (np.diff(device) == 0)
     tied = np.flatnonzero(same[1:] | same[:-1])
     own = order[tied]
-    order[tied] = own[np.lexsort([rows[name][own] for name in ("heading", "speed", "lon", "lat", "t", "device")])]
+    order[tied] = own[
+        np.lexsort([rows[name][own] for name in ("heading", "speed", "lon", "lat", "t", "device")])
+    ]
     return order
 
 
@@ -135,7 +182,9 @@ def _excerpt(rows: dict[str, Any], found: list[dict[str, Any]]) -> Bools:
     for one in found:
         for device in (one["a"], one["b"]):
             first, last = own[device]
-            low, high = np.searchsorted(rows["t"][first:last], [one["start"] - MARGIN, one["end"] + MARGIN + 1])
+            low, high = np.searchsorted(
+                rows["t"][first:last], [one["start"] - MARGIN, one["end"] + MARGIN + 1]
+            )
             wanted[first + low : first + high] = True
     return wanted
 
@@ -160,7 +209,9 @@ def _bins(base: Any) -> dict[str, int]:
         rows = base.sql(
             f"SELECT * FROM messages WHERE device IN {who_shares} ORDER BY device, t, lat, lon, speed, heading"
         ).to_arrow_table()
-        device, *columns = (rows.column(name).to_numpy() for name in ("device", "t", "lat", "lon", "speed"))
+        device, *columns = (
+            rows.column(name).to_numpy() for name in ("device", "t", "lat", "lon", "speed")
+        )
         who = np.zeros(len(device), dtype=np.int64)
         for first, last in runs_of(device):
             own = tell_apart(*(column[first:last] for column in columns))
@@ -199,7 +250,9 @@ def _together(t: Ints, who: Ints) -> int:
     """
     sent = np.unique(np.stack([t, who]), axis=1)  # heard twice, it counts once
     messages = np.unique(sent[0] // BIN, return_counts=True)[1]
-    senders = np.unique(np.unique(np.stack([sent[0] // BIN, sent[1]]), axis=1)[0], return_counts=True)[1]
+    senders = np.unique(
+        np.unique(np.stack([sent[0] // BIN, sent[1]]), axis=1)[0], return_counts=True
+    )[1]
     alone = messages[senders == 1]
     usual = float(np.quantile(alone, 0.9) if len(alone) >= TOGETHER else np.median(messages) / 2.0)
     return int(((senders > 1) & (messages >= MORE * usual)).sum())
@@ -243,14 +296,20 @@ def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bo
         "SELECT device, bin, lat, lon FROM binned WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates) "
         "ORDER BY device, bin"
     ).fetchnumpy()
-    own = {int(rows["device"][first]): slice(first, last) for first, last in runs_of(rows["device"])}
+    own = {
+        int(rows["device"][first]): slice(first, last) for first, last in runs_of(rows["device"])
+    }
     steps = int(config.interaction / METRES_PER_SECOND_APART / (BIN * 1e-6)) + 1
     reach = config.interaction + config.slack + FASTEST_MPS * BIN * 0.25e-6
     north = rows["lat"] * NORTH
     kept = np.zeros(len(pairs["a"]), dtype=bool)
-    for k, (a, b, first, last) in enumerate(zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)):
+    for k, (a, b, first, last) in enumerate(
+        zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)
+    ):
         wide = LONGITUDE * np.cos(float(rows["lat"][own[a]][0]) * np.pi / 180.0)
-        one, other = (_Sent(rows["bin"][own[n]], north[own[n]], rows["lon"][own[n]]) for n in (a, b))
+        one, other = (
+            _Sent(rows["bin"][own[n]], north[own[n]], rows["lon"][own[n]]) for n in (a, b)
+        )
         kept[k] = _least_apart(one, other, wide, first, last, steps) <= reach * reach
     return kept
 
@@ -267,7 +326,9 @@ _SENT = named(_Sent, I1, F1, F1)
 
 
 @kernel(_SENT, _SENT, F, I, I, I)
-def _least_apart(one: _Sent, other: _Sent, wide: float, first: int, last: int, steps: int) -> float:
+def _least_apart(
+    one: _Sent, other: _Sent, wide: float, first: int, last: int, steps: int
+) -> float:
     """Square of how near [m²] one, in bins from first to last, comes to the other, at most `steps` bins away.
 
     `wide` is the length of a degree of longitude [m].

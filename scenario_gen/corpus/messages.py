@@ -44,7 +44,9 @@ CAUSES = (  # in the order of messages.sql; each row is counted under the first 
 OFF = len(CAUSES)
 ROWS = Path(__file__).with_suffix(".sql").read_text(encoding="utf-8")
 GROUP = 122_880  # rows of a group in a table
-PACKED: dict[str, Any] = {  # how tables of messages are written: differences between rows, of one vehicle and in order of time
+PACKED: dict[
+    str, Any
+] = {  # how tables of messages are written: differences between rows, of one vehicle and in order of time
     "compression": "zstd",
     "compression_level": 3,
     "use_dictionary": ["device", "speed", "heading", "cause", "file"],
@@ -78,7 +80,10 @@ def ranges(files: Sequence[Place], folder: Place, size: int, memory: int) -> lis
                 room = size
             tasks[-1].append((path, begin, end))
             room -= end - begin
-    return [RangeTask(f"range {k}", tuple(pieces), folder / f"range-{k:06}.parquet", memory) for k, pieces in enumerate(tasks)]
+    return [
+        RangeTask(f"range {k}", tuple(pieces), folder / f"range-{k:06}.parquet", memory)
+        for k, pieces in enumerate(tasks)
+    ]
 
 
 @contextmanager
@@ -115,9 +120,13 @@ def parse_range(task: RangeTask) -> None:
         database(folder, task.memory, f"{task.name}: {files}") as base,
     ):
         names = {}
-        for k, (path, begin, end), here in zip(itertools.count(), task.pieces, _fetched_text(task, place), strict=False):
+        for k, (path, begin, end), here in zip(
+            itertools.count(), task.pieces, _fetched_text(task, place), strict=False
+        ):
             whole = begin == 0 and end == size_of(path)
-            names[str(here if whole else _extract(here, begin, end, place / f"{k}.csv"))] = str(path)
+            names[str(here if whole else _extract(here, begin, end, place / f"{k}.csv"))] = str(
+                path
+            )
         first = place / "parsed.parquet"
         account = _parse(base, names, first)
         with arriving(task.target.with_suffix(".json")) as part:
@@ -159,7 +168,12 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     """Parse files (read name -> true name) into one table, as messages.sql says; return the account."""
     files, true = list(names), list(names.values())
     columns = {name: TYPES.get(name, "VARCHAR") for name in COLUMNS}
-    for name, value in (("files", files), ("columns", columns), ("line", LONGEST_LINE), ("parsed", str(target))):
+    for name, value in (
+        ("files", files),
+        ("columns", columns),
+        ("line", LONGEST_LINE),
+        ("parsed", str(target)),
+    ):
         base.execute(f"SET VARIABLE {name} = ?", [value])
     base.execute("CREATE TYPE read AS ENUM (SELECT unnest(getvariable('files')))")
     write_messages(base.sql(ROWS).to_arrow_reader(GROUP), target)
@@ -184,11 +198,19 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
         named = NAMED_DAY.search(Path(true[file]).name)
         if named and abs(day - (int(named[1]) - DAY_OF_2004)) > 1:
             account[true[file]]["kept: stamps of another day"] += count
-    hours = base.execute(f"SELECT t // {HOUR}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL ORDER BY ALL").fetchall()
+    hours = base.execute(
+        f"SELECT t // {HOUR}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL ORDER BY ALL"
+    ).fetchall()
     return {
-        "files": {name: {why: n for why, n in sorted(found.items()) if n} for name, found in sorted(account.items())},
+        "files": {
+            name: {why: n for why, n in sorted(found.items()) if n}
+            for name, found in sorted(account.items())
+        },
         "hours": {str(hour): rows for hour, rows in hours},
-        "notes": [f"{true[file]}: DSecond disagrees with Gentime in most rows, and is ignored" for file in unchecked],
+        "notes": [
+            f"{true[file]}: DSecond disagrees with Gentime in most rows, and is ignored"
+            for file in unchecked
+        ],
     }
 
 
@@ -200,7 +222,9 @@ def _unchecked(base: Any, target: Path) -> list[int]:
     if files:
         again, listed = target.with_name("again.parquet"), ", ".join(map(str, files))
         kept = f"(CASE WHEN cause = {OFF} AND file IN ({listed}) THEN 0 ELSE cause END)::UTINYINT AS cause"
-        write_messages(base.sql(f"SELECT * REPLACE ({kept}) FROM parsed").to_arrow_reader(GROUP), again)
+        write_messages(
+            base.sql(f"SELECT * REPLACE ({kept}) FROM parsed").to_arrow_reader(GROUP), again
+        )
         again.replace(target)
     return files
 

@@ -28,9 +28,27 @@ from scenario_gen.base.documents import COUNT, read_json
 from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.folders import scratch
 from scenario_gen.base.parameters import flatten
-from scenario_gen.base.stores import below, download, each_fetched, naming_objects, Part, Place, Remote, size_of, temporary
+from scenario_gen.base.stores import (
+    below,
+    download,
+    each_fetched,
+    naming_objects,
+    Part,
+    Place,
+    Remote,
+    size_of,
+    temporary,
+)
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import account_of, clean_found, CleanTask, encounter_of, LogTask, read_one_log, tables_of
+from scenario_gen.corpus.encounters import (
+    account_of,
+    clean_found,
+    CleanTask,
+    encounter_of,
+    LogTask,
+    read_one_log,
+    tables_of,
+)
 from scenario_gen.corpus.grouping import group_partition, GroupTask, partitions
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
@@ -46,8 +64,15 @@ ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
     "type": "object",
     "required": ["files", "hours", "notes"],
     "properties": {
-        "files": {"type": "object", "additionalProperties": {"type": "object", "additionalProperties": COUNT}},
-        "hours": {"type": "object", "propertyNames": {"pattern": "^-?[0-9]{1,18}$"}, "additionalProperties": COUNT},
+        "files": {
+            "type": "object",
+            "additionalProperties": {"type": "object", "additionalProperties": COUNT},
+        },
+        "hours": {
+            "type": "object",
+            "propertyNames": {"pattern": "^-?[0-9]{1,18}$"},
+            "additionalProperties": COUNT,
+        },
         "notes": {"type": "array", "items": {"type": "string"}},
     },
 }
@@ -86,14 +111,23 @@ class Mined:
         lines += [f"{count} {cause}" for cause, count in sorted(self.account.items())]
         for file, causes in list(self.files.items())[:MOST_SHOWN]:
             lines.append(f"{file}: " + ", ".join(f"{n} {cause}" for cause, n in causes.items()))
-        lines += [f"encounter {one['name']} is left out: {one['why']}" for one in self.refused[:MOST_SHOWN]]
+        lines += [
+            f"encounter {one['name']} is left out: {one['why']}"
+            for one in self.refused[:MOST_SHOWN]
+        ]
         for what, ones in (("files", self.files), ("encounters left out", self.refused)):
             if len(ones) > MOST_SHOWN:
                 lines.append(f"… and {len(ones) - MOST_SHOWN} more {what}")
         return [*lines, *self.notes, *self.failed]
 
 
-def mine(archives: Sequence[Place], out: Place, config: CorpusConfig = CorpusConfig(), *, workers: Workers = Workers()) -> Mined:
+def mine(
+    archives: Sequence[Place],
+    out: Place,
+    config: CorpusConfig = CorpusConfig(),
+    *,
+    workers: Workers = Workers(),
+) -> Mined:
     """Find the encounters of an archive.
 
     Args:
@@ -112,14 +146,18 @@ def mine(archives: Sequence[Place], out: Place, config: CorpusConfig = CorpusCon
     with held(out), spread(workers) as go:
         _agree(out, messages, logs, config)
         log_tasks = [
-            LogTask(paths[0].stem, tuple(paths), out / "encounters" / f"log-{k:05}.parquet", config)
+            LogTask(
+                paths[0].stem, tuple(paths), out / "encounters" / f"log-{k:05}.parquet", config
+            )
             for k, paths in enumerate(logs)
         ]
         failed = go(read_one_log, undone(log_tasks))
         if messages:
             ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
             lost = go(parse_range, undone(ranged))
-            lost = lost or go(search_hours, hour_tasks(ranged, out, config))  # of all ranges, for an hour is done only once
+            lost = lost or go(
+                search_hours, hour_tasks(ranged, out, config)
+            )  # of all ranges, for an hour is done only once
             lost = lost or go(group_partition, group_tasks(out, config))
             failed += lost or go(clean_found, clean_tasks(out, config))
         tables = _encounters(out)
@@ -169,10 +207,18 @@ def _write_gallery(path: Path, tables: _Encounters, made: Mined) -> None:
         lines = [
             f"{row['count']} vehicles for {row['seconds']:.1f} s; smallest distance {row['distance']:.1f} m, "
             f"space-time gap {row['gap']:.1f} m",
-            "; ".join(f"vehicles {pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()),
+            "; ".join(
+                f"vehicles {pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()
+            ),
             *reactions_of(encounter).sentences(encounter.vehicles),
         ]
-        cards.append({"title": f"{row['kind']}: {row['name']}", "lines": lines, "pictures": [sketch(encounter)]})
+        cards.append(
+            {
+                "title": f"{row['kind']}: {row['name']}",
+                "lines": lines,
+                "pictures": [sketch(encounter)],
+            }
+        )
     first, *rest = made.lines()
     write_page(path, "Encounters mined", f"{first}. {LEGEND}", cards, rest)
 
@@ -208,9 +254,14 @@ def _of_objects(archive: Remote) -> Inventory:
     with scratch(temporary()) as place:
         root = place / archive.name
         found = {root if one is single else root / below(one, archive): one for one in objects}
-        folders = {folder for path in found for folder in path.parents if folder.is_relative_to(root)}
+        folders = {
+            folder for path in found for folder in path.parents if folder.is_relative_to(root)
+        }
         download(Part(one, 0, min(one.size, HEAD), path) for path, one in found.items())
-        of_path = {folder: archive if folder == root else archive / folder.relative_to(root).as_posix() for folder in folders}
+        of_path = {
+            folder: archive if folder == root else archive / folder.relative_to(root).as_posix()
+            for folder in folders
+        }
         of_path |= found
         with naming_objects({str(root): archive.url}):
             messages, logs, others = _of_files(root)
@@ -232,23 +283,39 @@ def _of_files(archive: Path) -> Files:
     if bags:
         rest = [path for path in rest if bags.isdisjoint(path.parents)]
     tables, rest = _parted(
-        rest, lambda path: any(is_log(path) for is_log in (is_table, is_commonroad, is_nocturne, is_bsm, is_fcd))
+        rest,
+        lambda path: any(
+            is_log(path) for is_log in (is_table, is_commonroad, is_nocturne, is_bsm, is_fcd)
+        ),
     )
     loose, others = _parted(rest, lambda path: path.suffix in SUFFIXES)
-    if tables and not (spmd or bags or loose) and all(path.parent == archive and is_table(path) for path in tables):
+    if (
+        tables
+        and not (spmd or bags or loose)
+        and all(path.parent == archive and is_table(path) for path in tables)
+    ):
         logs = [tables]  # one log in several tables
     else:
         logs = [[path] for path in (*tables, *sorted(bags), *loose)]
     if not spmd and not logs:
-        raise InputError(f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario")
+        raise InputError(
+            f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario"
+        )
     return spmd, logs, others
 
 
 def _visible_files(folder: Path) -> list[Path]:
-    return sorted(Path(above, name) for above, _, names in os.walk(folder) for name in names if not name.startswith("."))
+    return sorted(
+        Path(above, name)
+        for above, _, names in os.walk(folder)
+        for name in names
+        if not name.startswith(".")
+    )
 
 
-def _parted(paths: Iterable[Path], chosen: Callable[[Path], bool]) -> tuple[list[Path], list[Path]]:
+def _parted(
+    paths: Iterable[Path], chosen: Callable[[Path], bool]
+) -> tuple[list[Path], list[Path]]:
     """Return the paths that are chosen, and the others."""
     parts: tuple[list[Path], list[Path]] = ([], [])
     for path in paths:
@@ -256,7 +323,9 @@ def _parted(paths: Iterable[Path], chosen: Callable[[Path], bool]) -> tuple[list
     return parts
 
 
-def _agree(out: Place, messages: Sequence[Place], logs: Sequence[Sequence[Place]], config: CorpusConfig) -> None:
+def _agree(
+    out: Place, messages: Sequence[Place], logs: Sequence[Sequence[Place]], config: CorpusConfig
+) -> None:
     """Write down what the corpus is of; or see that it is of the same.
 
     Raises:
@@ -264,11 +333,17 @@ def _agree(out: Place, messages: Sequence[Place], logs: Sequence[Sequence[Place]
     """
     files = [*messages, *chain.from_iterable(logs)]
     names = [path.url if isinstance(path, Remote) else str(path.resolve()) for path in files]
-    sizes = [0 if isinstance(path, Path) and path.is_dir() else max(size_of(path), 0) for path in files]
+    sizes = [
+        0 if isinstance(path, Path) and path.is_dir() else max(size_of(path), 0) for path in files
+    ]
     document = {
         "format": 3,  # of the tables
         "files": [[name, size] for name, size in zip(names, sizes, strict=True)],
-        "parameters": {name: value for name, (_, value) in flatten(config).items() if name not in ("memory", "task_rows")},
+        "parameters": {
+            name: value
+            for name, (_, value) in flatten(config).items()
+            if name not in ("memory", "task_rows")
+        },
     }
     agree(out, ARCHIVE, document, "corpus")
 
@@ -282,37 +357,68 @@ def hour_tasks(ranged: Sequence[RangeTask], out: Place, config: CorpusConfig) ->
     for account, here in each_fetched(list(accounts)):
         for hour, count in read_json(here, ACCOUNT)["hours"].items():
             seen.add(int(hour))
-            if count >= least_rows(config):  # else every range is searched for hours that only wrong stamps name
+            if count >= least_rows(
+                config
+            ):  # else every range is searched for hours that only wrong stamps name
                 rows[int(hour)] += count
                 files.setdefault(int(hour), []).append(accounts[account])
     tasks: list[list[tuple[int, tuple[Place, ...]]]] = []
     room = 0
     sides = -(-overlap(config) // HOUR)
     done = {path.name for path in (out / "hours").glob("hour-*.parquet")}
-    for hour in sorted(seen & {hour for own in files for hour in (own - 1, own)}):  # a meeting may begin with an hour's last row
+    for hour in sorted(
+        seen & {hour for own in files for hour in (own - 1, own)}
+    ):  # a meeting may begin with an hour's last row
         if f"hour-{hour}.parquet" in done:
             continue
         if not tasks or rows[hour] > room:
             tasks.append([])
             room = config.task_rows
-        near = sorted({path for near in range(hour - sides, hour + sides + 1) for path in files.get(near, ())}, key=str)
+        near = sorted(
+            {
+                path
+                for near in range(hour - sides, hour + sides + 1)
+                for path in files.get(near, ())
+            },
+            key=str,
+        )
         tasks[-1].append((hour, tuple(near)))
         room -= rows[hour]
-    return [HourTask(f"hours {own[0][0]} to {own[-1][0]}", tuple(own), out / "hours", config) for own in tasks]
+    return [
+        HourTask(f"hours {own[0][0]} to {own[-1][0]}", tuple(own), out / "hours", config)
+        for own in tasks
+    ]
 
 
 def least_rows(config: CorpusConfig) -> int:
     """Return the fewest messages that a meeting can have: without a gap that is too long, for long enough, of two vehicles."""
-    return 2 * (int(min(config.log.min_presence, config.log.min_duration) / max(config.log.longest_gap, config.log.period)) + 1)
+    return 2 * (
+        int(
+            min(config.log.min_presence, config.log.min_duration)
+            / max(config.log.longest_gap, config.log.period)
+        )
+        + 1
+    )
 
 
 def group_tasks(out: Place, config: CorpusConfig) -> list[GroupTask]:
     """Divide all meetings at instants that none of them spans; return the partitions that are not grouped."""
     hours = _hours(out)
     tables = [out / "hours" / f"hour-{hour}.parquet" for hour in hours]
-    start, end = (np.concatenate([np.zeros(0, dtype=np.int64), *own]) for own in _columns(tables, "start", "end"))
+    start, end = (
+        np.concatenate([np.zeros(0, dtype=np.int64), *own])
+        for own in _columns(tables, "start", "end")
+    )
     tasks = [
-        GroupTask(f"partition {k}", out, k, _between(hours, begin // HOUR, (last - 1) // HOUR), begin, last, config)
+        GroupTask(
+            f"partition {k}",
+            out,
+            k,
+            _between(hours, begin // HOUR, (last - 1) // HOUR),
+            begin,
+            last,
+            config,
+        )
         for k, (begin, last) in enumerate(partitions(start, end))
     ]
     return undone(tasks)
@@ -329,16 +435,33 @@ def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
     for k in range(0, offsets[-1], config.task_encounters):
         last = min(k + config.task_encounters, offsets[-1])
         parts = range(bisect_right(offsets, k) - 1, bisect_left(offsets, last))
-        own = [(part, max(k - offsets[part], 0), min(last, offsets[part + 1]) - offsets[part]) for part in parts]
-        near = _between(hours, int(min(earliest[k:last])) // HOUR - 1, int(max(end[k:last])) // HOUR)
+        own = [
+            (part, max(k - offsets[part], 0), min(last, offsets[part + 1]) - offsets[part])
+            for part in parts
+        ]
+        near = _between(
+            hours, int(min(earliest[k:last])) // HOUR - 1, int(max(end[k:last])) // HOUR
+        )
         number = k // config.task_encounters
-        tasks.append(CleanTask(f"encounters from {k}", out, number, tuple(one for one in own if one[1] < one[2]), near, config))
+        tasks.append(
+            CleanTask(
+                f"encounters from {k}",
+                out,
+                number,
+                tuple(one for one in own if one[1] < one[2]),
+                near,
+                config,
+            )
+        )
     return undone(tasks)
 
 
 def _hours(out: Place) -> list[int]:
     """Return the hours that are searched, in order."""
-    return sorted(int(path.stem.removeprefix("hour-")) for path in (out / "hours").glob("hour-*[0-9].parquet"))
+    return sorted(
+        int(path.stem.removeprefix("hour-"))
+        for path in (out / "hours").glob("hour-*[0-9].parquet")
+    )
 
 
 def _between(hours: list[int], first: int, last: int) -> tuple[int, ...]:
@@ -354,7 +477,13 @@ def _columns(tables: Sequence[Place], *names: str) -> list[list[Ints]]:
     return [[table[name].to_numpy() for table in read] for name in names]
 
 
-def summary(out: Place, config: CorpusConfig, tables: _Encounters, failed: list[str], others: Sequence[Place] = ()) -> Mined:
+def summary(
+    out: Place,
+    config: CorpusConfig,
+    tables: _Encounters,
+    failed: list[str],
+    others: Sequence[Place] = (),
+) -> Mined:
     """Return what is in a corpus, by listing it; `others` are files of the archive that were not read."""
     from pyarrow import parquet
 
@@ -380,14 +509,21 @@ def summary(out: Place, config: CorpusConfig, tables: _Encounters, failed: list[
     shared: Counter[str] = Counter()
     hours: list[Place] = sorted((out / "hours").glob("hour-*[0-9].parquet"), key=str)
     for _, here in each_fetched(hours):
-        shared.update(json.loads((parquet.read_schema(here).metadata or {}).get(b"shared", b"{}")).keys())
+        shared.update(
+            json.loads((parquet.read_schema(here).metadata or {}).get(b"shared", b"{}")).keys()
+        )
     if shared:
         first = ", ".join(sorted(shared)[:10])
-        notes.append(f"{len(shared)} ids are shared by several vehicles at once, and separated by place: {first} …")
+        notes.append(
+            f"{len(shared)} ids are shared by several vehicles at once, and separated by place: {first} …"
+        )
     total: Counter[str] = Counter()
     for causes in files.values():
         total.update(causes)
-    reports = {file: {cause: n for cause, n in causes.items() if n and cause != "rows"} for file, causes in files.items()}
+    reports = {
+        file: {cause: n for cause, n in causes.items() if n and cause != "rows"}
+        for file, causes in files.items()
+    }
     return Mined(
         encounters=tables.kinds.total(),
         kinds=dict(tables.kinds),

@@ -25,7 +25,9 @@ def sketch(encounter: Encounter | Scenario, span: tuple[int, int] | None = None)
     there = encounter.there
     places = encounter.position[there]
     low, high = places.min(axis=0), places.max(axis=0)
-    scale = min((WIDTH - 2.0 * BORDER), (HEIGHT - 2.0 * BORDER)) / max(float((high - low).max()), 10.0)
+    scale = min((WIDTH - 2.0 * BORDER), (HEIGHT - 2.0 * BORDER)) / max(
+        float((high - low).max()), 10.0
+    )
     middle = (low + high) / 2.0
 
     def drawn(points: Any) -> str:
@@ -38,16 +40,24 @@ def sketch(encounter: Encounter | Scenario, span: tuple[int, int] | None = None)
         own = encounter.position[n, first : last + 1]
         colour = COLOURS[n % len(COLOURS)]
         line = own[np.unique(np.linspace(0, len(own) - 1, POINTS).astype(int))]
-        parts.append(f'<polyline points="{drawn(line)}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
+        parts.append(
+            f'<polyline points="{drawn(line)}" fill="none" stroke="{colour}" stroke-width="1.5"/>'
+        )
         if span is not None:
             inside = encounter.position[n, max(span[0], first) : min(span[1], last + 1)]
-            parts.append(f'<polyline points="{drawn(inside)}" fill="none" stroke="{colour}" stroke-width="4" opacity="0.6"/>')
+            parts.append(
+                f'<polyline points="{drawn(inside)}" fill="none" stroke="{colour}" stroke-width="4" opacity="0.6"/>'
+            )
         x, y = drawn(own[:1]).split(",")
         parts.append(f'<circle cx="{x}" cy="{y}" r="3.5" fill="{colour}"/>')
     metre = 10.0 * scale
     parts.append(f'<path d="M6,{HEIGHT - 6:.0f} h{metre:.1f}" stroke="#888" stroke-width="2"/>')
-    parts.append(f'<text x="{metre + 9:.0f}" y="{HEIGHT - 3:.0f}" font-size="9" fill="#888">10 m</text>')
-    return Markup(f'<svg width="{WIDTH:.0f}" height="{HEIGHT:.0f}" role="img">{"".join(parts)}</svg>')
+    parts.append(
+        f'<text x="{metre + 9:.0f}" y="{HEIGHT - 3:.0f}" font-size="9" fill="#888">10 m</text>'
+    )
+    return Markup(
+        f'<svg width="{WIDTH:.0f}" height="{HEIGHT:.0f}" role="img">{"".join(parts)}</svg>'
+    )
 
 
 def curve(found: Population) -> Markup:
@@ -60,18 +70,34 @@ def curve(found: Population) -> Markup:
 
     parts = [f'<path d="M{BORDER},{BORDER} v{down} h{across}" fill="none" stroke="#888"/>']
     for colour, name in zip(COLOURS, ("alone", "generated"), strict=False):
-        at = [(BORDER + across * point.templates / most, getattr(point, name)) for point in found.curve]
+        at = [
+            (BORDER + across * point.templates / most, getattr(point, name))
+            for point in found.curve
+        ]
         line = " ".join(f"{x:.1f},{height(share.value)}" for x, share in at)
         parts.append(f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2"/>')
-        parts += [f'<path d="M{x:.1f},{height(share.high)} V{height(share.low)}" stroke="{colour}"/>' for x, share in at]
+        parts += [
+            f'<path d="M{x:.1f},{height(share.high)} V{height(share.low)}" stroke="{colour}"/>'
+            for x, share in at
+        ]
     parts.append(
         f'<text x="{BORDER + 4}" y="{BORDER + 8}" font-size="9" fill="#888">1.0; red: with generated, blue: alone</text>'
     )
-    parts.append(f'<text x="{WIDTH - BORDER - 70}" y="{HEIGHT - 2}" font-size="9" fill="#888">{most} templates</text>')
-    return Markup(f'<svg width="{WIDTH:.0f}" height="{HEIGHT:.0f}" role="img">{"".join(parts)}</svg>')
+    parts.append(
+        f'<text x="{WIDTH - BORDER - 70}" y="{HEIGHT - 2}" font-size="9" fill="#888">{most} templates</text>'
+    )
+    return Markup(
+        f'<svg width="{WIDTH:.0f}" height="{HEIGHT:.0f}" role="img">{"".join(parts)}</svg>'
+    )
 
 
-def write_page(path: Path, title: str, lead: str, cards: Sequence[Mapping[str, Any]], notes: Sequence[str] = ()) -> None:
+def write_page(
+    path: Path,
+    title: str,
+    lead: str,
+    cards: Sequence[Mapping[str, Any]],
+    notes: Sequence[str] = (),
+) -> None:
     """Write a page of cards.
 
     Args:

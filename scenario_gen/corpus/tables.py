@@ -14,7 +14,9 @@ from scenario_gen.corpus.tasks import arriving
 ROWS = 100  # of a group, which is read at once: an encounter's tracks are long
 
 
-def write_table(target: Place, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], **facts: Any) -> None:
+def write_table(
+    target: Place, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], **facts: Any
+) -> None:
     """Write a table, whole or not at all; NaN becomes null.
 
     Args:
@@ -31,14 +33,20 @@ def write_table(target: Place, rows: Sequence[Mapping[str, Any]], columns: Mappi
         return pa.list_(kind(name[:-2])) if name.endswith("[]") else pa.type_for_alias(name)
 
     schema = pa.schema([(name, kind(text)) for name, text in columns.items()])
-    clean = [{name: None if row[name] != row[name] else row[name] for name in columns} for row in rows]
+    clean = [
+        {name: None if row[name] != row[name] else row[name] for name in columns} for row in rows
+    ]
     table = pa.Table.from_pylist(clean, schema=schema)
     with arriving(target) as part:
-        described = table.replace_schema_metadata({name: json.dumps(value) for name, value in facts.items()})
+        described = table.replace_schema_metadata(
+            {name: json.dumps(value) for name, value in facts.items()}
+        )
         parquet.write_table(described, part, row_group_size=ROWS, compression="zstd")
 
 
-def rows_of(tables: Sequence[Place], columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
+def rows_of(
+    tables: Sequence[Place], columns: Sequence[str] | None = None
+) -> Iterator[dict[str, Any]]:
     """Yield the rows of tables, in their order.
 
     Raises:
@@ -62,6 +70,11 @@ def rows_at(table: Place, numbers: Sequence[int]) -> list[dict[str, Any]]:
     """
     from pyarrow import dataset
 
-    with fetched([table]) as (here,), guarded(f"{table} cannot be read as a table", remedy="`mine` writes it anew"):
-        found: list[dict[str, Any]] = dataset.dataset(here, format="parquet").take(list(numbers)).to_pylist()
+    with (
+        fetched([table]) as (here,),
+        guarded(f"{table} cannot be read as a table", remedy="`mine` writes it anew"),
+    ):
+        found: list[dict[str, Any]] = (
+            dataset.dataset(here, format="parquet").take(list(numbers)).to_pylist()
+        )
     return found

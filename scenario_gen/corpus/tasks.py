@@ -85,10 +85,14 @@ def check_out(out: Place, read: Sequence[Place]) -> None:
     """
     if isinstance(out, Path) and out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file; name a folder")
-    own, *others = (f"{place.resolve() if isinstance(place, Path) else place}/" for place in (out, *read))
+    own, *others = (
+        f"{place.resolve() if isinstance(place, Path) else place}/" for place in (out, *read)
+    )
     for source, other in zip(read, others, strict=True):
         if own.startswith(other):
-            raise InputError(f"{out} lies in {source}, of which it would become a part; name a folder outside of it")
+            raise InputError(
+                f"{out} lies in {source}, of which it would become a part; name a folder outside of it"
+            )
 
 
 @contextmanager
@@ -123,7 +127,11 @@ def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> None
     """
     place, text = out / name, json.dumps(document, indent=1) + "\n"
     if not place.exists():
-        if out.exists() if isinstance(out, Remote) else any(not path.name.startswith(".") for path in out.iterdir()):
+        if (
+            out.exists()
+            if isinstance(out, Remote)
+            else any(not path.name.startswith(".") for path in out.iterdir())
+        ):
             raise InputError(f"{out} is not empty and no {kind}; name another folder")
         if isinstance(place, Path):
             with arriving(place) as part:
@@ -134,12 +142,16 @@ def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> None
     with fetched([place]) as (here,):
         before = read_json(here, {"type": "object"})
     if other := [key for key in document if before.get(key) != document[key]]:
-        raise InputError(f"{out} is a {kind} of other {', '.join(other)}; name another folder, or remove this one")
+        raise InputError(
+            f"{out} is a {kind} of other {', '.join(other)}; name another folder, or remove this one"
+        )
 
 
 def undone(tasks: Sequence[Target]) -> list[Target]:
     """Return the tasks whose file is not there; each folder is listed once."""
-    there = {str(path) for folder in {task.target.parent for task in tasks} for path in folder.glob("*")}
+    there = {
+        str(path) for folder in {task.target.parent for task in tasks} for path in folder.glob("*")
+    }
     return [task for task in tasks if str(task.target) not in there]
 
 
@@ -202,7 +214,9 @@ class Spread:
             lost = f"{self._scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
             raise InputError(f"{lost}; the same command goes on where it stopped") from error
 
-    def _distributed(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
+    def _distributed(
+        self, function: Callable[[Task], Any], tasks: Sequence[Task]
+    ) -> Iterator[str]:
         """Yield as `_outcomes` does.
 
         Tasks whose workers died are run again one at a time at the end, so that only the one that ends them fails.
@@ -211,7 +225,9 @@ class Spread:
 
         group = uuid4().hex  # one group of keys, which Dask queues
         keys = [(group, k) for k in range(len(tasks))]
-        running = dict(zip(self._client.map(partial(_guarded, function), tasks, key=keys), tasks, strict=True))
+        running = dict(
+            zip(self._client.map(partial(_guarded, function), tasks, key=keys), tasks, strict=True)
+        )
         suspects = []
         for future in as_completed(running):
             if future.status != "error":
@@ -242,7 +258,9 @@ def _guarded(function: Callable[[Any], Any], task: Any) -> str:
     except Exception as error:  # a fault of ours, or of a library: of this case, and its place is said for who mends it
         *_, (frame, line) = traceback.walk_tb(error.__traceback__)
         place = f"{Path(frame.f_code.co_filename).name}:{line}"
-        return f"{getattr(task, 'name', task)}: {type(error).__name__} at {place}: {describe(error)}"
+        return (
+            f"{getattr(task, 'name', task)}: {type(error).__name__} at {place}: {describe(error)}"
+        )
     return ""
 
 
@@ -253,12 +271,16 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
     from distributed import Client, LocalCluster
 
     for name in ("distributed", "distributed.client"):  # each has a level of its own
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # workers that die and a lost scheduler are named here
+        logging.getLogger(name).setLevel(
+            logging.CRITICAL
+        )  # workers that die and a lost scheduler are named here
     with ExitStack() as stack:
         cluster: Any = scheduler
         if not scheduler:
             settings = {
-                "temporary-directory": str(stack.enter_context(scratch(Path(tempfile.gettempdir())))),
+                "temporary-directory": str(
+                    stack.enter_context(scratch(Path(tempfile.gettempdir())))
+                ),
                 "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further task
                 "distributed.worker.daemon": True,
                 "distributed.worker.profile.enabled": False,
@@ -268,7 +290,9 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
             sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
             stack.enter_context(dask.config.set(settings))
             with starting():
-                cluster = stack.enter_context(LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0"))
+                cluster = stack.enter_context(
+                    LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0")
+                )
                 stack.enter_context(ending(partial(_end, cluster)))
         yield stack.enter_context(Client(cluster))
 
@@ -278,5 +302,7 @@ def _end(cluster: Any) -> None:
     cluster.loop.add_callback(cluster.loop.stop)
     for process in multiprocessing.active_children():
         process.kill()
-        with suppress(ChildProcessError):  # Dask was told already, and else is to be told: it fails where another takes the news
+        with suppress(
+            ChildProcessError
+        ):  # Dask was told already, and else is to be told: it fails where another takes the news
             os.waitid(os.P_PID, process.pid or 0, os.WEXITED | os.WNOWAIT)

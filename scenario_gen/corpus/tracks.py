@@ -11,7 +11,14 @@ import numpy as np
 
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.kinds import kind_of, Motion, unwrapped
-from scenario_gen.logs import metres_per_degree, OUT_OF_RANGE_S, shortest, space_time_gap, ticks, windows
+from scenario_gen.logs import (
+    metres_per_degree,
+    OUT_OF_RANGE_S,
+    shortest,
+    space_time_gap,
+    ticks,
+    windows,
+)
 from scenario_gen.numerics import Bools, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
@@ -68,23 +75,37 @@ def tracks_of(rows: dict[str, Any]) -> dict[int, Track]:
         kept = np.flatnonzero(good[begin:end]) + begin
         if len(kept) > 1:
             found[int(device[begin])] = Track(
-                int(device[begin]), t[kept], rows["lat"][kept], rows["lon"][kept], speed[kept], heading[kept]
+                int(device[begin]),
+                t[kept],
+                rows["lat"][kept],
+                rows["lon"][kept],
+                speed[kept],
+                heading[kept],
             )
     return found
 
 
-def meetings(a: Track, b: Track, span: tuple[int, int], config: CorpusConfig) -> list[dict[str, Any]]:
+def meetings(
+    a: Track, b: Track, span: tuple[int, int], config: CorpusConfig
+) -> list[dict[str, Any]]:
     """Return the meetings of two vehicles within a span of time [µs since 2004], each as a row of the table.
 
     Both near each other for long enough, one of them moves, and they have to do with each other.
     """
     period = round(config.log.period * 1e6)
-    first, last = -(-max(span[0], int(a.t[0]), int(b.t[0])) // period), min(span[1], int(a.t[-1]), int(b.t[-1])) // period + 1
+    first, last = (
+        -(-max(span[0], int(a.t[0]), int(b.t[0])) // period),
+        min(span[1], int(a.t[-1]), int(b.t[-1])) // period + 1,
+    )
     if last - first < shortest(config.log):
         return []
     at = np.arange(first, last) * period
     inside = (a.t >= at[0]) & (a.t <= at[-1])
-    origin = (float(a.lat[inside].mean()), float(a.lon[inside].mean())) if inside.any() else (float(a.lat[0]), float(a.lon[0]))
+    origin = (
+        (float(a.lat[inside].mean()), float(a.lon[inside].mean()))
+        if inside.any()
+        else (float(a.lat[0]), float(a.lon[0]))
+    )
     one, other = (_at(track, at, origin, config) for track in (a, b))
     apart = np.hypot(*(one[0].position - other[0].position).T)
     near = one[1] & other[1] & (apart < config.log.proximity)
@@ -93,8 +114,17 @@ def meetings(a: Track, b: Track, span: tuple[int, int], config: CorpusConfig) ->
         for begin, end in _windows(first + low, first + high, config):
             if end - begin < shortest(config.log):
                 continue
-            there = np.flatnonzero(one[1][begin - first : end - first] & other[1][begin - first : end - first]) + begin - first
-            p, q = (Motion(m.position[there], m.heading[there], m.speed[there]) for m, _ in (one, other))
+            there = (
+                np.flatnonzero(
+                    one[1][begin - first : end - first] & other[1][begin - first : end - first]
+                )
+                + begin
+                - first
+            )
+            p, q = (
+                Motion(m.position[there], m.heading[there], m.speed[there])
+                for m, _ in (one, other)
+            )
             travel = max(float(m.speed.sum()) for m in (p, q)) * config.log.period
             if travel < config.log.travel:
                 continue
@@ -113,20 +143,32 @@ def _windows(first: int, last: int, config: CorpusConfig) -> list[tuple[int, int
     """Cut as `logs.groups.windows` does, at whole multiples of `max_duration`, of ticks that count from 2004."""
     longest = ticks(config.log.max_duration, config.log)
     base = max(first // longest - 1, 0) * longest
-    return [(begin + base, end + base) for begin, end in windows(first - base, last - base, config.log)]
+    return [
+        (begin + base, end + base) for begin, end in windows(first - base, last - base, config.log)
+    ]
 
 
-def _at(track: Track, at: Ints, origin: tuple[float, float], config: CorpusConfig) -> tuple[Motion, Bools]:
+def _at(
+    track: Track, at: Ints, origin: tuple[float, float], config: CorpusConfig
+) -> tuple[Motion, Bools]:
     """A vehicle's motion at stamps (T,) [µs], and whether it is there: between messages no further apart than gaps may be."""
     low, high = np.searchsorted(track.t, [at[0], at[-1]])
     own = slice(max(int(low) - 1, 0), int(high) + 1)
     t = track.t[own]
     north, east = metres_per_degree(origin)
-    place = np.stack([(track.lon[own] - origin[1]) * east, (track.lat[own] - origin[0]) * north], axis=1)
+    place = np.stack(
+        [(track.lon[own] - origin[1]) * east, (track.lat[own] - origin[0]) * north], axis=1
+    )
     seconds, when = (t - at[0]) * 1e-6, (at - at[0]) * 1e-6
-    position = np.stack([np.interp(when, seconds, place[:, 0]), np.interp(when, seconds, place[:, 1])], axis=1)
+    position = np.stack(
+        [np.interp(when, seconds, place[:, 0]), np.interp(when, seconds, place[:, 1])], axis=1
+    )
     after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
-    there: Bools = (at >= t[0]) & (at <= t[-1]) & (t[after] - t[after - 1] <= config.log.longest_gap * 1e6 + 1.0)
+    there: Bools = (
+        (at >= t[0])
+        & (at <= t[-1])
+        & (t[after] - t[after - 1] <= config.log.longest_gap * 1e6 + 1.0)
+    )
     heading = np.interp(when, seconds, unwrapped(track.heading[own]))
     return Motion(position, heading, np.interp(when, seconds, track.speed[own])), there
 
@@ -145,13 +187,20 @@ def tell_apart(t: Ints, lat: Floats, lon: Floats, speed: Floats) -> Ints:
     who = np.zeros(len(t), dtype=np.int64)
     wide = np.cos(float(lat.mean()) * np.pi / 180.0) * LONGITUDE
     _tell_apart(
-        np.asarray(t, dtype=np.int64), lat * METRES, lon * wide, np.asarray(speed, dtype=np.float64), np.zeros((MAX_SAME, 4)), who
+        np.asarray(t, dtype=np.int64),
+        lat * METRES,
+        lon * wide,
+        np.asarray(speed, dtype=np.float64),
+        np.zeros((MAX_SAME, 4)),
+        who,
     )
     return who
 
 
 @kernel(I1, F1, F1, F1, OUT2, OUTI1)
-def _tell_apart(t: Ints, north: Floats, east: Floats, speed: Floats, places: Floats, who: Ints) -> None:
+def _tell_apart(
+    t: Ints, north: Floats, east: Floats, speed: Floats, places: Floats, who: Ints
+) -> None:
     """`places` (V, 4) takes the last message of each vehicle: t, north, east, speed; the last one takes whoever is left."""
     count = 0
     for k in range(len(t)):
@@ -159,7 +208,11 @@ def _tell_apart(t: Ints, north: Floats, east: Floats, speed: Floats, places: Flo
         for n in range(count):
             seconds = (t[k] - places[n, 0]) * 1e-6
             away = max(abs(north[k] - places[n, 1]), abs(east[k] - places[n, 2]))
-            if away < nearest and seconds < 600.0 and away < 20.0 + 1.5 * max(speed[k], places[n, 3], 5.0) * seconds:
+            if (
+                away < nearest
+                and seconds < 600.0
+                and away < 20.0 + 1.5 * max(speed[k], places[n, 3], 5.0) * seconds
+            ):
                 best, nearest = n, away
         if best < 0:
             best = min(count, len(places) - 1)

@@ -9,7 +9,15 @@ from scenario_gen.logs.adapters.openscenario import OPENSCENARIO_SPEEDS
 from scenario_gen.logs.cleaning import parse_origin
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_time_gap
-from scenario_gen.logs.geodesy import azimuthal, latitude_longitude, local_frame, metres_per_degree, middle_of, reprojected, utm
+from scenario_gen.logs.geodesy import (
+    azimuthal,
+    latitude_longitude,
+    local_frame,
+    metres_per_degree,
+    middle_of,
+    reprojected,
+    utm,
+)
 from scenario_gen.logs.groups import OUT_OF_RANGE_S, shortest, ticks, windows
 from scenario_gen.logs.growing import Growth, Meeting
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError

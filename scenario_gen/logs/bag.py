@@ -14,7 +14,15 @@ import numpy as np
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.definitions import TRACKED
-from scenario_gen.bags.vehicles import decode_sample, decode_tracked, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST
+from scenario_gen.bags.vehicles import (
+    decode_sample,
+    decode_tracked,
+    decode_tracks,
+    FIX,
+    ODOMETRY,
+    TRACKS,
+    TWIST,
+)
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, RawLog, Rows, Segment
@@ -78,9 +86,13 @@ def read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
                 topic.data.append(message.data)
     for name in listed_topics:
         if name not in seen:
-            raise InputError(f"parameter topics: {paths[0]} has no topic {name!r}; it has {listing(seen)}")
+            raise InputError(
+                f"parameter topics: {paths[0]} has no topic {name!r}; it has {listing(seen)}"
+            )
         if seen[name] not in USED:
-            raise InputError(f"{paths[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}")
+            raise InputError(
+                f"{paths[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}"
+            )
     if not topics:
         raise InputError(
             f"{paths[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
@@ -116,7 +128,9 @@ def read_streams(topics: list[Topic], name: str, config: LogConfig) -> RawLog:
     label = topics[0].label
     if len({topic.type == ODOMETRY for topic in topics if topic.type != TWIST}) > 1:
         mixed = listing({topic.name: topic.type for topic in topics})
-        raise InputError(f"{label} has both {FIX} and {ODOMETRY} ({mixed}); choose with the parameter topics")
+        raise InputError(
+            f"{label} has both {FIX} and {ODOMETRY} ({mixed}); choose with the parameter topics"
+        )
     vehicles: dict[str, Rows] = {}
     segments: list[Segment] = []
     unstamped: list[str] = []
@@ -131,15 +145,23 @@ def read_streams(topics: list[Topic], name: str, config: LogConfig) -> RawLog:
         unstamped += [topic.name] if is_unstamped else []
         row += len(topic.data)
     notes = check_frames(label, frames, vehicles)
-    silent = [owners[topic.name] for topic in topics if topic.type == TWIST and not vehicles[owners[topic.name]].fixes]
+    silent = [
+        owners[topic.name]
+        for topic in topics
+        if topic.type == TWIST and not vehicles[owners[topic.name]].fixes
+    ]
     if silent:
         raise InputError(
             f"{label}: there are speeds but no positions of {', '.join(silent)}; put {FIX} and {TWIST} in one namespace"
         )
     if unstamped:
-        notes += [f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: {', '.join(unstamped)}"]
+        notes += [
+            f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: {', '.join(unstamped)}"
+        ]
     notes += [
-        f"vehicle {vehicle} has no speeds: taken from its positions" for vehicle, rows in vehicles.items() if not rows.speeds
+        f"vehicle {vehicle} has no speeds: taken from its positions"
+        for vehicle, rows in vehicles.items()
+        if not rows.speeds
     ]
     return RawLog(
         name=name,
@@ -197,16 +219,26 @@ def check_frames(label: str, frames: dict[str, str], vehicles: dict[str, Rows]) 
     """
     for vehicle, frame in frames.items():
         refuse_moving(frame, f"{label}: the odometry of vehicle {vehicle}")
-    first = {vehicle: min(vehicles[vehicle].fixes) for vehicle in frames if vehicles[vehicle].fixes}
-    began = [vehicle for vehicle, (_, _, x, y, _) in first.items() if math.hypot(x, y) < AT_START_M]
-    at_once = len(began) >= 2 and np.ptp([first[vehicle][0] for vehicle in began]) < 1e9 * SPAWNED_S
+    first = {
+        vehicle: min(vehicles[vehicle].fixes) for vehicle in frames if vehicles[vehicle].fixes
+    }
+    began = [
+        vehicle for vehicle, (_, _, x, y, _) in first.items() if math.hypot(x, y) < AT_START_M
+    ]
+    at_once = (
+        len(began) >= 2 and np.ptp([first[vehicle][0] for vehicle in began]) < 1e9 * SPAWNED_S
+    )
     named = ", ".join(f"{vehicle} in {frame!r}" for vehicle, frame in frames.items())
     if at_once or len({frames[vehicle] for vehicle in began}) >= 2:
         raise InputError(
             f"{label}: the odometries of {' and '.join(began)} begin at 0, 0, each where its vehicle started ({named}); record "
             "positions in one frame, such as map, or choose with the parameter topics"
         )
-    return [f"the odometries name several frames ({named}); they are read as one"] if len(set(frames.values())) > 1 else []
+    return (
+        [f"the odometries name several frames ({named}); they are read as one"]
+        if len(set(frames.values())) > 1
+        else []
+    )
 
 
 def refuse_moving(frame: str, what: str) -> None:
@@ -237,9 +269,15 @@ def read_tracks(topics: list[Topic], name: str, others: list[str]) -> RawLog:
         row += len(topic.data)
         for number, data in enumerate(dict.fromkeys(topic.data)):
             found = decode_tracks(data, f"{topic.where}, message {number + 1}")
-            encounters.append(replace(found, name=name if whole == 1 else f"{name}-{len(encounters) + 1}"))
+            encounters.append(
+                replace(found, name=name if whole == 1 else f"{name}-{len(encounters) + 1}")
+            )
     known = ", ".join(topic.name for topic in topics)
-    notes = (f"read from {known}; the parameter topics can choose {', '.join(others)}",) if others else ()
+    notes = (
+        (f"read from {known}; the parameter topics can choose {', '.join(others)}",)
+        if others
+        else ()
+    )
     return RawLog(name, False, (), row, tuple(segments), notes, encounters=tuple(encounters))
 
 
@@ -257,7 +295,9 @@ def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
     topic, frames = topics[0], set()
     if len(topics) > 1:
         listed_topics = listing({t.name: t.type for t in topics})
-        raise InputError(f"{topic.label} has {listed_topics}; choose one with the parameter topics")
+        raise InputError(
+            f"{topic.label} has {listed_topics}; choose one with the parameter topics"
+        )
     vehicles: dict[str, Rows] = {}
     sizes: dict[str, list[tuple[float, float]]] = {}
     kinds: dict[str, Counter[str]] = {}

@@ -25,9 +25,15 @@ UNITS = {"milliseconds": ("ms", 1e-3), "microseconds": ("us", 1e-6), "nanosecond
 USUAL = (0.005, 2.0)  # s between fixes of usual sources
 FASTEST_MPS = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
 TELEPORT_SLACK_M = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
-TELEPORT_SLACK_MPS = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
+TELEPORT_SLACK_MPS = (
+    10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
+)
 LONGEST_M, WIDEST_M = 100.0, 4.0  # of a vehicle
-SIZES = (("feet", "ft", 0.3048), ("centimetres", "cm", 0.01), ("millimetres", "mm", 0.001))  # that sizes may be in
+SIZES = (
+    ("feet", "ft", 0.3048),
+    ("centimetres", "cm", 0.01),
+    ("millimetres", "mm", 0.001),
+)  # that sizes may be in
 MOVES_MPS = 1.0  # m/s: above it a vehicle is not where it was
 BORNE_OUT = 0.2  # of a measured speed: what the positions drive at least, in whatever unit it is
 RELOCATED = 5  # fixes in a row that agree with each other and are then a new place, not jumps
@@ -49,7 +55,10 @@ class Drops:
 
     def of(self, log: RawLog) -> tuple[Dropped, ...]:
         """Return the reasons with their counts and the places in the log."""
-        return tuple(Dropped(reason, count, log.where(self.first[reason])) for reason, count in self.count.items())
+        return tuple(
+            Dropped(reason, count, log.where(self.first[reason]))
+            for reason, count in self.count.items()
+        )
 
 
 def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Drops]:
@@ -66,7 +75,10 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     for reason, row in log.dropped:
         drops.add(reason, np.array([row]))
     known = {vehicle.id: vehicle for vehicle in log.vehicles}
-    sound = [sound_observations(known[name], log.geographic, drops) for name in picked(list(known), config, log.name)]
+    sound = [
+        sound_observations(known[name], log.geographic, drops)
+        for name in picked(list(known), config, log.name)
+    ]
     window = time_window(sound, log, drops, config)
     sound = [within(vehicle, *window) for vehicle in sound]
     if not any(len(vehicle.fix_ns) for vehicle in sound):
@@ -76,11 +88,15 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     sound = [in_order(vehicle, log, drops) for vehicle in sound]
     sound = [without_held(vehicle, drops, geographic=log.geographic) for vehicle in sound]
     check_clock(sound, log, config)
-    tracks, notes = sized([without_jumps(vehicle, drops, geographic=log.geographic) for vehicle in sound], config)
+    tracks, notes = sized(
+        [without_jumps(vehicle, drops, geographic=log.geographic) for vehicle in sound], config
+    )
     drops.notes += notes
     if config.strict and drops.count:
         worst = drops.of(log)[0]
-        raise InputError(f"{worst.first}: {worst.reason} ({worst.count} such rows), and strict is set")
+        raise InputError(
+            f"{worst.first}: {worst.reason} ({worst.count} such rows), and strict is set"
+        )
     if log.geographic:
         tracks = in_metres(tracks, config)
     return tuple(track for track in tracks if len(track.fix_ns) >= 2), drops
@@ -95,7 +111,9 @@ def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) ->
     ]
     if geographic:
         checks.append(("position is (0, 0)", (np.abs(fix) < 1e-6).all(axis=1)))
-        checks.append(("position is not on Earth", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0)))
+        checks.append(
+            ("position is not on Earth", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0))
+        )
     else:
         checks.append(("position is not on Earth", (np.abs(fix) > FARTHEST_M).any(axis=1)))
     keep = judge(checks, vehicle.fix_row, drops)
@@ -122,12 +140,16 @@ def select(vehicle: Observations, fixes: Bools | Ints, speeds: Bools | Ints) -> 
     """Return the vehicle with only the chosen observations, in the order given: flags (F,) and (S,), or indices."""
     return replace(
         vehicle,
-        **{name: getattr(vehicle, name)[fixes] for name in ("fix_ns", "fix", "fix_row", "heading")},
+        **{
+            name: getattr(vehicle, name)[fixes] for name in ("fix_ns", "fix", "fix_row", "heading")
+        },
         **{name: getattr(vehicle, name)[speeds] for name in ("speed_ns", "speed", "speed_row")},
     )
 
 
-def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: LogConfig) -> tuple[int, int]:
+def time_window(
+    sound: list[Observations], log: RawLog, drops: Drops, config: LogConfig
+) -> tuple[int, int]:
     """Return the first and last stamp wanted [ns].
 
     Raises:
@@ -144,10 +166,16 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
         )
     first, last = min(int(s.min()) for s in stamps), max(int(s.max()) for s in stamps)
     if config.end and config.end <= config.start:
-        raise InputError(f"parameter end is {config.end:g} s; it must be after start ({config.start:g} s), or 0")
+        raise InputError(
+            f"parameter end is {config.end:g} s; it must be after start ({config.start:g} s), or 0"
+        )
     if config.start * 1e9 > last - first:
-        raise InputError(f"parameter start is {config.start:g} s, but {log.name} is only {(last - first) * 1e-9:.1f} s long")
-    return first + round(config.start * 1e9), first + round(config.end * 1e9) if config.end else last
+        raise InputError(
+            f"parameter start is {config.start:g} s, but {log.name} is only {(last - first) * 1e-9:.1f} s long"
+        )
+    return first + round(config.start * 1e9), first + round(
+        config.end * 1e9
+    ) if config.end else last
 
 
 def looks_like(log: RawLog) -> str:
@@ -165,7 +193,11 @@ def looks_like(log: RawLog) -> str:
     ):
         if max(latitude, longitude) > 180.0 and latitude <= whole[0] and longitude <= whole[1]:
             return f"; they look like {what}: --set log.columns=lat=…:{unit},lon=…:{unit}"
-    return "; lat and lon may be swapped: --set log.columns=lat=…,lon=…" if 90.0 < latitude <= 180.0 else ""
+    return (
+        "; lat and lon may be swapped: --set log.columns=lat=…,lon=…"
+        if 90.0 < latitude <= 180.0
+        else ""
+    )
 
 
 def within(vehicle: Observations, first: int, last: int) -> Observations:
@@ -186,15 +218,31 @@ def in_metres(vehicles: list[Observations], config: LogConfig) -> list[Observati
     everything = np.concatenate([vehicle.fix for vehicle in vehicles])
     site = np.zeros(len(everything), dtype=np.int64) if config.origin else sites_of(everything)
     origins = [
-        parse_origin(config.origin) if config.origin else middle_of(everything[site == k], left_out=5.0, digits=5)
+        parse_origin(config.origin)
+        if config.origin
+        else middle_of(everything[site == k], left_out=5.0, digits=5)
         for k in range(int(site.max()) + 1)
     ]
     found = []
-    for vehicle, own in zip(vehicles, np.split(site, np.cumsum([len(vehicle.fix) for vehicle in vehicles])[:-1]), strict=True):
-        at = own[np.clip(np.searchsorted(vehicle.fix_ns, vehicle.speed_ns), 0, len(own) - 1)] if len(own) else own
+    for vehicle, own in zip(
+        vehicles,
+        np.split(site, np.cumsum([len(vehicle.fix) for vehicle in vehicles])[:-1]),
+        strict=True,
+    ):
+        at = (
+            own[np.clip(np.searchsorted(vehicle.fix_ns, vehicle.speed_ns), 0, len(own) - 1)]
+            if len(own)
+            else own
+        )
         for k in np.unique(own):
             part = select(vehicle, own == k, at == k)
-            found.append(replace(part, fix=local_frame(part.fix[:, 0], part.fix[:, 1], origins[k]), origin=origins[k]))
+            found.append(
+                replace(
+                    part,
+                    fix=local_frame(part.fix[:, 0], part.fix[:, 1], origins[k]),
+                    origin=origins[k],
+                )
+            )
     return found
 
 
@@ -207,7 +255,9 @@ def parse_origin(text: str, parameter: str = "origin") -> tuple[float, float]:
     try:
         latitude, longitude = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise InputError(f"parameter {parameter} is {text!r}; write latitude,longitude in degrees") from error
+        raise InputError(
+            f"parameter {parameter} is {text!r}; write latitude,longitude in degrees"
+        ) from error
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise InputError(f"parameter {parameter} is {text!r}; that is not a place on Earth")
     return latitude, longitude
@@ -224,13 +274,19 @@ def in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
     repeated = int((fixes == 0).sum())
     if len(fixes) >= 4 and (len(back) > len(fixes) / 2 or repeated > 0.9 * len(fixes)):
         row = vehicle.fix_row[back[0] if len(back) else 1]
-        fault = f"runs backwards {len(back)} times" if len(back) else f"stands still {repeated} times"
+        fault = (
+            f"runs backwards {len(back)} times" if len(back) else f"stands still {repeated} times"
+        )
         raise InputError(
             f"{log.where(int(row))}: the clock of vehicle {vehicle.id} {fault} in {len(fixes)} rows; check the time column"
         )
     drops.add("stamp out of order (sorted)", vehicle.fix_row[back])
     late = set(back.tolist())
-    same = [i + 1 for i in np.flatnonzero(speeds < 0) if i + 1 not in late and len(vehicle.speed_row) != len(vehicle.fix_row)]
+    same = [
+        i + 1
+        for i in np.flatnonzero(speeds < 0)
+        if i + 1 not in late and len(vehicle.speed_row) != len(vehicle.fix_row)
+    ]
     drops.add("stamp out of order (sorted)", vehicle.speed_row[same])
     keep, again = first_of_each(vehicle.fix_ns)
     keep_speed, _ = first_of_each(vehicle.speed_ns)
@@ -260,7 +316,9 @@ def without_held(vehicle: Observations, drops: Drops, *, geographic: bool) -> Ob
         moves = np.ones(len(repeats), dtype=bool)
     goes = np.append(goes, (goes & (np.diff(new) > 1)).any())  # the last one, if there are others
     held = repeats & moves & goes[np.cumsum(~repeats) - 1]
-    drops.add("position repeated while the vehicle moves (the first is kept)", vehicle.fix_row[held])
+    drops.add(
+        "position repeated while the vehicle moves (the first is kept)", vehicle.fix_row[held]
+    )
     return select(vehicle, ~held, np.ones(len(vehicle.speed_ns), dtype=bool))
 
 
@@ -287,9 +345,15 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
     vehicles = [vehicle for vehicle in vehicles if len(vehicle.fix_ns) >= 2]
     if not vehicles:
         return
-    typical = float(np.median(np.concatenate([np.diff(vehicle.fix_ns) for vehicle in vehicles]))) * 1e-9
+    typical = (
+        float(np.median(np.concatenate([np.diff(vehicle.fix_ns) for vehicle in vehicles]))) * 1e-9
+    )
     if typical > max(SLOWEST_S, config.longest_gap):
-        likely = [(name, unit) for name, (unit, factor) in UNITS.items() if USUAL[0] <= typical * factor <= USUAL[1]]
+        likely = [
+            (name, unit)
+            for name, (unit, factor) in UNITS.items()
+            if USUAL[0] <= typical * factor <= USUAL[1]
+        ]
         hint = f"this looks like {likely[0][0]} read as seconds; " if likely else ""
         raise InputError(
             f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {typical:g} s apart (median), at most {SLOWEST_S:g} s make "
@@ -335,16 +399,25 @@ def sized(vehicles: list[Observations], config: LogConfig) -> tuple[list[Observa
         elif length <= 0.0 or length > LONGEST_M:
             wrong.append(vehicle)
             length = np.nan
-        length, width = (own if np.isfinite(own) else known for own, known in zip((length, width), usual, strict=True))
+        length, width = (
+            own if np.isfinite(own) else known
+            for own, known in zip((length, width), usual, strict=True)
+        )
         found.append(replace(vehicle, length=length, width=width))
     if not wrong:
         return found, []
     size = (wrong[0].length, wrong[0].width)
     ways = {"swapped (log.columns=length=…,width=…)": size[::-1]} | {
-        f"in {name} (name the unit: log.columns=length=…:{unit},width=…:{unit})": (factor * size[0], factor * size[1])
+        f"in {name} (name the unit: log.columns=length=…:{unit},width=…:{unit})": (
+            factor * size[0],
+            factor * size[1],
+        )
         for name, unit, factor in SIZES
     }
-    way = next((words for words, (long, wide) in ways.items() if 2.5 < long < 20.0 and 1.2 < wide < 2.7), "")
+    way = next(
+        (words for words, (long, wide) in ways.items() if 2.5 < long < 20.0 and 1.2 < wide < 2.7),
+        "",
+    )
     more = f" ({len(wrong)} vehicles have such sizes)" if len(wrong) > 1 else ""
     return found, [
         f"vehicle {wrong[0].id} is recorded as {size[0]:g} m long and {size[1]:g} m wide, which no car is{more}"
@@ -371,10 +444,14 @@ def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
     keep = np.ones(len(fix), dtype=bool)
     last, n_doubted = 0, 0
     for i in range(1, len(fix)):
-        if np.linalg.norm(fix[i] - fix[last]) <= TELEPORT_SLACK_M + limit[i] * (seconds[i] - seconds[last]):
+        if np.linalg.norm(fix[i] - fix[last]) <= TELEPORT_SLACK_M + limit[i] * (
+            seconds[i] - seconds[last]
+        ):
             last, n_doubted = i, 0
             continue
-        agrees = n_doubted and np.linalg.norm(fix[i] - fix[i - 1]) <= TELEPORT_SLACK_M + limit[i] * (seconds[i] - seconds[i - 1])
+        agrees = n_doubted and np.linalg.norm(fix[i] - fix[i - 1]) <= TELEPORT_SLACK_M + limit[
+            i
+        ] * (seconds[i] - seconds[i - 1])
         n_doubted = n_doubted + 1 if agrees else 1
         keep[i] = False
         if n_doubted >= RELOCATED:

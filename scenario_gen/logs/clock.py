@@ -21,10 +21,16 @@ from scenario_gen.numerics import Bools, Floats, Ints
 LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
 ROWS = 5  # on either side of a step: fewer are rows out of order
 LONGER = {"min": 60.0, "h": 3600.0, "d": 86400.0}  # units of time, in s
-QUICKEST_S, SOURCE_S = 0.005, (0.02, 2.0)  # s between fixes: less is another unit's; and what is usual
+QUICKEST_S, SOURCE_S = (
+    0.005,
+    (0.02, 2.0),
+)  # s between fixes: less is another unit's; and what is usual
 LEAST = 2  # rows in the time that is there twice
 SLOW_S = 0.4  # s between fixes: of a slower source a single row counts, if the next follows after a usual step, and so does a
-USUAL, FEW = 1.5, 3  # stamp that stands: a usual step is so many medians at most; stamps of a vehicle that stand, at most
+USUAL, FEW = (
+    1.5,
+    3,
+)  # stamp that stands: a usual step is so many medians at most; stamps of a vehicle that stand, at most
 APART_M = 3.0  # m between two places at one time: not one vehicle
 ONWARD_SHARE = 0.5  # share of that distance within which the next row lies, if the vehicle drives on and its clock does not
 SAME_NS = 2_000_000_000  # steps of two vehicles this near are one
@@ -55,10 +61,18 @@ def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, tuple[str, ...]]:
             f"the clock starts anew, from {steps[0].before * 1e-9:.10g} to {steps[0].after * 1e-9:.10g} s, at "
             f"{log.where(steps[0].row)}{more}: what follows is read as later, and apart"
         )
-    first = min((int(own.fix_ns[~beyond(own.fix_ns)].min(initial=0)) for own in log.vehicles), default=0)
+    first = min(
+        (int(own.fix_ns[~beyond(own.fix_ns)].min(initial=0)) for own in log.vehicles), default=0
+    )
     if first < 0:
         seconds = -(first // 10**9)
-        log = _shifted(log, [(own.fix_ns * 0 + seconds * 10**9, own.speed_ns * 0 + seconds * 10**9) for own in log.vehicles])
+        log = _shifted(
+            log,
+            [
+                (own.fix_ns * 0 + seconds * 10**9, own.speed_ns * 0 + seconds * 10**9)
+                for own in log.vehicles
+            ],
+        )
         notes.append(f"times begin before 1970, or before an event: {seconds} s are added to all")
     return log, tuple(notes)
 
@@ -74,7 +88,10 @@ def check_unit(log: RawLog, config: LogConfig) -> None:
     typical = float(np.median(steps)) if len(steps) else np.inf
     span = max((float(np.ptp(own)) for own in stamps if len(own)), default=0.0)
     for unit, seconds in LONGER.items() if typical < QUICKEST_S else ():
-        if span < config.min_duration < span * seconds and SOURCE_S[0] < typical * seconds < SOURCE_S[1]:
+        if (
+            span < config.min_duration < span * seconds
+            and SOURCE_S[0] < typical * seconds < SOURCE_S[1]
+        ):
             raise InputError(
                 f"{log.segments[0].label}: all lasts {span:g} s, positions are {typical:g} s apart (median); the time may be in "
                 f"{unit}: --set log.columns=time=<column>:{unit}"
@@ -120,9 +137,13 @@ def _own_steps(own: Observations, log: RawLog) -> list[_Step]:
     places = on_sphere(fix) if log.geographic else fix
     steps = []
     for at, begin, end in zip(back.tolist(), edges[:-2].tolist(), edges[2:].tolist(), strict=True):
-        if min(at - begin, end - at) < ROWS or log.segment(int(rows[at])) != log.segment(int(rows[at - 1])):
+        if min(at - begin, end - at) < ROWS or log.segment(int(rows[at])) != log.segment(
+            int(rows[at - 1])
+        ):
             continue
-        again = at + np.flatnonzero((stamps[at:end] <= stamps[at - 1]) & (stamps[at:end] >= stamps[begin]))
+        again = at + np.flatnonzero(
+            (stamps[at:end] <= stamps[at - 1]) & (stamps[at:end] >= stamps[begin])
+        )
         onwards = at + 1 < end and 0 < stamps[at + 1] - stamps[at] < USUAL * usual
         if len(again) < LEAST and not (onwards and usual > SLOW_S * 1e9):
             continue
@@ -143,7 +164,9 @@ def _backs(stamps: Ints) -> Ints:
 def _at(stamps: Ints, places: Floats, when: Ints) -> Floats:
     """Return where a vehicle was (K, D) at stamps (K,)."""
     seconds = (stamps - stamps[0]) * 1e-9
-    return np.column_stack([np.interp((when - stamps[0]) * 1e-9, seconds, axis) for axis in places.T])
+    return np.column_stack(
+        [np.interp((when - stamps[0]) * 1e-9, seconds, axis) for axis in places.T]
+    )
 
 
 def _run_on(log: RawLog, steps: list[_Step], config: LogConfig) -> RawLog:
@@ -151,16 +174,26 @@ def _run_on(log: RawLog, steps: list[_Step], config: LogConfig) -> RawLog:
 
     def eras(stamps: Ints, rows: Ints) -> Ints:
         back = _backs(stamps)
-        same = [[i for i in back.tolist() if _is_same(int(stamps[i - 1]), int(stamps[i]), step)] for step in steps]
+        same = [
+            [i for i in back.tolist() if _is_same(int(stamps[i - 1]), int(stamps[i]), step)]
+            for step in steps
+        ]
         own = sorted({i[0] for i in same if i})
         if own:
             return np.searchsorted(own, np.arange(len(stamps)), side="right")
-        return np.searchsorted([step.row for step in steps], rows, side="right")  # it comes or goes with the step
+        return np.searchsorted(
+            [step.row for step in steps], rows, side="right"
+        )  # it comes or goes with the step
 
-    era = [(eras(own.fix_ns, own.fix_row), eras(own.speed_ns, own.speed_row)) for own in log.vehicles]
+    era = [
+        (eras(own.fix_ns, own.fix_row), eras(own.speed_ns, own.speed_row)) for own in log.vehicles
+    ]
     gap, shift, last = round((2.5 * config.longest_gap + 15.0) * 1e9), [0], None
     for k in range(len(steps) + 1):
-        own_ns = [v.fix_ns[(which == k) & ~beyond(v.fix_ns)] for v, (which, _) in zip(log.vehicles, era, strict=True)]
+        own_ns = [
+            v.fix_ns[(which == k) & ~beyond(v.fix_ns)]
+            for v, (which, _) in zip(log.vehicles, era, strict=True)
+        ]
         stamps = np.concatenate(own_ns)
         if last is not None:
             later = last + gap - int(stamps.min(initial=last + gap))

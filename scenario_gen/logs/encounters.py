@@ -9,19 +9,36 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.logs.cleaning import FASTEST_MPS, RELOCATED, select, SLOWEST_S, TELEPORT_SLACK_M, TELEPORT_SLACK_MPS
+from scenario_gen.logs.cleaning import (
+    FASTEST_MPS,
+    RELOCATED,
+    select,
+    SLOWEST_S,
+    TELEPORT_SLACK_M,
+    TELEPORT_SLACK_MPS,
+)
 from scenario_gen.logs.config import ahead_of_point, LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
-from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing, UnreconciledError
+from scenario_gen.logs.smoothing import (
+    Smooth,
+    smooth_piece,
+    speed_of_fixes,
+    standing,
+    UnreconciledError,
+)
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES
 
-TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
+TURNED = np.radians(
+    120.0
+)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
 SHARPEST = 0.4  # 1/m: no car turns sharper, noise included
 NOISY = 1.6  # times as sharp as others can turn, if that is sharper
-BACKWARDS = np.radians(150.0)  # headings further off the path are those of a vehicle that drives backwards
+BACKWARDS = np.radians(
+    150.0
+)  # headings further off the path are those of a vehicle that drives backwards
 REVERSES_MPS = 5.0  # the fastest that cars are driven backwards; above, the axes are mirrored (`remarks_on_units`)
 CONTRADICTS = 1.2  # times the highest speed of its type, from which on it is of another one
 LEVER_M = 3.0  # m over which the course before and after a stop is measured
@@ -53,7 +70,9 @@ class Piece:
         return self.smooth.speed[first - self.first : last - self.first]
 
 
-def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[list[Piece], VehicleQuality]:
+def pieces_of(
+    track: Observations, origin_ns: int, config: LogConfig
+) -> tuple[list[Piece], VehicleQuality]:
     """Cut a track at gaps, relocations and reversals, and smooth each piece.
 
     Gaps of up to two and a half of the source's own periods are bridged, so that a source of 1 Hz is not cut at every fix.
@@ -62,7 +81,9 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     usual = float(np.median(seconds))
     longest = longest_bridge(seconds, config)
     gaps = (seconds > longest) | abrupt(seconds, np.hypot(*np.diff(track.fix, axis=0).T))
-    back = np.zeros_like(gaps) if VEHICLE_TYPES[track.kind or CAR].walks else reversals(track, config)
+    back = (
+        np.zeros_like(gaps) if VEHICLE_TYPES[track.kind or CAR].walks else reversals(track, config)
+    )
     cuts = gaps | back | laps(track, config)
     bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
     whole = parts(track, cuts)
@@ -75,7 +96,11 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
             smoothed.append((part, None))
             lost += float(part.fix_ns[-1] - part.fix_ns[0]) * 1e-9
     ahead = ahead_of_point(config) * track.length
-    pieces = [Piece(part, moved_ahead(smooth, ahead) if ahead else smooth) for part, smooth in smoothed if smooth is not None]
+    pieces = [
+        Piece(part, moved_ahead(smooth, ahead) if ahead else smooth)
+        for part, smooth in smoothed
+        if smooth is not None
+    ]
     smooths = [piece.smooth for piece in pieces]
 
     def joined(name: str) -> Floats:
@@ -123,7 +148,9 @@ def of_types(pieces: Sequence[Piece]) -> tuple[list[Piece], tuple[str, ...]]:
         key = piece.track.id, piece.track.kind
         fastest[key] = max(fastest.get(key, 0.0), float(piece.smooth.speed.max()))
     wrong = {
-        key: speed for key, speed in fastest.items() if key[1] and speed > CONTRADICTS * VEHICLE_TYPES[key[1]].dynamics.max_speed
+        key: speed
+        for key, speed in fastest.items()
+        if key[1] and speed > CONTRADICTS * VEHICLE_TYPES[key[1]].dynamics.max_speed
     }
     notes = tuple(
         f"vehicle {vehicle} is a {name} by the log and as fast as {speed:.1f} m/s: it is read as of type {OTHER}"
@@ -131,11 +158,16 @@ def of_types(pieces: Sequence[Piece]) -> tuple[list[Piece], tuple[str, ...]]:
     )
     others = {vehicle for vehicle, _ in wrong}
     return [
-        replace(piece, track=replace(piece.track, kind=OTHER)) if piece.track.id in others else piece for piece in pieces
+        replace(piece, track=replace(piece.track, kind=OTHER))
+        if piece.track.id in others
+        else piece
+        for piece in pieces
     ], notes
 
 
-def driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], tuple[str, ...]]:
+def driven_forwards(
+    pieces: Sequence[Piece], config: LogConfig
+) -> tuple[list[Piece], tuple[str, ...]]:
     """Return the pieces without those whose recorded headings are opposite to the path, and a note on each of these.
 
     Where most are, these are no headings of cars, and all pieces stay.
@@ -144,7 +176,8 @@ def driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Pi
     opposite = [
         piece
         for piece in known
-        if np.median(np.abs(piece.smooth.turned)) > BACKWARDS and piece.smooth.speed.max() <= REVERSES_MPS
+        if np.median(np.abs(piece.smooth.turned)) > BACKWARDS
+        and piece.smooth.speed.max() <= REVERSES_MPS
     ]
     if 2 * len(opposite) > len(known):
         return list(pieces), ()
@@ -159,10 +192,15 @@ def driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Pi
 def moved_ahead(smooth: Smooth, metres: float) -> Smooth:
     """Return the motion of a point so far ahead; a vehicle of unknown heading faces east."""
     heading = np.nan_to_num(smooth.heading)
-    return replace(smooth, position=smooth.position + metres * np.stack([np.cos(heading), np.sin(heading)], axis=-1))
+    return replace(
+        smooth,
+        position=smooth.position + metres * np.stack([np.cos(heading), np.sin(heading)], axis=-1),
+    )
 
 
-def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple[Observations, Smooth | None]]:
+def steered(
+    part: Observations, origin_ns: int, config: LogConfig
+) -> list[tuple[Observations, Smooth | None]]:
     """Smooth a part of a track, cut wherever its path then turns sharper than a car can.
 
     A car cannot turn on the spot: where its path does, it reversed in a stop too short for the fixes.
@@ -174,7 +212,9 @@ def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple
     if kind.walks:  # turns on the spot
         return [(part, smooth)]
     sharpest = max(SHARPEST, NOISY * kind.dynamics.sharpest)
-    turn = np.abs(np.diff(smooth.heading)) - sharpest * np.hypot(*np.diff(smooth.position, axis=0).T)
+    turn = np.abs(np.diff(smooth.heading)) - sharpest * np.hypot(
+        *np.diff(smooth.position, axis=0).T
+    )
     if not (turn > 1e-6).any():
         return [(part, smooth)]
     at = origin_ns + round((smooth.first + int(np.argmax(turn)) + 0.5) * config.period * 1e9)
@@ -192,9 +232,14 @@ def abrupt(seconds: Floats, step: Floats) -> Bools:
     """
     rate = np.pad(step / seconds, 2, mode="edge")
     around = (
-        np.max([rate[:-4], rate[1:-3], rate[3:-1], rate[4:]], axis=0) if len(step) >= RELOCATED else np.full(len(step), np.inf)
+        np.max([rate[:-4], rate[1:-3], rate[3:-1], rate[4:]], axis=0)
+        if len(step) >= RELOCATED
+        else np.full(len(step), np.inf)
     )
-    far: Bools = step > TELEPORT_SLACK_M + np.minimum(1.5 * around + TELEPORT_SLACK_MPS, FASTEST_MPS) * seconds
+    far: Bools = (
+        step
+        > TELEPORT_SLACK_M + np.minimum(1.5 * around + TELEPORT_SLACK_MPS, FASTEST_MPS) * seconds
+    )
     return far
 
 
@@ -217,7 +262,9 @@ def reversals(track: Observations, config: LogConfig) -> Bools:
     speed = track.speed
     if not len(speed):
         speed_t, speed = seconds, speed_of_fixes(seconds, track.fix)
-    ticks = config.period * np.arange(max(int(seconds[-1] / config.period), 1) + 1, dtype=np.float64)
+    ticks = config.period * np.arange(
+        max(int(seconds[-1] / config.period), 1) + 1, dtype=np.float64
+    )
     cuts = np.zeros(len(seconds) - 1, dtype=bool)
     for begin, end in runs(standing(ticks, seconds, track.fix, speed_t, speed)):
         first, last = np.searchsorted(seconds, (ticks[begin], ticks[end - 1])).tolist()
@@ -243,6 +290,8 @@ def parts(track: Observations, cuts: Bools) -> list[Observations]:
     for begin, end in pairwise(edges):
         if end - begin < 2:
             continue
-        during = (track.speed_ns >= track.fix_ns[begin]) & (track.speed_ns <= track.fix_ns[end - 1])
+        during = (track.speed_ns >= track.fix_ns[begin]) & (
+            track.speed_ns <= track.fix_ns[end - 1]
+        )
         pieces.append(select(track, np.arange(begin, end), during))
     return pieces

@@ -47,7 +47,10 @@ def _least_gap(one: Floats, other: Floats) -> tuple[float, float, float]:
                 continue
             low, high = one[m, 4], one[m, 5]  # the gap to the other chord is convex between them
             first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-            gap, later = _gap_to_chord(one[m], first, other[n])[0], _gap_to_chord(one[m], second, other[n])[0]
+            gap, later = (
+                _gap_to_chord(one[m], first, other[n])[0],
+                _gap_to_chord(one[m], second, other[n])[0],
+            )
             for _ in range(STEPS):
                 if gap <= later:
                     high, second, later = second, first, gap
@@ -78,13 +81,20 @@ def _at_least(one: Floats, other: Floats) -> float:
 @kernel(inline=True)
 def _gap_to_chord(one: Floats, time: float, other: Floats) -> tuple[float, float]:
     """The least gap [m] of one motion at a time [s] to a chord of the other, and the time on that [s]."""
-    dx, dy = one[0] + (time - one[4]) * one[2] - other[0], one[1] + (time - one[4]) * one[3] - other[1]
+    dx, dy = (
+        one[0] + (time - one[4]) * one[2] - other[0],
+        one[1] + (time - one[4]) * one[3] - other[1],
+    )
     vx, vy = other[2], other[3]
     speed, then = np.sqrt(vx * vx + vy * vy), time
     if speed > METRES_PER_SECOND_APART:  # else it pays nowhere to be at another time
         foot = other[4] + (dx * vx + dy * vy) / (speed * speed)
         aside = abs(dx * vy - dy * vx) / speed
-        off = METRES_PER_SECOND_APART * aside / (speed * np.sqrt(speed * speed - METRES_PER_SECOND_APART**2))
+        off = (
+            METRES_PER_SECOND_APART
+            * aside
+            / (speed * np.sqrt(speed * speed - METRES_PER_SECOND_APART**2))
+        )
         then = min(max(time, foot - off), foot + off)
     then = min(max(then, other[4]), other[5])
     dx, dy = dx - vx * (then - other[4]), dy - vy * (then - other[4])

@@ -40,7 +40,9 @@ def utm(origin: tuple[float, float]) -> tuple[Any, str]:
     norway = 56.0 <= latitude < 64.0 and 3.0 <= longitude < 12.0  # its zone is wider
     zone = 32 if norway else int((longitude + 180.0) // 6.0) % 60 + 1
     half = "south" if latitude < 0.0 else "north"
-    return pyproj.Proj(proj="utm", zone=zone, south=latitude < 0.0, ellps="WGS84"), f"UTM zone {zone} {half}"
+    return pyproj.Proj(
+        proj="utm", zone=zone, south=latitude < 0.0, ellps="WGS84"
+    ), f"UTM zone {zone} {half}"
 
 
 def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]) -> Floats:
@@ -80,7 +82,9 @@ def middle_of(degrees: Floats, left_out: float = 0.0, digits: int = 7) -> tuple[
     """
     turned = np.column_stack([degrees[:, 0], _wrapped(degrees[:, 1] - degrees[0, 1])])
     latitude, longitude = np.percentile(turned, [left_out, 100.0 - left_out], axis=0).mean(axis=0)
-    return round(float(latitude), digits), round(float(_wrapped(longitude + degrees[0, 1])), digits)
+    return round(float(latitude), digits), round(
+        float(_wrapped(longitude + degrees[0, 1])), digits
+    )
 
 
 def _wrapped(longitude: Any) -> Any:
@@ -91,31 +95,43 @@ def on_sphere(degrees: Floats) -> Floats:
     """Return places (F, 3) [m] about the middle of a spherical earth, of latitudes and longitudes (F, 2) [degrees]."""
     latitude, longitude = np.radians(degrees).T
     around = np.cos(latitude)
-    return EARTH_M * np.column_stack([around * np.cos(longitude), around * np.sin(longitude), np.sin(latitude)])
+    return EARTH_M * np.column_stack(
+        [around * np.cos(longitude), around * np.sin(longitude), np.sin(latitude)]
+    )
 
 
 def sites_of(degrees: Floats) -> Ints:
     """Return the number (F,) of the site of each place (F, 2) [degrees]; sites are `SITE_M` apart or more."""
     place = np.floor(on_sphere(degrees) / SITE_M)
-    _, first, cell_of = np.unique(place @ (4096.0**2, 4096.0, 1.0), return_index=True, return_inverse=True)
+    _, first, cell_of = np.unique(
+        place @ (4096.0**2, 4096.0, 1.0), return_index=True, return_inverse=True
+    )
     cells = place[first]
     i, j = cKDTree(cells).query_pairs(1.0, p=np.inf, output_type="ndarray").T
     _, site = connected_components(
-        coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(cells), len(cells))), directed=False
+        coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(cells), len(cells))),
+        directed=False,
     )
     return np.asarray(site, dtype=np.int64)[cell_of]
 
 
 def about_its_middle(encounter: Encounter) -> Encounter:
     """Return an encounter in the frame about its own middle, if that is farther than `OWN_FRAME_M` from its frame's origin."""
-    if encounter.origin is None or not np.hypot(*encounter.position.reshape(-1, 2).T).max() > OWN_FRAME_M:
+    if (
+        encounter.origin is None
+        or not np.hypot(*encounter.position.reshape(-1, 2).T).max() > OWN_FRAME_M
+    ):
         return encounter
     origin = middle_of(latitude_longitude(encounter).reshape(-1, 2), digits=5)
-    position, heading = reprojected(encounter.position, encounter.heading, encounter.origin, azimuthal(origin))
+    position, heading = reprojected(
+        encounter.position, encounter.heading, encounter.origin, azimuthal(origin)
+    )
     return replace(encounter, position=position, heading=heading, origin=origin)
 
 
-def reprojected(position: Floats, heading: Floats, origin: tuple[float, float], into: Any) -> tuple[Floats, Floats]:
+def reprojected(
+    position: Floats, heading: Floats, origin: tuple[float, float], into: Any
+) -> tuple[Floats, Floats]:
     """Return positions (..., 2) [m] and headings (...) [rad] of the local frame about an origin in another projection.
 
     Args:
@@ -125,7 +141,9 @@ def reprojected(position: Floats, heading: Floats, origin: tuple[float, float], 
         into: a `pyproj.Proj`.
     """
     ahead = position + LEVER_M * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    there, ahead = (np.stack(into(*geodetic(places, origin)[::-1]), axis=-1) for places in (position, ahead))
+    there, ahead = (
+        np.stack(into(*geodetic(places, origin)[::-1]), axis=-1) for places in (position, ahead)
+    )
     course = np.arctan2(*np.moveaxis(ahead - there, -1, 0)[::-1])
     return there, heading + wrap_angle(course - heading)
 
@@ -137,5 +155,7 @@ def latitude_longitude(encounter: Encounter) -> Floats:
         InputError: its log came in metres, so it has no place on the globe.
     """
     if encounter.origin is None:
-        raise InputError(f"encounter {encounter.name!r} came in metres without an origin; it cannot be streamed as NavSatFix")
+        raise InputError(
+            f"encounter {encounter.name!r} came in metres without an origin; it cannot be streamed as NavSatFix"
+        )
     return np.stack(geodetic(encounter.position, encounter.origin), axis=-1)

@@ -34,7 +34,10 @@ class _OfPieces(Growth[Meeting]):
 
     def __init__(self, pieces: Sequence[Piece], config: LogConfig, *, small: bool) -> None:
         super().__init__(
-            ticks(config.min_duration, config) + 1, shortest(config), config.max_vehicles, share=0.0 if small else SHARED
+            ticks(config.min_duration, config) + 1,
+            shortest(config),
+            config.max_vehicles,
+            share=0.0 if small else SHARED,
         )
         self.pieces, self.config = pieces, config
 
@@ -45,8 +48,12 @@ class _OfPieces(Growth[Meeting]):
 
     def full(self, group: Group[Meeting], others: Iterable[int]) -> None:
         """Name those that are left out."""
-        if left := sorted({self.pieces[other].track.id for other in self.strangers(group, others)}):
-            group.notes.append(f"left out of an encounter of {len(group.spans)} vehicles (max_vehicles): {', '.join(left)}")
+        if left := sorted(
+            {self.pieces[other].track.id for other in self.strangers(group, others)}
+        ):
+            group.notes.append(
+                f"left out of an encounter of {len(group.spans)} vehicles (max_vehicles): {', '.join(left)}"
+            )
 
     def join(self, group: Group[Meeting], other: int, span: Span) -> None:
         """Add a vehicle for the time in which it is near any member, or note why not."""
@@ -82,7 +89,9 @@ class _OfPieces(Growth[Meeting]):
         last = min(end for _, end in group.spans.values() if end >= group.end - edge)
         if last - first > ticks(config.min_duration, config):
             group.start, group.end = first, last
-            group.spans = {m: (max(begin, first), min(end, last)) for m, (begin, end) in group.spans.items()}
+            group.spans = {
+                m: (max(begin, first), min(end, last)) for m, (begin, end) in group.spans.items()
+            }
         for m, (begin, end) in group.spans.items():
             if (begin, end) != (group.start, group.end):
                 group.notes.append(
@@ -105,22 +114,30 @@ class _OfPieces(Growth[Meeting]):
         return group.start + begin, group.start + end
 
 
-def find_groups(pieces: Sequence[Piece], config: LogConfig) -> tuple[tuple[Group[Meeting], ...], tuple[str, ...]]:
+def find_groups(
+    pieces: Sequence[Piece], config: LogConfig
+) -> tuple[tuple[Group[Meeting], ...], tuple[str, ...]]:
     """Return the encounters in order of time, and notes on vehicles that were left out or shortened one."""
     small = len({piece.track.id for piece in pieces}) <= config.max_vehicles
     groups, notes = [], []
-    for group in _OfPieces(pieces, config, small=small).groups(find_meetings(pieces, config, small=small)):
+    for group in _OfPieces(pieces, config, small=small).groups(
+        find_meetings(pieces, config, small=small)
+    ):
         whole, left = split(group, pieces, config)
         groups += whole
         notes += [*group.notes, *left] if whole else []
     groups.sort(key=lambda group: (group.start, group.end, sorted(group.spans)))
     shared, until = set[str](), dict[int, int]()
     for group in groups:
-        shared |= {pieces[m].track.id for m in group.spans if until.get(m, group.start) > group.start}
+        shared |= {
+            pieces[m].track.id for m in group.spans if until.get(m, group.start) > group.start
+        }
         until |= {m: max(until.get(m, group.end), group.end) for m in group.spans}
     if shared:
         names = ", ".join(sorted(shared, key=natural))
-        notes.append(f"in several encounters at a time, for each holds who meets half of its vehicles: vehicle {names}")
+        notes.append(
+            f"in several encounters at a time, for each holds who meets half of its vehicles: vehicle {names}"
+        )
     return tuple(groups), tuple(notes)
 
 
@@ -136,7 +153,9 @@ def find_meetings(pieces: Sequence[Piece], config: LogConfig, *, small: bool) ->
             if pieces[i].track.id == pieces[j].track.id:
                 continue
             begin = max(pieces[i].first, pieces[j].first)
-            for low, high in runs(distances(pieces[i], pieces[j]) < config.proximity, ticks(OUT_OF_RANGE_S, config)):
+            for low, high in runs(
+                distances(pieces[i], pieces[j]) < config.proximity, ticks(OUT_OF_RANGE_S, config)
+            ):
                 for first, last in windows(begin + low, begin + high, config):
                     if last - first < least:
                         continue
@@ -158,13 +177,21 @@ def windows(first: int, last: int, config: LogConfig) -> list[tuple[int, int]]:
     longest, least = ticks(config.max_duration, config), ticks(config.min_duration, config) + 1
     if last - first <= longest:
         return [(first, last)]
-    inside = [edge for edge in range(longest, last, longest) if first + least <= edge <= last - least]
+    inside = [
+        edge for edge in range(longest, last, longest) if first + least <= edge <= last - least
+    ]
     return list(pairwise([first, *inside, last]))
 
 
 def shortest(config: LogConfig) -> int:
     """Return the fewest ticks of a meeting: of one that forms an encounter, or of one that joins it."""
-    return ticks(config.min_duration if config.whole else min(config.min_presence, config.min_duration), config) + 1
+    return (
+        ticks(
+            config.min_duration if config.whole else min(config.min_presence, config.min_duration),
+            config,
+        )
+        + 1
+    )
 
 
 def ticks(seconds: float, config: LogConfig) -> int:
@@ -192,7 +219,9 @@ def seconds(first: int, last: int, config: LogConfig) -> str:
     return f"{max(last - first - 1, 0) * config.period:.1f}"
 
 
-def split(group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Group[Meeting]], list[str]]:
+def split(
+    group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig
+) -> tuple[list[Group[Meeting]], list[str]]:
     """Cut a group at long standstills of all, and into equal parts where it lasts too long; keep the parts with motion.
 
     Returns:
@@ -207,13 +236,18 @@ def split(group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig) -> 
             busy[begin + rest : end - rest] = False
     groups, notes = [], []
     for begin, end in runs(busy):
-        parts = max(int(np.ceil((end - begin - 1) * config.period / config.max_duration - 1e-9)), 1)
+        parts = max(
+            int(np.ceil((end - begin - 1) * config.period / config.max_duration - 1e-9)), 1
+        )
         edges = np.linspace(begin, end - 1, parts + 1).round().astype(int)
         for low, high in pairwise(edges.tolist()):
             part, left = part_of(group, group.start + low, group.start + high + 1, config)
             if len(part.spans) < 2 or part.end - part.start <= ticks(config.min_duration, config):
                 continue
-            if max(driven(pieces[m], *span, config) for m, span in part.spans.items()) >= config.travel:
+            if (
+                max(driven(pieces[m], *span, config) for m, span in part.spans.items())
+                >= config.travel
+            ):
                 groups.append(part)
                 notes += [
                     f"vehicle {pieces[m].track.id} is left out of a part that lasts {seconds(part.start, part.end, config)} s: "
@@ -223,11 +257,20 @@ def split(group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig) -> 
     return groups, notes
 
 
-def part_of(group: Group[Meeting], first: int, last: int, config: LogConfig) -> tuple[Group[Meeting], list[tuple[int, Span]]]:
+def part_of(
+    group: Group[Meeting], first: int, last: int, config: LogConfig
+) -> tuple[Group[Meeting], list[tuple[int, Span]]]:
     """Return a part of a group with the members that are there long enough; the others are returned with their ticks."""
     spans = {m: (max(own[0], first), min(own[1], last)) for m, own in group.spans.items()}
-    kept = {m: own for m, own in spans.items() if own == (first, last) or own[1] - own[0] > ticks(config.min_presence, config)}
+    kept = {
+        m: own
+        for m, own in spans.items()
+        if own == (first, last) or own[1] - own[0] > ticks(config.min_presence, config)
+    }
     left = [(m, own) for m, own in spans.items() if m not in kept and own[1] > own[0]]
     if kept:
-        first, last = min(begin for begin, _ in kept.values()), max(end for _, end in kept.values())
+        first, last = (
+            min(begin for begin, _ in kept.values()),
+            max(end for _, end in kept.values()),
+        )
     return Group(first, last, kept), left

@@ -101,28 +101,45 @@ class Growth(Generic[M]):
             group = self._grow(seed, left)
             start, end = seed.start, seed.end
             self.finish(group)
-            both = [one for a in group.spans for one in left[a] if one.a == a and one.b in group.spans]
+            both = [
+                one for a in group.spans for one in left[a] if one.a == a and one.b in group.spans
+            ]
             inside = [one for one in both if one.start < end and one.end > start]
             group.meetings = tuple(sorted(inside))
             found.append(group)
             for one in inside:
                 left[one.a].discard(one)
                 left[one.b].discard(one)
-                for first, last in ((one.start, min(one.end, group.start)), (max(one.start, group.end), one.end)):
+                for first, last in (
+                    (one.start, min(one.end, group.start)),
+                    (max(one.start, group.end), one.end),
+                ):
                     if last - first >= self.least:
                         put(replace(one, start=first, end=last))
         return found
 
     def _grow(self, seed: M, left: dict[int, set[M]]) -> Group[M]:
         """Return the group that a meeting makes."""
-        group: Group[M] = Group(seed.start, seed.end, dict.fromkeys((seed.a, seed.b), (seed.start, seed.end)))
+        group: Group[M] = Group(
+            seed.start, seed.end, dict.fromkeys((seed.a, seed.b), (seed.start, seed.end))
+        )
         refused: set[int] = set()
         while near := self._near(group, refused, left):
-            spans = {other: max((_inside(one, group) for one in ones), key=_length_first) for other, ones in near.items()}
+            spans = {
+                other: max((_inside(one, group) for one in ones), key=_length_first)
+                for other, ones in near.items()
+            }
             if len(group.spans) >= self.most:
                 self.full(group, near)
                 break
-            best = min(near, key=lambda other: (-_length_first(spans[other])[0], min(one.rank for one in near[other]), other))
+            best = min(
+                near,
+                key=lambda other: (
+                    -_length_first(spans[other])[0],
+                    min(one.rank for one in near[other]),
+                    other,
+                ),
+            )
             first, last = spans[best]
             together = sum(begin < last and first < end for begin, end in group.spans.values())
             if len({one.other(best) for one in near[best]}) >= self.share * together:
@@ -130,13 +147,20 @@ class Growth(Generic[M]):
             refused.add(best)
         return group
 
-    def _near(self, group: Group[M], refused: set[int], left: dict[int, set[M]]) -> dict[int, list[M]]:
+    def _near(
+        self, group: Group[M], refused: set[int], left: dict[int, set[M]]
+    ) -> dict[int, list[M]]:
         """Those who meet members in the group's time, with their meetings."""
         near: dict[int, list[M]] = defaultdict(list)
         for member in group.spans:
             for one in left[member]:
                 other = one.other(member)
-                if other not in group.spans and other not in refused and one.start < group.end and one.end > group.start:
+                if (
+                    other not in group.spans
+                    and other not in refused
+                    and one.start < group.end
+                    and one.end > group.start
+                ):
                     near[other].append(one)
         return near
 

@@ -30,7 +30,9 @@ NO_ROAD_USERS = frozenset(
         "aircraft",
     )
 )
-UNTOLD = frozenset(("", "nan", "none", "vehicle", "land vehicle", "motor vehicle", "default vehtype"))
+UNTOLD = frozenset(
+    ("", "nan", "none", "vehicle", "land vehicle", "motor vehicle", "default vehtype")
+)
 """Words that say nothing of the type: it is told from the size."""
 
 
@@ -42,7 +44,11 @@ def type_called(word: str) -> str | None:
         return ""
     known = {_plain(each): name for each, name in words().items()}
     parts = plain.split()
-    found = [part for part in (plain, *parts, *(part.removesuffix("s") for part in parts)) if part in known]
+    found = [
+        part
+        for part in (plain, *parts, *(part.removesuffix("s") for part in parts))
+        if part in known
+    ]
     return known[max(found, key=len)] if found else None
 
 
@@ -66,7 +72,9 @@ def typed(log: RawLog, config: LogConfig) -> RawLog:
         if name not in VEHICLE_TYPES:
             known = VEHICLE_TYPES.names()
             near = did_you_mean(name, known)
-            raise InputError(f"parameter log.types: there is no type {name!r}; choose of {', '.join(known)}{near}")
+            raise InputError(
+                f"parameter log.types: there is no type {name!r}; choose of {', '.join(known)}{near}"
+            )
     left_out, unknown = Counter[str](), Counter[str]()
     kept: list[Observations] = []
     for seen in log.vehicles:
@@ -83,7 +91,9 @@ def typed(log: RawLog, config: LogConfig) -> RawLog:
 
 
 def _counted(counts: Counter[str]) -> str:
-    return ", ".join(f"{count} × {kind or 'without a type'}" for kind, count in sorted(counts.items()))
+    return ", ".join(
+        f"{count} × {kind or 'without a type'}" for kind, count in sorted(counts.items())
+    )
 
 
 def usual_size(name: str, config: LogConfig) -> tuple[float, float]:

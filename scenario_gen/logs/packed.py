@@ -19,7 +19,14 @@ from scenario_gen.logs.raw import check_size
 
 PACKED = (".gz", ".zip")
 MOST_FILES = 10_000  # in a .zip
-DAMAGE = (OSError, EOFError, zlib.error, zipfile.BadZipFile, RuntimeError, NotImplementedError)  # or a password, or a method
+DAMAGE = (
+    OSError,
+    EOFError,
+    zlib.error,
+    zipfile.BadZipFile,
+    RuntimeError,
+    NotImplementedError,
+)  # or a password, or a method
 
 
 def without_packing(path: Path) -> Path:
@@ -34,7 +41,9 @@ def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
     Raises:
         InputError: a file is damaged, or too large when unpacked.
     """
-    packed = {k: path for k, path in enumerate(paths) if path.is_file() and path.suffix.lower() in PACKED}
+    packed = {
+        k: path for k, path in enumerate(paths) if path.is_file() and path.suffix.lower() in PACKED
+    }
     if not packed:
         yield list(paths)
         return
@@ -57,12 +66,18 @@ def _unpack(path: Path, target: Path, room: int, config: LogConfig) -> int:
                 size = _copy(source, target, room)
         else:
             with zipfile.ZipFile(path) as archive:
-                members = [one for one in archive.infolist() if not one.is_dir() and not _is_hidden(one.filename)]
+                members = [
+                    one
+                    for one in archive.infolist()
+                    if not one.is_dir() and not _is_hidden(one.filename)
+                ]
                 target.mkdir()
                 for one in members[:MOST_FILES]:
                     file = target / Path(one.filename).name  # folders in it do not count
                     if file.exists():
-                        raise InputError(f"{path} has two files {file.name}; unpack it, and give one folder at a time")
+                        raise InputError(
+                            f"{path} has two files {file.name}; unpack it, and give one folder at a time"
+                        )
                     with archive.open(one) as source:
                         size += _copy(source, file, room - size)
     check_size(str(path), (config.size_limit << 20) + size - room, 0, config)

@@ -24,7 +24,9 @@ from scenario_gen.logs.raw import check_size
 BATCH = 1 << 16  # rows
 
 
-def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFrame, dict[str, Column], list[str]]:
+def read_columns(
+    path: Path, before: int, config: LogConfig
+) -> tuple[pd.DataFrame, dict[str, Column], list[str]]:
     """Read the columns that are needed; `before` rows were read from other files.
 
     Returns:
@@ -38,13 +40,19 @@ def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFra
     columns = find_columns(list(schema.names), path, config.columns)
     for quantity, column in list(columns.items()):
         kind = schema.field(column.name).type
-        if quantity == "kind" and not is_text(kind.value_type if pa.types.is_dictionary(kind) else kind):
+        if quantity == "kind" and not is_text(
+            kind.value_type if pa.types.is_dictionary(kind) else kind
+        ):
             del columns[quantity]  # numbers whose meaning is not known
             continue
         check_kind(kind, quantity, column, path)
         if quantity == "time" and (factor := unit_of(kind)) is not None:
             columns[quantity] = replace(column, factor=factor)
-    return read_table(path, sorted({column.name for column in columns.values()}), before, config), columns, list(schema.names)
+    return (
+        read_table(path, sorted({column.name for column in columns.values()}), before, config),
+        columns,
+        list(schema.names),
+    )
 
 
 def read_schema(path: Path) -> pa.Schema:
@@ -78,7 +86,9 @@ def read_table(path: Path, names: list[str], before: int, config: LogConfig) -> 
     return pd.DataFrame(frame)
 
 
-def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, config: LogConfig) -> list[Any]:
+def read_batches(
+    path: Path, schema: pa.Schema, names: list[str], before: int, config: LogConfig
+) -> list[Any]:
     """Read some columns batch by batch; texts as dictionaries, so that repeated ones are stored once.
 
     Raises:
@@ -89,8 +99,15 @@ def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, c
         file = parquet.ParquetFile(path, read_dictionary=texts)
         groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
         parts = [group.column(k) for group in groups for k in range(group.num_columns)]
-        declared = sum(max(part.total_uncompressed_size, 0) for part in parts if part.path_in_schema.split(".")[0] in names)
-        rows, source = file.metadata.num_rows, file.iter_batches(BATCH, columns=names, use_threads=False)
+        declared = sum(
+            max(part.total_uncompressed_size, 0)
+            for part in parts
+            if part.path_in_schema.split(".")[0] in names
+        )
+        rows, source = (
+            file.metadata.num_rows,
+            file.iter_batches(BATCH, columns=names, use_threads=False),
+        )
     check_size(str(path), declared, before + rows, config)
     batches: list[Any] = []
     rows = size = 0
@@ -109,7 +126,9 @@ def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, c
 
 def is_text(kind: pa.DataType) -> bool:
     """Return whether a type of Arrow is text."""
-    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind))
+    return bool(
+        pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
+    )
 
 
 def unit_of(kind: pa.DataType) -> float | None:
@@ -129,10 +148,18 @@ def check_kind(kind: pa.DataType, quantity: str, column: Column, path: Path) -> 
     """
     kind = kind.value_type if pa.types.is_dictionary(kind) else kind
     sound = is_text(kind) or any(
-        is_kind(kind) for is_kind in (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
+        is_kind(kind)
+        for is_kind in (
+            pa.types.is_integer,
+            pa.types.is_floating,
+            pa.types.is_decimal,
+            pa.types.is_null,
+        )
     )
     if not (sound or (quantity == "time" and unit_of(kind) is not None)):
-        raise InputError(f"{path}, column {column.name!r} ({quantity}): a {kind} is no {quantity}; name another column")
+        raise InputError(
+            f"{path}, column {column.name!r} ({quantity}): a {kind} is no {quantity}; name another column"
+        )
 
 
 def to_series(values: pa.ChunkedArray) -> "pd.Series[Any]":
@@ -150,4 +177,6 @@ def to_series(values: pa.ChunkedArray) -> "pd.Series[Any]":
     if not (unit_of(values.type) or pa.types.is_integer(values.type)):
         return values.cast(pa.float64(), safe=False).to_pandas()
     whole = pa.uint64() if pa.types.is_uint64(values.type) else pa.int64()
-    return values.cast(whole).to_pandas(types_mapper={pa.int64(): pd.Int64Dtype(), pa.uint64(): pd.UInt64Dtype()}.get)
+    return values.cast(whole).to_pandas(
+        types_mapper={pa.int64(): pd.Int64Dtype(), pa.uint64(): pd.UInt64Dtype()}.get
+    )

@@ -25,15 +25,21 @@ CURVATURE = 0.1  # 1/m: spectral density of the curvature, about 0.1 1/m over 10
 STEERING = 0.002  # 1/m³: spectral density of the curvature's change, about 0.02 1/m² over 5 m
 LATERAL = 12.0  # m²/s³: spectral density of the lateral acceleration, about 2 m/s² over 3 s
 LATERAL_JERK = 1.0  # m²/s⁵: spectral density of the lateral jerk, about 1 m/s³ over 1 s
-CREEP_M = 0.2  # m: fixes closer together than this share one weight, for their differences are GPS noise
-SAME_HEADING_M = 1.0  # m: headings closer together than this share one weight, for their error is one
+CREEP_M = (
+    0.2  # m: fixes closer together than this share one weight, for their differences are GPS noise
+)
+SAME_HEADING_M = (
+    1.0  # m: headings closer together than this share one weight, for their error is one
+)
 STANDING_HEADING = 0.02  # the least weight of a heading: a stand of five seconds counts as much as a metre of driving
 HEADING_NOISE = float(np.radians(2.0))  # of a heading sensor at its best, slip included
 SCATTER_SAMPLES = 5  # samples on either side over which the scatter of headings is taken
 SCATTER = 9.0  # factor from the variance between neighbours to that of errors which they share
 MOVES_MPS = 1.0  # m/s: above it a course is known to a few degrees
 JUMP = float(np.radians(15.0))  # between two samples: no heading of a car
-CONTRADICTS = float(np.radians(20.0))  # headings further off the path are ignored: defaults, or of a reversing vehicle
+CONTRADICTS = float(
+    np.radians(20.0)
+)  # headings further off the path are ignored: defaults, or of a reversing vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +69,9 @@ class Path:
         foot = np.clip(foot, self.parameter[0], self.parameter[-1])
         gap, tangent = points - self.curve(foot), self.curve(foot, 1)
         left = tangent[:, 0] * gap[:, 1] - tangent[:, 1] * gap[:, 0]
-        return np.interp(foot, self.parameter, self.length), np.where(left < 0.0, -1.0, 1.0) * np.hypot(*gap.T)
+        return np.interp(foot, self.parameter, self.length), np.where(
+            left < 0.0, -1.0, 1.0
+        ) * np.hypot(*gap.T)
 
     def pose(self, arc: Floats) -> tuple[Floats, Floats]:
         """Return positions (T, 2) [m] and headings (T,) [rad], unwrapped, at arc lengths (T,) [m]."""
@@ -81,7 +89,12 @@ class Headings:
 
 
 def fit_path(
-    place: Floats, points: Floats, weight: Floats, noise: float, speed: Floats, headings: Headings | None = None
+    place: Floats,
+    points: Floats,
+    weight: Floats,
+    noise: float,
+    speed: Floats,
+    headings: Headings | None = None,
 ) -> Path:
     """Fit a curve to points.
 
@@ -117,23 +130,46 @@ def fit_path(
         observe(band, right, start + axis, values, 2, weight, points[:, axis])
     if headings is not None:
         lower = BSpline.design_matrix(inside, knots[1:-1], 2).data.reshape(-1, 3)
-        slope = np.zeros((len(place), 4))  # of a cubic basis: differences of the quadratic one, which begins at the same span
+        slope = np.zeros(
+            (len(place), 4)
+        )  # of a cubic basis: differences of the quadratic one, which begins at the same span
         slope[:, 1:] += lower / step
         slope[:, :-1] -= lower / step
         across = np.column_stack((-np.sin(headings.value), np.cos(headings.value)))
         entries = (slope[:, :, None] * across[:, None, :]).reshape(-1, 8)
         shared = np.clip(spread / SAME_HEADING_M, STANDING_HEADING, 1.0)
         observe(band, right, start, entries, 1, headings.weight * shared, np.zeros(len(place)))
-    for order, floor, moving, power in ((2, CURVATURE, LATERAL, 3), (3, STEERING, LATERAL_JERK, 5)):
+    for order, floor, moving, power in (
+        (2, CURVATURE, LATERAL, 3),
+        (3, STEERING, LATERAL_JERK, 5),
+    ):
         centre = low + step * (np.arange(count - order) + (order - 2) / 2.0)
         v = np.interp(centre, place, speed)
         weight = step ** (1 - 2 * order) * (1.0 / floor + v**power / moving)
         for axis in (0, 1):
-            observe(band, right, 2 * np.arange(count - order) + axis, differences(count, order), 2, weight, np.zeros(len(v)))
-    return tabulate(BSpline(knots, linalg.solveh_banded(band, right, lower=True).reshape(-1, 2), 3), low, high)
+            observe(
+                band,
+                right,
+                2 * np.arange(count - order) + axis,
+                differences(count, order),
+                2,
+                weight,
+                np.zeros(len(v)),
+            )
+    return tabulate(
+        BSpline(knots, linalg.solveh_banded(band, right, lower=True).reshape(-1, 2), 3), low, high
+    )
 
 
-def observe(band: Floats, right: Floats, start: Ints, entries: Floats, stride: int, weight: Floats, target: Floats) -> None:
+def observe(
+    band: Floats,
+    right: Floats,
+    start: Ints,
+    entries: Floats,
+    stride: int,
+    weight: Floats,
+    target: Floats,
+) -> None:
     """Add Σ weight · (entries · c - target)² to a lower band matrix (B, n) and its right side (n,).
 
     Args:
@@ -148,7 +184,9 @@ def observe(band: Floats, right: Floats, start: Ints, entries: Floats, stride: i
     for i in range(entries.shape[1]):
         np.add.at(right, start + stride * i, weight * entries[:, i] * target)
         for j in range(i + 1):
-            np.add.at(band[stride * (i - j)], start + stride * j, weight * entries[:, i] * entries[:, j])
+            np.add.at(
+                band[stride * (i - j)], start + stride * j, weight * entries[:, i] * entries[:, j]
+            )
 
 
 def differences(count: int, order: int) -> Floats:
@@ -193,12 +231,18 @@ def headings_of(heading: Floats, course: Floats, speed: Floats) -> Headings | No
     off = np.abs(wrap_angle(value - course[known]))
     moves = speed[known] > MOVES_MPS
     weight = np.zeros(len(heading))
-    for begin, end in pairwise([0, *(np.flatnonzero(np.abs(turn) > JUMP) + 1).tolist(), len(value)]):
+    for begin, end in pairwise(
+        [0, *(np.flatnonzero(np.abs(turn) > JUMP) + 1).tolist(), len(value)]
+    ):
         own = slice(begin, end)
         if moves[own].sum() < 3 or np.median(off[own][moves[own]]) > CONTRADICTS:
             continue
         square = np.pad(np.square(np.diff(turn[begin : end - 1])) / 6.0, 1, mode="edge")
-        scatter = np.maximum(uniform_filter1d(square, 2 * SCATTER_SAMPLES + 1, mode="nearest"), 0.0)
+        scatter = np.maximum(
+            uniform_filter1d(square, 2 * SCATTER_SAMPLES + 1, mode="nearest"), 0.0
+        )
         noise = np.sqrt(np.square(HEADING_NOISE) + SCATTER * scatter)
-        weight[known[own]] = np.minimum(1.0, 2.0 * noise / np.maximum(off[own], 1e-9)) / np.square(noise)  # Huber's
+        weight[known[own]] = np.minimum(1.0, 2.0 * noise / np.maximum(off[own], 1e-9)) / np.square(
+            noise
+        )  # Huber's
     return Headings(np.where(np.isfinite(heading), heading, 0.0), weight) if weight.any() else None

@@ -119,19 +119,30 @@ class Quality:
 
     def remarks(self) -> tuple[str, ...]:
         """Return what a person should know before anything is made of the log."""
-        overlaps = [f"encounter {encounter.name}: {overlap}" for encounter in self.encounters for overlap in encounter.overlaps]
+        overlaps = [
+            f"encounter {encounter.name}: {overlap}"
+            for encounter in self.encounters
+            for overlap in encounter.overlaps
+        ]
         return (*self.notes, *overlaps)
 
     def lines(self) -> tuple[str, ...]:
         """Return the summary for people, one fact per line."""
-        out = [f"{self.name}: {self.rows} rows of {len(self.vehicles)} vehicles, {len(self.encounters)} encounter(s)"]
+        out = [
+            f"{self.name}: {self.rows} rows of {len(self.vehicles)} vehicles, {len(self.encounters)} encounter(s)"
+        ]
         out += [f"  {drop}" for drop in self.dropped]
         out += [vehicle_line(vehicle) for vehicle in self.vehicles]
         for encounter in self.encounters:
-            out.append(f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {', '.join(encounter.vehicles)}")
+            out.append(
+                f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {', '.join(encounter.vehicles)}"
+            )
             if encounter.partly:
                 out.append(
-                    "    vehicle " + ", vehicle ".join(f"{name} from {a:.1f} to {b:.1f} s" for name, a, b in encounter.partly)
+                    "    vehicle "
+                    + ", vehicle ".join(
+                        f"{name} from {a:.1f} to {b:.1f} s" for name, a, b in encounter.partly
+                    )
                 )
             out += [f"    {overlap}" for overlap in encounter.overlaps]
         return (*out, *(f"  {note}" for note in self.notes))
@@ -139,7 +150,11 @@ class Quality:
 
 def vehicle_line(vehicle: VehicleQuality) -> str:
     """Return a vehicle's quality in one line."""
-    gaps = f"{vehicle.bridged} gaps bridged (up to {vehicle.longest_bridged:.1f} s)" if vehicle.bridged else "no gaps bridged"
+    gaps = (
+        f"{vehicle.bridged} gaps bridged (up to {vehicle.longest_bridged:.1f} s)"
+        if vehicle.bridged
+        else "no gaps bridged"
+    )
     if vehicle.cut:
         gaps += f", cut at {vehicle.cut} (up to {vehicle.longest_cut:.1f} s)"
     if vehicle.reversals:
@@ -147,7 +162,11 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
     headings = ""
     if math.isfinite(vehicle.headings):
         headings = f"; {100.0 * vehicle.headings:.0f} % of its headings used"
-        headings += f", changed by {math.degrees(vehicle.turned):.1f}° (median)" if math.isfinite(vehicle.turned) else ""
+        headings += (
+            f", changed by {math.degrees(vehicle.turned):.1f}° (median)"
+            if math.isfinite(vehicle.turned)
+            else ""
+        )
     return (
         f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; speed against position "
         f"{vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, "
@@ -159,7 +178,10 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
 def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
     """Return the pairs whose footprints overlap at some sample, with the share of their common samples and the largest area."""
     poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
-    footprints = [corners(poses[n], vehicle.length, vehicle.width) for n, vehicle in enumerate(encounter.vehicles)]
+    footprints = [
+        corners(poses[n], vehicle.length, vehicle.width)
+        for n, vehicle in enumerate(encounter.vehicles)
+    ]
     polygons = [shapely.polygons(each) for each in footprints]
     overlaps = []
     for a, b in combinations(range(len(polygons)), 2):
@@ -167,5 +189,9 @@ def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
         area = area[together(encounter.present, a, b)]
         share = float((area > 0.0).mean()) if len(area) else 0.0
         if share > 0.0:
-            overlaps.append(Overlap(encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())))
+            overlaps.append(
+                Overlap(
+                    encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())
+                )
+            )
     return tuple(overlaps)

@@ -79,7 +79,10 @@ class Observations:
             measured: whether the log has speeds.
         """
         n_speeds = len(rows) if measured else 0
-        fixes, speeds = (states[:, :2], rows, states[:, 2]), (stamps[:n_speeds], states[:n_speeds, 3], rows[:n_speeds])
+        fixes, speeds = (
+            (states[:, :2], rows, states[:, 2]),
+            (stamps[:n_speeds], states[:n_speeds, 3], rows[:n_speeds]),
+        )
         return cls(name, stamps, *fixes, *speeds, *size, kind)
 
 
@@ -161,7 +164,9 @@ def only_file(paths: Sequence[Path], config: LogConfig) -> Path:
         InputError: there are several, or the file is too large.
     """
     if len(paths) != 1:
-        raise InputError(f"{paths[0]} and {len(paths) - 1} more: they have clocks of their own; give one at a time")
+        raise InputError(
+            f"{paths[0]} and {len(paths) - 1} more: they have clocks of their own; give one at a time"
+        )
     check_size(str(paths[0]), paths[0].stat().st_size, 0, config)
     return paths[0]
 

@@ -44,7 +44,11 @@ if TYPE_CHECKING:
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
-OSI = (b"net.asam.osi", b"osi3.", b"ground_truth")  # what is near the beginning or the end of a trace of OSI
+OSI = (
+    b"net.asam.osi",
+    b"osi3.",
+    b"ground_truth",
+)  # what is near the beginning or the end of a trace of OSI
 HEAD_BYTES = 65_536  # bytes
 FAR_M = 200_000.0  # from an origin that is given: there distances are 0.02 % too long
 BSM_ENDINGS = (".json", ".jsonl", ".ndjson", ".txt")
@@ -61,7 +65,9 @@ class LogResult:
     quality: Quality
 
 
-def read_log(path: "Path | str | Sequence[Path | str] | DataFrame", config: LogConfig = LogConfig()) -> LogResult:
+def read_log(
+    path: "Path | str | Sequence[Path | str] | DataFrame", config: LogConfig = LogConfig()
+) -> LogResult:
     """Read a log and cut it into encounters.
 
     Args:
@@ -75,7 +81,10 @@ def read_log(path: "Path | str | Sequence[Path | str] | DataFrame", config: LogC
         InputError: the log cannot be used; the message names the file and the row or topic, and what to do.
     """
     if hasattr(path, "to_csv"):
-        with scratch(temporary()) as folder, naming_objects({str(folder / TABLE): "the DataFrame"}):
+        with (
+            scratch(temporary()) as folder,
+            naming_objects({str(folder / TABLE): "the DataFrame"}),
+        ):
             path.to_csv(folder / TABLE, index=False)
             return read_log(folder / TABLE, config)
     paths = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
@@ -106,7 +115,10 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     said_first = (*notes, *notes_on_drops(log, drops), *drops.notes)
     if len({track.id for track in tracks}) < 2:
         raise NoEncounterError(explain_few_vehicles(log, [track.id for track in tracks], drops))
-    tracks, dt_ns = tuple(sorted(tracks, key=lambda track: natural(track.id))), round(config.period * 1e9)
+    tracks, dt_ns = (
+        tuple(sorted(tracks, key=lambda track: natural(track.id))),
+        round(config.period * 1e9),
+    )
     origin_ns = min(int(track.fix_ns[0]) for track in tracks) // dt_ns * dt_ns
     pieces: list[Piece] = []
     vehicles = []
@@ -115,7 +127,9 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         pieces += own
         vehicles.append(quality)
     if not pieces and any(vehicle.lost for vehicle in vehicles):
-        raise InputError(f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units")
+        raise InputError(
+            f"{log.segments[0].label}: speeds and positions of no vehicle can be reconciled; check their units"
+        )
     pieces, doubts = plausible(pieces, config)
     groups, notes = find_groups(pieces, config)
     if not groups:
@@ -123,7 +137,10 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     notes += doubts
     notes += notes_on_origin(tracks, config)
     notes += notes_on_vehicles(
-        vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.spans}, config
+        vehicles,
+        unusable(log, tracks, config),
+        {pieces[m].track.id for group in groups for m in group.spans},
+        config,
     )
     encounters = []
     for k, group in enumerate(groups):
@@ -137,7 +154,12 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         dropped=drops.of(log),
         vehicles=tuple(vehicles),
         encounters=tuple(encounter_quality(encounter) for encounter in encounters),
-        notes=(*remarks_on_units(pieces, origin_ns, config), *said_first, *log.notes, *dict.fromkeys(notes)),
+        notes=(
+            *remarks_on_units(pieces, origin_ns, config),
+            *said_first,
+            *log.notes,
+            *dict.fromkeys(notes),
+        ),
     )
     return LogResult(tuple(encounters), summary)
 
@@ -152,7 +174,9 @@ def notes_on_drops(log: RawLog, drops: Drops) -> tuple[str, ...]:
     """Return a note if more than `MUCH` of the rows were left out, with the causes."""
     if sum(drops.count.values()) <= MUCH * log.rows:
         return ()
-    return (f"of {log.rows} rows there are left out, or sorted: {'; '.join(map(str, drops.of(log)))}{advice(log, drops)}",)
+    return (
+        f"of {log.rows} rows there are left out, or sorted: {'; '.join(map(str, drops.of(log)))}{advice(log, drops)}",
+    )
 
 
 def advice(log: RawLog, drops: Drops) -> str:
@@ -161,7 +185,11 @@ def advice(log: RawLog, drops: Drops) -> str:
         "speed is above": "the unit of the speeds (speed=…:kmh, …:cmps)",
         "position jumps": "the unit of x, y (x=…:cm,y=…:cm)",
     }
-    checks = [words for why, words in units.items() if any(n > 0.3 * log.rows for own, n in drops.count.items() if why in own)]
+    checks = [
+        words
+        for why, words in units.items()
+        if any(n > 0.3 * log.rows for own, n in drops.count.items() if why in own)
+    ]
     return f": check {' and '.join(checks)} with --set log.columns=…" if checks else ""
 
 
@@ -178,21 +206,37 @@ def notes_on_origin(tracks: Sequence[Observations], config: LogConfig) -> tuple[
 
 
 def notes_on_vehicles(
-    vehicles: Sequence[VehicleQuality], without_positions: list[str], met: set[str], config: LogConfig
+    vehicles: Sequence[VehicleQuality],
+    without_positions: list[str],
+    met: set[str],
+    config: LogConfig,
 ) -> tuple[str, ...]:
     """Return notes on vehicles that are in no encounter, have no positions, or whose measured speeds are not used."""
     doubted = [v.id for v in vehicles if v.changed > DOUBTED_MPS]
     left = [v for v in vehicles if v.id not in met]
     if len(left) > config.max_vehicles:
-        notes = [f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"]
+        notes = [
+            f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"
+        ]
     else:
-        notes = [f"vehicle {v.id} is in no encounter; it was recorded for {v.seconds:.1f} s" for v in left]
+        notes = [
+            f"vehicle {v.id} is in no encounter; it was recorded for {v.seconds:.1f} s"
+            for v in left
+        ]
     if without_positions:
         notes.append(f"fewer than two usable positions: vehicle {', '.join(without_positions)}")
     notes += [
-        f"vehicle {v.id}: {v.lost:.1f} s are left out, for no motion of a car fits its positions" for v in vehicles if v.lost
+        f"vehicle {v.id}: {v.lost:.1f} s are left out, for no motion of a car fits its positions"
+        for v in vehicles
+        if v.lost
     ]
-    return (*notes, *(f"vehicle {name}: its measured speeds contradict its positions and are not used" for name in doubted))
+    return (
+        *notes,
+        *(
+            f"vehicle {name}: its measured speeds contradict its positions and are not used"
+            for name in doubted
+        ),
+    )
 
 
 def as_recorded(log: RawLog, config: LogConfig) -> LogResult:
@@ -200,7 +244,10 @@ def as_recorded(log: RawLog, config: LogConfig) -> LogResult:
     cut = [between(encounter, config) for encounter in log.encounters]
     encounters = tuple(encounter for encounter, _ in cut)
     notes = (*log.notes, *(note for _, notes in cut for note in notes))
-    return LogResult(encounters, Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), notes))
+    return LogResult(
+        encounters,
+        Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), notes),
+    )
 
 
 def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[str, ...]]:
@@ -212,13 +259,19 @@ def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[s
     ids = [vehicle.id for vehicle in encounter.vehicles]
     requested = [ids.index(name) for name in picked(ids, config, encounter.name)]
     if config.start >= encounter.duration:
-        raise InputError(f"parameter start is {config.start:g} s, but {encounter.name} is only {encounter.duration:.1f} s long")
+        raise InputError(
+            f"parameter start is {config.start:g} s, but {encounter.name} is only {encounter.duration:.1f} s long"
+        )
     first = math.ceil(config.start / encounter.dt - 1e-9)
     last = math.floor(config.end / encounter.dt + 1e-9) + 1 if config.end else len(encounter.time)
     last = min(last, len(encounter.time))
     inside = cut(encounter.present, first, last)
     rows = [n for n in requested if inside[n, 1] > inside[n, 0]]
-    notes = tuple(f"vehicle {ids[n]} is left out: it is not recorded in the requested time" for n in requested if n not in rows)
+    notes = tuple(
+        f"vehicle {ids[n]} is left out: it is not recorded in the requested time"
+        for n in requested
+        if n not in rows
+    )
     if len(rows) < 2:
         raise InputError(
             f"encounter {encounter.name!r}: {len(rows)} of {len(requested)} vehicles are recorded between {config.start:g} s and "
@@ -229,7 +282,10 @@ def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[s
         encounter,
         vehicles=tuple(encounter.vehicles[n] for n in rows),
         start_ns=encounter.start_ns + first * encounter.dt_ns,
-        **{name: getattr(encounter, name)[rows, first:last] for name in ("position", "heading", "speed")},
+        **{
+            name: getattr(encounter, name)[rows, first:last]
+            for name in ("position", "heading", "speed")
+        },
         present=cut(encounter.present[rows], first, last),
     )
     return chosen, notes
@@ -244,7 +300,9 @@ def encounter_quality(encounter: Encounter) -> EncounterQuality:
         for name, (begin, end) in zip(ids, encounter.present.tolist(), strict=True)
         if (begin, end) != (0, last)
     )
-    return EncounterQuality(encounter.name, ids, encounter.duration, find_overlaps(encounter), partly)
+    return EncounterQuality(
+        encounter.name, ids, encounter.duration, find_overlaps(encounter), partly
+    )
 
 
 def cut_encounter(
@@ -261,14 +319,20 @@ def cut_encounter(
         speed.append(piece.smooth.speed[at])
         facing = piece.smooth.heading[at]
         if np.isnan(facing).any():
-            notes.append(f"vehicle {piece.track.id} never moves and its heading is not recorded: taken as east")
+            notes.append(
+                f"vehicle {piece.track.id} never moves and its heading is not recorded: taken as east"
+            )
             facing = np.zeros(len(facing))
         heading.append(facing)
-    tokens(member.track.id for member in members)  # refuses ids that are one name in ROS, before anything is made of them
+    tokens(
+        member.track.id for member in members
+    )  # refuses ids that are one name in ROS, before anything is made of them
     dt_ns = round(config.period * 1e9)
     encounter = Encounter(
         name=name,
-        vehicles=tuple(Vehicle(p.track.id, p.track.length, p.track.width, p.track.kind) for p in members),
+        vehicles=tuple(
+            Vehicle(p.track.id, p.track.length, p.track.width, p.track.kind) for p in members
+        ),
         start_ns=origin_ns + group.start * dt_ns,
         dt_ns=dt_ns,
         position=np.array(position),
@@ -282,7 +346,9 @@ def cut_encounter(
 
 def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
     """Return the error message on fewer than two vehicles."""
-    causes = "; ".join((*(note for note in log.notes if note.startswith("left out: ")), *map(str, drops.of(log))))
+    causes = "; ".join(
+        (*(note for note in log.notes if note.startswith("left out: ")), *map(str, drops.of(log)))
+    )
     have = f"only vehicle {names[0]}" if names else "no vehicle"
     return (
         f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock. "
@@ -297,23 +363,32 @@ def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig
         f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.min_duration:g} s while one "
         f"drives {config.travel:g} m"
     )
-    pairs = [(a, b) for a, b in combinations(pieces, 2) if a.track.id != b.track.id and np.isfinite(distances(a, b)).any()]
+    pairs = [
+        (a, b)
+        for a, b in combinations(pieces, 2)
+        if a.track.id != b.track.id and np.isfinite(distances(a, b)).any()
+    ]
     if not pairs:
         return f"{rule}: no two vehicles are recorded at the same time and site"
     met = [(*time_near(a, b, config), a.track.id, b.track.id) for a, b in pairs]
     seconds, travel, nearest, first, second = max(met, key=lambda one: (one[0], one[1], -one[2]))
     if seconds <= 0.0:
         nearest, first, second = min(one[2:] for one in met)
-        long_enough = [apart for a, b in pairs if len(apart := distances(a, b)) > ticks(config.min_duration, config)]
+        long_enough = [
+            apart
+            for a, b in pairs
+            if len(apart := distances(a, b)) > ticks(config.min_duration, config)
+        ]
         remedy = "none is recorded beside another for that long"
         if long_enough:
             width = ticks(config.min_duration, config) + 2
-            reach = min(float(sliding_window_view(np.pad(apart, 1, "edge"), width).max(axis=1).min()) for apart in long_enough)
+            reach = min(
+                float(sliding_window_view(np.pad(apart, 1, "edge"), width).max(axis=1).min())
+                for apart in long_enough
+            )
             remedy = f"--set log.proximity={math.ceil(reach / 10.0 + 1e-9) * 10} takes two"
         return f"{rule}. Vehicles {first} and {second} come closest, to {nearest:.0f} m; {remedy}"
-    near = (
-        f"Vehicles {first} and {second} are within {config.proximity:g} m for {seconds:.1f} s and come as near as {nearest:.0f} m"
-    )
+    near = f"Vehicles {first} and {second} are within {config.proximity:g} m for {seconds:.1f} s and come as near as {nearest:.0f} m"
     if seconds < config.min_duration:
         return f"{rule}. {near}; --set log.min_duration={math.floor(10.0 * seconds) / 10.0:g} takes them"
     if travel < config.travel:
@@ -324,9 +399,16 @@ def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig
 def time_near(a: Piece, b: Piece, config: LogConfig) -> tuple[float, float, float]:
     """Return how long two pieces are near each other at a stretch [s], how far one drives in it, how near they come [m]."""
     apart, begin = distances(a, b), max(a.first, b.first)
-    spans = [(last - 1 - first, begin + first, begin + last) for first, last in runs(apart < config.proximity)]
+    spans = [
+        (last - 1 - first, begin + first, begin + last)
+        for first, last in runs(apart < config.proximity)
+    ]
     near, first, last = max(spans, default=(0, begin, begin))
-    return near * config.period, max(driven(a, first, last, config), driven(b, first, last, config)), float(apart.min())
+    return (
+        near * config.period,
+        max(driven(a, first, last, config), driven(b, first, last, config)),
+        float(apart.min()),
+    )
 
 
 def is_bag(path: Path) -> bool:
@@ -343,7 +425,11 @@ def is_osi(path: Path) -> bool:
         file.seek(max(path.stat().st_size - HEAD_BYTES, 0))
         tail = file.read(HEAD_BYTES)
     profile = head[17 : 17 + 8]  # after the header's length
-    return head.startswith(MCAP) and profile != b"\x04\0\0\0ros2" and any(sign in part for sign in OSI for part in (head, tail))
+    return (
+        head.startswith(MCAP)
+        and profile != b"\x04\0\0\0ros2"
+        and any(sign in part for sign in OSI for part in (head, tail))
+    )
 
 
 def is_spmd(path: Path) -> bool:
@@ -353,7 +439,9 @@ def is_spmd(path: Path) -> bool:
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         fields = file.readline(LONGEST_HEADER).split(",")
     try:
-        return len(fields) == SPMD_FIELDS and bool([float(field.strip() or "nan") for field in fields])
+        return len(fields) == SPMD_FIELDS and bool(
+            [float(field.strip() or "nan") for field in fields]
+        )
     except ValueError:
         return False
 
@@ -362,7 +450,9 @@ def is_bsm(path: Path) -> bool:
     """Return whether a file is of basic safety messages, in JSON or in a table made of it, by its name and beginning."""
     if path.suffix.lower() not in (*BSM_ENDINGS, ".csv") or not path.is_file():
         return False
-    return (b"coredata_position_lat" if path.suffix.lower() == ".csv" else b'"coredata"') in beginning(path).lower()
+    return (
+        b"coredata_position_lat" if path.suffix.lower() == ".csv" else b'"coredata"'
+    ) in beginning(path).lower()
 
 
 def is_fcd(path: Path) -> bool:
@@ -425,10 +515,14 @@ class LogFormat:
     read: Reader
 
 
-FORMATS = Registry[LogFormat](
+FORMATS = Registry[
+    LogFormat
+](
     "scenario_gen.logs",
     {  # tried in this order: a table without a header is SPMD, and a trace of OSI has the name of a bag's file
-        "osi": LogFormat(is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))),
+        "osi": LogFormat(
+            is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))
+        ),
         "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
         "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
         "openscenario": LogFormat(is_openscenario, late("adapters.openscenario")),
@@ -457,14 +551,18 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
         found = [file for path in paths for file in present(path)]
     with unpacked(found, config) as files:
         log = _read_files([file for path in files for file in present(path)], config)
-        return replace(log, segments=tuple(replace(one, label=renamed(one.label)) for one in log.segments))
+        return replace(
+            log, segments=tuple(replace(one, label=renamed(one.label)) for one in log.segments)
+        )
 
 
 def _read_files(files: Sequence[Path], config: LogConfig) -> RawLog:
     """Read one log from files as `read_raw` does."""
     with guarded(str(files[0]), OSError):
         if config.format == "auto":
-            known = next((known for known in FORMATS.values() if all(map(known.accepts, files))), None)
+            known = next(
+                (known for known in FORMATS.values() if all(map(known.accepts, files))), None
+            )
         else:
             known = FORMATS[config.format]
     if known is None:
@@ -487,7 +585,9 @@ def present(path: Path) -> list[Path]:
     if not path.exists():
         beside = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
         local(path, "a log")
-        raise InputError(f"{path} does not exist; check the name and the folder{did_you_mean(path.name, beside)}")
+        raise InputError(
+            f"{path} does not exist; check the name and the folder{did_you_mean(path.name, beside)}"
+        )
     if not (path.is_file() or path.is_dir()):
         raise InputError(f"{path} is neither a file nor a folder")
     if path.is_dir() and not any(path.iterdir()):
@@ -497,4 +597,8 @@ def present(path: Path) -> list[Path]:
     if path.is_file() or is_bag(path):
         return [path]
     tables = {file for file in path.iterdir() if is_table(file) and file.stat().st_size}
-    return sorted(file for file in tables if without_packing(file) == file or without_packing(file) not in tables) or [path]
+    return sorted(
+        file
+        for file in tables
+        if without_packing(file) == file or without_packing(file) not in tables
+    ) or [path]

@@ -21,11 +21,22 @@ from scipy.ndimage import median_filter
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.path import differences, fit_path, Headings, headings_of, MOVES_MPS, observe, Path, straight_path
+from scenario_gen.logs.path import (
+    differences,
+    fit_path,
+    Headings,
+    headings_of,
+    MOVES_MPS,
+    observe,
+    Path,
+    straight_path,
+)
 from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Bools, Floats, Ints, runs, wrap_angle
 
-STANDS_MPS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
+STANDS_MPS = (
+    0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
+)
 STILL_MPS = 0.1  # m/s: below this it is not on its way to or from standing
 SHIFTED_M = 1.0  # m: if fixes move further while the speed is zero, the speed is wrong
 DOUBTED_MPS = 3.0  # a speed that differs more from that of the fixes is not used in the first layout; if most do, none is used
@@ -53,17 +64,28 @@ class Motion:
         """Set the program up; the speed is zero at the ticks of which `stands` (T,) is true."""
         dt = config.period
         self.dt, self.ticks = dt, len(stands)
-        self.variable = np.concatenate([[0], np.cumsum(~stands)])  # v_i = 0 makes c_{i+1} the variable of c_i
+        self.variable = np.concatenate(
+            [[0], np.cumsum(~stands)]
+        )  # v_i = 0 makes c_{i+1} the variable of c_i
         self.size = int(self.variable[-1]) + 1
         first, second, third = (self._differences(order) for order in (1, 2, 3))
-        speed, change = (first[0], first[1] * (1.0 / dt)), (second[0], second[1] * (1.0 / np.square(dt)))
+        speed, change = (
+            (first[0], first[1] * (1.0 / dt)),
+            (second[0], second[1] * (1.0 / np.square(dt))),
+        )
         self.prior = np.zeros((4, self.size + 3))
         weight = np.full(len(third[0]), dt / (config.jerk * dt**3) ** 2)
         observe(self.prior, np.zeros(self.size + 3), *third, 1, weight, np.zeros(len(weight)))
         blocks = (speed[0], -speed[1]), change, (change[0], -change[1])
-        self.bounds = np.repeat([0.0, config.acceleration_limit, config.braking_limit], [len(block[0]) for block in blocks])
+        self.bounds = np.repeat(
+            [0.0, config.acceleration_limit, config.braking_limit],
+            [len(block[0]) for block in blocks],
+        )
         above = np.cumsum([0, *(len(block[0]) for block in blocks)])
-        rows = [np.repeat(top + np.arange(len(at)), values.shape[1]) for top, (at, values) in zip(above, blocks, strict=False)]
+        rows = [
+            np.repeat(top + np.arange(len(at)), values.shape[1])
+            for top, (at, values) in zip(above, blocks, strict=False)
+        ]
         columns = [(at[:, None] + np.arange(values.shape[1])).ravel() for at, values in blocks]
         entries = np.concatenate([values.ravel() for _, values in blocks])
         some = entries != 0.0  # merged variables leave the last places of a row empty
@@ -73,7 +95,10 @@ class Motion:
     def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
         """Rows (F, E) over the coefficients from `tick` (F,) on, as the first variable (F,) and rows (F, E) from there."""
         out = np.zeros(weights.shape)
-        column = self.variable[tick[:, None] + np.arange(weights.shape[1])] - self.variable[tick][:, None]
+        column = (
+            self.variable[tick[:, None] + np.arange(weights.shape[1])]
+            - self.variable[tick][:, None]
+        )
         np.add.at(out, (np.arange(len(tick))[:, None], column), weights)
         return self.variable[tick], out
 
@@ -82,7 +107,9 @@ class Motion:
         tick = np.arange(len(self.variable) - order)
         return self._merged(tick, differences(len(self.variable), order))
 
-    def _weights(self, seconds: Floats, *, speed: bool = False) -> tuple[Ints, tuple[Floats, Floats, Floats]]:
+    def _weights(
+        self, seconds: Floats, *, speed: bool = False
+    ) -> tuple[Ints, tuple[Floats, Floats, Floats]]:
         """The first of the three coefficients that count at any times (F,), and the weights (F,) of each: place or speed."""
         tick = np.clip(np.floor(seconds / self.dt).astype(np.int64), 0, max(self.ticks - 2, 0))
         u = seconds / self.dt - tick
@@ -102,27 +129,48 @@ class Motion:
         quadratic, linear = self.prior.copy(), np.zeros(self.size + 3)
         for seconds, values, deviation, speed in observed:
             tick, weights = self._weights(seconds, speed=speed)
-            observe(quadratic, linear, *self._merged(tick, np.column_stack(weights)), 1, 1.0 / np.square(deviation), values)
-        upper = sparse.dia_array((quadratic[:, : self.size], -np.arange(4)), (self.size, self.size)).T.tocsc()
+            observe(
+                quadratic,
+                linear,
+                *self._merged(tick, np.column_stack(weights)),
+                1,
+                1.0 / np.square(deviation),
+                values,
+            )
+        upper = sparse.dia_array(
+            (quadratic[:, : self.size], -np.arange(4)), (self.size, self.size)
+        ).T.tocsc()
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
         cones = [clarabel.NonnegativeConeT(len(self.bounds))]
-        for scaled in (True, False):  # fixes seconds apart leave the matrix such that its scaling makes it worse
+        for scaled in (
+            True,
+            False,
+        ):  # fixes seconds apart leave the matrix such that its scaling makes it worse
             settings.equilibrate_enable = scaled
-            solver = clarabel.DefaultSolver(upper, -linear[: self.size], self.constraints, self.bounds, cones, settings)
+            solver = clarabel.DefaultSolver(
+                upper, -linear[: self.size], self.constraints, self.bounds, cones, settings
+            )
             solution = solver.solve()
-            if solution.status in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+            if solution.status in (
+                clarabel.SolverStatus.Solved,
+                clarabel.SolverStatus.AlmostSolved,
+            ):
                 break
         else:
             raise UnreconciledError("speeds and positions cannot be reconciled; check their units")
-        merged = np.maximum.accumulate(np.asarray(solution.x))  # within the solver's tolerance it may run backwards
+        merged = np.maximum.accumulate(
+            np.asarray(solution.x)
+        )  # within the solver's tolerance it may run backwards
         return np.asarray(merged[self.variable])
 
     def place(self, coefficients: Floats, seconds: Floats) -> Floats:
         """Return the distances driven (F,) [m] at any times (F,) [s], of coefficients (T+1,)."""
         tick, (w0, w1, w2) = self._weights(seconds)
-        place: Floats = w0 * coefficients[tick] + w1 * coefficients[tick + 1] + w2 * coefficients[tick + 2]
+        place: Floats = (
+            w0 * coefficients[tick] + w1 * coefficients[tick + 1] + w2 * coefficients[tick + 2]
+        )
         return place
 
     def at_ticks(self, coefficients: Floats) -> tuple[Floats, Floats]:
@@ -186,7 +234,9 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
     deviation = config.speed_noise or float(np.clip(white_equivalent(differs), 0.3, 3.0))
     trusted = len(piece.speed) > 0 and np.median(np.abs(differs)) <= max(DOUBTED_MPS, 5.0 * noise)
     measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if trusted else []
-    guess = layout(ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t)
+    guess = layout(
+        ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t
+    )
     weight = np.ones(len(fix_t))
     headings = None
     for _ in range(ROUNDS):
@@ -195,8 +245,12 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         coefficients = motion.solve([*measured, (fix_t, place, noise / np.sqrt(weight), False)])
         guess = motion.place(coefficients, fix_t)
         if not config.position_noise:
-            noise = noise_about(first_noise, np.interp(fix_t, ticks, stands) < 0.5, aside, place - guess)
-        weight = np.minimum(1.0, 2.0 * noise / np.maximum(np.hypot(aside, place - guess), 1e-9))  # Huber's
+            noise = noise_about(
+                first_noise, np.interp(fix_t, ticks, stands) < 0.5, aside, place - guess
+            )
+        weight = np.minimum(
+            1.0, 2.0 * noise / np.maximum(np.hypot(aside, place - guess), 1e-9)
+        )  # Huber's
         headings = headings_of(piece.heading, path.pose(guess)[1], np.gradient(guess, fix_t))
     place, published = motion.at_ticks(coefficients)
     position, heading = path.pose(place)
@@ -215,7 +269,11 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         moved=np.hypot(*(piece.fix - path.pose(guess)[0]).T),
         noise=noise,
         turned=wrap_angle(piece.heading[rolls] - np.interp(fix_t[rolls], ticks, heading)),
-        headings=known[known] if np.ptp(place) < STRAIGHT_M else (headings.weight > 0.0)[known] if headings else ~known[known],
+        headings=known[known]
+        if np.ptp(place) < STRAIGHT_M
+        else (headings.weight > 0.0)[known]
+        if headings
+        else ~known[known],
     )
 
 
@@ -243,7 +301,14 @@ def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Fl
     return guess
 
 
-def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float, speed: Floats, headings: Headings | None) -> Path:
+def path_of(
+    guess: Floats,
+    piece: Observations,
+    weight: Floats,
+    noise: float,
+    speed: Floats,
+    headings: Headings | None,
+) -> Path:
     """Fit the path; one too short to have a shape is straight, in the recorded heading where there is one.
 
     Args:
@@ -286,9 +351,17 @@ def estimated_noise(fix: Floats) -> float:
         return 0.5
     lag = np.arange(-half, half + 1)
     square = np.square(lag) - np.square(lag).mean()
-    parabola = 1.0 / len(lag) - np.square(lag).mean() * square / np.square(square).sum()  # the fitted parabola's value at lag 0
+    parabola = (
+        1.0 / len(lag) - np.square(lag).mean() * square / np.square(square).sum()
+    )  # the fitted parabola's value at lag 0
     residual = fix[half : len(fix) - half] - sliding_window_view(fix, len(lag), axis=0) @ parabola
-    return float(np.clip(max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])), LEAST_NOISE, MOST_NOISE))
+    return float(
+        np.clip(
+            max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])),
+            LEAST_NOISE,
+            MOST_NOISE,
+        )
+    )
 
 
 def noise_about(guess: float, moves: Bools, aside: Floats, ahead: Floats) -> float:
@@ -341,7 +414,9 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
     smooth = median_filter(np.interp(ticks, speed_t, speed), 2 * half + 1, mode="nearest")
     stands = np.zeros(len(ticks), dtype=bool)
     for begin, end in runs(smooth < STANDS_MPS):
-        still = begin + np.flatnonzero(smooth[begin:end] <= max(STILL_MPS, 1.5 * float(np.median(smooth[begin:end]))))
+        still = begin + np.flatnonzero(
+            smooth[begin:end] <= max(STILL_MPS, 1.5 * float(np.median(smooth[begin:end])))
+        )
         begin, end = int(still[0]), int(still[-1]) + 1  # noqa: PLW2901 - rolling before and after the stop is not standing
         inside = fix[(fix_t >= ticks[begin]) & (fix_t <= ticks[end - 1])]
         k = max(len(inside) // 5, 1)

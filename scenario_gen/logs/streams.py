@@ -21,7 +21,9 @@ from scenario_gen.logs.smoothing import speed_of_fixes
 from scenario_gen.types import Sample, Vehicle
 
 WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to distinguish a jump from a new place
-FAR_NS = 10_000_000_000  # a stamp this far from the newest one belongs to another time, or is wrong
+FAR_NS = (
+    10_000_000_000  # a stamp this far from the newest one belongs to another time, or is wrong
+)
 MAX_PER_SECOND = 100  # messages of one kind per vehicle and second that are kept
 EVERY = 2  # ticks that are sampled at once, after one cleaning
 
@@ -131,7 +133,9 @@ class Streams:
 
     def _tracks(self) -> tuple[Observations, ...]:
         """Clean the last seconds."""
-        names = sorted((name for name, rows in self._recent.items() if len(rows.fixes) >= 2), key=natural)
+        names = sorted(
+            (name for name, rows in self._recent.items() if len(rows.fixes) >= 2), key=natural
+        )
         log = self._log("streams", {name: self._recent[name] for name in names})
         if not any(np.isfinite(vehicle.fix).all(axis=1).any() for vehicle in log.vehicles):
             return ()
@@ -140,11 +144,17 @@ class Streams:
     def _awaited(self, track: Observations, tick: int) -> bool:
         """Return whether a vehicle's next fix may still come: its source may be slower than the others."""
         silent = (self._newest - self._late_ns - int(track.fix_ns[-1])) * 1e-9
-        return bool(track.fix_ns[-1] < tick) and silent <= longest_bridge(np.diff(track.fix_ns) * 1e-9, self._config)
+        return bool(track.fix_ns[-1] < tick) and silent <= longest_bridge(
+            np.diff(track.fix_ns) * 1e-9, self._config
+        )
 
     def _place(self, vehicle: str) -> str:
         """Return the first sound fix of a vehicle, to about a metre, as an origin for all that follows."""
-        on_globe = (row for row in self._recent[vehicle].fixes if 0.0 < abs(row[2]) <= 90.0 and abs(row[3]) <= 180.0)
+        on_globe = (
+            row
+            for row in self._recent[vehicle].fixes
+            if 0.0 < abs(row[2]) <= 90.0 and abs(row[3]) <= 180.0
+        )
         _, _, latitude, longitude, _ = min(on_globe)
         return f"{latitude:.5f},{longitude:.5f}"
 
@@ -177,9 +187,15 @@ def sample_at(tracks: Sequence[Observations], stamp_ns: int, config: LogConfig) 
     vehicles, position, speed = [], [], []
     for track in tracks:
         after = int(np.searchsorted(track.fix_ns, stamp_ns))
-        before = after if after < len(track.fix_ns) and track.fix_ns[after] == stamp_ns else after - 1
+        before = (
+            after if after < len(track.fix_ns) and track.fix_ns[after] == stamp_ns else after - 1
+        )
         seconds = np.diff(track.fix_ns) * 1e-9
-        if before < 0 or after == len(track.fix_ns) or seconds[before:after].sum() > longest_bridge(seconds, config):
+        if (
+            before < 0
+            or after == len(track.fix_ns)
+            or seconds[before:after].sum() > longest_bridge(seconds, config)
+        ):
             continue
         vehicles.append(Vehicle(track.id, track.length, track.width))
         position.append([np.interp(stamp_ns, track.fix_ns, axis) for axis in track.fix.T])
@@ -187,5 +203,15 @@ def sample_at(tracks: Sequence[Observations], stamp_ns: int, config: LogConfig) 
             speed.append(np.interp(stamp_ns, track.speed_ns, track.speed))
         else:
             clock = (track.fix_ns - track.fix_ns[0]) * 1e-9
-            speed.append(np.interp((stamp_ns - int(track.fix_ns[0])) * 1e-9, clock, speed_of_fixes(clock, track.fix)))
-    return Sample(stamp_ns, tuple(vehicles), np.array(position), np.array(speed)) if len(vehicles) >= 2 else None
+            speed.append(
+                np.interp(
+                    (stamp_ns - int(track.fix_ns[0])) * 1e-9,
+                    clock,
+                    speed_of_fixes(clock, track.fix),
+                )
+            )
+    return (
+        Sample(stamp_ns, tuple(vehicles), np.array(position), np.array(speed))
+        if len(vehicles) >= 2
+        else None
+    )

@@ -27,9 +27,22 @@ NOW = 3e8, 4e9  # s since 1970: from 1979 to 2096
 FEW_ROWS = 10  # of which each may be of a vehicle of its own
 STILL_M = 0.05  # that no vehicle of an encounter drives
 LONGEST_NUMBER = 300  # characters
-EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
+EPOCH_NS = (
+    1_072_915_200 * 10**9
+)  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
-    *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
+    *(
+        "RxDevice",
+        "FileId",
+        "TxDevice",
+        "Gentime",
+        "TxRandom",
+        "MsgCount",
+        "DSecond",
+        "Latitude",
+        "Longitude",
+        "Elevation",
+    ),
     *("Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"),
 )
 QUANTITIES = {
@@ -57,13 +70,19 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
     for path in paths:
         size += path.stat().st_size
         check_size(str(path), size, row, config)
-        frames.append(read_messages(path, row, config) if spmd else read_columns(path, row, config, notes))
+        frames.append(
+            read_messages(path, row, config) if spmd else read_columns(path, row, config, notes)
+        )
         if "vehicle" not in frames[-1]:
             frames[-1]["vehicle"] = "0" if len(paths) == 1 else path.stem
-        segments.append(segment_of(path, row, header=0 if spmd else 1 + frames[-1].attrs.get("above", 0)))
+        segments.append(
+            segment_of(path, row, header=0 if spmd else 1 + frames[-1].attrs.get("above", 0))
+        )
         row += len(frames[-1])
     if len({"lat" in frame for frame in frames}) > 1:
-        raise InputError(f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one")
+        raise InputError(
+            f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one"
+        )
     log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
     return replace(log, notes=(*dict.fromkeys(notes), *log.notes))
 
@@ -89,14 +108,32 @@ def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -
     else:
         layout = layout_of(path)
         notes += layout.notes
-        form = {"encoding": layout.encoding, "sep": layout.separator, "decimal": layout.decimal, "skiprows": layout.above}
+        form = {
+            "encoding": layout.encoding,
+            "sep": layout.separator,
+            "decimal": layout.decimal,
+            "skiprows": layout.above,
+        }
         header = [str(name) for name in read_text(path, before, config, **form, nrows=0).columns]
         columns = find_columns(header, path, config.columns)
-        texts = {columns[quantity].name: object for quantity in ("vehicle", "kind") if quantity in columns}
-        frame = read_text(path, before, config, **form, dtype=texts)  # a number of 64 bits, or in hexadecimal, is no float64
+        texts = {
+            columns[quantity].name: object
+            for quantity in ("vehicle", "kind")
+            if quantity in columns
+        }
+        frame = read_text(
+            path, before, config, **form, dtype=texts
+        )  # a number of 64 bits, or in hexadecimal, is no float64
         above = layout.above
-    if "kind" in columns and not columns["kind"].types and len(kinds := reals(frame[columns["kind"].name]).dropna().unique()):
-        name, some = columns.pop("kind").name, ", ".join(f"{kind:g}" for kind in sorted(kinds)[:SHOWN])
+    if (
+        "kind" in columns
+        and not columns["kind"].types
+        and len(kinds := reals(frame[columns["kind"].name]).dropna().unique())
+    ):
+        name, some = (
+            columns.pop("kind").name,
+            ", ".join(f"{kind:g}" for kind in sorted(kinds)[:SHOWN]),
+        )
         notes.append(
             f"column {name} has numbers ({some}), whose meaning is not known: all are read by their sizes; name it with, say, "
             f"--set log.columns=kind={name}:car1+truck2"
@@ -110,7 +147,9 @@ def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -
     return numbers
 
 
-def check_ids(frame: pd.DataFrame, columns: dict[str, Column], numbers: pd.DataFrame, path: Path) -> None:
+def check_ids(
+    frame: pd.DataFrame, columns: dict[str, Column], numbers: pd.DataFrame, path: Path
+) -> None:
     """Check that a table without a column for the vehicle is of one vehicle, and that such a column does not number the rows.
 
     Raises:
@@ -118,25 +157,41 @@ def check_ids(frame: pd.DataFrame, columns: dict[str, Column], numbers: pd.DataF
     """
     time = numbers["time"]
     if "vehicle" not in columns:
-        sound, fault = time.nunique() > len(time) / 2 + 1, "several rows have the same time, and no column names the vehicle"
+        sound, fault = (
+            time.nunique() > len(time) / 2 + 1,
+            "several rows have the same time, and no column names the vehicle",
+        )
     else:
         sound = len(time) < FEW_ROWS or numbers["vehicle"].nunique() < len(time)
-        fault = f"the column {columns['vehicle'].name!r} is another one in each row, and so no vehicle"
+        fault = (
+            f"the column {columns['vehicle'].name!r} is another one in each row, and so no vehicle"
+        )
     if sound:
         return
-    unused = [name for name in frame.columns if name not in {column.name for column in columns.values()}]
+    unused = [
+        name for name in frame.columns if name not in {column.name for column in columns.values()}
+    ]
     could = [
         str(name)
         for name in unused
-        if 2 <= frame[name].nunique() <= len(frame) / 2 and not pd.DataFrame({"t": time, "v": frame[name]}).duplicated().any()
+        if 2 <= frame[name].nunique() <= len(frame) / 2
+        and not pd.DataFrame({"t": time, "v": frame[name]}).duplicated().any()
     ]
-    remedy = f"it could be {' or '.join(could)}: --set log.columns=vehicle={could[0]}" if could else "add a column `id`"
+    remedy = (
+        f"it could be {' or '.join(could)}: --set log.columns=vehicle={could[0]}"
+        if could
+        else "add a column `id`"
+    )
     raise InputError(f"{path}: {fault}; {remedy}")
 
 
 def segment_of(path: Path, row: int, *, header: int = 1) -> Segment:
     """Return the place of a file's rows, the first of which is `row` of the log, after so many lines of text."""
-    return Segment(row, str(path), "row", 1) if path.suffix.lower() in PARQUET else Segment(row, str(path), "line", 1 + header)
+    return (
+        Segment(row, str(path), "row", 1)
+        if path.suffix.lower() in PARQUET
+        else Segment(row, str(path), "line", 1 + header)
+    )
 
 
 def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.DataFrame:
@@ -156,12 +211,16 @@ def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.
                 **{"nrows": config.row_limit - before + 1} | options,
             )
         except UnicodeDecodeError as error:
-            raise InputError(f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+            raise InputError(
+                f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8"
+            ) from error
     check_size(str(path), 0, before + len(frame), config)
     if frame.empty and options.get("nrows") != 0:
         raise InputError(f"{path} has a header but no rows")
     if not isinstance(frame.index, pd.RangeIndex):
-        raise InputError(f"{path}: the rows have more fields than the header; name every column, and write 0.5, not 0,5")
+        raise InputError(
+            f"{path}: the rows have more fields than the header; name every column, and write 0.5, not 0,5"
+        )
     return frame
 
 
@@ -175,14 +234,22 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
     for quantity, column in columns.items():
         values = frame[column.name]
         if isinstance(values, pd.DataFrame):
-            raise InputError(f"{path} has more than one column {column.name!r}; rename all but one")
+            raise InputError(
+                f"{path} has more than one column {column.name!r}; rename all but one"
+            )
         if quantity == "vehicle":
             out["vehicle"] = vehicle_names(values)
         elif quantity == "kind":
             words = values.astype(str)
-            out["kind"] = reals(values).map(dict(column.types)).fillna("unnamed " + words) if column.types else words
+            out["kind"] = (
+                reals(values).map(dict(column.types)).fillna("unnamed " + words)
+                if column.types
+                else words
+            )
         elif pd.api.types.is_bool_dtype(values):
-            raise InputError(f"{path}, column {column.name!r} ({quantity}): true or false is no {quantity}; name another column")
+            raise InputError(
+                f"{path}, column {column.name!r} ({quantity}): true or false is no {quantity}; name another column"
+            )
         elif quantity == "time":
             out["time"], out["time_ok"] = nanoseconds(values, column.factor)
             check_stamps(values, out["time"], out["time_ok"], column, path)
@@ -192,14 +259,18 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
                 degrees = np.trunc(numbers / 100.0)
                 numbers = degrees + (numbers - 100.0 * degrees) / 60.0
             numbers = numbers * abs(column.factor)
-            out[quantity] = math.copysign(1.0, column.factor) * ((math.pi / 2.0 - numbers) if column.clockwise else numbers)
+            out[quantity] = math.copysign(1.0, column.factor) * (
+                (math.pi / 2.0 - numbers) if column.clockwise else numbers
+            )
     return out
 
 
 def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
     """Return numbers, or texts that are numbers, as float64; NaN where they are none."""
     if not pd.api.types.is_numeric_dtype(values):
-        values = values.where(values.astype(str).str.len() < LONGEST_NUMBER)  # pandas fails on a number beyond float64
+        values = values.where(
+            values.astype(str).str.len() < LONGEST_NUMBER
+        )  # pandas fails on a number beyond float64
     return pd.to_numeric(values, errors="coerce").astype(float)
 
 
@@ -217,10 +288,20 @@ def vehicle_names(values: "pd.Series[Any]") -> "pd.Series[Any]":
     names = values.map(vehicle_name).astype(object)
     known = pd.Series(names.unique(), dtype=object)
     whole = known.str.fullmatch(r"\d{1,300}(\.0*)?") | (known == "")
-    return names.map({name: name and str(int(name.partition(".")[0])) for name in known}) if whole.all() else names
+    return (
+        names.map({name: name and str(int(name.partition(".")[0])) for name in known})
+        if whole.all()
+        else names
+    )
 
 
-def check_stamps(values: "pd.Series[Any]", time: "pd.Series[int]", known: "pd.Series[bool]", column: Column, path: Path) -> None:
+def check_stamps(
+    values: "pd.Series[Any]",
+    time: "pd.Series[int]",
+    known: "pd.Series[bool]",
+    column: Column,
+    path: Path,
+) -> None:
     """Refuse a column of which no value is a stamp, or most are beyond all times: it is in another unit.
 
     Raises:
@@ -229,10 +310,16 @@ def check_stamps(values: "pd.Series[Any]", time: "pd.Series[int]", known: "pd.Se
     first = shown(next(iter(values.dropna()), ""))
     place = f"{path}, column {column.name!r} (time)"
     if not known.any():
-        raise InputError(f"{place}: a stamp is not a number, nor a date such as 2022-08-31T12:00:00.5, but {first!r}")
+        raise InputError(
+            f"{place}: a stamp is not a number, nor a date such as 2022-08-31T12:00:00.5, but {first!r}"
+        )
     if (time.abs() >= round(LATEST_S * 1e9)).mean() > 0.5:
         middle = float(reals(values).abs().median())
-        since = [unit for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if NOW[0] < middle * factor < NOW[1]]
+        since = [
+            unit
+            for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+            if NOW[0] < middle * factor < NOW[1]
+        ]
         if since and column.factor == 1.0:
             raise InputError(
                 f"{place}: {first} looks like {since[0]} since 1970: --set log.columns=time={column.name}:{since[0]}"
@@ -245,9 +332,16 @@ def check_degrees(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -
     Raises:
         InputError: they are.
     """
-    if "x" not in frame or not (frame["x"].abs().max() <= 180.0 and frame["y"].abs().max() <= 90.0):
+    if "x" not in frame or not (
+        frame["x"].abs().max() <= 180.0 and frame["y"].abs().max() <= 90.0
+    ):
         return
-    spread = float(frame.groupby("vehicle" if "vehicle" in frame else frame.index * 0)[["x", "y"]].agg(np.ptp).max().max())
+    spread = float(
+        frame.groupby("vehicle" if "vehicle" in frame else frame.index * 0)[["x", "y"]]
+        .agg(np.ptp)
+        .max()
+        .max()
+    )
     if (
         0.0 < spread < STILL_M
         and frame[["x", "y"]].abs().max().max() > 1.0
@@ -260,7 +354,9 @@ def check_degrees(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -
         )
 
 
-def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int]", "pd.Series[bool]"]:
+def nanoseconds(
+    values: "pd.Series[Any]", factor: float
+) -> tuple["pd.Series[int]", "pd.Series[bool]"]:
     """Return stamps as integer nanoseconds, `LONGEST` where they are beyond it, and which of them are numbers (or dates) at all.
 
     Args:
@@ -269,17 +365,23 @@ def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int
     """
     if pd.api.types.is_integer_dtype(values):
         inside = (values.astype(float).abs() * factor < LATEST_S).astype(bool)
-        return values.where(inside, int(LATEST_S / factor)).astype(np.int64) * round(factor * 1e9), values.notna().astype(bool)
+        return values.where(inside, int(LATEST_S / factor)).astype(np.int64) * round(
+            factor * 1e9
+        ), values.notna().astype(bool)
     numbers = reals(values)
     if numbers.isna().all():
         dates = pd.to_datetime(values, errors="coerce", utc=True, format="ISO8601")
         ticks = dates.fillna(pd.Timestamp(0, tz="UTC")).astype(np.int64)
         return nanoseconds(ticks, UNITS["time"][dates.dt.unit])[0], dates.notna()
     inside = numbers.abs() * factor < LATEST_S
-    return (numbers.where(inside, LATEST_S / factor) * (factor * 1e9)).round().astype(np.int64), numbers.notna()
+    return (numbers.where(inside, LATEST_S / factor) * (factor * 1e9)).round().astype(
+        np.int64
+    ), numbers.notna()
 
 
-def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segment, ...], config: LogConfig) -> RawLog:
+def from_frame(
+    frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segment, ...], config: LogConfig
+) -> RawLog:
     """Group a table in our units by vehicle.
 
     Raises:
@@ -290,7 +392,9 @@ def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segme
     usable = frame["time_ok"].to_numpy() & (frame["vehicle"] != "").to_numpy()
     rows = frame["row"].to_numpy() if "row" in frame else np.arange(len(frame))
     reason = np.where(frame["time_ok"].to_numpy(), "no vehicle", "stamp is not a number")
-    dropped = tuple((str(why), int(row)) for why, row in zip(reason[~usable], rows[~usable], strict=True))
+    dropped = tuple(
+        (str(why), int(row)) for why, row in zip(reason[~usable], rows[~usable], strict=True)
+    )
     position = ("lat", "lon") if geographic else ("x", "y")
     vehicles = []
     frame = frame.assign(row=rows)[usable]
@@ -304,7 +408,9 @@ def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> O
     """Return one vehicle's rows as observations; a row is both a fix and a speed."""
 
     def column(quantity: str) -> Floats:
-        return group[quantity].to_numpy(float) if quantity in group else np.full(len(group), np.nan)
+        return (
+            group[quantity].to_numpy(float) if quantity in group else np.full(len(group), np.nan)
+        )
 
     def median(quantity: str) -> float:
         values = column(quantity)
@@ -318,7 +424,9 @@ def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> O
     rows: Ints = group["row"].to_numpy(np.int64)
     size = median("length"), median("width")
     kind = str(group["kind"].mode().iloc[0]) if "kind" in group else ""
-    return Observations.of_rows(name, stamps, states, rows, size, kind=kind, measured="speed" in group)
+    return Observations.of_rows(
+        name, stamps, states, rows, size, kind=kind, measured="speed" in group
+    )
 
 
 def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:

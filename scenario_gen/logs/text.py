@@ -38,14 +38,25 @@ def layout_of(path: Path) -> Layout:
         start = file.read(4 * LONGEST_HEADER)
     is_utf16 = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     if not is_utf16 and b"\0" in start:
-        raise UnknownFormatError(f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as UTF-8 text")
+        raise UnknownFormatError(
+            f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as UTF-8 text"
+        )
     encoding = "utf-16" if is_utf16 else "utf-8-sig"
     text = start.decode(encoding, errors="replace").splitlines()
     said = (line.strip().strip('"').lower() for line in text)
-    above = next((k for k, line in enumerate(said) if line and not line.startswith(("#", "//", "%", "sep="))), 0)
+    above = next(
+        (
+            k
+            for k, line in enumerate(said)
+            if line and not line.startswith(("#", "//", "%", "sep="))
+        ),
+        0,
+    )
     header, *lines = text[above : above + LOOKED_AT + 1] or [""]
     if len(header) >= LONGEST_HEADER:
-        raise UnknownFormatError(f"{path} is no table: its first line has {LONGEST_HEADER} characters or more")
+        raise UnknownFormatError(
+            f"{path} is no table: its first line has {LONGEST_HEADER} characters or more"
+        )
     separator = max(SEPARATORS, key=header.count)
     if separator not in header and len(header.split()) > 1:
         separator = r"\s+"
@@ -55,7 +66,9 @@ def layout_of(path: Path) -> Layout:
             f"{path}: line {above + 1} has numbers instead of column names; put a line such as {EXAMPLE} above it"
         )
     has_comma = separator != "," and any(
-        WITH_COMMA.fullmatch(field.strip()) for line in lines for field in re.split(separator.replace("|", r"\|"), line)
+        WITH_COMMA.fullmatch(field.strip())
+        for line in lines
+        for field in re.split(separator.replace("|", r"\|"), line)
     )
     notes = ["the file is UTF-16"] if is_utf16 else []
     notes += ["its numbers have a decimal comma"] if has_comma else []

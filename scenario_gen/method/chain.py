@@ -53,9 +53,13 @@ class Chain:
             request=self.request, limits=config.limits,
         )  # fmt: skip
         routes = plan_routes(self.road, fit, config.planning, self.seed, config.limits)
-        return GenerationResult(self.encounter, self.segmentation, self.road, fit, routes, seed=self.seed)
+        return GenerationResult(
+            self.encounter, self.segmentation, self.road, fit, routes, seed=self.seed
+        )
 
-    def sample(self, planned: GenerationResult, callbacks: Callbacks = Callbacks()) -> GenerationResult:
+    def sample(
+        self, planned: GenerationResult, callbacks: Callbacks = Callbacks()
+    ) -> GenerationResult:
         """Sample what was planned; every candidate is checked.
 
         Raises:

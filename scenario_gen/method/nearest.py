@@ -21,8 +21,24 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between
-from scenario_gen.roads import CORRIDOR, draw_route, footprint_fits, ground_for, nearest_pose_with_room, road_and_template
-from scenario_gen.types import Encounter, ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
+from scenario_gen.roads import (
+    CORRIDOR,
+    draw_route,
+    footprint_fits,
+    ground_for,
+    nearest_pose_with_room,
+    road_and_template,
+)
+from scenario_gen.types import (
+    Encounter,
+    ENDS,
+    GenerationResult,
+    Request,
+    Road,
+    State,
+    Vehicle,
+    vehicle_index,
+)
 
 BISECTIONS = 7
 _NAMED = 2  # roads that keep an encounter
@@ -30,8 +46,17 @@ ENOUGH = 10  # valid scenarios by which a request counts as possible, if not few
 _FAR_ENDS = (1.0, 0.75, 0.5, 0.25)  # shares of a way at which a bisection may begin
 _STRETCHES = (0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 FAR_M = 30.0  # m, how far a pose with room is looked for
-_OFFSETS = (0.25 * np.arange(1, 121)).tolist()  # m, by which an overlapping footprint is moved along its heading
-_MARGINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2)  # m, beyond the nearest pose with room, until a pose in whole centimetres has it
+_OFFSETS = (
+    0.25 * np.arange(1, 121)
+).tolist()  # m, by which an overlapping footprint is moved along its heading
+_MARGINS = (
+    0.0,
+    0.01,
+    0.02,
+    0.05,
+    0.1,
+    0.2,
+)  # m, beyond the nearest pose with room, until a pose in whole centimetres has it
 
 
 def elements(request: Request) -> list[tuple[str, str]]:
@@ -54,7 +79,9 @@ def _with_room(road: Road, vehicle: Vehicle, pose: Floats, requested: Floats) ->
     away = (pose - requested)[:2] / np.hypot(*(pose - requested)[:2])
     for margin in _MARGINS:
         tried = np.array([*np.round(pose[:2] + margin * away, 2), requested[2]])
-        if footprint_fits(ground_for(road, vehicle), tried[None], vehicle.length, vehicle.width)[0]:
+        if footprint_fits(ground_for(road, vehicle), tried[None], vehicle.length, vehicle.width)[
+            0
+        ]:
             return tuple(tried.tolist())
     return tuple(pose.tolist())
 
@@ -76,11 +103,16 @@ class ImpossibleError(RefusedError):
 
     def __init__(self, reason: str, suggestions: tuple[Suggestion, ...]) -> None:
         offers = "; or ".join(suggestion.message for suggestion in suggestions)
-        super().__init__(f"{reason}. " + (f"Nearest possible: {offers}" if offers else "No nearby request was found possible"))
+        super().__init__(
+            f"{reason}. "
+            + (f"Nearest possible: {offers}" if offers else "No nearby request was found possible")
+        )
         self.suggestions = suggestions
 
 
-def suggest_nearest(error: RefusedError, requested: Chain, cancelled: Cancelled = lambda: False) -> RefusedError:
+def suggest_nearest(
+    error: RefusedError, requested: Chain, cancelled: Cancelled = lambda: False
+) -> RefusedError:
     """Return a refusal with the nearest requests that are possible, for a command or node to answer with.
 
     Args:
@@ -105,7 +137,13 @@ def suggest_nearest(error: RefusedError, requested: Chain, cancelled: Cancelled 
 
 
 def answer_refusal(
-    error: RefusedError, encounter: Encounter, road: Road | str, config: PipelineConfig, request: Request, count: int, seed: int
+    error: RefusedError,
+    encounter: Encounter,
+    road: Road | str,
+    config: PipelineConfig,
+    request: Request,
+    count: int,
+    seed: int,
 ) -> RefusedError:
     """Return what a command answers when `pipeline.generate` refused these arguments: with the nearest requests or roads."""
     if road == AUTO:
@@ -114,12 +152,18 @@ def answer_refusal(
         return with_suitable_roads(error, encounter, road, config, seed)
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
-    return suggest_nearest(error, Chain(encounter, segmentation, road, config, request, count, seed))
+    return suggest_nearest(
+        error, Chain(encounter, segmentation, road, config, request, count, seed)
+    )
 
 
 def roads_that_keep(requested: Chain) -> list[str]:
     """Names of the built-in roads that the template fits with all its conflicts, two at most; else `corridor`, its own road."""
-    return list(islice(suitable_roads(requested.encounter, requested.segmentation, requested.config), _NAMED)) or [CORRIDOR]
+    return list(
+        islice(
+            suitable_roads(requested.encounter, requested.segmentation, requested.config), _NAMED
+        )
+    ) or [CORRIDOR]
 
 
 class _Search:
@@ -189,7 +233,9 @@ class _Search:
         """The request with each state moved as little as it takes to have room, and its speed within the limit."""
         request = self.requested.request
         for end, name in elements(request):
-            vehicle = self.requested.encounter.vehicles[vehicle_index(self.requested.encounter, name, end)]
+            vehicle = self.requested.encounter.vehicles[
+                vehicle_index(self.requested.encounter, name, end)
+            ]
             state = request.states(end)[name]
             pose = np.array(state[:3])
             ground = ground_for(self.requested.road, vehicle)
@@ -197,7 +243,10 @@ class _Search:
             if answer is not None and answer[1] > 0.0:
                 state = _with_room(self.requested.road, vehicle, answer[0], pose) + state[3:]
             if len(state) == 4:
-                state = (*state[:3], min(state[3], self.requested.config.limits.of(vehicle.type).planned.max_speed))
+                state = (
+                    *state[:3],
+                    min(state[3], self.requested.config.limits.of(vehicle.type).planned.max_speed),
+                )
             request = with_state(request, end, name, state)
         for end, name in elements(request):
             request = self._apart(request, end, name)
@@ -213,7 +262,10 @@ class _Search:
         others = [m for m in range(len(rows)) if m != n and not np.isnan(rows[m, 0])]
 
         def gap(pose: Floats) -> float:
-            gaps = [footprint_gaps(vehicles[n].half, pose[None], vehicles[m].half, rows[[m]])[0][0] for m in others]
+            gaps = [
+                footprint_gaps(vehicles[n].half, pose[None], vehicles[m].half, rows[[m]])[0][0]
+                for m in others
+            ]
             return float(min(gaps, default=np.inf))
 
         state = request.states(end)[name]
@@ -224,7 +276,10 @@ class _Search:
             tried = moved(state, np.array(state[:3]) + offset * ahead)
             pose = np.array(tried[:3])
             fits = footprint_fits(
-                ground_for(self.requested.road, vehicles[n]), pose[None], vehicles[n].length, vehicles[n].width
+                ground_for(self.requested.road, vehicles[n]),
+                pose[None],
+                vehicles[n].length,
+                vehicles[n].width,
             )[0]
             if fits and gap(pose) >= self.requested.config.fitting.clearance:
                 return with_state(request, end, name, tried)
@@ -239,16 +294,23 @@ class _Search:
         base = self.base[end][n] if self.base else None
         if len(state) == 4:
             target = 0.0 if base is None else float(base[3])
-            yield lambda share: with_state(request, end, name, (*state[:3], round(state[3] + share * (target - state[3]), 2)))
+            yield lambda share: with_state(
+                request, end, name, (*state[:3], round(state[3] + share * (target - state[3]), 2))
+            )
         route = self._route(request, n, name)
         if route is not None:
             yield lambda share: with_state(
-                request, end, name, moved(state, route.at((1.0 - share if end == "goals" else share) * route.length))
+                request,
+                end,
+                name,
+                moved(state, route.at((1.0 - share if end == "goals" else share) * route.length)),
             )
         if base is not None:
             turn = angle_between(base[2], state[2])
             step = np.array([base[0] - state[0], base[1] - state[1], turn])
-            yield lambda share: with_state(request, end, name, moved(state, np.array(state[:3]) + share * step))
+            yield lambda share: with_state(
+                request, end, name, moved(state, np.array(state[:3]) + share * step)
+            )
 
     def _all_towards_base(self, request: Request, share: float) -> Request:
         """Every asked state on its way to where the fitting has it: poses, then speeds."""
@@ -270,7 +332,11 @@ class _Search:
             ends.append(self.base[end][n, :3] if requested is None else np.array(requested[:3]))
         vehicle = self.requested.encounter.vehicles[n]
         road = ground_for(self.requested.road, vehicle)
-        return draw_route(ends[0], ends[1], lambda poses: bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all()))
+        return draw_route(
+            ends[0],
+            ends[1],
+            lambda poses: bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all()),
+        )
 
     def _bisected(self, path: Path) -> Request | None:
         """The least change along `path` that is possible, to 1/128 of it; None if even most of it is not enough."""
@@ -286,10 +352,16 @@ class _Search:
     def _stretched(self, request: Request) -> Suggestion | None:
         """The same states on a longer clock."""
         for stretch in _STRETCHES:
-            if stretch > self.requested.config.sampling.max_stretch and self.possible(request, stretch):
+            if stretch > self.requested.config.sampling.max_stretch and self.possible(
+                request, stretch
+            ):
                 before = self.requested.encounter.duration
                 message = f"sampling.max_stretch:={stretch:g} (up to {before * (1.0 + stretch):.1f} s instead of {before:.1f} s)"
-                other = "" if request == self.requested.request else f" with {self._difference(request)}"
+                other = (
+                    ""
+                    if request == self.requested.request
+                    else f" with {self._difference(request)}"
+                )
                 return Suggestion(request, message + other, stretch)
         return None
 

@@ -35,8 +35,15 @@ from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, REC
 LEAST_S = 5.0  # that a new encounter lasts
 TRIES = 40  # pairs that are looked at for each encounter wanted
 RARER = 1.2  # times as far from the middle of the law of the kind as the rarer of the two, at most
-_GAPS_S = (0.5, 1.2, 2.5)  # least time gap τ, that of who never drives in the leader's lane, and greatest
-_OVERLAP_S, _OVERLAP_COST = 8.0, 1.5  # that recordings of leaders overlap, if they are so long; m/s that none of it is worth
+_GAPS_S = (
+    0.5,
+    1.2,
+    2.5,
+)  # least time gap τ, that of who never drives in the leader's lane, and greatest
+_OVERLAP_S, _OVERLAP_COST = (
+    8.0,
+    1.5,
+)  # that recordings of leaders overlap, if they are so long; m/s that none of it is worth
 _STEP = 2  # samples by which one is moved against the other
 _ASIDE_M = 2.2  # of the follower's path, within which the leader is on it
 _BACKWARDS = -0.5  # m/s: who would drive backwards faster than this does not follow
@@ -72,14 +79,28 @@ class Pair:
     @property
     def clears(self) -> float:
         """When [s] the first one has cleared what the second one waits for; of a follower when the first one comes there."""
-        given = [edge.clears for edge in self.reactions if edge.kind == YIELD and math.isfinite(edge.gap)]
-        return given[0] if given else self.conflict.entry_first if self.conflict.following else self.conflict.exit_first
+        given = [
+            edge.clears
+            for edge in self.reactions
+            if edge.kind == YIELD and math.isfinite(edge.gap)
+        ]
+        return (
+            given[0]
+            if given
+            else self.conflict.entry_first
+            if self.conflict.following
+            else self.conflict.exit_first
+        )
 
     @property
     def meeting(self) -> Floats:
         """(3,) the first one's pose where the paths meet."""
         own, end = self.conflict, self.encounter.duration
-        at = own.entry_first if own.following else (own.entry_first + min(own.exit_first, end)) / 2.0
+        at = (
+            own.entry_first
+            if own.following
+            else (own.entry_first + min(own.exit_first, end)) / 2.0
+        )
         return self.motion(own.first, np.array([at]))[0, :3]
 
     def motion(self, n: int, at: Floats) -> Floats:
@@ -97,9 +118,15 @@ class Pair:
 def pair_of(encounter: Encounter) -> Pair | None:
     """Return the pair of an encounter; None if no two of it share an area."""
     member = member_of(encounter, "", 0)
-    if member.kind == APART or member.pair is None or (conflict := conflict_of(encounter, *member.pair)) is None:
+    if (
+        member.kind == APART
+        or member.pair is None
+        or (conflict := conflict_of(encounter, *member.pair)) is None
+    ):
         return None
-    edges = tuple(edge for edge in reactions_of(encounter).edges if {edge.who, edge.whom} == set(member.pair))
+    edges = tuple(
+        edge for edge in reactions_of(encounter).edges if {edge.who, edge.whom} == set(member.pair)
+    )
     return Pair(encounter, member.kind, member.features, conflict, edges)
 
 
@@ -120,7 +147,13 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
     rows = np.stack([a.motion(a.conflict.first, begin + one.time[: len(motion)]), motion])
     start = one.start_ns + round(begin / one.dt) * one.dt_ns
     made = Encounter(
-        f"{one.name}{RECOMBINED}{other.name}", (first, second), start, one.dt_ns, rows[..., :2], rows[..., 2], rows[..., 3]
+        f"{one.name}{RECOMBINED}{other.name}",
+        (first, second),
+        start,
+        one.dt_ns,
+        rows[..., :2],
+        rows[..., 2],
+        rows[..., 3],
     )
     found, change = pair_of(made), np.diff(made.speed[1]) / made.dt
     if found is None or found.kind != a.kind or found.conflict.second != 1:
@@ -130,14 +163,21 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
     if found.features[DISTANCE] <= 0.0:
         raise RefusedError("together they overlap")
     law = Law.of(a.kind, [a.features, b.features])
-    if law.distance(found.features) > RARER * max(law.distance(a.features), law.distance(b.features)):
+    if law.distance(found.features) > RARER * max(
+        law.distance(a.features), law.distance(b.features)
+    ):
         raise RefusedError("together they are more unusual than each of the recorded")
-    if change.max() > second.kind.dynamics.max_acceleration or -change.min() > second.kind.dynamics.max_deceleration:
+    if (
+        change.max() > second.kind.dynamics.max_acceleration
+        or -change.min() > second.kind.dynamics.max_deceleration
+    ):
         raise RefusedError("the second one would brake or accelerate too hard")
     return made
 
 
-def recombinations(encounters: Sequence[Encounter], most: int, seed: int = 0) -> tuple[list[Encounter], Counter[str]]:
+def recombinations(
+    encounters: Sequence[Encounter], most: int, seed: int = 0
+) -> tuple[list[Encounter], Counter[str]]:
     """Return new encounters of pairs of recorded ones that are of one kind and not the same, and why pairs gave none.
 
     Pairs of all are tried in a random order, forty for each encounter wanted at most.
@@ -149,9 +189,18 @@ def recombinations(encounters: Sequence[Encounter], most: int, seed: int = 0) ->
     """
     count, made, refused = len(encounters), list[Encounter](), Counter[str]()
     pairs = [pair_of(encounter) for encounter in encounters]
-    for number in np.random.default_rng(seed).choice(count**2, min(count**2, TRIES * most), replace=False).tolist():
+    for number in (
+        np.random.default_rng(seed)
+        .choice(count**2, min(count**2, TRIES * most), replace=False)
+        .tolist()
+    ):
         a, b = (pairs[k] for k in divmod(number, count))
-        if not (a and b) or a.kind != b.kind or np.array_equal(a.features, b.features) or len(made) == most:
+        if (
+            not (a and b)
+            or a.kind != b.kind
+            or np.array_equal(a.features, b.features)
+            or len(made) == most
+        ):
             continue
         try:
             made.append(recombined(a.encounter, b.encounter))
@@ -181,14 +230,21 @@ def _following(a: Pair, b: Pair) -> tuple[float, Floats]:
     own, led = b.there(b.conflict.second) + later, b.there(b.conflict.first) + later + tau
     span = np.array([max(own[0], led[0]), min(own[1], led[1])])
     at = _common(a, a.there(a.conflict.first) + np.array([tau, 0.0]), span)
-    leader, follower = clean_tracks(b.encounter)[b.conflict.first], clean_tracks(b.encounter)[b.conflict.second]
+    leader, follower = (
+        clean_tracks(b.encounter)[b.conflict.first],
+        clean_tracks(b.encounter)[b.conflict.second],
+    )
     track = clean_tracks(a.encounter)[a.conflict.first]
     theirs, ours = b.encounter.time, a.encounter.time
-    speed = np.interp(at - tau, ours, track.speed) - np.interp(at - later - tau, theirs, leader.speed)
+    speed = np.interp(at - tau, ours, track.speed) - np.interp(
+        at - later - tau, theirs, leader.speed
+    )
     speed += np.interp(at - later, theirs, follower.speed)
     if speed.min() < _BACKWARDS:
         raise RefusedError("the second one would drive backwards")
-    behind = np.interp(at - later - tau, theirs, _on_path(b)) - np.interp(at - later, theirs, follower.progress)
+    behind = np.interp(at - later - tau, theirs, _on_path(b)) - np.interp(
+        at - later, theirs, follower.progress
+    )
     driven = np.maximum.accumulate(np.interp(at - tau, ours, _on_path(a)) - behind)
     return float(at[0]), np.column_stack([_way(a, driven), np.maximum(speed, 0.0)])
 
@@ -196,7 +252,10 @@ def _following(a: Pair, b: Pair) -> tuple[float, Floats]:
 def _common(a: Pair, own: Floats, moved: Floats) -> Floats:
     """(T,) the instants of a's clock between the later begin and the earlier end of two spans (2,) [s]."""
     dt = a.encounter.dt
-    first, last = math.ceil(max(own[0], moved[0]) / dt - 1e-6), math.floor(min(own[1], moved[1]) / dt + 1e-6)
+    first, last = (
+        math.ceil(max(own[0], moved[0]) / dt - 1e-6),
+        math.floor(min(own[1], moved[1]) / dt + 1e-6),
+    )
     if (last - first) * dt < LEAST_S:
         raise RefusedError(f"together they last less than {LEAST_S:g} s")
     return np.arange(first, last + 1) * dt
@@ -212,19 +271,25 @@ def _alike(a: Pair, b: Pair) -> float:
     for move in range(least - len(theirs), len(ours) - least + 1, _STEP):
         begin, end = max(0, move), min(len(ours), len(theirs) + move)
         off = float(np.sqrt(np.square(ours[begin:end] - theirs[begin - move : end - move]).mean()))
-        best = min(best, (round(off + _OVERLAP_COST * (1.0 - (end - begin) / shorter), 6), move))  # ties on any CPU
+        best = min(
+            best, (round(off + _OVERLAP_COST * (1.0 - (end - begin) / shorter), 6), move)
+        )  # ties on any CPU
     return best[1] * dt + float(a.there(a.conflict.first)[0] - b.there(b.conflict.first)[0])
 
 
 def _led(pair: Pair, dt: float) -> Floats:
     """(T,) the speeds [m/s] of the first one, every dt [s] from when it comes until it goes."""
     comes, goes = pair.there(pair.conflict.first).tolist()
-    return pair.motion(pair.conflict.first, comes + dt * np.arange(int((goes - comes) / dt + 1e-6) + 1))[:, 3]
+    return pair.motion(
+        pair.conflict.first, comes + dt * np.arange(int((goes - comes) / dt + 1e-6) + 1)
+    )[:, 3]
 
 
 def _way(pair: Pair, station: Floats) -> Floats:
     """(T, 3) the poses at distances (T,) on the path of the second one, beyond its end beside that of the first."""
-    ahead, own = (clean_tracks(pair.encounter)[n].curve for n in (pair.conflict.first, pair.conflict.second))
+    ahead, own = (
+        clean_tracks(pair.encounter)[n].curve for n in (pair.conflict.first, pair.conflict.second)
+    )
     poses, over = own.at(station), station - own.length
     join, aside = (float(value[0]) for value in ahead.project(own.points[-1:, :2]))
     beyond = (over > 0.0) & (abs(aside) < _ASIDE_M)
@@ -234,7 +299,10 @@ def _way(pair: Pair, station: Floats) -> Floats:
 
 def _on_path(pair: Pair) -> Floats:
     """(T,) how far [m] the first one is on the path of the second, at the samples of their encounter."""
-    curve, track = clean_tracks(pair.encounter)[pair.conflict.second].curve, clean_tracks(pair.encounter)[pair.conflict.first]
+    curve, track = (
+        clean_tracks(pair.encounter)[pair.conflict.second].curve,
+        clean_tracks(pair.encounter)[pair.conflict.first],
+    )
     station, aside = curve.project(pair.encounter.position[pair.conflict.first])
     on = track.there & (station > 0.0) & (station < curve.length) & (np.abs(aside) < _ASIDE_M)
     if not on.any():

@@ -14,7 +14,10 @@ from scenario_gen.types import Encounter, GenerationResult, NARROW, Request, UNI
 
 
 def with_references(
-    result: GenerationResult, config: PipelineConfig, request: Request = Request(), population: Sequence[Encounter] = ()
+    result: GenerationResult,
+    config: PipelineConfig,
+    request: Request = Request(),
+    population: Sequence[Encounter] = (),
 ) -> GenerationResult:
     """Add what a result is measured against: sets without changepoints and with uniform ones.
 
@@ -27,10 +30,23 @@ def with_references(
     """
     road, _ = result.road_and_fit()
     count = min(result.generated.requested, MEASURED)
-    plain = Chain(result.encounter, result.segmentation, road, config, request.plain, count, result.seed, population=population)
-    chains = {WITHOUT: replace(plain, segmentation=without_changepoints(result.segmentation), waits=())}
+    plain = Chain(
+        result.encounter,
+        result.segmentation,
+        road,
+        config,
+        request.plain,
+        count,
+        result.seed,
+        population=population,
+    )
+    chains = {
+        WITHOUT: replace(plain, segmentation=without_changepoints(result.segmentation), waits=())
+    }
     if result.segmentation.changepoints.size:
-        chains[UNIFORM] = replace(plain, segmentation=uniform_changepoints(result.segmentation), waits=())
+        chains[UNIFORM] = replace(
+            plain, segmentation=uniform_changepoints(result.segmentation), waits=()
+        )
     if config.sampling.variety != "narrow":
         narrow = replace(config, sampling=replace(config.sampling, variety="narrow"))
         chains[NARROW] = replace(plain, config=narrow)
@@ -40,6 +56,14 @@ def with_references(
             references[name] = (chain.sample(result) if name == NARROW else chain.run()).generated
         except RefusedError as error:
             refusals[name] = str(error)
-    requested = [name for name in ("target", "choose", "order") if getattr(request, name) != getattr(request.plain, name)]
-    not_compared = f"only the delivered set was drawn with {' and '.join(requested)} as requested" if requested else ""
+    requested = [
+        name
+        for name in ("target", "choose", "order")
+        if getattr(request, name) != getattr(request.plain, name)
+    ]
+    not_compared = (
+        f"only the delivered set was drawn with {' and '.join(requested)} as requested"
+        if requested
+        else ""
+    )
     return replace(result, references=references, refusals=refusals, not_compared=not_compared)

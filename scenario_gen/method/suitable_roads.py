@@ -13,7 +13,13 @@ from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
-from scenario_gen.roads import drives_about_ring, NoPlaceError, road_and_template, ROADS, ROUNDABOUT
+from scenario_gen.roads import (
+    drives_about_ring,
+    NoPlaceError,
+    road_and_template,
+    ROADS,
+    ROUNDABOUT,
+)
 from scenario_gen.template import conflict_of, conflicts_in, refuse_reversing, refuse_too_large
 from scenario_gen.types import Encounter, GenerationResult, join_ego, Road, Segmentation
 
@@ -21,7 +27,9 @@ AUTO = "auto"
 LOOKED_AT = 50  # scenarios of a set, whether they keep the areas that vehicles share
 
 
-def takes(road: Road | str, encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> bool:
+def takes(
+    road: Road | str, encounter: Encounter, segmentation: Segmentation, config: PipelineConfig
+) -> bool:
     """Whether the template fits a road, and nothing of its encounter is lost there."""
     try:
         there, template = road_and_template(road, encounter, config.road)
@@ -31,7 +39,9 @@ def takes(road: Road | str, encounter: Encounter, segmentation: Segmentation, co
     return True
 
 
-def suitable_roads(encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> Iterator[str]:
+def suitable_roads(
+    encounter: Encounter, segmentation: Segmentation, config: PipelineConfig
+) -> Iterator[str]:
     """Yield the names of the built-in roads that take the template: `roundabout` first for who drives about a ring.
 
     The last is `corridor`, its own road.
@@ -42,7 +52,10 @@ def suitable_roads(encounter: Encounter, segmentation: Segmentation, config: Pip
 
 
 def on_first_suitable_road(
-    generate: Callable[[str], GenerationResult], encounter: Encounter, config: PipelineConfig, seed: int
+    generate: Callable[[str], GenerationResult],
+    encounter: Encounter,
+    config: PipelineConfig,
+    seed: int,
 ) -> GenerationResult:
     """Return what is generated on the first built-in road that takes the template; the result says which it is.
 
@@ -51,10 +64,14 @@ def on_first_suitable_road(
     """
     refuse_too_large(encounter)
     refuse_reversing(encounter)
-    refusal = RefusedError(f"{encounter.name}: no built-in road takes this encounter; give the path of a map")
+    refusal = RefusedError(
+        f"{encounter.name}: no built-in road takes this encounter; give the path of a map"
+    )
     for name in suitable_roads(encounter, segment(encounter, config.segmentation, seed), config):
         try:
-            return _refuse_lost(generate(name)).noted(f"road auto: {name}, the first built-in road that keeps the encounter")
+            return _refuse_lost(generate(name)).noted(
+                f"road auto: {name}, the first built-in road that keeps the encounter"
+            )
         except RefusedError as error:
             kind = TargetError if isinstance(error, TargetError) else RefusedError
             refusal = kind(f"{encounter.name} on road {name}, the last that takes it: {error}")
@@ -87,5 +104,7 @@ def _refuse_lost(result: GenerationResult) -> GenerationResult:
             ids = [vehicle.id for vehicle in scenario.vehicles]
             a, b = sorted(map(ids.index, names))
             if conflict_of(scenario, a, b) is None:
-                raise RefusedError(f"vehicles {names[0]} and {names[1]} share no area there in scenario {scenario.index}")
+                raise RefusedError(
+                    f"vehicles {names[0]} and {names[1]} share no area there in scenario {scenario.index}"
+                )
     return result

@@ -10,7 +10,7 @@ import sys
 from time import monotonic, time
 
 from scenario_gen.numerics.compiling import make_ready, ONLY, words
-from scenario_gen.numerics.kernel_cache import folder
+from scenario_gen.numerics.kernel_cache import root
 from scenario_gen.numerics.kernels import import_all, registered
 
 UNUSED_S = 60.0 * 86400.0  # after which kernels of another version are removed
@@ -42,8 +42,9 @@ def main() -> None:
         last = text
 
     count = make_ready(registered(), show)
-    folder().touch()
-    for old in folder().parent.glob("kernels-*"):
+    for each in registered():
+        each.mark.parent.touch()
+    for old in root().glob("kernels-*"):
         if time() - old.stat().st_mtime > UNUSED_S:
             shutil.rmtree(old, ignore_errors=True)
     print(f"{count} kernels ready after {monotonic() - started:.1f} s", flush=True)

@@ -14,7 +14,9 @@ Bools = npt.NDArray[np.bool_]
 Counts = npt.NDArray[np.int32]
 Array = TypeVar("Array", bound=npt.NDArray[Any])
 
-LARGEST_ANGLE = 3.141592653  # the last whole nanoradian inside (-pi, pi); rounding must not step over the cut
+LARGEST_ANGLE = (
+    3.141592653  # the last whole nanoradian inside (-pi, pi); rounding must not step over the cut
+)
 
 
 def sealed(array: Array) -> Array:
@@ -55,21 +57,29 @@ def canonical_angle(angle: npt.ArrayLike) -> Floats:
     A quaternion on the wire gives an angle back to 1e-16; rounded, it is the very same number, so a value that went
     through a message equals one that did not, bit for bit.
     """
-    rounded = np.round(wrap_angle(np.asarray(angle, dtype=np.float64)), 9) + 0.0  # no -0, which other bytes than 0 would mean
-    return frozen(np.minimum(np.maximum(rounded, -LARGEST_ANGLE), LARGEST_ANGLE))  # a third of the time of np.clip
+    rounded = (
+        np.round(wrap_angle(np.asarray(angle, dtype=np.float64)), 9) + 0.0
+    )  # no -0, which other bytes than 0 would mean
+    return frozen(
+        np.minimum(np.maximum(rounded, -LARGEST_ANGLE), LARGEST_ANGLE)
+    )  # a third of the time of np.clip
 
 
 def canonical_heading(heading: npt.ArrayLike) -> Floats:
     """Canonical angles (..., T) [rad] made continuous along the last axis (time or path)."""
     angle = canonical_angle(heading)
     jumps = (np.abs(angle[..., 1:] - angle[..., :-1]) > np.pi).any()
-    return sealed(np.unwrap(angle, axis=-1)) if jumps else angle  # most have none, and unwrapping costs ten times as much
+    return (
+        sealed(np.unwrap(angle, axis=-1)) if jumps else angle
+    )  # most have none, and unwrapping costs ten times as much
 
 
 def canonical_poses(poses: npt.ArrayLike, *, continuous: bool = False) -> Floats:
     """Poses (..., 3+) of x, y, yaw, ... with the yaw canonical; `continuous` unwraps it along the first axis."""
     array = np.array(poses, dtype=np.float64, order="C")
-    array[..., 2] = canonical_heading(array[..., 2]) if continuous else canonical_angle(array[..., 2])
+    array[..., 2] = (
+        canonical_heading(array[..., 2]) if continuous else canonical_angle(array[..., 2])
+    )
     return frozen(array)
 
 

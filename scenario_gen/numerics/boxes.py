@@ -81,7 +81,10 @@ def _corner_distance(a: Box, b: Box) -> float:
     for k in range(4):
         ahead, left = b.length if k < 2 else -b.length, b.width if k % 3 == 0 else -b.width
         dx, dy = b.x + ahead * b.cos - left * b.sin - a.x, b.y + ahead * b.sin + left * b.cos - a.y
-        along, across = abs(dx * a.cos + dy * a.sin) - a.length, abs(dy * a.cos - dx * a.sin) - a.width
+        along, across = (
+            abs(dx * a.cos + dy * a.sin) - a.length,
+            abs(dy * a.cos - dx * a.sin) - a.width,
+        )
         least = min(least, np.hypot(max(along, 0.0), max(across, 0.0)))
     return least
 
@@ -117,10 +120,15 @@ def boxes_meet(a: Floats, b: Floats) -> bool:
     dx, dy, reach = b[0] - a[0], b[1] - a[1], a[6] + b[6]
     if dx * dx + dy * dy >= reach * reach:
         return False
-    return box_gap(Box(a[0], a[1], a[2], a[3], a[4], a[5]), Box(b[0], b[1], b[2], b[3], b[4], b[5])) < 0.0
+    return (
+        box_gap(Box(a[0], a[1], a[2], a[3], a[4], a[5]), Box(b[0], b[1], b[2], b[3], b[4], b[5]))
+        < 0.0
+    )
 
 
-def footprint_gaps(a: tuple[float, float], poses_a: Floats, b: tuple[float, float], poses_b: Floats) -> tuple[Floats, Floats]:
+def footprint_gaps(
+    a: tuple[float, float], poses_a: Floats, b: tuple[float, float], poses_b: Floats
+) -> tuple[Floats, Floats]:
     """Return the signed gap of two footprints at many instants; between corners the true distance is larger.
 
     Args:
@@ -138,7 +146,9 @@ def footprint_gaps(a: tuple[float, float], poses_a: Floats, b: tuple[float, floa
 
 
 @kernel(F2, F1, F2, F1, OUT1, OUT2)
-def _fill_gaps(poses_a: Floats, half_a: Floats, poses_b: Floats, half_b: Floats, gap: Floats, axis: Floats) -> None:
+def _fill_gaps(
+    poses_a: Floats, half_a: Floats, poses_b: Floats, half_b: Floats, gap: Floats, axis: Floats
+) -> None:
     for t in range(len(gap)):
         p, q = poses_a[t], poses_b[t]
         a = Box(p[0], p[1], np.cos(p[2]), np.sin(p[2]), half_a[0], half_a[1])

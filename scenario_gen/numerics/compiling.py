@@ -15,12 +15,14 @@ from typing import Protocol
 
 from filelock import FileLock, Timeout
 
-from scenario_gen.numerics.kernel_cache import folder, is_lasting
+from scenario_gen.numerics.kernel_cache import is_lasting, root
 
 WORKERS = max(1, min(4, os.cpu_count() or 1))
 POLL_S = 0.5
 ONLY = "--only"
-Progress = Callable[[int, int, float], None]  # kernels that are there, kernels that are needed, seconds
+Progress = Callable[
+    [int, int, float], None
+]  # kernels that are there, kernels that are needed, seconds
 
 
 class Compilable(Protocol):
@@ -40,7 +42,9 @@ _workers: list["subprocess.Popen[bytes]"] = []
 def words(done: int, needed: int, seconds: float) -> str:
     """Say how far it is."""
     often = (
-        "once for this installation" if is_lasting() else "at every start: set NUMBA_CACHE_DIR to a folder that can be written to"
+        "once for this installation"
+        if is_lasting()
+        else "at every start: set NUMBA_CACHE_DIR to a folder that can be written to"
     )
     return f"kernels: {done} of {needed} compiled, {seconds:.0f} s; {often}"
 
@@ -48,7 +52,9 @@ def words(done: int, needed: int, seconds: float) -> str:
 def _log(done: int, needed: int, seconds: float) -> None:
     """Say once that it begins; a program without logging of its own has it on the standard error."""
     if seconds < POLL_S:
-        logging.getLogger("scenario_gen").warning("%s; this takes a minute or two", words(done, needed, seconds))
+        logging.getLogger("scenario_gen").warning(
+            "%s; this takes a minute or two", words(done, needed, seconds)
+        )
 
 
 def make_ready(needed: Sequence[Compilable], report: Progress = _log) -> int:
@@ -67,7 +73,7 @@ def make_ready(needed: Sequence[Compilable], report: Progress = _log) -> int:
 
     while absent := len(_missing(needed)):
         show(absent)
-        with suppress(Timeout), FileLock(folder() / "compiling.lock").acquire(timeout=POLL_S):
+        with suppress(Timeout), FileLock(root() / "compiling.lock").acquire(timeout=POLL_S):
             _compile(_missing(needed), lambda: show(len(_missing(needed))))
             break  # what does not compile says why where it is called
     return len(needed)
@@ -80,13 +86,17 @@ def _missing(kernels: Sequence[Compilable]) -> list[Compilable]:
 
 def _compile(absent: Sequence[Compilable], show: Callable[[], None]) -> None:
     """Have kernels compiled by processes, each its share of them."""
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder().parent)}
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(root())}
     names = [each.name for each in sorted(absent, key=lambda each: each.size, reverse=True)]
     command = [sys.executable, "-m", "scenario_gen.numerics", ONLY]
     try:
-        for k in range(min(WORKERS, len(names))):  # in a session of its own: not the terminal's Ctrl-C
+        for k in range(
+            min(WORKERS, len(names))
+        ):  # in a session of its own: not the terminal's Ctrl-C
             share = names[k::WORKERS]
-            _workers.append(subprocess.Popen([*command, *share], env=environment, start_new_session=True))
+            _workers.append(
+                subprocess.Popen([*command, *share], env=environment, start_new_session=True)
+            )
         for worker in _workers:
             while worker.poll() is None:
                 with suppress(subprocess.TimeoutExpired):

@@ -11,7 +11,9 @@ import numpy as np
 from scenario_gen.numerics.arrays import Floats, frozen, Ints
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws, meeting_shares
 
-TOGETHER = 64  # positions that are projected at once, on the edges that can be nearest to any of them
+TOGETHER = (
+    64  # positions that are projected at once, on the edges that can be nearest to any of them
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +84,9 @@ class Curve:
             best = np.argmin(gap, axis=1)
             row = np.arange(len(part))
             side = way[best, 0] * rel[row, best, 1] - way[best, 1] * rel[row, best, 0]
-            candidates.append(np.array([at[near][best] + t[row, best], np.sign(side) * gap[row, best]]))
+            candidates.append(
+                np.array([at[near][best] + t[row, best], np.sign(side) * gap[row, best]])
+            )
         station, offset = np.concatenate(candidates, axis=1)
         return station, offset
 
@@ -117,7 +121,9 @@ def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
     near_other = _edges_in(b, a[np.union1d(near, near + 1)]) if len(near) else near
     u, v = np.diff(a, axis=0)[near], np.diff(b, axis=0)[near_other]
     t, q, det = meeting_shares(a[near, None], u[:, None], b[None, near_other], v[None])
-    sine = np.abs(det) / (np.hypot(u[:, 0], u[:, 1])[:, None] * np.hypot(v[:, 0], v[:, 1])[None, :])
+    sine = np.abs(det) / (
+        np.hypot(u[:, 0], u[:, 1])[:, None] * np.hypot(v[:, 0], v[:, 1])[None, :]
+    )
     hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= np.sin(min_angle))
     i, j = np.nonzero(hit)
     k, n = near[i], near_other[j]

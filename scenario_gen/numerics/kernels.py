@@ -54,7 +54,7 @@ def named(of: type[Any], *fields: Any) -> Any:
 def _compiler(function: Callable[..., Any], **options: Any) -> Any:
     """`numba.njit`, with its cache in our folder; the setting is the user's again afterwards."""
     user = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder())
+    numba.config.CACHE_DIR = str(folder(Path(function.__code__.co_filename)))
     try:
         return numba.njit(**OPTIONS, **options)(function)
     finally:
@@ -87,7 +87,10 @@ def _record_reader(declared: Any) -> Callable[[Any], Any]:
     def read_record(value: Any) -> Any:
         last = seen[0]  # one look: other threads have tuples of their own
         if last[0] is not value:
-            last = value, type(value)(*[read(each) for read, each in zip(readers, value, strict=True)])
+            last = (
+                value,
+                type(value)(*[read(each) for read, each in zip(readers, value, strict=True)]),
+            )
             seen[0] = last
         return last[1]
 
@@ -133,7 +136,7 @@ class Kernel:
     @property
     def mark(self) -> Path:
         """The empty file that says that it is in the cache."""
-        return folder() / f"{self.name}.ready"
+        return folder(Path(self.dispatcher.py_func.__code__.co_filename)) / f"{self.name}.ready"
 
     def compile(self) -> Any:
         """Make or load the compiled form, once, and return numba's function."""
@@ -151,7 +154,9 @@ class Kernel:
             if not self.mark.exists():
                 make_ready(registered())
             self.compile()
-        return self.dispatcher(*[read(value) for read, value in zip(self._readers, values, strict=True)])
+        return self.dispatcher(
+            *[read(value) for read, value in zip(self._readers, values, strict=True)]
+        )
 
 
 @typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
@@ -160,7 +165,9 @@ def _typeof_kernel(kernel: Kernel, context: Any) -> Any:
     return typeof_impl(kernel.compile(), context)
 
 
-def kernel(*declared: Any, inline: bool = False, forced: bool = False) -> Callable[[Function], Function]:
+def kernel(
+    *declared: Any, inline: bool = False, forced: bool = False
+) -> Callable[[Function], Function]:
     """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath).
 
     Args:
@@ -171,7 +178,9 @@ def kernel(*declared: Any, inline: bool = False, forced: bool = False) -> Callab
 
     def decorate(function: Function) -> Function:
         if inline:
-            return cast("Function", _compiler(function, no_cpython_wrapper=True, forceinline=forced))
+            return cast(
+                "Function", _compiler(function, no_cpython_wrapper=True, forceinline=forced)
+            )
         _kernels.append(Kernel(function, declared))
         return cast("Function", _kernels[-1])
 

@@ -13,7 +13,9 @@ import numpy as np
 from scenario_gen.numerics.arrays import Floats
 
 
-def pattern_search(costs: Callable[[Floats], Floats], state: Floats, step: Floats, least: float) -> tuple[Floats, float]:
+def pattern_search(
+    costs: Callable[[Floats], Floats], state: Floats, step: Floats, least: float
+) -> tuple[Floats, float]:
     """Return the state (K,) to which steps along the axes lead, the best first, and its cost.
 
     Args:

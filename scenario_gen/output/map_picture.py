@@ -19,7 +19,11 @@ from scenario_gen.types import DRIVERS, Encounter, LaneNetwork, Road
 from scenario_gen.types.markings import markings
 
 PLACES = 8  # that are shown
-WIDE, HEAD, FOOT = 1200.0, 70.0, 45.0  # pixels, of the sheet, and of the title above and the scale below
+WIDE, HEAD, FOOT = (
+    1200.0,
+    70.0,
+    45.0,
+)  # pixels, of the sheet, and of the title above and the scale below
 SCALES = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)  # metres
 LEGEND = (
     "green: traffic enters, red: it leaves; arrows: direction of lanes; darker: junctions; pink: cycle and bus lanes; "
@@ -50,16 +54,23 @@ def map_picture(name: str, encounter: Encounter | None = None) -> tuple[str, lis
         road = build_road(name, encounter)
         arms = f"{len(road.entries)} entries, {len(road.exits)} exits"
         if road.lanes is not None:
-            return _picture(road.lanes, ()), [f"{road.name}: {road!r}, {len(road.lanes.lanes)} lanes, {arms}"]
+            return _picture(road.lanes, ()), [
+                f"{road.name}: {road!r}, {len(road.lanes.lanes)} lanes, {arms}"
+            ]
         return _picture_of_grid(road), [f"{road.name}: {road!r}, {arms}; it has no lanes to show"]
     network = read_network(split(name)[0])
     junctions = sorted({lane.junction for lane in network.lanes if lane.junction})
     arms = f"{len(network.entries)} entries, {len(network.exits)} exits"
-    said = [f"{network.name}: {len(network.lanes)} lanes, {len(junctions)} junctions, {arms}", *network.notes]
+    said = [
+        f"{network.name}: {len(network.lanes)} lanes, {len(junctions)} junctions, {arms}",
+        *network.notes,
+    ]
     found: list[Place] = []
     if encounter is not None:
         try:
-            found = list(islice(_apart(places(network, drivers_of(clean_tracks(encounter)))), PLACES))
+            found = list(
+                islice(_apart(places(network, drivers_of(clean_tracks(encounter)))), PLACES)
+            )
         except RefusedError as error:
             said.append(f"no place for {encounter.name}: {error}")
         said += [
@@ -73,14 +84,18 @@ def _apart(found: Iterator[Place]) -> Iterator[Place]:
     """Yield the places that lie elsewhere than those before, which are better."""
     boxes: list[Floats] = []
     for place in found:
-        if not any((place.box[0] < other[1]).all() and (other[0] < place.box[1]).all() for other in boxes):
+        if not any(
+            (place.box[0] < other[1]).all() and (other[0] < place.box[1]).all() for other in boxes
+        ):
             boxes.append(place.box)
             yield place
 
 
 def _cost_in_words(place: Place) -> str:
     """Say how little a place resembles the template."""
-    return f"cost {place.cost:.1f} m² (about {np.sqrt(place.cost):.1f} m off the recording's paths)"
+    return (
+        f"cost {place.cost:.1f} m² (about {np.sqrt(place.cost):.1f} m off the recording's paths)"
+    )
 
 
 class _Sheet:
@@ -118,7 +133,10 @@ class _Sheet:
         metres = next((m for m in SCALES if m * self.scale > 0.08 * WIDE), SCALES[-1])
         bar = f'<path class="paint scale" d="M20 {tall - 18:.0f}v6h{metres * self.scale:.1f}v-6"/>'
         words = [(20, 28, 18, title), (20, 48, 12, LEGEND), (26, tall - 18, 12, f"{metres} m")]
-        texts = [f'<text x="{x}" y="{y:.0f}" font-size="{size}">{escape(text)}</text>' for x, y, size, text in words]
+        texts = [
+            f'<text x="{x}" y="{y:.0f}" font-size="{size}">{escape(text)}</text>'
+            for x, y, size, text in words
+        ]
         named = [f"<title>{escape(title)}</title>", f"<style>{STYLE}</style>"]
         return "\n".join([head, *named, ground, *self.parts, bar, *texts, "</svg>\n"])
 
@@ -128,8 +146,12 @@ def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
     sheet = _Sheet(corners.min(axis=0), corners.max(axis=0))
     junctions: dict[str, list[Floats]] = defaultdict(list)
     for lane in network.others:
-        sheet.shape("polygon", lane.outline, **{"class": "other" if lane.open_to(DRIVERS) else "walk"})
-    for lane in sorted(network.lanes, key=lambda lane: not lane.junction):  # an arm's borders lie over the ways' ends
+        sheet.shape(
+            "polygon", lane.outline, **{"class": "other" if lane.open_to(DRIVERS) else "walk"}
+        )
+    for lane in sorted(
+        network.lanes, key=lambda lane: not lane.junction
+    ):  # an arm's borders lie over the ways' ends
         sheet.shape("polygon", lane.outline, **{"class": "turn" if lane.junction else "lane"})
         if lane.junction and not network.drawn:
             junctions[lane.junction].append(lane.centre.mean(axis=0))
@@ -141,10 +163,19 @@ def _picture(network: LaneNetwork, found: Sequence[Place]) -> str:
             _arrow(sheet, network.lanes[k].centre, at, kind)
     for k, place in enumerate(found, 1):
         (x0, y0), (x1, y1) = place.box.tolist()
-        sheet.shape("polygon", np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), **{"class": "box"})
+        sheet.shape(
+            "polygon", np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), **{"class": "box"}
+        )
         for n, path in enumerate(place.paths):
             colour = COLOURS[n % len(COLOURS)]
-            sheet.shape("polyline", path, fill="none", stroke=colour, stroke_width="2.5", stroke_opacity="0.8")
+            sheet.shape(
+                "polyline",
+                path,
+                fill="none",
+                stroke=colour,
+                stroke_width="2.5",
+                stroke_opacity="0.8",
+            )
         sheet.text(np.array([x0, y1 + 1.0]), f"place {k}: {_cost_in_words(place)}", 14.0)
     for name, middles in junctions.items():
         sheet.text(np.mean(middles, axis=0), name)
@@ -157,14 +188,18 @@ def _arrow(sheet: _Sheet, line: Floats, at: int, kind: str) -> None:
     step = line[at + 1] - line[at]
     ahead = step / max(float(np.hypot(*step)), 1e-9)
     left = np.array([-ahead[1], ahead[0]])
-    sheet.shape("polygon", line[at] + np.array([1.8 * ahead, 0.7 * left, -0.7 * left]), **{"class": kind})
+    sheet.shape(
+        "polygon", line[at] + np.array([1.8 * ahead, 0.7 * left, -0.7 * left]), **{"class": kind}
+    )
 
 
 def _picture_of_grid(road: Road) -> str:
     """Draw the rows of drivable cells, and the entries and exits."""
     height, width = road.drivable.shape
     sheet = _Sheet(road.origin, road.origin + np.array([width, height]) * road.resolution)
-    for row, (first, stop) in ((row, run) for row, cells in enumerate(road.drivable) for run in runs(cells)):
+    for row, (first, stop) in (
+        (row, run) for row, cells in enumerate(road.drivable) for run in runs(cells)
+    ):
         x0, x1 = (road.origin[0] + edge * road.resolution for edge in (first, stop))
         y0, y1 = (road.origin[1] + edge * road.resolution for edge in (row, row + 1))
         sheet.shape("polygon", np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), fill="#d4d9e2")

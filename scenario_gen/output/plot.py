@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 _MOST = 200  # scenarios drawn: with more, one hides the other
 
 
-def plot(shown: GenerationResult | Scenario | Tracks, ax: "Axes | None" = None, *, road: Road | None = None) -> "Axes":
+def plot(
+    shown: GenerationResult | Scenario | Tracks,
+    ax: "Axes | None" = None,
+    *,
+    road: Road | None = None,
+) -> "Axes":
     """Draw the paths of all vehicles from above, each vehicle in a colour of its own; a dot is where it starts.
 
     Args:
@@ -34,7 +39,9 @@ def plot(shown: GenerationResult | Scenario | Tracks, ax: "Axes | None" = None, 
     import matplotlib.pyplot as plt
 
     axes = plt.subplots()[1] if ax is None else ax
-    drawn: Sequence[Scenario | Tracks] = list(shown)[:_MOST] if isinstance(shown, GenerationResult) else [shown]
+    drawn: Sequence[Scenario | Tracks] = (
+        list(shown)[:_MOST] if isinstance(shown, GenerationResult) else [shown]
+    )
     road = shown.road if isinstance(shown, GenerationResult) and road is None else road
     if road is not None:
         _draw_road(axes, road)
@@ -43,12 +50,17 @@ def plot(shown: GenerationResult | Scenario | Tracks, ax: "Axes | None" = None, 
         for n, vehicle in enumerate(scenario.vehicles):
             path = scenario.position[n, scenario.there[n]]
             label = f"vehicle {vehicle.id}" if k == 0 else "_"
-            axes.plot(*path.T, color=f"C{n}", alpha=max(0.1, 1.0 / np.sqrt(len(drawn))), label=label)
+            axes.plot(
+                *path.T, color=f"C{n}", alpha=max(0.1, 1.0 / np.sqrt(len(drawn))), label=label
+            )
             axes.plot(*path[0], "o", color=f"C{n}", markersize=4)
             limits.append([path.min(axis=0), path.max(axis=0)])
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=_title(shown))
     if limits:
-        low, high = np.min([low for low, _ in limits], axis=0) - 5.0, np.max([high for _, high in limits], axis=0) + 5.0
+        low, high = (
+            np.min([low for low, _ in limits], axis=0) - 5.0,
+            np.max([high for _, high in limits], axis=0) + 5.0,
+        )
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         legend = axes.legend()
         for line in legend.get_lines():
@@ -61,14 +73,31 @@ def _draw_road(axes: "Axes", road: Road) -> None:
     height, width = (cells * road.resolution for cells in road.drivable.shape)
     x, y = road.origin
     shade = np.where(road.drivable, 0.85, np.nan)
-    axes.imshow(shade, cmap="gray", vmin=0.0, vmax=1.0, origin="lower", extent=(x, x + width, y, y + height), zorder=0)
-    for lane in (lane for lane in road.lanes.others if not lane.crossing) if road.lanes is not None else ():
-        axes.fill(*lane.outline.T, color="#d9a9a2" if lane.open_to(DRIVERS) else "#e9e5d6", zorder=-0.5, linewidth=0)
+    axes.imshow(
+        shade,
+        cmap="gray",
+        vmin=0.0,
+        vmax=1.0,
+        origin="lower",
+        extent=(x, x + width, y, y + height),
+        zorder=0,
+    )
+    for lane in (
+        (lane for lane in road.lanes.others if not lane.crossing) if road.lanes is not None else ()
+    ):
+        axes.fill(
+            *lane.outline.T,
+            color="#d9a9a2" if lane.open_to(DRIVERS) else "#e9e5d6",
+            zorder=-0.5,
+            linewidth=0,
+        )
     for bar in markings(road.lanes).get(Marking.ZEBRA, ()) if road.lanes is not None else ():
         axes.plot(*bar.T, color="white", linewidth=1.5, zorder=0.6)
 
 
 def _title(shown: GenerationResult | Scenario | Tracks) -> str:
     if isinstance(shown, GenerationResult):
-        return f"{len(shown)} scenarios, {shown.title}" + (f" (the first {_MOST})" if len(shown) > _MOST else "")
+        return f"{len(shown)} scenarios, {shown.title}" + (
+            f" (the first {_MOST})" if len(shown) > _MOST else ""
+        )
     return f"scenario {shown.index}" if isinstance(shown, Scenario) else f"encounter {shown.name}"

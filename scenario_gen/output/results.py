@@ -30,12 +30,19 @@ def report(folder: Path | str, *cases: GenerationResult, title: str = "") -> Pat
         InputError: the folder holds something else.
     """
     with replaced_folder(Path(folder), GENERATED) as place:
-        write_results(place, cases, title=title or cases[0].title, quality=(), provenance=cases[0].provenance)
+        write_results(
+            place, cases, title=title or cases[0].title, quality=(), provenance=cases[0].provenance
+        )
     return Path(folder) / REPORT
 
 
 def write_results(
-    folder: Path, cases: Sequence[GenerationResult], *, title: str, quality: Sequence[str], provenance: Mapping[str, str]
+    folder: Path,
+    cases: Sequence[GenerationResult],
+    *,
+    title: str,
+    quality: Sequence[str],
+    provenance: Mapping[str, str],
 ) -> None:
     """Write bag, report and figures of all cases to `folder`.
 
@@ -63,27 +70,44 @@ def _figures(case: GenerationResult) -> dict[str, Any]:
     """Return a case's E beside what it is compared with, who reacts to whom, its evaluation, and what the stages did."""
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
     figures: dict[str, Any] = {"similarity": case.similarity(), "reactions": case.reacting}
-    figures |= json.loads(case.evaluation.to_json()) | {"adaptations": list(case.generated.adaptations)}
+    figures |= json.loads(case.evaluation.to_json()) | {
+        "adaptations": list(case.generated.adaptations)
+    }
     fit = {} if case.fit is None else case.fit.figures()
     coverage = {} if case.coverage is None else case.coverage.document()
     reached = {} if case.generated.reached is None else case.generated.reached.figures()
     weights = {
-        str(scenario.index): scenario.facts["weight"] for scenario in case.generated.scenarios if "weight" in scenario.facts
+        str(scenario.index): scenario.facts["weight"]
+        for scenario in case.generated.scenarios
+        if "weight" in scenario.facts
     }
     figures |= {"coverage": coverage, "target": {**reached, "weights": weights} if reached else {}}
-    return figures | {"fit": fit, "routes": {vehicle.id: route.figures() for vehicle, route in vehicles}}
+    return figures | {
+        "fit": fit,
+        "routes": {vehicle.id: route.figures() for vehicle, route in vehicles},
+    }
 
 
-def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path, config: BagConfig) -> None:
+def write_evaluation(
+    folder: Path, cases: Sequence[GenerationResult], bag: Path, config: BagConfig
+) -> None:
     """Write report, figures and table of what a bag was found to hold to `folder`, which `replaced_folder` gives.
 
     Raises:
         OSError: the disk is full, or fails.
     """
     write_text(folder / TABLE, as_table(cases) + "\n")
-    write_text(folder / FIGURES, json.dumps({"cases": [_figures(case) for case in cases]}, indent=2) + "\n")
-    facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | read_recording(bag, config, (INFO,)).provenance
-    write_report(folder / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts, bag=bag.name))
+    write_text(
+        folder / FIGURES,
+        json.dumps({"cases": [_figures(case) for case in cases]}, indent=2) + "\n",
+    )
+    facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | read_recording(
+        bag, config, (INFO,)
+    ).provenance
+    write_report(
+        folder / REPORT,
+        ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts, bag=bag.name),
+    )
 
 
 def as_table(cases: Sequence[GenerationResult]) -> str:
@@ -102,10 +126,18 @@ def namespaces(count: int) -> list[str]:
 
 
 def provenance_of(
-    logs: Sequence[Path], seed: int, count: int, roads: Sequence[str], config: PipelineConfig, request: Request = Request()
+    logs: Sequence[Path],
+    seed: int,
+    count: int,
+    roads: Sequence[str],
+    config: PipelineConfig,
+    request: Request = Request(),
 ) -> dict[str, str]:
     """Return everything needed to do it again: log hashes, seed, versions, the request and all parameters."""
     names = [path.name for path in logs]
-    facts = {f"log {path if names.count(path.name) > 1 else path.name}": f"sha256 {sha256_of(path)}" for path in logs}
+    facts = {
+        f"log {path if names.count(path.name) > 1 else path.name}": f"sha256 {sha256_of(path)}"
+        for path in logs
+    }
     facts |= {"roads": ", ".join(roads), "seed": str(seed), "count": str(count)}
     return facts | what_makes_it_again(config, request)

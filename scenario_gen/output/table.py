@@ -13,7 +13,13 @@ from scenario_gen.types import Evaluation, GenerationResult, join_ego
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-FIGURES = {"ttc": "ttc", "pet": "pet", "arrival_gap": "arrival_gap", "distance": "gap", "closing_speed": "closing_speed"}
+FIGURES = {
+    "ttc": "ttc",
+    "pet": "pet",
+    "arrival_gap": "arrival_gap",
+    "distance": "gap",
+    "closing_speed": "closing_speed",
+}
 """Columns, and the measure that each one holds."""
 
 
@@ -28,9 +34,16 @@ def measures(result: GenerationResult) -> "DataFrame":
 
     rows = []
     for scenario in map(join_ego, result):
-        figures = {column: MEASURES.figure(scenario, name, None) for column, name in FIGURES.items()}
-        most = {"speed": float(scenario.speed.max()), "braking": float(-scenario.acceleration.min())}
-        rows.append({"scenario": scenario.index, "seconds": float(scenario.time[-1]), **figures, **most})
+        figures = {
+            column: MEASURES.figure(scenario, name, None) for column, name in FIGURES.items()
+        }
+        most = {
+            "speed": float(scenario.speed.max()),
+            "braking": float(-scenario.acceleration.min()),
+        }
+        rows.append(
+            {"scenario": scenario.index, "seconds": float(scenario.time[-1]), **figures, **most}
+        )
     return pd.DataFrame(rows, columns=["scenario", "seconds", *FIGURES, "speed", "braking"])
 
 
@@ -50,9 +63,19 @@ def filter_scenarios(result: GenerationResult, condition: str) -> GenerationResu
         scenarios = tuple(result[int(k)] for k in kept)
     except Exception as error:  # what pandas makes of any text
         columns = ", ".join(table.columns)
-        raise InputError(f"condition {condition!r}: {describe(error)}; the columns are {columns}") from error
+        raise InputError(
+            f"condition {condition!r}: {describe(error)}; the columns are {columns}"
+        ) from error
     note = f"filtered by {condition!r}: {len(scenarios)} of {len(result)} scenarios"
-    generated = replace(result.generated, scenarios=scenarios, adaptations=(*result.generated.adaptations, note))
+    generated = replace(
+        result.generated, scenarios=scenarios, adaptations=(*result.generated.adaptations, note)
+    )
     return replace(
-        result, generated=generated, evaluation=Evaluation.empty(), references={}, refusals={}, coverage=None, valid=None
+        result,
+        generated=generated,
+        evaluation=Evaluation.empty(),
+        references={},
+        refusals={},
+        coverage=None,
+        valid=None,
     )

@@ -4,7 +4,15 @@
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
 from scenario_gen.roads.along import lane_along, sharing_lanes
-from scenario_gen.roads.build import build_road, BUILT_IN, CORRIDOR, DrawRoad, road_and_template, ROADS, ROUNDABOUT
+from scenario_gen.roads.build import (
+    build_road,
+    BUILT_IN,
+    CORRIDOR,
+    DrawRoad,
+    road_and_template,
+    ROADS,
+    ROUNDABOUT,
+)
 from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.roads.clearance import (
     blocked_before,
@@ -26,10 +34,23 @@ from scenario_gen.roads.drawn import Arm, draw_plan, Driven, Plan, ways_through
 from scenario_gen.roads.junctions import drives_about_ring
 from scenario_gen.roads.obstacles import read_obstacles
 from scenario_gen.roads.pavement import drivable_beside
-from scenario_gen.roads.vector.ground import along_lanes, cells_of, drives_against, ground_for, own_ground
+from scenario_gen.roads.vector.ground import (
+    along_lanes,
+    cells_of,
+    drives_against,
+    ground_for,
+    own_ground,
+)
 from scenario_gen.roads.vector.match import Course
 from scenario_gen.roads.vector.network import FAULTY
-from scenario_gen.roads.vector.place import NoPlaceError, Place, placements, places, tracks_on, users_of
+from scenario_gen.roads.vector.place import (
+    NoPlaceError,
+    Place,
+    placements,
+    places,
+    tracks_on,
+    users_of,
+)
 from scenario_gen.roads.vector.read import is_vector_map, read_network, split
 from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.ways import draw_route

@@ -37,7 +37,11 @@ from scenario_gen.template import (
 from scenario_gen.types import Encounter, LaneNetwork, MIRRORED, Road
 
 
-def build_road(name_or_path: str | Shape, encounter: Encounter | None = None, config: RoadConfig = RoadConfig()) -> Road:
+def build_road(
+    name_or_path: str | Shape,
+    encounter: Encounter | None = None,
+    config: RoadConfig = RoadConfig(),
+) -> Road:
     """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
@@ -53,8 +57,14 @@ def build_road(name_or_path: str | Shape, encounter: Encounter | None = None, co
         RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be separated.
     """
     obstacles = read_obstacles(config.obstacles)
-    road = _bare_road(name_or_path, encounter, config) if isinstance(name_or_path, str) else road_of_shape(name_or_path, config)
-    return with_obstacles(road, obstacles, cells_of(road, road.lanes.others if road.lanes is not None else ()))
+    road = (
+        _bare_road(name_or_path, encounter, config)
+        if isinstance(name_or_path, str)
+        else road_of_shape(name_or_path, config)
+    )
+    return with_obstacles(
+        road, obstacles, cells_of(road, road.lanes.others if road.lanes is not None else ())
+    )
 
 
 def road_and_template(
@@ -81,7 +91,9 @@ def road_and_template(
     try:
         road = build_road(name_or_path, encounter, config)
     except RefusedError as error:
-        if not is_vector_map(name_or_path) or not _differs(encounter, read_network(split(name_or_path)[0])):
+        if not is_vector_map(name_or_path) or not _differs(
+            encounter, read_network(split(name_or_path)[0])
+        ):
             raise
         refusal = error
     else:
@@ -91,8 +103,12 @@ def road_and_template(
     with suppress(RefusedError):
         there = build_road(name_or_path, other, config)
         if there.lanes is not None and _on_other_side(encounter, there):
-            note = f"{MIRRORED}: traffic on road {there.name} keeps to the {there.lanes.traffic_side}"
-            return replace(there, lanes=replace(there.lanes, notes=(note, *there.lanes.notes))), other
+            note = (
+                f"{MIRRORED}: traffic on road {there.name} keeps to the {there.lanes.traffic_side}"
+            )
+            return replace(
+                there, lanes=replace(there.lanes, notes=(note, *there.lanes.notes))
+            ), other
     if refusal is not None:
         raise refusal
     return road, encounter
@@ -131,7 +147,9 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
     if config.paper and name_or_path in BUILT_IN:
         return draw_paper(name_or_path, config)
     if is_vector_map(name_or_path):
-        return vector_road(name_or_path, None if encounter is None else driven_tracks(encounter), config)
+        return vector_road(
+            name_or_path, None if encounter is None else driven_tracks(encounter), config
+        )
     path = Path(name_or_path)
     if path.suffix.lower() in (".yaml", ".yml"):
         with reading(path):
@@ -139,14 +157,24 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
     if name_or_path not in ROADS:
         names, near = ", ".join(ROADS.names()), did_you_mean(name_or_path, ROADS.names())
         kinds = f"a map_server YAML file or a vector map ({', '.join(FORMATS)})"
-        part = "; one part behind one # can be named of a vector map alone" if "#" in name_or_path else ""
-        raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}{near}")
+        part = (
+            "; one part behind one # can be named of a vector map alone"
+            if "#" in name_or_path
+            else ""
+        )
+        raise InputError(
+            f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}{near}"
+        )
     draw_road = ROADS[name_or_path]
     with ROADS.running(name_or_path):
         road = draw_road(name_or_path, encounter, config)
         if not isinstance(road, Road):
             raise TypeError(f"it returned {type(road).__name__}; it must return a Road")
-        return road if encounter is None or name_or_path not in BUILT_IN else _with_room_to_walk(road, encounter, config)
+        return (
+            road
+            if encounter is None or name_or_path not in BUILT_IN
+            else _with_room_to_walk(road, encounter, config)
+        )
 
 
 def _with_room_to_walk(road: Road, encounter: Encounter, config: RoadConfig) -> Road:
@@ -160,7 +188,9 @@ def _with_room_to_walk(road: Road, encounter: Encounter, config: RoadConfig) -> 
     more = int(np.ceil(reach / road.resolution))
     height, width = (cells + 2 * more for cells in road.drivable.shape)
     refuse_too_many_cells(road.name, width, height, config)
-    return replace(road, drivable=np.pad(road.drivable, more), origin=road.origin - more * road.resolution)
+    return replace(
+        road, drivable=np.pad(road.drivable, more), origin=road.origin - more * road.resolution
+    )
 
 
 def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -174,7 +204,9 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     try:
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings: a junction's template
-        if name in ("t_intersection", "four_way") and not any(track.makes_u_turn for track in tracks):
+        if name in ("t_intersection", "four_way") and not any(
+            track.makes_u_turn for track in tracks
+        ):
             return draw_junction(name, encounter, config)
     else:
         main = main_line(frenet, tracks)

@@ -13,8 +13,27 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import across, aligned, Arm, draw_lanes, draw_plan, Driven, half_way, Plan
-from scenario_gen.roads.pavement import ARM_COUNT, drivable_beside, LANE_GAP, paved, ROOM, SHORTEST, SIDE_ARMS, SLACK, swept
+from scenario_gen.roads.drawn import (
+    across,
+    aligned,
+    Arm,
+    draw_lanes,
+    draw_plan,
+    Driven,
+    half_way,
+    Plan,
+)
+from scenario_gen.roads.pavement import (
+    ARM_COUNT,
+    drivable_beside,
+    LANE_GAP,
+    paved,
+    ROOM,
+    SHORTEST,
+    SIDE_ARMS,
+    SLACK,
+    swept,
+)
 from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
 from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road
@@ -51,22 +70,43 @@ def draw(name: str, layout: Layout, config: RoadConfig, tracks: tuple[Track, ...
         config: lane width, corner radius, resolution, traffic side.
         tracks: of the template, if there is one.
     """
-    sides, half, cell = SIDE_ARMS[: ARM_COUNT[name] - 2], layout.lanes * config.lane_width, config.resolution
+    sides, half, cell = (
+        SIDE_ARMS[: ARM_COUNT[name] - 2],
+        layout.lanes * config.lane_width,
+        config.resolution,
+    )
     arms = [Arm.towards(yaw, layout.main, layout.lanes) for yaw in (np.pi, 0.0)]
     arms += [Arm.towards(yaw, layout.side, layout.lanes) for yaw in sides]
     axis = Curve(np.array([[-layout.main, 0.0, 0.0], [layout.main, 0.0, 0.0]]))
     outermost = layout.lanes - 1
-    ends = [[arm.lane(outermost, config, inward=inward) for inward in (True, False)] for arm in arms[:2] if layout.u_turns]
+    ends = [
+        [arm.lane(outermost, config, inward=inward) for inward in (True, False)]
+        for arm in arms[:2]
+        if layout.u_turns
+    ]
     turns = ((k, draw_u_turn(entry, leave, layout.main)) for k, (entry, leave) in enumerate(ends))
-    driven = [Driven((k, outermost, k, outermost), way, _TURNING[0], _TURNING[1]) for k, way in turns if way is not None]
+    driven = [
+        Driven((k, outermost, k, outermost), way, _TURNING[0], _TURNING[1])
+        for k, way in turns
+        if way is not None
+    ]
     verge = layout.side if config.paper else half + config.cycle_lane + _VERGE
     south, north = (layout.side if side in sides else verge for side in SIDE_ARMS)
-    low = -half - cell * np.ceil((np.array([layout.main, south]) - half) / cell - 1e-6)  # kerbs on cell edges
+    low = -half - cell * np.ceil(
+        (np.array([layout.main, south]) - half) / cell - 1e-6
+    )  # kerbs on cell edges
     aim = _turned_round(tracks, outermost, config)
-    return draw_plan(Plan(arms, axis, driven, drawn_for=aim), name, config, np.array([low, [layout.main, north]]))
+    return draw_plan(
+        Plan(arms, axis, driven, drawn_for=aim),
+        name,
+        config,
+        np.array([low, [layout.main, north]]),
+    )
 
 
-def _turned_round(tracks: tuple[Track, ...], outermost: int, config: RoadConfig) -> DrawnFor | None:
+def _turned_round(
+    tracks: tuple[Track, ...], outermost: int, config: RoadConfig
+) -> DrawnFor | None:
     """Where a template lies of which a vehicle makes a U-turn: in the road's middle, from the first arm's outermost lane."""
     turner = next((track for track in tracks if track.makes_u_turn), None)
     if turner is None:
@@ -90,7 +130,11 @@ def _shares(turner: Track, pose: Floats, middle: int, *, last: bool) -> bool:
     """Whether a pose (3,) lies in the lane by which a vehicle comes that makes a U-turn, or by which it goes (`last`)."""
     station, offset = turner.curve.project(pose[None, :2])
     turned = abs(float(wrap_angle(turner.curve.at(station)[0, 2] - pose[2])))
-    return bool(abs(offset[0]) < LANE_GAP and turned < _SAME_WAY and (station[0] > turner.curve.station[middle]) == last)
+    return bool(
+        abs(offset[0]) < LANE_GAP
+        and turned < _SAME_WAY
+        and (station[0] > turner.curve.station[middle]) == last
+    )
 
 
 def draw_paper(name: str, config: RoadConfig) -> Road:
@@ -117,7 +161,9 @@ def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) 
         else:
             low, high = frenet.span(tracks)
             layout = Layout(max((high - low) / 2.0 + ROOM, SHORTEST), SHORTEST, frenet.lanes)
-    main, side = (config.arm_length, config.arm_length) if config.arm_length else (layout.main, layout.side)
+    main, side = (
+        (config.arm_length, config.arm_length) if config.arm_length else (layout.main, layout.side)
+    )
     lanes = config.lanes or layout.lanes
     mouth = lanes * config.lane_width + config.corner_radius + 5.0 if name != "straight" else 5.0
     return Layout(max(main, mouth), max(side, mouth), lanes, layout.u_turns)
@@ -168,7 +214,11 @@ def _parallel_lanes(tracks: tuple[Track, ...], lane_width: float) -> int:
             oncoming = (along < -np.cos(_SAME_WAY)) & (np.abs(offset) < _ONCOMING)
             gaps = np.diff(np.sort(offset[same]))
             between = np.round(np.abs(offset[oncoming]) / lane_width - 1.0).max(initial=0.0)
-            most = max(most, 1 + int((gaps > LANE_GAP).sum()), min(1 + int(np.ceil(between / 2.0)), _MOST_LANES))
+            most = max(
+                most,
+                1 + int((gaps > LANE_GAP).sum()),
+                min(1 + int(np.ceil(between / 2.0)), _MOST_LANES),
+            )
     return most
 
 
@@ -185,7 +235,9 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
             requested.
     """
     if config.cycle_lane:
-        raise RefusedError(f"road {name} is drawn without cycle lanes; unset road.cycle_lane, or choose another road")
+        raise RefusedError(
+            f"road {name} is drawn without cycle lanes; unset road.cycle_lane, or choose another road"
+        )
     if encounter is None:
         raise InputError(f"road {name} is drawn around a recording; give a log too")
     surface, paths, widths = list[BaseGeometry](), dict[str, Curve](), dict[str, float]()
@@ -199,7 +251,9 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
     shared = sharing_lanes(paths)
     lanes = [
         lane_along(
-            f"along vehicle {name}", paths[name].cut(0.0, paths[name].length, 1.0), max(widths[own] for own in names) / 2.0
+            f"along vehicle {name}",
+            paths[name].cut(0.0, paths[name].length, 1.0),
+            max(widths[own] for own in names) / 2.0,
         )
         for name, names in shared.items()
     ]
@@ -208,5 +262,13 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
         return road
     line = paths[next(iter(shared))]
     middle = line.cut(*half_way(line), _STEP)
-    right, left = (float(np.median(drivable_beside(road.drivable_at, middle, side, _WIDEST_CROSSING))) for side in (-1.0, 1.0))
-    return replace(road, lanes=road.lanes.with_lanes((*lanes, across("crossing 1", line, half_way(line), (right, left)))))
+    right, left = (
+        float(np.median(drivable_beside(road.drivable_at, middle, side, _WIDEST_CROSSING)))
+        for side in (-1.0, 1.0)
+    )
+    return replace(
+        road,
+        lanes=road.lanes.with_lanes(
+            (*lanes, across("crossing 1", line, half_way(line), (right, left)))
+        ),
+    )

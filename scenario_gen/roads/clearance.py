@@ -61,7 +61,13 @@ def segments_free(road: Road, start: Floats, end: Floats, radius: float) -> Bool
         (M,) True where every non-drivable cell is farther than `radius` from the segment.
     """
     free = np.empty(len(start), dtype=np.bool_)
-    check_segments(clearance_in_cells(road), to_cells(road, start), to_cells(road, end), radius / road.resolution, free)
+    check_segments(
+        clearance_in_cells(road),
+        to_cells(road, start),
+        to_cells(road, end),
+        radius / road.resolution,
+        free,
+    )
     return free
 
 
@@ -80,7 +86,13 @@ def footprint_fits(road: Road, poses: Floats, length: float, width: float) -> Bo
     poses = np.ascontiguousarray(np.reshape(poses, (-1, 3)), dtype=np.float64)
     fits = np.empty(len(poses), dtype=np.bool_)
     grid = np.concatenate((to_cells(road, poses[:, :2]), poses[:, 2:]), axis=1)
-    check_footprints(clearance_in_cells(road), grid, 0.5 * length / road.resolution, 0.5 * width / road.resolution, fits)
+    check_footprints(
+        clearance_in_cells(road),
+        grid,
+        0.5 * length / road.resolution,
+        0.5 * width / road.resolution,
+        fits,
+    )
     return fits
 
 
@@ -99,7 +111,9 @@ def distance_transform(drivable: Bools, out: Floats) -> None:
         for j in range(width):
             below = out[i + 1, j] if i < height - 1 else 0.0
             out[i, j] = min(out[i, j], below + 1.0)
-    site = np.empty(width + 2, dtype=np.int64)  # columns on the lower envelope, and where each begins to rule
+    site = np.empty(
+        width + 2, dtype=np.int64
+    )  # columns on the lower envelope, and where each begins to rule
     begin = np.empty(width + 3, dtype=np.int64)
     level = np.empty(width + 2)
     for i in range(height):  # along the rows: the lower envelope of phi(x - j) + h_j^2
@@ -169,20 +183,26 @@ def _gap_squared(ax: float, ay: float, bx: float, by: float, left: float, low: f
 
 
 @kernel(inline=True)
-def near_squares_free(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
+def near_squares_free(
+    clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float
+) -> bool:
     """Whether each non-drivable square of the field (H, W) is farther than `radius` from the (short) segment a-b; in cells."""
     height, width = clearance.shape
     reach = radius + CONTACT
     for i in range(int(np.floor(min(ay, by) - reach)), int(np.floor(max(ay, by) + reach)) + 1):
         for j in range(int(np.floor(min(ax, bx) - reach)), int(np.floor(max(ax, bx) + reach)) + 1):
             inside = 0 <= i < height and 0 <= j < width
-            if (not inside or clearance[i, j] == 0.0) and _gap_squared(ax, ay, bx, by, float(j), float(i)) <= reach * reach:
+            if (not inside or clearance[i, j] == 0.0) and _gap_squared(
+                ax, ay, bx, by, float(j), float(i)
+            ) <= reach * reach:
                 return False
     return True
 
 
 @kernel(F2, F, F, F, F, F)
-def free_length(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> float:
+def free_length(
+    clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float
+) -> float:
     """How far a disc can surely move from a towards b; infinity if all the way, exactly; else what is verified, to a cell.
 
     Source: sphere tracing (Hart 1996), with exact checks where it would have to creep.
@@ -204,7 +224,9 @@ def free_length(clearance: Floats, ax: float, ay: float, bx: float, by: float, r
         if here == 0.0 or here + 0.7072 <= radius:  # 0.7072: half a cell's diagonal, rounded up
             return t
         ex, ey = x - j - 0.5, y - i - 0.5
-        room = here - np.sqrt(ex * ex + ey * ey) - radius  # a ball about (x, y) that is surely free
+        room = (
+            here - np.sqrt(ex * ex + ey * ey) - radius
+        )  # a ball about (x, y) that is surely free
         if room < 0.5:
             room = min(1.0, length - t)
             if not near_squares_free(clearance, x, y, x + room * dx, y + room * dy, radius):
@@ -215,20 +237,26 @@ def free_length(clearance: Floats, ax: float, ay: float, bx: float, by: float, r
 
 
 @kernel(F2, F, F, F, F, F)
-def segment_free(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
+def segment_free(
+    clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float
+) -> bool:
     """Whether a disc can move from a to b, exactly; all in cells, with the clearance field (H, W)."""
     return free_length(clearance, ax, ay, bx, by, radius) == np.inf
 
 
 @kernel(F2, F2, F2, F, OUTB1)
-def check_segments(clearance: Floats, start: Floats, end: Floats, radius: float, free: Bools) -> None:
+def check_segments(
+    clearance: Floats, start: Floats, end: Floats, radius: float, free: Bools
+) -> None:
     """`segment_free` for M segments; start and end (M, 2), radius, all in cells; writes free (M,)."""
     for m in range(start.shape[0]):
         free[m] = segment_free(clearance, start[m, 0], start[m, 1], end[m, 0], end[m, 1], radius)
 
 
 @kernel(inline=True)
-def footprint_free(clearance: Floats, x: float, y: float, yaw: float, half_length: float, half_width: float) -> bool:
+def footprint_free(
+    clearance: Floats, x: float, y: float, yaw: float, half_length: float, half_width: float
+) -> bool:
     """Whether the rectangle at one pose (in cells) covers drivable cells only, by the clearance field (H, W)."""
     height, width = clearance.shape
     i, j = int(np.floor(y)), int(np.floor(x))
@@ -242,7 +270,9 @@ def footprint_free(clearance: Floats, x: float, y: float, yaw: float, half_lengt
         u = half_length if k in (0, 3) else -half_length
         v = half_width if k < 2 else -half_width
         corner_x[k], corner_y[k] = x + c * u - s * v, y + s * u + c * v
-    for i in range(int(np.floor(corner_y.min() + CONTACT)), int(np.ceil(corner_y.max() - CONTACT))):
+    for i in range(
+        int(np.floor(corner_y.min() + CONTACT)), int(np.ceil(corner_y.max() - CONTACT))
+    ):
         low, high = np.inf, -np.inf  # the rectangle's extent in x within this row of cells
         for k in range(4):
             x0, y0, x1, y1 = corner_x[k], corner_y[k], corner_x[(k + 1) % 4], corner_y[(k + 1) % 4]
@@ -259,10 +289,14 @@ def footprint_free(clearance: Floats, x: float, y: float, yaw: float, half_lengt
 
 
 @kernel(F2, F2, F, F, OUTB1)
-def check_footprints(clearance: Floats, poses: Floats, half_length: float, half_width: float, fits: Bools) -> None:
+def check_footprints(
+    clearance: Floats, poses: Floats, half_length: float, half_width: float, fits: Bools
+) -> None:
     """`footprint_free` for M poses (M, 3), in cells and rad; writes fits (M,)."""
     for m in range(poses.shape[0]):
-        fits[m] = footprint_free(clearance, poses[m, 0], poses[m, 1], poses[m, 2], half_length, half_width)
+        fits[m] = footprint_free(
+            clearance, poses[m, 0], poses[m, 1], poses[m, 2], half_length, half_width
+        )
 
 
 BISECTIONS = 20

@@ -22,7 +22,9 @@ from scenario_gen.types import once_per_object, Road
 @once_per_object
 def components(road: Road, radius: float) -> Ints:
     """Connected components for a disc of `radius` [m]: (H, W), 0 where its centre cannot be, else 1, 2, …; read-only, cached."""
-    return sealed(ndimage.label(clearance_in_cells(road) > radius / road.resolution)[0].astype(np.int64))
+    return sealed(
+        ndimage.label(clearance_in_cells(road) > radius / road.resolution)[0].astype(np.int64)
+    )
 
 
 @once_per_object
@@ -35,7 +37,12 @@ def component_cells(road: Road, radius: float, label: int) -> tuple[Ints, Ints]:
     inside = np.pad(components(road, radius) == label, 1)
     corner = np.zeros(road.drivable.shape, dtype=np.bool_)
     rows, columns = road.drivable.shape
-    for di, dj in ((0, 0), (0, 2), (2, 0), (2, 2)):  # the diagonal neighbour is closed, the two between are open
+    for di, dj in (
+        (0, 0),
+        (0, 2),
+        (2, 0),
+        (2, 2),
+    ):  # the diagonal neighbour is closed, the two between are open
         beside, above = inside[1:-1, dj : dj + columns], inside[di : di + rows, 1:-1]
         corner |= ~inside[di : di + rows, dj : dj + columns] & beside & above
     corner &= inside[1:-1, 1:-1]

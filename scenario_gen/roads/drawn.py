@@ -70,7 +70,11 @@ class Arm:
 
     def lane(self, k: int, config: RoadConfig, *, inward: bool) -> Floats:
         """The pose (3,) [m, m, rad] of lane k, counted from the dividing line, heading as its traffic does."""
-        left = (k + 0.5) * config.lane_width * (1.0 if inward == (config.traffic_side == "right") else -1.0)
+        left = (
+            (k + 0.5)
+            * config.lane_width
+            * (1.0 if inward == (config.traffic_side == "right") else -1.0)
+        )
         yaw = self.pose[2]
         return np.array([*(self.pose[:2] + left * unit_left(yaw)), yaw + np.pi if inward else yaw])
 
@@ -121,7 +125,10 @@ def lane_id(arm: int, lane: int, *, inward: bool) -> str:
 
 
 def aligned(
-    tracks: Sequence[Track], lane_of: Mapping[tuple[int, bool], tuple[int, int]], pose: Floats, at: Floats
+    tracks: Sequence[Track],
+    lane_of: Mapping[tuple[int, bool], tuple[int, int]],
+    pose: Floats,
+    at: Floats,
 ) -> DrawnFor | None:
     """Where the template of a road lies of which a pose (3,) in its own frame is one on the road; None without a template.
 
@@ -151,7 +158,9 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
         RefusedError: it has more cells than are allowed, or cannot have cycle lanes.
     """
     if config.cycle_lane and (plan.ring or not all(arm.outward for arm in plan.arms)):
-        raise RefusedError(f"road {name} is drawn without cycle lanes; unset road.cycle_lane, or choose another road")
+        raise RefusedError(
+            f"road {name} is drawn without cycle lanes; unset road.cycle_lane, or choose another road"
+        )
     drawing = _Drawing(plan, config)
     lanes, surface = drawing.drawn()
     others = drawing.others(lanes)
@@ -169,10 +178,17 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
         box = np.reshape(shapely.total_bounds(whole), (2, 2)) + np.array([[-_VERGE_M], [_VERGE_M]])
         box[0] = np.floor(box[0])
     low = box[0]
-    return draw_lanes(network.moved(-low), shapely.transform(surface, lambda points: points - low), config, box - low)
+    return draw_lanes(
+        network.moved(-low),
+        shapely.transform(surface, lambda points: points - low),
+        config,
+        box - low,
+    )
 
 
-def draw_lanes(network: LaneNetwork, surface: BaseGeometry, config: RoadConfig, box: Floats | None = None) -> Road:
+def draw_lanes(
+    network: LaneNetwork, surface: BaseGeometry, config: RoadConfig, box: Floats | None = None
+) -> Road:
     """Return the road of lanes and of what is paved about them, in metres; `box` of its grid, or all and a verge.
 
     Raises:
@@ -189,7 +205,9 @@ class _Drawing:
 
     def __init__(self, plan: Plan, config: RoadConfig) -> None:
         self._plan, self._config, self._width = plan, config, config.lane_width
-        self._sign = 1.0 if config.traffic_side == "right" else -1.0  # lanes in lie so many times their offset to the right
+        self._sign = (
+            1.0 if config.traffic_side == "right" else -1.0
+        )  # lanes in lie so many times their offset to the right
         self._joined = len(plan.arms) > 2 or plan.axis is None or len(plan.driven) > 0
         self._lines = [self._line(k) for k in range(len(plan.arms))]
         rounded = self._joined and not plan.ring and all(arm.outward for arm in plan.arms)
@@ -197,11 +215,17 @@ class _Drawing:
         self._surface = paved(self._pieces(), self._corner_radius)
         self._drivable: Inside = inside(self._surface)
         self._driven = {way.places: way.curve for way in reversed(plan.driven)}
-        self._mouths = [self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)]
+        self._mouths = [
+            self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)
+        ]
         for places in self._usual() if self._joined else ():
-            if self._way(places) is None and (way := self._from_end_to_end(places)) is not None:  # its mouths lie too near
+            if (
+                self._way(places) is None and (way := self._from_end_to_end(places)) is not None
+            ):  # its mouths lie too near
                 self._driven[places] = way
-        self._mouths = [self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)]
+        self._mouths = [
+            self._mouth(k) if self._joined else line.length for k, line in enumerate(self._lines)
+        ]
 
     def drawn(self) -> tuple[tuple[Lane, ...], BaseGeometry]:
         """All lanes, those of the arms first, and what is paved."""
@@ -210,7 +234,9 @@ class _Drawing:
         for k, arm in enumerate(arms[: None if self._joined else 1]):
             outward = arm.outward if self._joined else arms[1].inward
             for inward, count in ((True, arm.inward), (False, outward)):
-                borders = self._along(k, (self._width * n for n in range(count + 1)), inward=inward)
+                borders = self._along(
+                    k, (self._width * n for n in range(count + 1)), inward=inward
+                )
                 first = len(lanes)
                 for n, (inner, outer) in enumerate(pairwise(borders)):
                     left, right = (inner, outer) if self._sign > 0.0 else (outer, inner)
@@ -219,7 +245,10 @@ class _Drawing:
                     lanes.append(Lane(lane_id(k, n, inward=inward), left, right, (), beside))
         if not self._joined:
             return tuple(lanes), self._surface
-        ways = [(index[a, True, i], index[b, False, j], way) for (a, i, b, j), way in self._ways().items()]
+        ways = [
+            (index[a, True, i], index[b, False, j], way)
+            for (a, i, b, j), way in self._ways().items()
+        ]
         narrow = [self._way_lane(way, lanes[start], lanes[goal], 0.0) for start, goal, way in ways]
         outlines = shapely.make_valid([shapely.Polygon(lane.outline) for lane in narrow])
         self._surface = paved([self._surface, *outlines], self._corner_radius)
@@ -230,32 +259,54 @@ class _Drawing:
             lane = self._way_lane(way, lanes[start], lanes[goal], self._wider(way))
             lanes.append(replace(lane, successors=(goal,)))
         return tuple(
-            replace(lane, successors=tuple(after.get(k, lane.successors))) for k, lane in enumerate(lanes)
+            replace(lane, successors=tuple(after.get(k, lane.successors)))
+            for k, lane in enumerate(lanes)
         ), self._surface
 
     def rules(self, lanes: Sequence[Lane]) -> Iterator[TrafficRule]:
         """What signs say at the mouths of arms: to stop, or to give way to the other arms, and to who is on the ring."""
-        arms = range(len(self._plan.arms)) if self._joined and self._config.priority != "none" else ()
+        arms = (
+            range(len(self._plan.arms)) if self._joined and self._config.priority != "none" else ()
+        )
         mouths = [k for k, lane in enumerate(lanes) if not lane.junction]
         into = [[k for k in mouths if lanes[k].id.startswith(f"{arm + 1}.-")] for arm in arms]
-        stop = self._config.priority == "all_way_stop" and not self._plan.ring and all(arm.outward for arm in self._plan.arms)
+        stop = (
+            self._config.priority == "all_way_stop"
+            and not self._plan.ring
+            and all(arm.outward for arm in self._plan.arms)
+        )
         for arm in arms:
             if not into[arm] or not (stop or arm in self._plan.yielding):
                 continue
-            over = [k for other in arms if other != arm and other not in self._plan.yielding for k in into[other]]
+            over = [
+                k
+                for other in arms
+                if other != arm and other not in self._plan.yielding
+                for k in into[other]
+            ]
             if self._plan.ring:
-                over = [k for k, lane in enumerate(lanes) if lane.junction and not lane.id.startswith(f"{arm + 1}.")]
+                over = [
+                    k
+                    for k, lane in enumerate(lanes)
+                    if lane.junction and not lane.id.startswith(f"{arm + 1}.")
+                ]
             ends = [edge for k in into[arm] for edge in (lanes[k].left[-1], lanes[k].right[-1])]
             line = np.stack((ends[0], ends[-1]) if self._sign > 0.0 else (ends[1], ends[-2]))
             if self._config.crossing != "none":  # who stops does so before it
-                line -= (_CROSSING_M[1] + _BEFORE_M) * unit(float(self._lines[arm].at(np.array([self._mouths[arm]]))[0, 2]))
+                line -= (_CROSSING_M[1] + _BEFORE_M) * unit(
+                    float(self._lines[arm].at(np.array([self._mouths[arm]]))[0, 2])
+                )
             kind = RuleKind.STOP if stop else RuleKind.GIVE_WAY
-            yield TrafficRule(f"arm {arm + 1}", kind, tuple(into[arm]), () if stop else tuple(over), line)
+            yield TrafficRule(
+                f"arm {arm + 1}", kind, tuple(into[arm]), () if stop else tuple(over), line
+            )
 
     def others(self, lanes: Sequence[Lane]) -> list[Lane]:
         """Cycle lanes and crossings, whose neighbours count behind those of lanes that cars may use."""
         others, index, arms = list[Lane](), dict[tuple[int, bool], int](), self._plan.arms
-        for k, arm in enumerate(arms[: None if self._joined else 1] if self._config.cycle_lane else ()):
+        for k, arm in enumerate(
+            arms[: None if self._joined else 1] if self._config.cycle_lane else ()
+        ):
             counts = arm.inward, arm.outward if self._joined else arms[1].inward
             for inward, count in zip((True, False), counts, strict=True):
                 edges = count * self._width + np.array([0.0, self._config.cycle_lane])
@@ -267,7 +318,9 @@ class _Drawing:
             way = self._cycle_way(a, b)
             if way is not None:
                 start, goal = index[a, True], index[b, False]
-                lane = self._way_lane(way, others[start], others[goal], (self._config.cycle_lane - self._width) / 2.0)
+                lane = self._way_lane(
+                    way, others[start], others[goal], (self._config.cycle_lane - self._width) / 2.0
+                )
                 leads = (*others[start].successors, len(lanes) + len(others))
                 others[start] = replace(others[start], successors=leads)
                 others.append(replace(lane, successors=(len(lanes) + goal,), users=_CYCLISTS))
@@ -289,13 +342,18 @@ class _Drawing:
         near, far = (max(self._mouths[k] - metres, 0.0) for metres in _CROSSING_M)
         stations = (far, near) if self._joined else half_way(line)
         counts = arms[k].inward, arms[k].outward if self._joined else arms[1].inward
-        right, left = (count * self._width + self._config.cycle_lane for count in (counts if self._sign > 0.0 else counts[::-1]))
+        right, left = (
+            count * self._width + self._config.cycle_lane
+            for count in (counts if self._sign > 0.0 else counts[::-1])
+        )
         return across(f"crossing {k + 1}", line, stations, (right, left))
 
     def _pieces(self) -> Iterator[BaseGeometry]:
         """What is paved for certain: the arms, the ring, and where a vehicle drives through the junction."""
         for arm, line in zip(self._plan.arms, self._lines, strict=True):
-            right, left = (arm.inward, arm.outward) if self._sign > 0.0 else (arm.outward, arm.inward)
+            right, left = (
+                (arm.inward, arm.outward) if self._sign > 0.0 else (arm.outward, arm.inward)
+            )
             yield strip(line, -right * self._width, left * self._width)
         if self._plan.ring:
             yield ring(self._plan.ring, self._width / 2.0 + _RING_ROOM_M)
@@ -310,7 +368,11 @@ class _Drawing:
         axis = self._plan.axis
         if axis is not None and k < 2:
             line = axis if k == 0 else axis.reversed()
-            return line.cut(0.0, float(line.project(np.zeros((1, 2)))[0][0]), _STEP_M) if self._joined else line
+            return (
+                line.cut(0.0, float(line.project(np.zeros((1, 2)))[0][0]), _STEP_M)
+                if self._joined
+                else line
+            )
         start = reverse(self._plan.arms[k].pose)
         length = -float((start[:2] * unit(start[2])).sum()) - self._plan.ring
         return Curve(np.array([start, [*(start[:2] + length * unit(start[2])), start[2]]]))
@@ -345,7 +407,9 @@ class _Drawing:
             (a, i, b, j)
             for a, b in permutations(range(len(arms)), 2)
             for i in range(arms[a].inward)
-            if 0 <= (j := i if arms[a].outward else i + arms[b].outward - arms[a].inward) < arms[b].outward
+            if 0
+            <= (j := i if arms[a].outward else i + arms[b].outward - arms[a].inward)
+            < arms[b].outward
         ]
 
     def _ways(self) -> dict[Way, Curve]:
@@ -354,8 +418,16 @@ class _Drawing:
         everywhere = dict.fromkeys((*self._driven, *self._usual()))
         ways = {places: way for places in everywhere if (way := self._way(places)) is not None}
         for a, b in permutations(range(len(arms)), 2):
-            lacking = [(a, i, b, arms[b].outward - 1) for i in range(arms[a].inward) if all(w[:2] != (a, i) for w in ways)]
-            lacking += [(a, arms[a].inward - 1, b, j) for j in range(arms[b].outward) if all(w[2:] != (b, j) for w in ways)]
+            lacking = [
+                (a, i, b, arms[b].outward - 1)
+                for i in range(arms[a].inward)
+                if all(w[:2] != (a, i) for w in ways)
+            ]
+            lacking += [
+                (a, arms[a].inward - 1, b, j)
+                for j in range(arms[b].outward)
+                if all(w[2:] != (b, j) for w in ways)
+            ]
             for places in lacking:
                 if min(places) >= 0 and (way := self._way(places)) is not None:
                     ways[places] = way
@@ -364,8 +436,13 @@ class _Drawing:
     def _from_end_to_end(self, places: Way) -> Curve | None:
         """The way from the end of one lane to that of another; None if no car could drive it."""
         (a, i, b, j), arms = places, self._plan.arms
-        start, goal = arms[a].lane(i, self._config, inward=True), arms[b].lane(j, self._config, inward=False)
-        return None if abs(angle_between(goal[2], start[2])) > _TURN_BACK else draw_route(start, goal)
+        start, goal = (
+            arms[a].lane(i, self._config, inward=True),
+            arms[b].lane(j, self._config, inward=False),
+        )
+        return (
+            None if abs(angle_between(goal[2], start[2])) > _TURN_BACK else draw_route(start, goal)
+        )
 
     def _way(self, places: Way) -> Curve | None:
         """The way from the middle of one lane at its mouth to another's; None if no car could drive it."""
@@ -383,7 +460,9 @@ class _Drawing:
         line = line.cut(self._mouths[a], line.length - self._mouths[1 - a], _WAY_STEP_M)
         return Curve(line.beside(line.station, -self._sign * offset))
 
-    def _drawn_way(self, a: int, begins: float, b: int, ends: float, tightest: float = TIGHTEST) -> Curve | None:
+    def _drawn_way(
+        self, a: int, begins: float, b: int, ends: float, tightest: float = TIGHTEST
+    ) -> Curve | None:
         """The way from one arm's mouth to another's, from and to places so far [m] beside their dividing lines."""
         start = self._lines[a].beside(np.array([self._mouths[a]]), -self._sign * begins)[0]
         goal = reverse(self._lines[b].beside(np.array([self._mouths[b]]), self._sign * ends)[0])
@@ -398,15 +477,23 @@ class _Drawing:
             return 0.0
         swell = np.square(np.sin(np.pi * way.station / way.length))
         half = self._width / 2.0
-        beside = (drivable_beside(self._drivable, way, sign, half + _WIDER_M, _LOOK_M / 2.0) for sign in (1.0, -1.0))
+        beside = (
+            drivable_beside(self._drivable, way, sign, half + _WIDER_M, _LOOK_M / 2.0)
+            for sign in (1.0, -1.0)
+        )
         inner, free = swell > _INNER, np.minimum(*beside) - half
-        return np.asarray(swell * float(np.clip((free[inner] + _LOOK_M) / swell[inner], 0.0, _WIDER_M).min()))
+        return np.asarray(
+            swell * float(np.clip((free[inner] + _LOOK_M) / swell[inner], 0.0, _WIDER_M).min())
+        )
 
     def _way_lane(self, way: Curve, start: Lane, goal: Lane, wider: Floats | float) -> Lane:
         """The lane along a way, whose borders begin and end at those of the lanes that it joins."""
         share = (way.station / way.length)[:, None]
         edges = []
-        for sign, ends in ((1.0, (start.left[-1], goal.left[0])), (-1.0, (start.right[-1], goal.right[0]))):
+        for sign, ends in (
+            (1.0, (start.left[-1], goal.left[0])),
+            (-1.0, (start.right[-1], goal.right[0])),
+        ):
             own = way.beside(way.station, sign * (self._width / 2.0 + wider))[:, :2]
             edges.append(own + (1.0 - share) * (ends[0] - own[0]) + share * (ends[1] - own[-1]))
             edges[-1][[0, -1]] = ends
@@ -419,15 +506,21 @@ def half_way(line: Curve) -> tuple[float, float]:
     return line.length / 2.0 - half, line.length / 2.0 + half
 
 
-def across(name: str, line: Curve, stations: tuple[float, float], reach: tuple[float, float]) -> Lane:
+def across(
+    name: str, line: Curve, stations: tuple[float, float], reach: tuple[float, float]
+) -> Lane:
     """Return the crossing between two stations [m] of a line, so many metres to its right and to its left."""
-    behind, ahead = (line.beside(np.full(2, s), np.array([-reach[0], reach[1]]))[:, :2] for s in stations)
+    behind, ahead = (
+        line.beside(np.full(2, s), np.array([-reach[0], reach[1]]))[:, :2] for s in stations
+    )
     return Lane(name, behind, ahead, users=frozenset(("pedestrian",)), crossing=True)
 
 
 def ways_through(road: Road) -> dict[tuple[int, int], Curve]:
     """Return the ways from the end of an entry's lane to that of an exit's, by the indices of the two, that a drawn road has."""
-    network = road.lanes if road.lanes is not None and road.lanes.drawn else LaneNetwork(road.name, ())
+    network = (
+        road.lanes if road.lanes is not None and road.lanes.drawn else LaneNetwork(road.name, ())
+    )
     ways = {}
     for e, first in enumerate(network.entries):
         for way in network.lanes[first].successors:

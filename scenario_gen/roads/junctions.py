@@ -22,13 +22,28 @@ from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLACK
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route
-from scenario_gen.template import driven_tracks, driver_rows, reactions_of, sharpness_of, Track, turn_of
+from scenario_gen.template import (
+    driven_tracks,
+    driver_rows,
+    reactions_of,
+    sharpness_of,
+    Track,
+    turn_of,
+)
 from scenario_gen.types import Encounter, Road, YIELD
 
-_RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane where none was recorded
+_RING = (
+    13.0,
+    45.0,
+)  # metres, smallest and largest radius of a roundabout's lane where none was recorded
 _LEAST_RING = 8.0  # metres, of one that was recorded
-_RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
-_NEAR_RING = 4.0  # metres beyond the middle of its lane within which a vehicle's speed is one on the ring
+_RING_LATERAL, _RING_FASTEST = (
+    3.0,
+    4.0,
+)  # m/s² at the template's fastest: as it is sized, and at most
+_NEAR_RING = (
+    4.0  # metres beyond the middle of its lane within which a vehicle's speed is one on the ring
+)
 _EVERY = 1.0  # metres between the poses of a path by which a ring is found
 _WIDEST_RING = 60.0  # metres of its radius, in the template
 _LEAST_ARC = 12.0  # metres that are driven about it
@@ -83,7 +98,10 @@ class _Direction:
 
     def reach(self, tracks: tuple[Track, ...]) -> float:
         """How far [m] from the centre its members' footprints reach."""
-        return max([end.away + tracks[end.vehicle].vehicle.length / 2.0 for end in self.members], default=0.0)
+        return max(
+            [end.away + tracks[end.vehicle].vehicle.length / 2.0 for end in self.members],
+            default=0.0,
+        )
 
 
 def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
@@ -100,7 +118,9 @@ def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
     tracks = driven_tracks(encounter)
     centre = junction_centre(tracks)
     directions = _directions(name, tracks, centre)
-    longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
+    longest = max(
+        directions, key=lambda direction: max((end.away for end in direction.members), default=0.0)
+    )
     turn = np.pi - longest.yaw  # the longest arm leads west
     lane_of: dict[tuple[int, bool], tuple[int, int]] = {}  # arm and lane of each end
     arms: list[Arm] = []
@@ -110,7 +130,9 @@ def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
         yaw = direction.yaw + turn
         most = [_most(lanes, inward=inward) + 1 for inward in (True, False)]
         if max(most) > _MOST_LANES:
-            raise RefusedError(f"road {name} would need {max(most)} lanes in one direction; {_MOST_LANES} are drawn at most")
+            raise RefusedError(
+                f"road {name} would need {max(most)} lanes in one direction; {_MOST_LANES} are drawn at most"
+            )
         arm = Arm.towards(yaw, reach, 0, offset)
         arms.append(Arm(arm.pose, *(max(count, config.lanes) for count in most)))
         lane_of.update({key: (len(arms) - 1, lane) for key, lane in lanes.items()})
@@ -118,16 +140,28 @@ def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
     for i, track in enumerate(tracks):
         if (i, True) in lane_of and (i, False) in lane_of and not track.still:
             (a, first), (b, last) = lane_of[i, True], lane_of[i, False]
-            ends = arms[a].lane(first, config, inward=True), arms[b].lane(last, config, inward=False)
+            ends = (
+                arms[a].lane(first, config, inward=True),
+                arms[b].lane(last, config, inward=False),
+            )
             way = draw_route(*ends, sharpness=sharpness_of(track))
             if way is not None:
-                driven.append(Driven((a, first, b, last), way, track.vehicle.length, track.vehicle.width + 2.0 * _SWEPT))
+                driven.append(
+                    Driven(
+                        (a, first, b, last),
+                        way,
+                        track.vehicle.length,
+                        track.vehicle.width + 2.0 * _SWEPT,
+                    )
+                )
     aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
     yielding = _yielding_arms(encounter, lane_of, config)
     return draw_plan(Plan(arms, driven=driven, yielding=yielding, drawn_for=aim), name, config)
 
 
-def _yielding_arms(encounter: Encounter, lane_of: Mapping[tuple[int, bool], tuple[int, int]], config: RoadConfig) -> set[int]:
+def _yielding_arms(
+    encounter: Encounter, lane_of: Mapping[tuple[int, bool], tuple[int, int]], config: RoadConfig
+) -> set[int]:
     """Return the arms of those who yield to others of other arms, but for those to whom somebody yields.
 
     Args:
@@ -136,7 +170,10 @@ def _yielding_arms(encounter: Encounter, lane_of: Mapping[tuple[int, bool], tupl
         config: whether priorities are shown.
     """
     came_by = {vehicle: arm for (vehicle, inward), (arm, _) in lane_of.items() if inward}
-    edges, rows = reactions_of(encounter).edges if config.priority == "auto" else (), driver_rows(encounter)
+    edges, rows = (
+        reactions_of(encounter).edges if config.priority == "auto" else (),
+        driver_rows(encounter),
+    )
     yields = [(rows.get(e.who, -1), rows.get(e.whom, -1)) for e in edges if e.kind == YIELD]
     ways = [(came_by[who], came_by[whom]) for who, whom in yields if {who, whom} <= came_by.keys()]
     pairs = [(arm, other) for arm, other in ways if arm != other]
@@ -159,10 +196,14 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         driven_about = _ring_driven(tracks, config)
         centre = junction_centre(tracks) if driven_about is None else driven_about[0]
         radius, fastest = _ring(tracks, centre, None if driven_about is None else driven_about[1])
-        length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
+        length, wide = (
+            max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width")
+        )
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
         if driven_about is None:
-            notes.append(f"no recorded vehicle drives round a ring; one of {radius:.0f} m radius is drawn in its middle")
+            notes.append(
+                f"no recorded vehicle drives round a ring; one of {radius:.0f} m radius is drawn in its middle"
+            )
     if fastest > np.sqrt(_RING_FASTEST * radius):
         possible = float(np.sqrt(_RING_FASTEST * _RING[1]))
         raise RefusedError(
@@ -172,11 +213,17 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     turn = np.pi - directions[0].yaw
     arms = []
     for direction in directions:
-        straight = replace(direction, members=[end for end in direction.members if end.steady >= 2.0 * _SURE])
+        straight = replace(
+            direction, members=[end for end in direction.members if end.steady >= 2.0 * _SURE]
+        )
         most = max(_lanes(straight, config)[1].values(), default=0)
         if most > 0 and len({end.inward for end in direction.members}) < 2:
-            raise RefusedError(f"road roundabout has one lane, and the recording drives in {most + 1} beside each other")
-        reach = config.arm_length or max(direction.reach(tracks) + ROOM + 2.0 * SLACK, radius + SHORTEST)
+            raise RefusedError(
+                f"road roundabout has one lane, and the recording drives in {most + 1} beside each other"
+            )
+        reach = config.arm_length or max(
+            direction.reach(tracks) + ROOM + 2.0 * SLACK, radius + SHORTEST
+        )
         yaw = direction.yaw + turn
         arms.append(Arm.towards(yaw, reach, 1))
     driven = []
@@ -185,11 +232,15 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         way = draw_ring_route(*ends, np.zeros(2), radius)
         if way is not None:
             driven.append(Driven((a, 0, b, 0), way, length, wide + 2.0 * _SWEPT))
-    lane_of = {end.key: (a, 0) for a, direction in enumerate(directions) for end in direction.members}
+    lane_of = {
+        end.key: (a, 0) for a, direction in enumerate(directions) for end in direction.members
+    }
     aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
     yielding = set(range(len(arms))) - {arm for (_, inward), (arm, _) in lane_of.items() if inward}
     yielding |= set() if encounter is None else _yielding_arms(encounter, lane_of, config)
-    plan = Plan(arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim, notes=tuple(notes))
+    plan = Plan(
+        arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim, notes=tuple(notes)
+    )
     return draw_plan(plan, name, config)
 
 
@@ -206,7 +257,11 @@ def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats,
     sign, points = 1.0 if config.traffic_side == "right" else -1.0, np.zeros((0, 2))
     for track in tracks:
         poses = track.curve.at(np.arange(0.0, track.travelled, _EVERY))
-        turned = sign * np.gradient(np.convolve(poses[:, 2], np.full(5, 0.2), "same")) if len(poses) > 9 else np.zeros(len(poses))
+        turned = (
+            sign * np.gradient(np.convolve(poses[:, 2], np.full(5, 0.2), "same"))
+            if len(poses) > 9
+            else np.zeros(len(poses))
+        )
         turned[:3] = turned[-3:] = 0.0
         about = turned > _EVERY / _WIDEST_RING
         if -turned[turned < 0.0].sum() > _FLARED or turned[about].sum() > _CIRCLED:
@@ -224,14 +279,18 @@ def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats,
     return None
 
 
-def _ring(tracks: tuple[Track, ...], centre: Floats, recorded: float | None) -> tuple[float, float]:
+def _ring(
+    tracks: tuple[Track, ...], centre: Floats, recorded: float | None
+) -> tuple[float, float]:
     """The radius [m] of a roundabout's lane that suits the template's speeds on it, not on its arms; the fastest [m/s] there.
 
     One that was recorded is drawn as it was, if cars can drive it so fast.
     """
     there = [slice(track.present[0], track.present[1] + 1) for track in tracks]
     speed = np.concatenate([track.speed[own] for track, own in zip(tracks, there, strict=True)])
-    place = np.concatenate([track.poses[own, :2] for track, own in zip(tracks, there, strict=True)])
+    place = np.concatenate(
+        [track.poses[own, :2] for track, own in zip(tracks, there, strict=True)]
+    )
     away = np.hypot(*(place - centre).T)
     if recorded is not None:
         fastest = float(speed[away < recorded + _OFF_RING].max(initial=0.0))
@@ -253,22 +312,33 @@ def _ends(i: int, track: Track, centre: Floats, ring: float) -> list[_End]:
         along = poses if inward else poses[::-1]
         turning = np.flatnonzero(np.abs(along[:, 2] - along[0, 2]) > _STEADY)
         nearest = int(np.argmin(np.square(along[:, :2]).sum(axis=1)))
-        last = min(int(turning[0]) if len(turning) else len(along) - 1, nearest)  # not beyond the junction
+        last = min(
+            int(turning[0]) if len(turning) else len(along) - 1, nearest
+        )  # not beyond the junction
         yaw = float(np.median(along[: last + 1, 2])) + (np.pi if inward else 0.0)
         if ring and last * 0.5 < 2.0 * _SURE:  # still bending: arms lead straight to the middle
             yaw = float(np.arctan2(*along[0, 1::-1]))
         away = float((along[0, :2] * unit(yaw)).sum())
         at = along[nearest if abs(turn) < _THROUGH and not ring else last, :2]
-        ends.append(_End(i, inward, yaw, at, away, last * 0.5, goes_on * (-1.0 if inward else 1.0)))
+        ends.append(
+            _End(i, inward, yaw, at, away, last * 0.5, goes_on * (-1.0 if inward else 1.0))
+        )
     if track.still:
         return [max(ends, key=lambda end: end.away)]  # it stands on the arm on which it is
     return ends
 
 
-def _directions(name: str, tracks: tuple[Track, ...], centre: Floats, ring: float = 0.0) -> list[_Direction]:
+def _directions(
+    name: str, tracks: tuple[Track, ...], centre: Floats, ring: float = 0.0
+) -> list[_Direction]:
     """Directions of the arms about a centre (2,) [m] with their members, as many as the road has; an end on a ring is on none."""
     count = ARM_COUNT[name]
-    ends = [end for i, track in enumerate(tracks) for end in _ends(i, track, centre, ring) if not ring or end.away > ring]
+    ends = [
+        end
+        for i, track in enumerate(tracks)
+        for end in _ends(i, track, centre, ring)
+        if not ring or end.away > ring
+    ]
     directions: list[_Direction] = []
     reached = [end for end in ends if end.away > 0.0]
     for end in sorted(reached, key=lambda end: (-min(end.steady, 20.0), end.vehicle, end.inward)):
@@ -277,12 +347,20 @@ def _directions(name: str, tracks: tuple[Track, ...], centre: Floats, ring: floa
             directions.append(_Direction(end.yaw, [end]))
         else:
             nearest.members.append(end)
-            nearest.yaw = _mean([m for m in nearest.members if m.steady >= _SURE] or nearest.members)
+            nearest.yaw = _mean(
+                [m for m in nearest.members if m.steady >= _SURE] or nearest.members
+            )
     while len(directions) > count:
-        pairs = [(abs(angle_between(a.yaw, b.yaw)), j, k) for j, a in enumerate(directions) for k, b in enumerate(directions[:j])]
+        pairs = [
+            (abs(angle_between(a.yaw, b.yaw)), j, k)
+            for j, a in enumerate(directions)
+            for k, b in enumerate(directions[:j])
+        ]
         apart, j, k = min(pairs)
         if apart > _MERGED:
-            who = ", ".join(tracks[direction.members[0].vehicle].vehicle.id for direction in directions)
+            who = ", ".join(
+                tracks[direction.members[0].vehicle].vehicle.id for direction in directions
+            )
             raise RefusedError(
                 f"road {name} has {count} arms, and the recorded vehicles enter and leave by {len(directions)} (one each: "
                 f"vehicles {who}); choose another road"
@@ -295,13 +373,19 @@ def _directions(name: str, tracks: tuple[Track, ...], centre: Floats, ring: floa
             nearest = _nearest(end, directions)
             if nearest is not None:
                 nearest.members.append(end)
-            elif len(directions) < count and not any(abs(angle_between(other.yaw, end.yaw)) < _MERGED for other in directions):
+            elif len(directions) < count and not any(
+                abs(angle_between(other.yaw, end.yaw)) < _MERGED for other in directions
+            ):
                 directions.append(_Direction(end.yaw, [end]))
     directions = directions or [_Direction(0.0, [])]  # all ends are on the ring
     while len(directions) < count:
         yaws = [direction.yaw + k * np.pi / 2.0 for direction in directions for k in (2, 1, 3)]
-        free = [min(abs(angle_between(yaw, direction.yaw)) for direction in directions) for yaw in yaws]
-        directions.append(_Direction(yaws[int(np.argmax(np.round(np.minimum(free, np.pi / 2.0), 6)))], []))
+        free = [
+            min(abs(angle_between(yaw, direction.yaw)) for direction in directions) for yaw in yaws
+        ]
+        directions.append(
+            _Direction(yaws[int(np.argmax(np.round(np.minimum(free, np.pi / 2.0), 6)))], [])
+        )
     return directions
 
 
@@ -310,9 +394,15 @@ def _nearest(end: _End, directions: list[_Direction]) -> _Direction | None:
 
     def joins(direction: _Direction) -> bool:
         off = angle_between(direction.yaw, end.yaw)
-        return abs(off) < _SAME_ARM or (end.steady < _SURE and off * end.turning > 0.0 and abs(off) < _PART)
+        return abs(off) < _SAME_ARM or (
+            end.steady < _SURE and off * end.turning > 0.0 and abs(off) < _PART
+        )
 
-    return min(filter(joins, directions), key=lambda near: abs(angle_between(near.yaw, end.yaw)), default=None)
+    return min(
+        filter(joins, directions),
+        key=lambda near: abs(angle_between(near.yaw, end.yaw)),
+        default=None,
+    )
 
 
 def _mean(ends: list[_End]) -> float:
@@ -328,7 +418,9 @@ def _lanes(direction: _Direction, config: RoadConfig) -> tuple[float, dict[tuple
     sign = {True: keep, False: -keep}  # lanes in lie to the left of who looks outward
     left, width = unit_left(direction.yaw), config.lane_width
     offset = {end.key: float((end.at * left).sum()) for end in direction.members}
-    sure = [end.key for end in direction.members if end.away > 0.0 and end.steady >= _SURE / 2.0] or list(offset)
+    sure = [
+        end.key for end in direction.members if end.away > 0.0 and end.steady >= _SURE / 2.0
+    ] or list(offset)
     lanes: dict[tuple[int, bool], int] = {}
     innermost = {}
     for inward in (True, False):
@@ -346,10 +438,17 @@ def _lanes(direction: _Direction, config: RoadConfig) -> tuple[float, dict[tuple
     if len(innermost) == 2:
         between = keep * (innermost[True] - innermost[False])
         free = min(max(round(between / width) - 1, 0), _MOST_BETWEEN)
-        lanes = {key: lane + ((free + 1) // 2 if key[1] else free // 2) for key, lane in lanes.items()}
+        lanes = {
+            key: lane + ((free + 1) // 2 if key[1] else free // 2) for key, lane in lanes.items()
+        }
     lines = [offset[key] - sign[key[1]] * (lanes[key] + 0.5) * width for key in sure]
     middle = float(np.mean(lines)) if lines else 0.0
-    for key, aside in offset.items():  # who has not reached the junction's end takes the lane nearest to where it would
+    for (
+        key,
+        aside,
+    ) in (
+        offset.items()
+    ):  # who has not reached the junction's end takes the lane nearest to where it would
         if key not in lanes:
             nearest = round(sign[key[1]] * (aside - middle) / width - 0.5)
             lanes[key] = min(max(nearest, 0), _most(lanes, inward=key[1]))

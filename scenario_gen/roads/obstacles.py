@@ -40,7 +40,9 @@ def read_obstacles(text: str, what: str = "obstacles") -> tuple[Obstacle, ...]:
     for piece in split_pieces(text):
         values = read_numbers(piece)
         if len(values) != 5:
-            raise InputError(f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, e.g. `20 1.5 0 4.6 1.9`")
+            raise InputError(
+                f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, e.g. `20 1.5 0 4.6 1.9`"
+            )
         if not all(0.0 < size <= _LARGEST for size in values[3:]):
             raise InputError(
                 f"{what}: {piece!r} has length {values[3]:g} m and width {values[4]:g} m; above 0 to {_LARGEST:g} m are drawn"
@@ -49,7 +51,9 @@ def read_obstacles(text: str, what: str = "obstacles") -> tuple[Obstacle, ...]:
     return tuple(obstacles)
 
 
-def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...], others: Bools | bool = False) -> Road:
+def with_obstacles(
+    road: Road, obstacles: tuple[Obstacle, ...], others: Bools | bool = False
+) -> Road:
     """Return the road with every cell that an obstacle overlaps no longer drivable; `others` (H, W) are so for some types alone.
 
     Raises:
@@ -60,12 +64,21 @@ def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...], others: Bools | 
     blocked = np.zeros(road.drivable.shape, dtype=np.bool_)
     height, width = road.drivable.shape
     low, high = road.origin, road.origin + np.array([width, height]) * road.resolution
-    x, y = (first + (np.arange(n) + 0.5) * road.resolution for first, n in zip(low, (width, height), strict=True))
+    x, y = (
+        first + (np.arange(n) + 0.5) * road.resolution
+        for first, n in zip(low, (width, height), strict=True)
+    )
     cells = np.stack((*np.broadcast_arrays(x, y[:, None]), np.zeros((height, width))), axis=-1)
     half = 0.5 * road.resolution * (1.0 - 1e-9)  # touching is no overlap
     for obstacle in obstacles:
-        pose, size = np.array([obstacle.x, obstacle.y, obstacle.yaw]), (obstacle.length / 2.0, obstacle.width / 2.0)
-        near = np.hypot(*np.moveaxis(cells[..., :2] - pose[:2], -1, 0)) < np.hypot(*size) + road.resolution
+        pose, size = (
+            np.array([obstacle.x, obstacle.y, obstacle.yaw]),
+            (obstacle.length / 2.0, obstacle.width / 2.0),
+        )
+        near = (
+            np.hypot(*np.moveaxis(cells[..., :2] - pose[:2], -1, 0))
+            < np.hypot(*size) + road.resolution
+        )
         over = np.zeros_like(blocked)
         own = np.ascontiguousarray(cells[near])
         over[near] = footprint_gaps((half, half), own, size, np.tile(pose, (len(own), 1)))[0] < 0.0
@@ -77,4 +90,6 @@ def with_obstacles(road: Road, obstacles: tuple[Obstacle, ...], others: Bools | 
         blocked |= over
     if not (road.drivable & ~blocked).any():
         raise InputError(f"the obstacles leave nothing drivable of road {road.name!r}")
-    return replace(road, drivable=road.drivable & ~blocked, obstructed=(road.drivable | others) & blocked)
+    return replace(
+        road, drivable=road.drivable & ~blocked, obstructed=(road.drivable | others) & blocked
+    )

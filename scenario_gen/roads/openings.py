@@ -13,7 +13,9 @@ _MIN_WIDTH = 2.5  # metres: narrower gaps are no way in for a car
 _MOST_LANES = 1000  # at the whole border: 3.5 km of openings
 
 
-def find_openings(drivable: Bools, resolution: float, origin: Floats, config: RoadConfig) -> tuple[Floats, Floats]:
+def find_openings(
+    drivable: Bools, resolution: float, origin: Floats, config: RoadConfig
+) -> tuple[Floats, Floats]:
     """Return entries (E, 3) and exits (X, 3) of a grid.
 
     Every run of drivable cells on the grid's edge that a car can pass is an opening. It is divided into lanes of about
@@ -27,7 +29,13 @@ def find_openings(drivable: Bools, resolution: float, origin: Floats, config: Ro
     entries: list[list[float]] = []
     exits: list[list[float]] = []
     edges = (
-        (drivable[0], 0, low[1], -np.pi / 2.0, -1),  # the last: is the right of who leaves the lower or the higher coordinate
+        (
+            drivable[0],
+            0,
+            low[1],
+            -np.pi / 2.0,
+            -1,
+        ),  # the last: is the right of who leaves the lower or the higher coordinate
         (drivable[:, -1], 1, high[0], 0.0, -1),
         (drivable[-1], 0, high[1], np.pi / 2.0, 1),
         (drivable[:, 0], 1, low[0], np.pi, 1),

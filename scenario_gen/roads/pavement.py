@@ -26,7 +26,10 @@ SHORTEST = 30.0  # metres of an arm
 LANE_GAP = 2.0  # metres sideways that make another lane
 _SLIVER = 60.0  # m²: smaller holes are filled
 _STEP = 0.5  # metres between two cross sections of a strip
-_SWEPT, _SWEPT_TURN = 10.0, 0.05  # metres and rad between two footprints of which the hull is swept, at most
+_SWEPT, _SWEPT_TURN = (
+    10.0,
+    0.05,
+)  # metres and rad between two footprints of which the hull is swept, at most
 _QUARTER = 16  # segments of a quarter of a circle
 
 
@@ -41,9 +44,13 @@ def swept(line: Curve, length: float, width: float) -> BaseGeometry:
     """What a footprint of `length` and `width` [m] covers on its way along a line."""
     dense = line.cut(0.0, line.length, _STEP)
     turned = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(dense.points[:, 2])))))
-    _, first = np.unique(np.floor(turned / _SWEPT_TURN + dense.station / _SWEPT), return_index=True)
+    _, first = np.unique(
+        np.floor(turned / _SWEPT_TURN + dense.station / _SWEPT), return_index=True
+    )
     boxes = corners(dense.points[[*first, -1]], length, width)
-    return shapely.union_all(shapely.convex_hull(shapely.multipoints(np.concatenate((boxes[:-1], boxes[1:]), axis=1))))
+    return shapely.union_all(
+        shapely.convex_hull(shapely.multipoints(np.concatenate((boxes[:-1], boxes[1:]), axis=1)))
+    )
 
 
 def ring(radius: float, half: float) -> BaseGeometry:
@@ -55,7 +62,9 @@ def paved(pieces: Iterable[BaseGeometry], corner_radius: float) -> BaseGeometry:
     """All pieces, the corners between them rounded with a radius [m] (0: not at all), and small holes filled."""
     surface = shapely.union_all(list(pieces))
     if corner_radius > 0.0:
-        surface = surface.buffer(corner_radius, quad_segs=_QUARTER).buffer(-corner_radius, quad_segs=_QUARTER)
+        surface = surface.buffer(corner_radius, quad_segs=_QUARTER).buffer(
+            -corner_radius, quad_segs=_QUARTER
+        )
     holes = [Polygon(hole) for part in shapely.get_parts(surface) for hole in part.interiors]
     return shapely.union_all([surface, *(hole for hole in holes if hole.area <= _SLIVER)])
 
@@ -66,7 +75,9 @@ def inside(surface: BaseGeometry) -> Inside:
     return lambda points: np.asarray(shapely.contains_xy(surface, points[..., 0], points[..., 1]))
 
 
-def drivable_beside(drivable: Inside, line: Curve, sign: float, most: float, step: float = 0.1) -> Floats:
+def drivable_beside(
+    drivable: Inside, line: Curve, sign: float, most: float, step: float = 0.1
+) -> Floats:
     """Return (M,) how far [m] it is drivable to the left (`sign` 1) or right (-1) of a line's points, at most `most`."""
     distance = np.arange(0.0, most, step)
     station = np.repeat(line.station[:, None], len(distance), axis=1)

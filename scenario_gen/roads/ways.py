@@ -20,7 +20,9 @@ Fits = Callable[[Floats], bool]
 
 _STEP = 0.25  # metres
 _PARALLEL = np.radians(8.0)
-_BLENDED = np.radians(35.0)  # a turn by up to this is also possible while changing to the line of the exit
+_BLENDED = np.radians(
+    35.0
+)  # a turn by up to this is also possible while changing to the line of the exit
 _RAMP = 1.0 / 3.0  # share of a bend's length on which its curvature rises, and falls again
 _SHORT_RAMP = 0.12
 TIGHTEST = 0.2  # 1/m
@@ -34,7 +36,11 @@ _TIGHTEST_U_TURN = 6.0  # metres
 
 
 def draw_route(
-    entry: Floats, leave: Floats, fits: Fits = lambda _: True, sharpness: float | None = None, tightest: float = TIGHTEST
+    entry: Floats,
+    leave: Floats,
+    fits: Fits = lambda _: True,
+    sharpness: float | None = None,
+    tightest: float = TIGHTEST,
 ) -> Curve | None:
     """The way from an entry pose (3,) x, y [m], yaw [rad] to an exit pose, or None if `fits` allows none.
 
@@ -57,13 +63,18 @@ def draw_route(
     along_entry = ahead - along_exit * np.cos(turn)
     sharp = sharpness or _PLAIN
     last = dict.fromkeys((*_LAST, tightest))
-    for curvature, ramp in (*((factor * sharp, _RAMP) for factor in _LADDER), *((curvature, _SHORT_RAMP) for curvature in last)):
+    for curvature, ramp in (
+        *((factor * sharp, _RAMP) for factor in _LADDER),
+        *((curvature, _SHORT_RAMP) for curvature in last),
+    ):
         if curvature > tightest:
             continue
         bend = _bend(round(turn, 9), round(curvature, 9), ramp)
         tangent = float(bend[-1, 1]) / np.sin(turn)
         if tangent <= min(along_entry, along_exit) - 0.5:
-            route = _accepted(_joined(entry, along_entry - tangent, bend, along_exit - tangent), fits)
+            route = _accepted(
+                _joined(entry, along_entry - tangent, bend, along_exit - tangent), fits
+            )
             if route is not None:
                 return route
     if abs(turn) < _BLENDED and ahead > 1.0:
@@ -99,13 +110,20 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float)
         return None
     bends = []
     for distance, aside in ((ahead, abs(left)), (-behind, abs(right))):
-        along = float(np.sqrt(np.square(radius + _FLARE) - np.square(aside + _FLARE)))  # from the bend's centre to the ring's
+        along = float(
+            np.sqrt(np.square(radius + _FLARE) - np.square(aside + _FLARE))
+        )  # from the bend's centre to the ring's
         if distance - along < 0.5:
             return None
         bends.append((distance - along, float(np.arctan2(along, aside + _FLARE))))
     (before, first), (after, last) = bends
     about = float(((leave[2] - entry[2]) * side + first + last) % (2.0 * np.pi))
-    pieces = ((before, 0.0), (_FLARE * first, -side / _FLARE), (radius * about, side / radius), (_FLARE * last, -side / _FLARE))
+    pieces = (
+        (before, 0.0),
+        (_FLARE * first, -side / _FLARE),
+        (radius * about, side / radius),
+        (_FLARE * last, -side / _FLARE),
+    )
     yaw, steps = [0.0], []
     for length, curvature in (*pieces, (after, 0.0)):
         count = max(round(length / _STEP), 1)
@@ -151,7 +169,9 @@ def _bend(turn: float, curvature: float, ramp: float) -> Floats:
     length = abs(turn) / (curvature * (1.0 - ramp))
     count = max(int(np.ceil(length / _STEP)), 8)
     x = np.linspace(0.0, 1.0, count + 1)
-    rise = np.minimum(np.square(np.minimum(x, ramp)) / (2.0 * ramp) + np.maximum(x - ramp, 0.0), 1.0 - ramp)
+    rise = np.minimum(
+        np.square(np.minimum(x, ramp)) / (2.0 * ramp) + np.maximum(x - ramp, 0.0), 1.0 - ramp
+    )
     fall = np.square(np.maximum(x - (1.0 - ramp), 0.0)) / (2.0 * ramp)
     share = np.where(x > 1.0 - ramp, x - ramp / 2.0 - fall, rise) / (1.0 - ramp)  # of the turn
     return frozen(np.column_stack((polyline_of(turn * share, length / count), turn * share)))
@@ -160,7 +180,9 @@ def _bend(turn: float, curvature: float, ramp: float) -> Floats:
 def _accepted(curve: Curve | None, fits: Fits) -> Curve | None:
     if curve is None:
         return None
-    inner = curve.cut(3.0, max(curve.length - 3.0, 3.5), 0.5)  # the first and last footprint reach beyond the road's end
+    inner = curve.cut(
+        3.0, max(curve.length - 3.0, 3.5), 0.5
+    )  # the first and last footprint reach beyond the road's end
     return curve if fits(inner.points) else None
 
 
@@ -171,7 +193,9 @@ def _beside(entry: Floats, ahead: float, left: float, turn: float) -> Curve | No
     if abs(left) < 0.05 and abs(turn) < 1e-3:
         return Curve(np.array([entry[:3], [*place(entry, ahead, left), entry[2]]]))
     reach = max(
-        float(np.sqrt(abs(aside) * 5.7735 / _STEEPEST_SHIFT)),  # the blend's steepest second derivative is 5.7735
+        float(
+            np.sqrt(abs(aside) * 5.7735 / _STEEPEST_SHIFT)
+        ),  # the blend's steepest second derivative is 5.7735
         1.875 * abs(slope) / _STEEPEST_SHIFT,
     )
     if abs(left) > _WIDEST_SHIFT + abs(slope) * ahead or reach > ahead - 2.0:
@@ -180,7 +204,9 @@ def _beside(entry: Floats, ahead: float, left: float, turn: float) -> Curve | No
     first, last = (ahead - reach) / 2.0, (ahead + reach) / 2.0
     end = left - slope * (ahead - last)
     cube = x**3
-    y = end * cube * (10.0 - 15.0 * x + 6.0 * np.square(x)) + slope * reach * cube * (-4.0 + 7.0 * x - 3.0 * np.square(x))
+    y = end * cube * (10.0 - 15.0 * x + 6.0 * np.square(x)) + slope * reach * cube * (
+        -4.0 + 7.0 * x - 3.0 * np.square(x)
+    )
     along = np.concatenate(([0.0], first + reach * x, [ahead]))
     return Curve.through(place(entry, along, np.concatenate(([0.0], y, [left]))))
 

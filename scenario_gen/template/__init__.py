@@ -3,7 +3,16 @@
 
 """What is about the recorded encounter on its own ground: tracks, path coordinates, stops, conflicts."""
 
-from scenario_gen.template.answers import conflict_of, conflicts_in, departure, lag_behind, lane_gaps, Motion, passing, time_gaps
+from scenario_gen.template.answers import (
+    conflict_of,
+    conflicts_in,
+    departure,
+    lag_behind,
+    lane_gaps,
+    Motion,
+    passing,
+    time_gaps,
+)
 from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine, to_frenet
 from scenario_gen.template.interaction import (
     closest_crossing,
@@ -16,14 +25,39 @@ from scenario_gen.template.interaction import (
     WAIT_SPEED,
     waits_to_keep,
 )
-from scenario_gen.template.manoeuvre import in_words, keeps, manoeuvre_of, MOST_CHANGE, sharpness_of, turn_of, turns_to_keep
+from scenario_gen.template.manoeuvre import (
+    in_words,
+    keeps,
+    manoeuvre_of,
+    MOST_CHANGE,
+    sharpness_of,
+    turn_of,
+    turns_to_keep,
+)
 from scenario_gen.template.path_crossing import pair_crossings, path_crossing
 from scenario_gen.template.reactions import reactions_of
-from scenario_gen.template.separation import least_gap, least_gaps, own_paths, separate, smallest_gaps
+from scenario_gen.template.separation import (
+    least_gap,
+    least_gaps,
+    own_paths,
+    separate,
+    smallest_gaps,
+)
 from scenario_gen.template.side import mirrored, traffic_side
-from scenario_gen.template.size import MOST_SAMPLES, MOST_VEHICLES, refuse_reversing, refuse_too_large
+from scenario_gen.template.size import (
+    MOST_SAMPLES,
+    MOST_VEHICLES,
+    refuse_reversing,
+    refuse_too_large,
+)
 from scenario_gen.template.starts import Equation, solve_starts
-from scenario_gen.template.tracks import clean_tracks, driven_tracks, driver_rows, drivers_of, Track
+from scenario_gen.template.tracks import (
+    clean_tracks,
+    driven_tracks,
+    driver_rows,
+    drivers_of,
+    Track,
+)
 
 __all__ = [
     "MOST_CHANGE",

@@ -66,7 +66,11 @@ def conflicts_in(motion: Motion) -> tuple[Conflict, ...]:
 @once_per_object
 def _conflicts(motion: Motion) -> dict[tuple[int, int], Conflict]:
     """Return the conflict of each pair of vehicles that has one."""
-    return _by_pair(find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present))
+    return _by_pair(
+        find_conflicts(
+            motion.vehicles, motion.time, motion.position, motion.heading, motion.present
+        )
+    )
 
 
 def _by_pair(conflicts: Iterable[Conflict]) -> dict[tuple[int, int], Conflict]:
@@ -76,7 +80,9 @@ def _by_pair(conflicts: Iterable[Conflict]) -> dict[tuple[int, int], Conflict]:
 @lru_cache(maxsize=4)  # of one template many places are looked at
 def meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
     """Return the conflicts of some tracks by their vehicles, the lower index first."""
-    poses, present = (np.stack([getattr(track, name) for track in tracks]) for name in ("poses", "present"))
+    poses, present = (
+        np.stack([getattr(track, name) for track in tracks]) for name in ("poses", "present")
+    )
     time = np.arange(poses.shape[1], dtype=np.float64) * tracks[0].dt
     vehicles = tuple(track.vehicle for track in tracks)
     return _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], present))
@@ -119,11 +125,19 @@ def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float,
     if not merges:
         return conflict.exit_first, enters
     first, second = conflict.first, conflict.second
-    poses, place = (np.column_stack([motion.position[n], motion.heading[n]]) for n in (first, second))
-    place = np.repeat([[np.interp(enters, motion.time, column) for column in place.T]], len(poses), axis=0)
-    gap, _ = footprint_gaps(motion.vehicles[first].half, poses, motion.vehicles[second].half, place)
+    poses, place = (
+        np.column_stack([motion.position[n], motion.heading[n]]) for n in (first, second)
+    )
+    place = np.repeat(
+        [[np.interp(enters, motion.time, column) for column in place.T]], len(poses), axis=0
+    )
+    gap, _ = footprint_gaps(
+        motion.vehicles[first].half, poses, motion.vehicles[second].half, place
+    )
     came, goes = motion.present[first].tolist()
-    near = came + np.flatnonzero(gap[came : goes + 1] < max(_LEFT, float(gap[came : goes + 1].min()) + 1e-9))
+    near = came + np.flatnonzero(
+        gap[came : goes + 1] < max(_LEFT, float(gap[came : goes + 1].min()) + 1e-9)
+    )
     k, last = int(near[-1]), min(int(near[-1]) + 1, goes)
     share = (_LEFT - gap[k]) / (gap[last] - gap[k]) if gap[last] > _LEFT > gap[k] else 0.0
     return float(motion.time[k] + share * (motion.time[last] - motion.time[k])), enters
@@ -145,7 +159,9 @@ def is_behind(motion: Motion, who: int, whom: int) -> Bools:
         rows = np.arange(0, len(path), step)  # where the other was before; where this one will be
         square = distance.cdist(mine, path[rows], "sqeuclidean")
         nearest = np.argmin(square, axis=1)
-        near = (np.sqrt(square[now, nearest]) < LANE) & (np.abs(wrap_angle(path_yaw[rows[nearest]] - yaw)) < ALIKE)
+        near = (np.sqrt(square[now, nearest]) < LANE) & (
+            np.abs(wrap_angle(path_yaw[rows[nearest]] - yaw)) < ALIKE
+        )
         behind = behind | (near & (sign * (rows[nearest] - now) > step))
     return np.asarray(behind & both & (np.sqrt(np.square(between).sum(axis=1)) < FAR))
 

@@ -123,12 +123,19 @@ def to_frenet(tracks: tuple[Track, ...]) -> FrenetTracks:
             )
     lines = [_reference_line(tracks, base) for base in _reference_candidates(tracks)]
     line, direction = min(lines, key=lambda pair: _cost_of_line(tracks, pair[0]))
-    station, offset = np.empty((len(tracks), len(tracks[0].progress))), np.empty((len(tracks), len(tracks[0].progress)))
+    station, offset = (
+        np.empty((len(tracks), len(tracks[0].progress))),
+        np.empty((len(tracks), len(tracks[0].progress))),
+    )
     for i, track in enumerate(tracks):
         poses = track.poses
         station[i], offset[i] = line.project(poses[:, :2])
         station[i] = _smoothed_station(track, station[i] * direction[i]) * direction[i]
-        turned = np.abs(wrap_angle(poses[:, 2] - line.at(station[i])[:, 2] + (np.pi if direction[i] < 0 else 0.0)))
+        turned = np.abs(
+            wrap_angle(
+                poses[:, 2] - line.at(station[i])[:, 2] + (np.pi if direction[i] < 0 else 0.0)
+            )
+        )
         if turned.max() > _ALONG:
             raise RefusedError(
                 f"vehicle {track.vehicle.id} lies across the others' road (turned from it by {np.degrees(turned.max()):.0f}°): "
@@ -150,7 +157,9 @@ def _smoothed_station(track: Track, along: Floats) -> Floats:
     """
     if track.still:
         return np.full_like(along, along.mean())
-    grid, extra = smoothing_spline(track.progress, (along - track.progress)[:, None], _STATION_WAVELENGTH)
+    grid, extra = smoothing_spline(
+        track.progress, (along - track.progress)[:, None], _STATION_WAVELENGTH
+    )
     return np.maximum.accumulate(track.progress + np.interp(track.progress, grid, extra[:, 0]))
 
 
@@ -174,7 +183,10 @@ def _cost_of_line(tracks: tuple[Track, ...], line: Curve) -> tuple[int, float]:
 
 def _reference_line(tracks: tuple[Track, ...], base: int) -> tuple[Curve, Ints]:
     """One vehicle's path, extended at both ends by the parts of the others that reach beyond it."""
-    order = [base, *sorted((i for i in range(len(tracks)) if i != base), key=lambda i: -tracks[i].travelled)]
+    order = [
+        base,
+        *sorted((i for i in range(len(tracks)) if i != base), key=lambda i: -tracks[i].travelled),
+    ]
     line = tracks[base].curve
     direction = np.ones(len(tracks), dtype=np.int64)
     for i in order[1:]:
@@ -205,21 +217,29 @@ def _extended(line: Curve, other: Curve) -> Curve:
 
 
 def _shifted(curve: Curve, rows: Ints, offset: float) -> Floats:
-    shift = offset if abs(offset) < _MAX_SHIFT else 0.0  # farther apart there is nothing to fit on to
+    shift = (
+        offset if abs(offset) < _MAX_SHIFT else 0.0
+    )  # farther apart there is nothing to fit on to
     normal = np.column_stack((np.sin(curve.points[rows, 2]), -np.cos(curve.points[rows, 2])))
     return np.asarray(curve.points[rows, :2] + shift * normal)
 
 
-def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: Floats) -> tuple[Ints, Floats, Floats, int]:
+def _lanes(
+    tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: Floats
+) -> tuple[Ints, Floats, Floats, int]:
     """Lanes of each direction by clustering offsets, from the driver's left; lane changes, swerves, how many lanes."""
     right = -direction[:, None] * offset
     span = max(offset.shape[1] // 10, 1)
     ends = np.column_stack((right[:, :span].mean(axis=1), right[:, -span:].mean(axis=1)))
     changes = np.abs(ends[:, 1] - ends[:, 0]) > _LANE_CHANGE
     into = _into_oncoming(direction, -direction[:, None] * ends) & changes[:, None]
-    ends = np.where(into, ends[:, ::-1], ends)  # who ends in the oncoming lane has not changed to a lane of its own direction
+    ends = np.where(
+        into, ends[:, ::-1], ends
+    )  # who ends in the oncoming lane has not changed to a lane of its own direction
     changes &= ~into.any(axis=1)
-    swerve = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * np.linspace(0.0, 1.0, offset.shape[1]) - right
+    swerve = (
+        ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * np.linspace(0.0, 1.0, offset.shape[1]) - right
+    )
     swerve[changes | (np.abs(swerve).max(axis=1) < _SWERVE)] = 0.0
     swerves = swerve.any(axis=1)
     ends[~changes & swerves] = ends[~changes & swerves].mean(axis=1)[:, None]
@@ -228,19 +248,33 @@ def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: 
     for i in np.flatnonzero(changes):
         done = np.clip((right[i] - ends[i, 0]) / (ends[i, 1] - ends[i, 0]), 0.0, 1.0)
         change[i] = np.maximum.accumulate(done)
-    there = np.stack((change < 0.5, (change >= 0.5) | ~changes[:, None]), axis=1)  # when each is in its first, in its last lane
-    there &= np.stack([track.there for track in tracks])[:, None] & (np.abs(swerve) < _SWERVE / 2.0)[:, None]
+    there = np.stack(
+        (change < 0.5, (change >= 0.5) | ~changes[:, None]), axis=1
+    )  # when each is in its first, in its last lane
+    there &= (
+        np.stack([track.there for track in tracks])[:, None]
+        & (np.abs(swerve) < _SWERVE / 2.0)[:, None]
+    )
     lane = np.zeros((len(tracks), 2), dtype=np.int64)
     for sign in (1, -1):
         members = np.flatnonzero(direction == sign)
-        slots = sorted((float(ends[i, k]), int(i), k) for i in members for k in (0, 1) if k == 0 or changes[i])
+        slots = sorted(
+            (float(ends[i, k]), int(i), k) for i in members for k in (0, 1) if k == 0 or changes[i]
+        )
         current = 0
         values: list[float] = []
         held: list[tuple[int, int]] = []
         for value, j, k in slots:
             apart = bool(values) and value - float(np.mean(values)) > _SAME_LANE
             if apart or any(
-                _beside(tracks, station, j, other, there[j, k] & there[other, m], passing=bool(swerves[j] or swerves[other]))
+                _beside(
+                    tracks,
+                    station,
+                    j,
+                    other,
+                    there[j, k] & there[other, m],
+                    passing=bool(swerves[j] or swerves[other]),
+                )
                 for other, m in held
                 if other != j
             ):
@@ -267,12 +301,16 @@ def _between(direction: Ints, offset: Floats) -> tuple[int, int]:
     aside = offset.mean(axis=1)
     if (direction > 0).all() or (direction < 0).all():
         return 0, 0
-    apart = float(aside[direction < 0].min() - aside[direction > 0].max())  # of those nearest to the middle
+    apart = float(
+        aside[direction < 0].min() - aside[direction > 0].max()
+    )  # of those nearest to the middle
     free = min(max(round(apart / (2.0 * _SAME_LANE)) - 1, 0), _MOST_BETWEEN)
     return (free + 1) // 2, free // 2
 
 
-def _beside(tracks: tuple[Track, ...], station: Floats, i: int, j: int, when: Bools, *, passing: bool) -> bool:
+def _beside(
+    tracks: tuple[Track, ...], station: Floats, i: int, j: int, when: Bools, *, passing: bool
+) -> bool:
     """True if the two are ever side by side at these samples (T,), so that they cannot share a lane; nor if one gets past.
 
     With `passing` one leaves the lane to get past.
@@ -281,4 +319,6 @@ def _beside(tracks: tuple[Track, ...], station: Floats, i: int, j: int, when: Bo
         return False
     reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0 - _OVERLAP
     ahead = (station[i] - station[j])[when]
-    return bool((np.abs(ahead) < reach).any() or (not passing and np.sign(ahead[0]) != np.sign(ahead[-1])))
+    return bool(
+        (np.abs(ahead) < reach).any() or (not passing and np.sign(ahead[0]) != np.sign(ahead[-1]))
+    )

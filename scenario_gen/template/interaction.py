@@ -22,16 +22,28 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, Ints, runs
 from scenario_gen.numerics.boxes import Box, box_gap
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
-from scenario_gen.types import ALWAYS, CAR, Encounter, once_per_object, Segmentation, Vehicle, VEHICLE_TYPES
+from scenario_gen.types import (
+    ALWAYS,
+    CAR,
+    Encounter,
+    once_per_object,
+    Segmentation,
+    Vehicle,
+    VEHICLE_TYPES,
+)
 
 WAIT_SPEED = VEHICLE_TYPES.built_in[CAR].waits_below  # m/s
 WAIT_DURATION = 1.0  # s
 WAIT_SMOOTHING = 0.5  # s, width of the centred moving mean
-STAND_SPEED = 0.1  # m/s; a wait in which the vehicle is never so slow for `WAIT_DURATION` is a creeping one
+STAND_SPEED = (
+    0.1  # m/s; a wait in which the vehicle is never so slow for `WAIT_DURATION` is a creeping one
+)
 
 POSE_STEP = 1.0  # m, longest distance between two neighbouring poses of a sweep
 POSE_TURN = 0.1  # rad, largest turn between them
-STAND_STEP = 0.01  # m, a sample that moves less than this from its neighbours adds nothing to the sweep
+STAND_STEP = (
+    0.01  # m, a sample that moves less than this from its neighbours adds nothing to the sweep
+)
 BLOCK = 16  # poses that share one bounding circle
 DEPTH = 1e-6  # m, footprints that meet less deeply only touch
 
@@ -93,10 +105,17 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     The speed is smoothed by a centred moving mean over 0.5 s (an odd number of samples; the end samples are repeated).
     """
     width = 2 * round(0.5 * WAIT_SMOOTHING / encounter.dt) + 1
-    smooth = ndimage.uniform_filter1d(encounter.speed, width, mode="nearest")  # outside of its presence a speed is held
+    smooth = ndimage.uniform_filter1d(
+        encounter.speed, width, mode="nearest"
+    )  # outside of its presence a speed is held
     time = encounter.time
     return tuple(
-        Wait(vehicle, float(time[a]), float(time[b - 1]), _moves_slowly(encounter.speed[vehicle, a:b], time[a:b]))
+        Wait(
+            vehicle,
+            float(time[a]),
+            float(time[b - 1]),
+            _moves_slowly(encounter.speed[vehicle, a:b], time[a:b]),
+        )
         for vehicle, (speed, there) in enumerate(zip(smooth, encounter.there, strict=True))
         for a, b in runs((speed < encounter.vehicles[vehicle].kind.waits_below) & there)
         if time[b - 1] - time[a] >= WAIT_DURATION - 1e-9
@@ -115,7 +134,11 @@ def _moves_slowly(speed: Floats, time: Floats) -> bool:
 
 
 def find_conflicts(
-    vehicles: tuple[Vehicle, ...], time: Floats, position: Floats, heading: Floats, present: Ints = ALWAYS
+    vehicles: tuple[Vehicle, ...],
+    time: Floats,
+    position: Floats,
+    heading: Floats,
+    present: Ints = ALWAYS,
 ) -> tuple[Conflict, ...]:
     """Return one conflict per pair of vehicles whose swept footprints intersect, ordered by pair.
 
@@ -129,11 +152,17 @@ def find_conflicts(
         heading: (N, T) rad.
         present: (N, 2) first and last sample of each vehicle; default: everybody throughout.
     """
-    spans = [slice(first, last + 1) for first, last in present.tolist()] if len(present) else [slice(None)] * len(vehicles)
+    spans = (
+        [slice(first, last + 1) for first, last in present.tolist()]
+        if len(present)
+        else [slice(None)] * len(vehicles)
+    )
     sweeps = [_swept(time[own], position[n, own], heading[n, own]) for n, own in enumerate(spans)]
     sizes = [np.array((vehicle.length, vehicle.width)) for vehicle in vehicles]
     pairs = combinations(range(len(vehicles)), 2)
-    conflicts = (_pair_conflict(a, b, (*sweeps[a], sizes[a]), (*sweeps[b], sizes[b])) for a, b in pairs)
+    conflicts = (
+        _pair_conflict(a, b, (*sweeps[a], sizes[a]), (*sweeps[b], sizes[b])) for a, b in pairs
+    )
     return tuple(conflict for conflict in conflicts if conflict is not None)
 
 
@@ -154,7 +183,9 @@ def required_orders(conflicts: Sequence[Conflict], order: str) -> tuple[int | No
         return (None,) * len(conflicts)
     closest = closest_crossing(conflicts)
     if closest is None:
-        raise RefusedError("order: no recorded vehicle crosses another one's path or merges into it, so no order can be swapped")
+        raise RefusedError(
+            "order: no recorded vehicle crosses another one's path or merges into it, so no order can be swapped"
+        )
     return tuple(c.second if c is closest else c.first if c.following else None for c in conflicts)
 
 
@@ -181,18 +212,24 @@ def _pair_conflict(a: int, b: int, sweep_a: _Sweep, sweep_b: _Sweep) -> Conflict
 def _sweep(time: Floats, position: Floats, heading: Floats) -> Floats:
     """Poses (M, 5) t, x, y, cos, sin of a sweep: samples in which a vehicle stands dropped, long steps divided."""
     t = time.shape[0]
-    keep = np.ones(t, dtype=np.int64)  # number of steps from the last kept sample to this one; 0: not kept
+    keep = np.ones(
+        t, dtype=np.int64
+    )  # number of steps from the last kept sample to this one; 0: not kept
     total, last = 1, 0
     for k in range(1, t):
         if k < t - 1:
             here = np.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
-            there = np.hypot(position[k + 1, 0] - position[last, 0], position[k + 1, 1] - position[last, 1])
+            there = np.hypot(
+                position[k + 1, 0] - position[last, 0], position[k + 1, 1] - position[last, 1]
+            )
             turn = max(abs(heading[k] - heading[last]), abs(heading[k + 1] - heading[last]))
             if max(here, there) < STAND_STEP and turn < STAND_STEP:
                 keep[k] = 0
                 continue
         moved = np.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
-        keep[k] = max(1, int(np.ceil(max(moved / POSE_STEP, abs(heading[k] - heading[last]) / POSE_TURN))))
+        keep[k] = max(
+            1, int(np.ceil(max(moved / POSE_STEP, abs(heading[k] - heading[last]) / POSE_TURN)))
+        )
         total += keep[k]
         last = k
     poses = np.empty((total, 5))
@@ -220,7 +257,11 @@ def _block_circles(poses: Floats) -> Floats:
     circles = np.empty((n, 3))
     for b in range(n):
         lo, hi = b * BLOCK, min(m, (b + 1) * BLOCK)
-        x, y, radius = 0.5 * (poses[lo, 1] + poses[hi - 1, 1]), 0.5 * (poses[lo, 2] + poses[hi - 1, 2]), 0.0
+        x, y, radius = (
+            0.5 * (poses[lo, 1] + poses[hi - 1, 1]),
+            0.5 * (poses[lo, 2] + poses[hi - 1, 2]),
+            0.0,
+        )
         for i in range(lo, hi):
             radius = max(radius, np.hypot(poses[i, 1] - x, poses[i, 2] - y))
         circles[b, 0], circles[b, 1], circles[b, 2] = x, y, radius
@@ -230,7 +271,10 @@ def _block_circles(poses: Floats) -> Floats:
 @kernel(inline=True)
 def _boxes_meet(a: Floats, half_a: Size, b: Floats, half_b: Size) -> bool:
     """True if two boxes at poses (t, x, y, cos, sin) overlap by more than DEPTH."""
-    one, other = Box(a[1], a[2], a[3], a[4], half_a[0], half_a[1]), Box(b[1], b[2], b[3], b[4], half_b[0], half_b[1])
+    one, other = (
+        Box(a[1], a[2], a[3], a[4], half_a[0], half_a[1]),
+        Box(b[1], b[2], b[3], b[4], half_b[0], half_b[1]),
+    )
     return box_gap(one, other) < -DEPTH
 
 
@@ -251,7 +295,9 @@ def _meets_sweep(pose: Floats, half: Size, poses: Floats, circles: Floats, other
 
 
 @kernel(inline=True)
-def _crossing_time(out_pose: Floats, in_pose: Floats, half: Size, poses: Floats, circles: Floats, other: Size) -> float:
+def _crossing_time(
+    out_pose: Floats, in_pose: Floats, half: Size, poses: Floats, circles: Floats, other: Size
+) -> float:
     """Time between two neighbouring poses at which the box begins (or ends) to meet the sweep, by bisection."""
     outside, inside, pose = 0.0, 1.0, np.empty(5)
     for _ in range(10):
@@ -268,7 +314,9 @@ def _crossing_time(out_pose: Floats, in_pose: Floats, half: Size, poses: Floats,
 
 
 @kernel(inline=True)
-def _occupancy(mine: Floats, half: Size, poses: Floats, circles: Floats, other: Size) -> tuple[float, float]:
+def _occupancy(
+    mine: Floats, half: Size, poses: Floats, circles: Floats, other: Size
+) -> tuple[float, float]:
     """(first entry, last exit) [s] of a vehicle's poses `mine` into the sweep `poses`; entry is inf if they never meet."""
     m = mine.shape[0]
     first = 0
@@ -288,7 +336,9 @@ def _occupancy(mine: Floats, half: Size, poses: Floats, circles: Floats, other: 
 
 
 @kernel(inline=True)
-def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: Size) -> tuple[float, float]:
+def _shared_path(
+    a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: Size
+) -> tuple[float, float]:
     """(metres of a's path shared with b in the same direction, metres of it on which a came first minus second)."""
     shared, lead, last = 0.0, 0.0, 0
     reach = np.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1])
@@ -297,7 +347,9 @@ def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: 
         if step == 0.0:
             continue
         near, nearest = -1, reach * reach
-        distance = (b[last, 1] - a[i, 1]) ** 2 + (b[last, 2] - a[i, 2]) ** 2  # a good first guess leaves few to look at
+        distance = (b[last, 1] - a[i, 1]) ** 2 + (
+            b[last, 2] - a[i, 2]
+        ) ** 2  # a good first guess leaves few to look at
         if distance < nearest:
             near, nearest = last, distance
         for c in range(circles_b.shape[0]):
@@ -337,6 +389,8 @@ def _conflict(
         return
     shared, lead = _shared_path(a, b, circles_b, half_a, half_b)
     following = shared >= FOLLOWING_LENGTHS * max(size_a[0], size_b[0])
-    a_first = lead > 0.0 if (following or entry_a == entry_b) and lead != 0.0 else entry_a <= entry_b
+    a_first = (
+        lead > 0.0 if (following or entry_a == entry_b) and lead != 0.0 else entry_a <= entry_b
+    )
     out[0], out[1], out[2] = 1.0, 1.0 if a_first else 0.0, 1.0 if following else 0.0
     out[3], out[4], out[5], out[6] = entry_a, exit_a, entry_b, exit_b

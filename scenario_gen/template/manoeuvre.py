@@ -10,9 +10,13 @@ import numpy as np
 from scenario_gen.numerics.plane import angle_between
 from scenario_gen.template.tracks import Track
 
-MOST_CHANGE: Final = np.radians(25.0)  # a manoeuvre is kept if its turn differs by no more, and it has the same name
+MOST_CHANGE: Final = np.radians(
+    25.0
+)  # a manoeuvre is kept if its turn differs by no more, and it has the same name
 _STRAIGHT, _ROUND = np.radians(30.0), np.radians(150.0)
-_DOUBT: Final = np.radians(15.0)  # turns that differ by less are the same manoeuvre, on whichever side of a threshold they lie
+_DOUBT: Final = np.radians(
+    15.0
+)  # turns that differ by less are the same manoeuvre, on whichever side of a threshold they lie
 _WINDOW = 8.0  # metres over which a bend's curvature is taken
 _GENTLEST, _TIGHTEST = 0.005, 0.17  # 1/m
 
@@ -37,7 +41,9 @@ def manoeuvre_of(turn: float) -> str:
 def keeps(template: float, road: float) -> bool:
     """Whether a turn on a road [rad] is that of the template [rad]: at most 25° different, and of the same name."""
     change = abs(angle_between(road, template))
-    return change <= _DOUBT or (change <= MOST_CHANGE and manoeuvre_of(template) == manoeuvre_of(road))
+    return change <= _DOUBT or (
+        change <= MOST_CHANGE and manoeuvre_of(template) == manoeuvre_of(road)
+    )
 
 
 def turns_to_keep(track: Track) -> list[float]:
@@ -60,4 +66,8 @@ def in_words(turn: float) -> str:
     side = "left" if turn > 0.0 else "right"
     if manoeuvre_of(turn) != "straight":
         return f"turns {side} by {abs(np.degrees(turn)):.0f}°"
-    return "goes straight on" if abs(turn) < np.radians(1.0) else f"goes straight on ({abs(np.degrees(turn)):.0f}° to the {side})"
+    return (
+        "goes straight on"
+        if abs(turn) < np.radians(1.0)
+        else f"goes straight on ({abs(np.degrees(turn)):.0f}° to the {side})"
+    )

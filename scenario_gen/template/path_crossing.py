@@ -14,7 +14,9 @@ from scenario_gen.template.tracks import Track
 
 _BEYOND = 15.0  # metres by which a path is continued to look for a crossing
 _ANGLE = np.radians(25.0)
-_HEAD_ON = np.radians(30.0)  # nearer to head-on than this, a crossing is a matter of lateral offset (or of GPS)
+_HEAD_ON = np.radians(
+    30.0
+)  # nearer to head-on than this, a crossing is a matter of lateral offset (or of GPS)
 
 
 @dataclass(frozen=True)

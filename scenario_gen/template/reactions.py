@@ -20,7 +20,15 @@ from scipy import ndimage
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left, angle_between
-from scenario_gen.template.answers import ALIKE, bumper_gaps, conflicts_in, is_behind, LANE, passing, SLOWEST
+from scenario_gen.template.answers import (
+    ALIKE,
+    bumper_gaps,
+    conflicts_in,
+    is_behind,
+    LANE,
+    passing,
+    SLOWEST,
+)
 from scenario_gen.template.interaction import Conflict, find_waits
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, ReactionGraph, YIELD
@@ -28,17 +36,30 @@ from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, Rea
 LONG_ENOUGH = 2.0  # s, for which one drives behind another
 LAGS = 0.3, 3.0  # s, between which a follower answers
 SURE = 0.3  # confidence below which there is no edge
-NEAR, IN_LANE, PASSES = 0.9, (2.0, 4.0), (3.0, 5.0)  # confidence of closeness up to so many s apart, and 0.5 until so many
+NEAR, IN_LANE, PASSES = (
+    0.9,
+    (2.0, 4.0),
+    (3.0, 5.0),
+)  # confidence of closeness up to so many s apart, and 0.5 until so many
 _STANDS_AS = 4.0  # m/s, of a follower that is slower, where its gap is turned into seconds
 _BESIDE = 0.25  # of its length, by which records may overlap of who is behind another one and not beside it
 _KEPT_FOR = 1.0  # s, for which a gap in a lane is kept to count
-_HEAD_ON, _ALONG = 2.6, 0.35  # rad between headings, beyond and below which closeness to a crossing says nothing
+_HEAD_ON, _ALONG = (
+    2.6,
+    0.35,
+)  # rad between headings, beyond and below which closeness to a crossing says nothing
 _BEFORE = 8.0  # s, for which a driver foresees
 _APART, _MARGIN = 0.5, 1.0  # m and s by which a footprint is kept away from another one's
-_LOOKS = 0.5, 0.2  # s, between the instants at which a driver looks ahead, and between those that it sees
+_LOOKS = (
+    0.5,
+    0.2,
+)  # s, between the instants at which a driver looks ahead, and between those that it sees
 _SMOOTH = 1.0  # s
 _SIGNIFICANT = 2.6  # standard errors of a correlation, the best of some lags
-_DRIVERS_LAG, _PERFECT = (1.2, 0.6), 0.999  # s, mean and standard deviation of followers' lags; greatest correlation
+_DRIVERS_LAG, _PERFECT = (
+    (1.2, 0.6),
+    0.999,
+)  # s, mean and standard deviation of followers' lags; greatest correlation
 _STEADY = 0.3  # m/s, spread of a leader's speed below which no gain can be seen
 _GAINS = 0.3, 1.0
 _OWN = 0.05, 0.15  # of the gap, least and greatest own residual of a follower
@@ -65,22 +86,29 @@ def reactions_of(encounter: Encounter) -> ReactionGraph:
     """Return who reacts to whom."""
     seen, leaders = _nearest_leaders(encounter)
     conflicts = conflicts_in(encounter)
-    passes = [found for conflict in conflicts if (found := _passes(encounter, conflict)) is not None]
+    passes = [
+        found for conflict in conflicts if (found := _passes(encounter, conflict)) is not None
+    ]
     led = {edge.who: edge for edge in leaders}
     met = {
         pair
         for one in conflicts
         for pair in ((one.first, one.second), (one.second, one.first))
-        if _turned(encounter, (one.first, one.exit_first), (one.second, one.entry_second)) < _HEAD_ON
+        if _turned(encounter, (one.first, one.exit_first), (one.second, one.entry_second))
+        < _HEAD_ON
     }
     met |= {(found.who, found.whom) for found in [*seen, *(one for one in passes if one.edge)]}
     pairs = [pair for pair in permutations(range(len(encounter.vehicles)), 2) if pair not in met]
     short = [edge for pair in pairs if (edge := _gives_way(encounter, *pair)) is not None]
     best: dict[tuple[int, float], Reaction] = {}
     for edge in [*short, *(found.edge for found in passes if found.edge is not None)]:
-        if not _explained(edge, led.get(edge.who), encounter):  # of several that a wait is for, the last to clear lets it go
+        if not _explained(
+            edge, led.get(edge.who), encounter
+        ):  # of several that a wait is for, the last to clear lets it go
             key = edge.who, edge.until
-            best[key] = max(best.get(key, edge), edge, key=lambda known: (known.clears, known.confidence))
+            best[key] = max(
+                best.get(key, edge), edge, key=lambda known: (known.clears, known.confidence)
+            )
     graph = without_circles([*leaders, *best.values()], len(encounter.vehicles))
     return graph if graph.edges else replace(graph, why=_why(encounter, [*seen, *passes]))
 
@@ -90,19 +118,25 @@ def _why(encounter: Encounter, seen: Sequence[_Seen]) -> str:
     nearest = min(seen, key=lambda found: found.apart, default=None)
     if nearest is None or nearest.apart == math.inf:
         pairs = zip(encounter.vehicles, encounter.speed, strict=True)
-        stand = [vehicle.label for vehicle, speed in pairs if np.all(speed < vehicle.kind.waits_below)]
+        stand = [
+            vehicle.label for vehicle, speed in pairs if np.all(speed < vehicle.kind.waits_below)
+        ]
         standing = f"; {' and '.join(stand)} stands throughout" if stand else ""
         return f"none drives behind another one in its lane, or crosses its path{standing}"
     who, whom = (encounter.vehicles[n].label for n in (nearest.who, nearest.whom))
     least = math.floor(10.0 * nearest.apart) / 10.0
-    return f"the nearest are {who} and {whom}, and they are never within {least:.1f} s of each other"
+    return (
+        f"the nearest are {who} and {whom}, and they are never within {least:.1f} s of each other"
+    )
 
 
 def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:
     """Return the graph of these edges of `count` vehicles; the least sure edge of every circle is cut."""
     kept: list[Reaction] = []
     cut: list[Reaction] = []
-    behind: list[set[int]] = [set() for _ in range(count)]  # all whom a vehicle reacts to, directly or through others
+    behind: list[set[int]] = [
+        set() for _ in range(count)
+    ]  # all whom a vehicle reacts to, directly or through others
     for edge in sorted(edges, key=lambda edge: (-edge.confidence, edge.who, edge.whom)):
         if edge.who == edge.whom or edge.who in behind[edge.whom]:
             cut.append(edge)
@@ -143,7 +177,9 @@ def _need(encounter: Encounter, who: int, whom: int) -> float:
     gap = np.full(len(poses), np.inf)
     for off in (-_MARGIN, 0.0, _MARGIN):
         at = np.clip(later + round(off / one.dt), rows[0], rows[-1]).ravel()
-        gap = np.minimum(gap, footprint_gaps(one.vehicle.half, poses, other.vehicle.half, other.poses[at])[0])
+        gap = np.minimum(
+            gap, footprint_gaps(one.vehicle.half, poses, other.vehicle.half, other.poses[at])[0]
+        )
     meets = (gap.reshape(later.shape) < _APART) & (later <= rows[-1])
     first = np.argmax(meets, axis=1)
     each = np.arange(len(begins))
@@ -162,10 +198,15 @@ def _nearest_leaders(encounter: Encounter) -> tuple[list[_Seen], list[Reaction]]
     for who in range(n):
         gaps = {whom: bumper_gaps(encounter, who, whom) for whom in range(n) if whom != who}
         ahead = {
-            whom: is_behind(encounter, who, whom) & (gaps[whom] > -_BESIDE * encounter.vehicles[whom].length) for whom in gaps
+            whom: is_behind(encounter, who, whom)
+            & (gaps[whom] > -_BESIDE * encounter.vehicles[whom].length)
+            for whom in gaps
         }
         nearest = np.min([np.where(ahead[whom], gaps[whom], np.inf) for whom in ahead], axis=0)
-        found = [_follows(encounter, who, whom, ahead[whom] & (gaps[whom] <= nearest), gaps[whom]) for whom in ahead]
+        found = [
+            _follows(encounter, who, whom, ahead[whom] & (gaps[whom] <= nearest), gaps[whom])
+            for whom in ahead
+        ]
         seen += [one for one in found if one is not None]
         sure = [one.edge for one in found if one is not None and one.edge is not None]
         if sure:
@@ -173,7 +214,9 @@ def _nearest_leaders(encounter: Encounter) -> tuple[list[_Seen], list[Reaction]]
     return seen, leaders
 
 
-def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, gaps: Floats) -> _Seen | None:
+def _follows(
+    encounter: Encounter, who: int, whom: int, behind: Bools, gaps: Floats
+) -> _Seen | None:
     """What is seen of a vehicle that drives `behind` (T,) another one with `gaps` (T,) [m]; None if it does so for too short."""
     dt, time = encounter.dt, encounter.time
     rows = np.flatnonzero(behind)
@@ -184,14 +227,20 @@ def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, gaps: Flo
     apart = float(seconds[round(_KEPT_FOR / dt)])
     lag, drop = _best_lag(np.gradient(own, dt), np.gradient(other, dt), behind, dt)
     near = _closeness(apart, IN_LANE)
-    confidence = 1.0 - (1.0 - near) * (1.0 - _need(encounter, who, whom)) * (1.0 - (0.0 if near else drop))
+    confidence = 1.0 - (1.0 - near) * (1.0 - _need(encounter, who, whom)) * (
+        1.0 - (0.0 if near else drop)
+    )
     if confidence < SURE:
         return _Seen(who, whom, apart, None)
     steps = round(lag / dt)
     late = rows[rows >= steps]
     led, answer = other[late - steps], own[late]
     spread = float(np.std(led))
-    gain = 1.0 if spread < _STEADY else float(((led - led.mean()) * (answer - answer.mean())).mean()) / (spread * spread)
+    gain = (
+        1.0
+        if spread < _STEADY
+        else float(((led - led.mean()) * (answer - answer.mean())).mean()) / (spread * spread)
+    )
     gap = max(float(np.median(gaps[rows])), 1.0)
     line = np.column_stack([np.ones(len(rows)), own[rows]])
     rest = gaps[rows] - line @ np.linalg.lstsq(line, gaps[rows], rcond=None)[0]
@@ -215,7 +264,11 @@ def _soon(lag: float, duration: float) -> float:
 def _smoothed(speed: Floats, dt: float) -> Floats:
     """The moving mean over a second, twice."""
     width = 2 * round(0.5 * _SMOOTH / dt) + 1
-    return np.asarray(ndimage.uniform_filter1d(ndimage.uniform_filter1d(speed, width, mode="nearest"), width, mode="nearest"))
+    return np.asarray(
+        ndimage.uniform_filter1d(
+            ndimage.uniform_filter1d(speed, width, mode="nearest"), width, mode="nearest"
+        )
+    )
 
 
 def _best_lag(own: Floats, other: Floats, behind: Bools, dt: float) -> tuple[float, float]:
@@ -239,8 +292,12 @@ def _best_lag(own: Floats, other: Floats, behind: Bools, dt: float) -> tuple[flo
     error = _standard_error(a, b)
     lag, correlation = np.array([pair[:2] for pair in pairs]).T
     explained = np.square(np.clip(correlation, 0.0, _PERFECT))
-    likely = -0.5 * np.log1p(-explained) / (error * error) - 0.5 * np.square((lag - _DRIVERS_LAG[0]) / _DRIVERS_LAG[1])
-    return float(lag[int(np.argmax(likely))]), greatest * greatest if greatest > _SIGNIFICANT * error else 0.0
+    likely = -0.5 * np.log1p(-explained) / (error * error) - 0.5 * np.square(
+        (lag - _DRIVERS_LAG[0]) / _DRIVERS_LAG[1]
+    )
+    return float(
+        lag[int(np.argmax(likely))]
+    ), greatest * greatest if greatest > _SIGNIFICANT * error else 0.0
 
 
 def _standard_error(a: Floats, b: Floats) -> float:
@@ -249,7 +306,12 @@ def _standard_error(a: Floats, b: Floats) -> float:
     total = 1.0
     for k in range(1, n // 2):
         weight = 1.0 - k / n
-        product = float((a[k:] * a[:-k]).mean() / np.square(a).mean() * (b[k:] * b[:-k]).mean() / np.square(b).mean())
+        product = float(
+            (a[k:] * a[:-k]).mean()
+            / np.square(a).mean()
+            * (b[k:] * b[:-k]).mean()
+            / np.square(b).mean()
+        )
         total += 2.0 * weight * weight * product
     return math.sqrt(max(total, 1.0) / n)
 
@@ -262,28 +324,56 @@ def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
     who, whom = conflict.second, conflict.first
     aside = _from_aside(encounter, conflict)
     k = max(int(np.searchsorted(encounter.time, conflict.entry_second)) - 1, 0)
-    if k <= encounter.present[who, 0] or (not aside and (conflict.following or is_behind(encounter, who, whom)[k])):
+    if k <= encounter.present[who, 0] or (
+        not aside and (conflict.following or is_behind(encounter, who, whom)[k])
+    ):
         return None
     clears, enters = passing(encounter, conflict, merges=conflict.following)
     gap = enters - clears
     turned = _turned(encounter, (who, enters), (whom, clears))
-    apart = max(gap, 0.0) if gap > -ANTICIPATES and (conflict.following or _ALONG < turned < _HEAD_ON) else math.inf
+    apart = (
+        max(gap, 0.0)
+        if gap > -ANTICIPATES and (conflict.following or _ALONG < turned < _HEAD_ON)
+        else math.inf
+    )
     near = _closeness(apart, PASSES)
     since, until, stands = _slow_before(encounter, who, clears, enters)
-    soon = _soon(until - clears, encounter.duration) if stands and until - clears > -ANTICIPATES else 0.0
-    need = _need(encounter, who, whom) * float(np.interp(gap, [PASSES[1], 2.0 * PASSES[1]], [1.0, 0.0]))
+    soon = (
+        _soon(until - clears, encounter.duration)
+        if stands and until - clears > -ANTICIPATES
+        else 0.0
+    )
+    need = _need(encounter, who, whom) * float(
+        np.interp(gap, [PASSES[1], 2.0 * PASSES[1]], [1.0, 0.0])
+    )
     confidence = 1.0 - (1.0 - near) * (1.0 - need) * (1.0 - soon)
     if confidence < SURE:
         return _Seen(who, whom, apart, None)
     lag, merges = until - clears, conflict.following
-    edge = Reaction(YIELD, who, whom, lag, 1.0, _OWN_LAG, confidence, since, until, gap=gap, stands=stands, merges=merges)
+    edge = Reaction(
+        YIELD,
+        who,
+        whom,
+        lag,
+        1.0,
+        _OWN_LAG,
+        confidence,
+        since,
+        until,
+        gap=gap,
+        stands=stands,
+        merges=merges,
+    )
     return _Seen(who, whom, apart, edge)
 
 
 def _from_aside(encounter: Encounter, conflict: Conflict) -> bool:
     """Whether the second one comes into the first one's lane from beside it."""
     time, who = encounter.time, conflict.second
-    rows = np.flatnonzero(encounter.there[who] & (np.abs(time - conflict.entry_second + 0.5 * _ASIDE) <= 0.5 * _ASIDE))
+    rows = np.flatnonzero(
+        encounter.there[who]
+        & (np.abs(time - conflict.entry_second + 0.5 * _ASIDE) <= 0.5 * _ASIDE)
+    )
     path = clean_tracks(encounter)[conflict.first].curve
     station, left = path.project(encounter.position[who, rows])
     turned = wrap_angle(path.at(station)[:, 2] - encounter.heading[who, rows])
@@ -292,7 +382,11 @@ def _from_aside(encounter: Encounter, conflict: Conflict) -> bool:
 
 def _turned(encounter: Encounter, *passed: tuple[int, float]) -> float:
     """The angle [rad] between the headings of two vehicles, each when [s] it passes."""
-    return abs(angle_between(*(float(np.interp(at, encounter.time, encounter.heading[n])) for n, at in passed)))
+    return abs(
+        angle_between(
+            *(float(np.interp(at, encounter.time, encounter.heading[n])) for n, at in passed)
+        )
+    )
 
 
 def _gives_way(encounter: Encounter, who: int, whom: int) -> Reaction | None:
@@ -311,18 +405,32 @@ def _gives_way(encounter: Encounter, who: int, whom: int) -> Reaction | None:
     if speed[top] - speed[-1] < _SLOWS_BY or (need := _need(encounter, who, whom)) < SURE:
         return None
     since, until = (float(encounter.time[k]) for k in (rows[top], rows[-1]))
-    return Reaction(YIELD, who, whom, 0.0, 1.0, _OWN_LAG, need, since, until, gap=math.inf, stands=stops)
+    return Reaction(
+        YIELD, who, whom, 0.0, 1.0, _OWN_LAG, need, since, until, gap=math.inf, stands=stops
+    )
 
 
-def _slow_before(encounter: Encounter, who: int, clears: float, enters: float) -> tuple[float, float, bool]:
+def _slow_before(
+    encounter: Encounter, who: int, clears: float, enters: float
+) -> tuple[float, float, bool]:
     """When [s] a vehicle begins to slow down or stand before it enters, and is slowest or drives off; whether it stands.
 
     Slow instants in one approach are one wait. Both are when it enters, if it does not slow down.
     """
     time = encounter.time
-    stands = [wait for wait in find_waits(encounter) if wait.vehicle == who and wait.start < clears and wait.end <= enters + 1.0]
+    stands = [
+        wait
+        for wait in find_waits(encounter)
+        if wait.vehicle == who and wait.start < clears and wait.end <= enters + 1.0
+    ]
     place = encounter.position[who, min(int(np.searchsorted(time, enters)), len(time) - 1)]
-    if stands and np.hypot(*(encounter.position[who, int(np.searchsorted(time, stands[-1].end - 1e-9))] - place)) < _WAITS_WITHIN:
+    if (
+        stands
+        and np.hypot(
+            *(encounter.position[who, int(np.searchsorted(time, stands[-1].end - 1e-9))] - place)
+        )
+        < _WAITS_WITHIN
+    ):
         return stands[-1].start, stands[-1].end, True
     rows = np.flatnonzero(encounter.there[who] & (time <= enters))
     speed = encounter.speed[who, rows]
@@ -337,4 +445,7 @@ def _explained(edge: Reaction, leader: Reaction | None, encounter: Encounter) ->
     """Whether a yielder stands behind its leader, who leaves shortly before it: it waits for that one."""
     if leader is None or not edge.stands or not leader.since <= edge.until <= leader.until:
         return False
-    return any(wait.vehicle == leader.whom and 0.0 <= edge.until - wait.end <= LAGS[1] + 1.0 for wait in find_waits(encounter))
+    return any(
+        wait.vehicle == leader.whom and 0.0 <= edge.until - wait.end <= LAGS[1] + 1.0
+        for wait in find_waits(encounter)
+    )

@@ -47,7 +47,9 @@ def smallest_gaps(tracks: Sequence[Track]) -> Floats:
     return gaps
 
 
-def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sideways: float = 1.0) -> Separation:
+def separate(
+    tracks: Sequence[Track], clearance: float, max_shift: float, *, sideways: float = 1.0
+) -> Separation:
     """Shift whole paths so that footprints stay `clearance` [m] apart at all times.
 
     Pairs that are too close are corrected in turn at their worst instant, along the axis on which they overlap least, shared
@@ -71,11 +73,18 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
     known: dict[tuple[int, int], _Gap] = {}
     for _ in range(_ROUNDS):
         known |= {pair: _least_gap(tracks, poses, *pair) for pair in pairs if pair not in known}
-        worst = min(known.values(), key=lambda gap: gap.size, default=_Gap(np.inf, (0, 0), 0, np.zeros(2)))
+        worst = min(
+            known.values(), key=lambda gap: gap.size, default=_Gap(np.inf, (0, 0), 0, np.zeros(2))
+        )
         if worst.size >= clearance - 1e-3:
             break
         i, j = worst.pair
-        levers = np.array([ahead_and_left(axis, poses[k][worst.sample, 2]) for k, axis in ((i, worst.axis), (j, -worst.axis))])
+        levers = np.array(
+            [
+                ahead_and_left(axis, poses[k][worst.sample, 2])
+                for k, axis in ((i, worst.axis), (j, -worst.axis))
+            ]
+        )
         power = (ease * np.square(levers)).sum()
         if power >= 1e-6:
             shift[[i, j]] += (clearance - worst.size) / power * ease * levers
@@ -98,7 +107,9 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
     return Separation(tuple(_place(tracks[k], shift[k]) for k in range(n)), frozen(moved), notes)
 
 
-def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -> list[tuple[int, int]]:
+def _near_pairs(
+    tracks: Sequence[Track], poses: Sequence[Floats], room: float
+) -> list[tuple[int, int]]:
     """Pairs (i, j), j < i, that are there together, and whose footprints come within `room` [m] of each other at most."""
     diagonal = [float(np.hypot(track.vehicle.length, track.vehicle.width)) for track in tracks]
     pairs = []
@@ -144,7 +155,11 @@ def _place(track: Track, shift: Floats) -> Track:
 
 def _too_close(tracks: Sequence[Track], gap: _Gap, clearance: float, max_shift: float) -> str:
     first, second = (tracks[k].vehicle.id for k in gap.pair)
-    how = f"overlap by {-gap.size:.2f} m" if gap.size < 0.0 else f"come within {gap.size:.2f} m of each other"
+    how = (
+        f"overlap by {-gap.size:.2f} m"
+        if gap.size < 0.0
+        else f"come within {gap.size:.2f} m of each other"
+    )
     return (
         f"vehicles {first} and {second} {how} and cannot be kept {clearance:.2f} m apart by shifting their paths up to "
         f"{max_shift:.1f} m"

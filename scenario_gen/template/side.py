@@ -24,9 +24,20 @@ def traffic_side(encounter: Encounter) -> str:
     """
     votes = 0
     for a in range(len(encounter.vehicles)):
-        both = encounter.there[a] & encounter.there & (encounter.speed[a] > _MOVES) & (encounter.speed > _MOVES)
-        ahead, left = ahead_and_left(encounter.position - encounter.position[a], encounter.heading[a])
-        passing = both & (np.abs(wrap_angle(encounter.heading - encounter.heading[a])) > _OPPOSITE) & (np.abs(ahead) < _ABREAST)
+        both = (
+            encounter.there[a]
+            & encounter.there
+            & (encounter.speed[a] > _MOVES)
+            & (encounter.speed > _MOVES)
+        )
+        ahead, left = ahead_and_left(
+            encounter.position - encounter.position[a], encounter.heading[a]
+        )
+        passing = (
+            both
+            & (np.abs(wrap_angle(encounter.heading - encounter.heading[a])) > _OPPOSITE)
+            & (np.abs(ahead) < _ABREAST)
+        )
         passing &= (np.abs(left) > _BESIDE[0]) & (np.abs(left) < _BESIDE[1])
         votes += int(np.sign(left[passing]).sum())
     return "right" if votes > 0 else "left" if votes < 0 else ""

@@ -14,10 +14,15 @@ from scenario_gen.types import Encounter
 MOST_VEHICLES = 64  # as many as a log is cut into at most
 MOST_VEHICLE_SECONDS = 4000.0  # two vehicles for 1,000 s take some two minutes and 1 GB; effort grows faster than the duration
 MOST_SECONDS = 1000.0  # memory grows with the square of the duration
-MOST_SAMPLES = 45_000  # of all vehicles: those seconds at 10 Hz; the segmenter keeps some 16 kB for each
+MOST_SAMPLES = (
+    45_000  # of all vehicles: those seconds at 10 Hz; the segmenter keeps some 16 kB for each
+)
 FARTHEST_APART = 2000.0  # m: as `log.proximity` at most
 REVERSED = 2.0  # m of path against its heading from which on a vehicle drives backwards
-STRAY, OUT_OF_PROPORTION = 2000.0, 4.0  # a vehicle's places span at most so many metres, and so many times what it drives
+STRAY, OUT_OF_PROPORTION = (
+    2000.0,
+    4.0,
+)  # a vehicle's places span at most so many metres, and so many times what it drives
 
 
 def refuse_too_large(encounter: Encounter) -> None:
@@ -34,8 +39,15 @@ def refuse_too_large(encounter: Encounter) -> None:
             f"log.max_vehicles={MOST_VEHICLES}, or name those that matter with --set log.vehicles=ID,ID"
         )
     if count * seconds > MOST_VEHICLE_SECONDS or seconds > MOST_SECONDS:
-        longest, fewer = int(min(MOST_VEHICLE_SECONDS / count, MOST_SECONDS)), int(MOST_VEHICLE_SECONDS / seconds)
-        instead = f", or keep {fewer} vehicles: --set log.max_vehicles={fewer}" if fewer >= 2 and seconds <= MOST_SECONDS else ""
+        longest, fewer = (
+            int(min(MOST_VEHICLE_SECONDS / count, MOST_SECONDS)),
+            int(MOST_VEHICLE_SECONDS / seconds),
+        )
+        instead = (
+            f", or keep {fewer} vehicles: --set log.max_vehicles={fewer}"
+            if fewer >= 2 and seconds <= MOST_SECONDS
+            else ""
+        )
         raise RefusedError(
             f"{encounter.name}: {count} vehicles for {seconds:.0f} s are {count * seconds:.0f} vehicle seconds, "
             f"{MOST_VEHICLE_SECONDS:.0f}, and {MOST_SECONDS:.0f} s, are possible; cut it to {longest} s: "

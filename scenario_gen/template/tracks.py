@@ -24,8 +24,20 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
 from scenario_gen.types import Encounter, mask, ON_THE_SPOT, once_per_object, Vehicle
 
-_WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
-_SHARE_OF_CURVATURE = 0.8  # of the sharpest curve of its type; of a car 0.2 1/m, its tightest turn but for a little
+_WAVELENGTHS = (
+    8.0,
+    12.0,
+    16.0,
+    24.0,
+    32.0,
+    48.0,
+    64.0,
+    96.0,
+    128.0,
+)  # metres at which the filter halves an oscillation
+_SHARE_OF_CURVATURE = (
+    0.8  # of the sharpest curve of its type; of a car 0.2 1/m, its tightest turn but for a little
+)
 _SHARE_OF_LATERAL = 2.0 / 3.0  # of its type's lateral acceleration; of a car 4 m/s²
 _MAX_DEVIATION = 0.6  # metres from the record
 _TURN = math.radians(45.0)
@@ -117,7 +129,9 @@ def driven_tracks(encounter: Encounter) -> tuple[Track, ...]:
 
 def driver_rows(encounter: Encounter) -> dict[int, int]:
     """Return the rows of those who drive, or of everybody where nobody does: among `drivers_of`, by that in the encounter."""
-    drive = [n for n, vehicle in enumerate(encounter.vehicles) if not vehicle.kind.walks] or range(len(encounter.vehicles))
+    drive = [n for n, vehicle in enumerate(encounter.vehicles) if not vehicle.kind.walks] or range(
+        len(encounter.vehicles)
+    )
     return {n: k for k, n in enumerate(drive)}
 
 
@@ -131,12 +145,19 @@ def _clean(encounter: Encounter, i: int) -> Track:
     still = bool(claimed[-1] < _STILL or spread < _STILL)
     cleaned = _standing if still else _smoothed
     dynamics = encounter.vehicles[i].kind.dynamics
-    limits = min(_SHARE_OF_CURVATURE * dynamics.sharpest, ON_THE_SPOT), _SHARE_OF_LATERAL * dynamics.max_lateral_acceleration
-    curve, progress, deviation = cleaned(encounter.position[i, there], heading, speed, claimed, limits)
+    limits = (
+        min(_SHARE_OF_CURVATURE * dynamics.sharpest, ON_THE_SPOT),
+        _SHARE_OF_LATERAL * dynamics.max_lateral_acceleration,
+    )
+    curve, progress, deviation = cleaned(
+        encounter.position[i, there], heading, speed, claimed, limits
+    )
     return Track(
         vehicle=encounter.vehicles[i],
         curve=curve,
-        progress=frozen(np.pad(progress, (first, encounter.speed.shape[1] - 1 - last), mode="edge")),
+        progress=frozen(
+            np.pad(progress, (first, encounter.speed.shape[1] - 1 - last), mode="edge")
+        ),
         speed=encounter.speed[i],
         still=still,
         deviation=deviation,
@@ -147,7 +168,11 @@ def _clean(encounter: Encounter, i: int) -> Track:
 
 
 def _standing(
-    position: Floats, heading: Floats, speed: Floats, _claimed: Floats, _limits: tuple[float, float]
+    position: Floats,
+    heading: Floats,
+    speed: Floats,
+    _claimed: Floats,
+    _limits: tuple[float, float],
 ) -> tuple[Curve, Floats, float]:
     """The path of a vehicle that stands, its progress, and how far its positions lie from it."""
     centre = position.mean(axis=0)
@@ -172,8 +197,13 @@ def _smoothed(
         progress = np.interp(claimed, grid, curve.station)
         deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
         curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
-        lateral = curvature * np.square(np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)))
-        excess = (float(lateral.max()) / max_lateral, deviation / _MAX_DEVIATION)  # what is too sharp is eased below
+        lateral = curvature * np.square(
+            np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed))
+        )
+        excess = (
+            float(lateral.max()) / max_lateral,
+            deviation / _MAX_DEVIATION,
+        )  # what is too sharp is eased below
         badness = math.fsum(max(e - 1.0, 0.0) for e in excess)
         if best is None or badness < best[0]:
             best = (badness, curve, progress, deviation)

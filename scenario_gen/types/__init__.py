@@ -21,20 +21,65 @@ from scenario_gen.types.coverage import Coverage, Spread
 from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.ego import join_ego, split_off, with_witness
 from scenario_gen.types.encounter import Encounter, most_exposed, RECOMBINED, Tracks, Vehicle
-from scenario_gen.types.evaluation import as_markdown, CheckCounts, Evaluation, formatted, Interval, Metric, Row, SCHEMA
+from scenario_gen.types.evaluation import (
+    as_markdown,
+    CheckCounts,
+    Evaluation,
+    formatted,
+    Interval,
+    Metric,
+    Row,
+    SCHEMA,
+)
 from scenario_gen.types.fit import Fit, FittedVehicle, Loss
 from scenario_gen.types.generation import ERRORS, GenerationResult
-from scenario_gen.types.lanes import CARS, DrawnFor, DRIVERS, Lane, LaneNetwork, lanes_for, LEVEL, MIRRORED, RuleKind, TrafficRule
+from scenario_gen.types.lanes import (
+    CARS,
+    DrawnFor,
+    DRIVERS,
+    Lane,
+    LaneNetwork,
+    lanes_for,
+    LEVEL,
+    MIRRORED,
+    RuleKind,
+    TrafficRule,
+)
 from scenario_gen.types.measures import Measure, Measures
 from scenario_gen.types.names import token, tokens, vehicle_index
 from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
-from scenario_gen.types.presence import ALWAYS, always, at_ends, canonical_presence, cut, mask, together
+from scenario_gen.types.presence import (
+    ALWAYS,
+    always,
+    at_ends,
+    canonical_presence,
+    cut,
+    mask,
+    together,
+)
 from scenario_gen.types.qos import Quality
-from scenario_gen.types.reaction import FOLLOW, lost_pairs, NOT_KEPT, Reaction, reaction_facts, ReactionGraph, YIELD, yielders_of
+from scenario_gen.types.reaction import (
+    FOLLOW,
+    lost_pairs,
+    NOT_KEPT,
+    Reaction,
+    reaction_facts,
+    ReactionGraph,
+    YIELD,
+    yielders_of,
+)
 from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
 from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
 from scenario_gen.types.route import Route, routes_in_words
-from scenario_gen.types.row_names import NARROW, RECORDING, REPLAY, row_name, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.row_names import (
+    NARROW,
+    RECORDING,
+    REPLAY,
+    row_name,
+    UNIFORM,
+    WITH,
+    WITHOUT,
+)
 from scenario_gen.types.sample import Sample
 from scenario_gen.types.scenario import (
     BoundaryStates,

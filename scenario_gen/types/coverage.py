@@ -52,7 +52,15 @@ class Coverage:
             return float(f"{value:.5g}") if math.isfinite(value) else None
 
         figures = {
-            name: {**vars(spread), "values": [number(value) for value in spread.values], "template": number(spread.template)}
+            name: {
+                **vars(spread),
+                "values": [number(value) for value in spread.values],
+                "template": number(spread.template),
+            }
             for name, spread in self.spreads.items()
         }
-        return {"index": self.index, "figures": figures, **{k: getattr(self, k) for k in ("bins", "pairs", "picks", "orders")}}
+        return {
+            "index": self.index,
+            "figures": figures,
+            **{k: getattr(self, k) for k in ("bins", "pairs", "picks", "orders")},
+        }

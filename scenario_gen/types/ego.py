@@ -35,10 +35,13 @@ def join_ego(scenario: Scenario) -> Scenario:
     if witness is None:
         return scenario
     parts = (replace(scenario, reference_drive=None), witness)
-    time = np.unique(np.concatenate([part.time for part in parts]))  # whole nanoseconds, so equal instants are equal
+    time = np.unique(
+        np.concatenate([part.time for part in parts])
+    )  # whole nanoseconds, so equal instants are equal
     vehicles = (*scenario.vehicles, *witness.vehicles)
     arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name)[:, _held(part, time)] for part in parts]) for name in _ROWS
+        name: np.concatenate([getattr(part, name)[:, _held(part, time)] for part in parts])
+        for name in _ROWS
     }
     present = np.concatenate([np.searchsorted(time, part.time[part.present]) for part in parts])
     return replace(parts[0], vehicles=vehicles, time=time, **arrays, present=present)

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
 
-RECOMBINED = " + "  # between the names of the two encounters that a recombined one has its vehicles of
+RECOMBINED = (
+    " + "  # between the names of the two encounters that a recombined one has its vehicles of
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,9 @@ class Vehicle:
 
 def most_exposed(vehicles: Iterable[Vehicle]) -> str:
     """Return the type of the most exposed road user: of the smallest width that is usual of its type."""
-    return min((vehicle.type for vehicle in vehicles), key=lambda name: (VEHICLE_TYPES[name].width, name))
+    return min(
+        (vehicle.type for vehicle in vehicles), key=lambda name: (VEHICLE_TYPES[name].width, name)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +103,14 @@ class Tracks:
         freeze(self, position=frozen(self.position), speed=frozen(self.speed))
         n, t = self.speed.shape
         if n < 1 or t < 2:
-            raise InputError(f"{self.name!r} has {n} vehicle(s) and {t} sample(s); at least 1 and 2 are needed")
-        if self.position.shape != (n, t, 2) or self.heading.shape != (n, t) or len(self.vehicles) != n:
+            raise InputError(
+                f"{self.name!r} has {n} vehicle(s) and {t} sample(s); at least 1 and 2 are needed"
+            )
+        if (
+            self.position.shape != (n, t, 2)
+            or self.heading.shape != (n, t)
+            or len(self.vehicles) != n
+        ):
             raise InputError(f"encounter {self.name!r}: arrays disagree in shape")
         if not all(np.isfinite(a).all() for a in (self.position, self.heading, self.speed)):
             raise InputError(f"encounter {self.name!r} holds a value that is not finite")
@@ -109,7 +119,9 @@ class Tracks:
             raise InputError(f"encounter {self.name!r} holds a negative speed")
         ids = [vehicle.id for vehicle in self.vehicles]
         if len(set(ids)) != n:
-            raise InputError(f"encounter {self.name!r}: vehicle ids are not unique: {', '.join(ids)}")
+            raise InputError(
+                f"encounter {self.name!r}: vehicle ids are not unique: {', '.join(ids)}"
+            )
         freeze(self, present=canonical_presence(self.present, n, t, f"encounter {self.name!r}"))
         if self.present[:, 0].min() > 0 or self.present[:, 1].max() < t - 1:
             raise InputError(
@@ -173,7 +185,9 @@ class Encounter(Tracks):
     def __post_init__(self) -> None:
         n, t = np.shape(self.speed)
         if n < 2 or t < 2:
-            raise InputError(f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed")
+            raise InputError(
+                f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed"
+            )
         super().__post_init__()
 
     @property

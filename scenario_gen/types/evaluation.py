@@ -40,7 +40,11 @@ SCHEMA = _object(
     confidence_level={**NUMBER, "exclusiveMinimum": 0.0, "exclusiveMaximum": 1.0},
     resamples=COUNT,
     seed=COUNT,
-    metrics=_list(_object(**{**dict.fromkeys(METRIC_KEYS, TEXT), "better": {"enum": ["lower", "higher", ""]}})),
+    metrics=_list(
+        _object(
+            **{**dict.fromkeys(METRIC_KEYS, TEXT), "better": {"enum": ["lower", "higher", ""]}}
+        )
+    ),
     rows=_list(
         _object(
             name=TEXT,
@@ -48,13 +52,18 @@ SCHEMA = _object(
             notes=_list(TEXT),
             values={
                 "type": "object",
-                "additionalProperties": _object(value=NUMBER_OR_NULL, low=NUMBER_OR_NULL, high=NUMBER_OR_NULL),
+                "additionalProperties": _object(
+                    value=NUMBER_OR_NULL, low=NUMBER_OR_NULL, high=NUMBER_OR_NULL
+                ),
             },
         )
     ),
 )
 """Of the JSON that `to_json` writes."""
-_KEYS = {"duration": "duration_s", "level": "confidence_level"}  # of fields that are named otherwise in JSON
+_KEYS = {
+    "duration": "duration_s",
+    "level": "confidence_level",
+}  # of fields that are named otherwise in JSON
 
 
 @dataclass(frozen=True)
@@ -82,7 +91,10 @@ class CheckCounts:
     def of_verdicts(cls, verdicts: Iterable[Verdict]) -> "CheckCounts":
         """Count verdicts, one per scenario."""
         verdicts = list(verdicts)
-        return cls(len(verdicts), Counter(verdict.violations[0].cause for verdict in verdicts if not verdict.valid))
+        return cls(
+            len(verdicts),
+            Counter(verdict.violations[0].cause for verdict in verdicts if not verdict.valid),
+        )
 
     def share_of(self, causes: Sequence[Cause]) -> tuple[int, int]:
         """Return how many candidates were refused for one of `causes`, and the number of candidates."""
@@ -173,13 +185,19 @@ class Evaluation:
         """Return JSON; what is not a number is null, figures have six significant digits."""
         document = {_KEYS.get(name, name): value for name, value in vars(self).items()} | {
             "duration_s": _number(self.duration),
-            "metrics": [{key: value for key, value in vars(metric).items() if value is not None} for metric in self.metrics],
+            "metrics": [
+                {key: value for key, value in vars(metric).items() if value is not None}
+                for metric in self.metrics
+            ],
             "rows": [
                 {
                     "name": row.name,
                     "samples": row.samples,
                     "notes": row.notes,
-                    "values": {key: {name: _number(figure) for name, figure in vars(e).items()} for key, e in row.values.items()},
+                    "values": {
+                        key: {name: _number(figure) for name, figure in vars(e).items()}
+                        for key, e in row.values.items()
+                    },
                 }
                 for row in self.rows
             ],
@@ -201,7 +219,8 @@ class Evaluation:
         fields = {name: document[_KEYS.get(name, name)] for name in cls.__dataclass_fields__}
         fields["vehicles"] = tuple(document["vehicles"])
         fields["metrics"] = tuple(
-            Metric(**{key: metric[key] for key in METRIC_KEYS}, cap=metric.get("cap")) for metric in document["metrics"]
+            Metric(**{key: metric[key] for key in METRIC_KEYS}, cap=metric.get("cap"))
+            for metric in document["metrics"]
         )
         fields["rows"] = tuple(_row(row) for row in document["rows"])
         return cls(**fields)
@@ -214,7 +233,9 @@ class Evaluation:
             f"{len(self.vehicles)} vehicles, {self.duration:.1f} s, K = {self.changepoints} changepoints; "
             f"{self.level:.0%} bootstrap intervals in brackets ({self.resamples} resamples, seed {self.seed}).",
             "",
-            "| metric | better | " + " | ".join(f"{row.name} ({row.samples})" for row in self.rows) + " |",
+            "| metric | better | "
+            + " | ".join(f"{row.name} ({row.samples})" for row in self.rows)
+            + " |",
             "|---|---|" + "---|" * len(self.rows),
         ]
         group = ""
@@ -223,7 +244,10 @@ class Evaluation:
                 group = metric.group
                 lines.append(f"| **{group}** | |" + " |" * len(self.rows))
             unit = f" [{metric.unit}]" if metric.unit else ""
-            cells = [formatted(row.values.get(metric.id), metric.unit, cap=metric.cap) for row in self.rows]
+            cells = [
+                formatted(row.values.get(metric.id), metric.unit, cap=metric.cap)
+                for row in self.rows
+            ]
             lines.append(f"| {metric.label}{unit} | {metric.better} | " + " | ".join(cells) + " |")
         notes = [f"- {row.name}: {note}" for row in self.rows for note in row.notes]
         return "\n".join([*lines, "", *notes]).rstrip() + "\n"
@@ -234,7 +258,9 @@ def as_markdown(name: str) -> str:
     return re.sub(r"([\\`*\[\]<>|]|^[_#]|_$)", r"\\\1", printable(name).replace("\n", " "))
 
 
-def formatted(estimate: Interval | None, unit: str, *, bounds: bool = True, cap: float | None = None) -> str:
+def formatted(
+    estimate: Interval | None, unit: str, *, bounds: bool = True, cap: float | None = None
+) -> str:
     """Lay out an estimate for people: three significant digits, the interval in brackets, a dash if there is none.
 
     Where nothing lies below `cap` (see `Metric`), this is said.
@@ -261,7 +287,17 @@ def _number(value: float) -> float | None:
 
 def _row(document: Mapping[str, Any]) -> Row:
     values = {
-        key: Interval(*(math.nan if entry[bound] is None else entry[bound] for bound in ("value", "low", "high")))
+        key: Interval(
+            *(
+                math.nan if entry[bound] is None else entry[bound]
+                for bound in ("value", "low", "high")
+            )
+        )
         for key, entry in document["values"].items()
     }
-    return Row(FORMER.get(document["name"], document["name"]), document["samples"], values, tuple(document["notes"]))
+    return Row(
+        FORMER.get(document["name"], document["name"]),
+        document["samples"],
+        values,
+        tuple(document["notes"]),
+    )

@@ -37,11 +37,20 @@ class FittedVehicle:
     path: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
-        freeze(self, anchors=canonical_poses(self.anchors), moved=frozen(self.moved), path=frozen(self.path))
+        freeze(
+            self,
+            anchors=canonical_poses(self.anchors),
+            moved=frozen(self.moved),
+            path=frozen(self.path),
+        )
 
     def figures(self) -> dict[str, Any]:
         """Return what the fitting decided, ready for JSON: manoeuvre, scale, largest move [m], turns [deg, left positive]."""
-        turned = [round(float(turn), 1) for turn in np.degrees(self.turned)] if np.isfinite(self.turned).all() else [None, None]
+        turned = (
+            [round(float(turn), 1) for turn in np.degrees(self.turned)]
+            if np.isfinite(self.turned).all()
+            else [None, None]
+        )
         return {
             "manoeuvre": self.manoeuvre,
             "scale": round(self.scale, 4),
@@ -91,6 +100,12 @@ class Fit:
     def figures(self) -> dict[str, Any]:
         """Return what is lost, and by vehicle what was decided, ready for JSON."""
         return {
-            "lost": [{"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.message} for loss in self.losses],
-            "vehicles": {vehicle.id: fitted.figures() for vehicle, fitted in zip(self.vehicles, self.fitted, strict=False)},
+            "lost": [
+                {"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.message}
+                for loss in self.losses
+            ],
+            "vehicles": {
+                vehicle.id: fitted.figures()
+                for vehicle, fitted in zip(self.vehicles, self.fitted, strict=False)
+            },
         }

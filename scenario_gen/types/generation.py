@@ -74,7 +74,11 @@ class GenerationResult:
     coverage: Coverage | None = None
     not_compared: str = ""
     apart, row, oracle = Renamed("not_compared"), Renamed("row_name"), Renamed("replay")
-    outdone, placed, lost = Renamed("better_references"), Renamed("road_and_fit"), Renamed("losses")
+    outdone, placed, lost = (
+        Renamed("better_references"),
+        Renamed("road_and_fit"),
+        Renamed("losses"),
+    )
 
     def __repr__(self) -> str:
         road = self.road.name if self.road is not None else "no road"
@@ -92,7 +96,10 @@ class GenerationResult:
 
     def noted(self, note: str) -> "GenerationResult":
         """Return the result with a note in front of the others."""
-        return replace(self, generated=replace(self.generated, adaptations=(note, *self.generated.adaptations)))
+        return replace(
+            self,
+            generated=replace(self.generated, adaptations=(note, *self.generated.adaptations)),
+        )
 
     def to_dataframe(self) -> "DataFrame":
         """Return all scenarios as one table: a row for each scenario, vehicle and instant; columns as `Scenario.to_dataframe`."""
@@ -100,8 +107,17 @@ class GenerationResult:
 
     def _repr_html_(self) -> str:
         """Return the same for a notebook, with who reacts to whom and what was refused."""
-        refused = ", ".join(f"{count} {cause}" for cause, count in causes_in_words(self.generated.refused)) or "none"
-        lines = [*self.reacting["sentences"], f"refused candidates: {refused}", *self.generated.adaptations]
+        refused = (
+            ", ".join(
+                f"{count} {cause}" for cause, count in causes_in_words(self.generated.refused)
+            )
+            or "none"
+        )
+        lines = [
+            *self.reacting["sentences"],
+            f"refused candidates: {refused}",
+            *self.generated.adaptations,
+        ]
         return f"<b>{escape(repr(self))}</b><ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
 
     def measures(self) -> "DataFrame":
@@ -143,7 +159,14 @@ class GenerationResult:
     @property
     def compared(self) -> tuple[str, ...]:
         """Rows whose E may be compared: that of `generated` first, then the references drawn with the same freedom."""
-        return (self.row_name, *(name for name in (WITHOUT, UNIFORM) if name in self.references and not self.not_compared))
+        return (
+            self.row_name,
+            *(
+                name
+                for name in (WITHOUT, UNIFORM)
+                if name in self.references and not self.not_compared
+            ),
+        )
 
     def best(self, metric: str) -> str:
         """Return the compared row with the least figure, that of `generated` where they are equal; "" if there is none."""
@@ -169,15 +192,25 @@ class GenerationResult:
 
         def figures(row: str) -> dict[str, float | None]:
             values = {metric: self.evaluation.value(row, metric) for metric in ERRORS}
-            return {metric: float(f"{value:.6g}") if math.isfinite(value) else None for metric, value in values.items()}
+            return {
+                metric: float(f"{value:.6g}") if math.isfinite(value) else None
+                for metric, value in values.items()
+            }
 
         rows = [row.name for row in self.evaluation.rows]
-        beside = [row for row in (WITHOUT, UNIFORM, NARROW, REPLAY) if row in rows and row not in self.compared]
+        beside = [
+            row
+            for row in (WITHOUT, UNIFORM, NARROW, REPLAY)
+            if row in rows and row not in self.compared
+        ]
         return {
             "compared": {row: figures(row) for row in self.compared if row in rows},
             "beside": {row: figures(row) for row in beside},
             "best": {metric: best for metric in ERRORS if (best := self.best(metric))},
-            "said": [*self.better_references(), *([f"nothing is compared: {self.not_compared}"] if self.not_compared else [])],
+            "said": [
+                *self.better_references(),
+                *([f"nothing is compared: {self.not_compared}"] if self.not_compared else []),
+            ],
         }
 
     def road_and_fit(self) -> tuple[Road, Fit]:
@@ -199,7 +232,11 @@ class GenerationResult:
     def reacting(self) -> dict[str, Any]:
         """Who reacts to whom in the template, and what the scenarios keep of it, as a document."""
         graph, vehicles = self.generated.graph, self.encounter.vehicles
-        return {"edges": [], "cut": [], "sentences": []} if graph is None else graph.document(vehicles, self.generated.reactions)
+        return (
+            {"edges": [], "cut": [], "sentences": []}
+            if graph is None
+            else graph.document(vehicles, self.generated.reactions)
+        )
 
     @property
     def losses(self) -> tuple[str, ...]:
@@ -215,7 +252,9 @@ class GenerationResult:
     @property
     def lost_reactions(self) -> tuple[str, ...]:
         """Which reactions of the template the scenarios could not keep, in sentences."""
-        return tuple(message for message in self.generated.adaptations if message.startswith(NOT_KEPT))
+        return tuple(
+            message for message in self.generated.adaptations if message.startswith(NOT_KEPT)
+        )
 
     @property
     def published(self) -> int:

@@ -53,12 +53,27 @@ class Lane:
     crossing: bool = False
 
     def __post_init__(self) -> None:
-        height = self.height if len(self.height) == len(self.left) else np.full(len(self.left), np.nan)
+        height = (
+            self.height if len(self.height) == len(self.left) else np.full(len(self.left), np.nan)
+        )
         users = frozenset() if self.users == DRIVERS else self.users
-        freeze(self, left=frozen(self.left), right=frozen(self.right), height=frozen(height), users=users)
+        freeze(
+            self,
+            left=frozen(self.left),
+            right=frozen(self.right),
+            height=frozen(height),
+            users=users,
+        )
         if not users <= LANE_USERS:
-            raise InputError(f"lane {self.id}: users {', '.join(sorted(users))}; choose of {', '.join(sorted(LANE_USERS))}")
-        if self.left.shape != self.right.shape or self.left.ndim != 2 or self.left.shape[1] != 2 or len(self.left) < 2:
+            raise InputError(
+                f"lane {self.id}: users {', '.join(sorted(users))}; choose of {', '.join(sorted(LANE_USERS))}"
+            )
+        if (
+            self.left.shape != self.right.shape
+            or self.left.ndim != 2
+            or self.left.shape[1] != 2
+            or len(self.left) < 2
+        ):
             raise InputError(
                 f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed"
             )
@@ -120,7 +135,9 @@ class TrafficRule:
     def __post_init__(self) -> None:
         freeze(self, line=frozen(np.reshape(self.line, (-1, 2))))
         if len(self.line) == 1 or not np.isfinite(self.line).all():
-            raise InputError(f"traffic rule {self.id}: its stop line is a single point, or not finite")
+            raise InputError(
+                f"traffic rule {self.id}: its stop line is a single point, or not finite"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,22 +185,30 @@ class LaneNetwork:
 
     def __post_init__(self) -> None:
         if len(self.origin) not in (0, 2):
-            raise InputError(f"lanes of {self.name!r}: origin {self.origin}; latitude and longitude are needed")
+            raise InputError(
+                f"lanes of {self.name!r}: origin {self.origin}; latitude and longitude are needed"
+            )
         count = len(self.lanes)
         for rule in self.rules:
             if any(not 0 <= k < count for k in (*rule.lanes, *rule.over)):
-                raise InputError(f"traffic rule {rule.id} of {self.name!r} names a lane that is not there")
+                raise InputError(
+                    f"traffic rule {rule.id} of {self.name!r} names a lane that is not there"
+                )
         for lanes in (self.lanes, self.of_all):
             for lane in lanes:
                 if any(not 0 <= k < len(lanes) for k in (*lane.successors, *lane.beside)):
-                    raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")
+                    raise InputError(
+                        f"lane {lane.id} of {self.name!r} leads to a lane that is not there"
+                    )
 
     def with_lanes(self, lanes: Sequence[Lane]) -> "LaneNetwork":
         """Return the network with these lanes, of all users, in place of its own."""
         order = sorted(range(len(lanes)), key=lambda k: not lanes[k].open_to(CARS))
         of_all = _chosen(lanes, order)
         cars = [k for k, lane in enumerate(of_all) if lane.open_to(CARS)]
-        return replace(self, lanes=_chosen(of_all, cars), of_all=of_all if len(cars) < len(of_all) else ())
+        return replace(
+            self, lanes=_chosen(of_all, cars), of_all=of_all if len(cars) < len(of_all) else ()
+        )
 
     @property
     def every_lane(self) -> tuple[Lane, ...]:
@@ -211,20 +236,35 @@ class LaneNetwork:
         def found(lanes: Sequence[int]) -> tuple[int, ...]:
             return tuple(index[k] for k in lanes if k in index)
 
-        rules = (replace(rule, lanes=found(rule.lanes), over=found(rule.over)) for rule in self.rules)
-        return replace(self, lanes=_chosen(lanes, kept), rules=tuple(rule for rule in rules if rule.lanes), of_all=())
+        rules = (
+            replace(rule, lanes=found(rule.lanes), over=found(rule.over)) for rule in self.rules
+        )
+        return replace(
+            self,
+            lanes=_chosen(lanes, kept),
+            rules=tuple(rule for rule in rules if rule.lanes),
+            of_all=(),
+        )
 
     def moved(self, by: Floats) -> "LaneNetwork":
         """The same lanes (2,) [m] farther."""
-        lanes = [replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.every_lane]
+        lanes = [
+            replace(lane, left=lane.left + by, right=lane.right + by) for lane in self.every_lane
+        ]
         rules = (replace(rule, line=rule.line + by) for rule in self.rules)
-        aim = self.drawn_for and replace(self.drawn_for, frame=self.drawn_for.frame + np.array([*by, 0.0]))
+        aim = self.drawn_for and replace(
+            self.drawn_for, frame=self.drawn_for.frame + np.array([*by, 0.0])
+        )
         return replace(self.with_lanes(lanes), rules=tuple(rules), drawn_for=aim)
 
     @cached_property
     def has_levels(self) -> bool:
         """Whether some lanes may lie above others."""
-        height = np.concatenate([lane.height[np.isfinite(lane.height)] for lane in self.lanes]) if self.lanes else np.zeros(0)
+        height = (
+            np.concatenate([lane.height[np.isfinite(lane.height)] for lane in self.lanes])
+            if self.lanes
+            else np.zeros(0)
+        )
         return bool(len(height) and np.ptp(height) > LEVEL)
 
     @cached_property
@@ -262,7 +302,9 @@ class LaneNetwork:
 
         In right-hand traffic the oncoming lane has the same left border.
         """
-        left, right = (_shared([getattr(lane, side) for lane in self.lanes]) for side in ("left", "right"))
+        left, right = (
+            _shared([getattr(lane, side) for lane in self.lanes]) for side in ("left", "right")
+        )
         return "right" if left > right else "left" if right > left else ""
 
     @cached_property
@@ -283,7 +325,10 @@ def _chosen(lanes: Sequence[Lane], kept: Sequence[int]) -> tuple[Lane, ...]:
     index = {k: n for n, k in enumerate(kept)}
     chosen = []
     for lane in (lanes[k] for k in kept):
-        after, beside = (tuple(index[k] for k in names if k in index) for names in (lane.successors, lane.beside))
+        after, beside = (
+            tuple(index[k] for k in names if k in index)
+            for names in (lane.successors, lane.beside)
+        )
         same = (after, beside) == (lane.successors, lane.beside)
         chosen.append(lane if same else replace(lane, successors=after, beside=beside))
     return tuple(chosen)

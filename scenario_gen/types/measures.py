@@ -10,7 +10,9 @@ import math
 from scenario_gen.types.scenario import NEARNESS, Scenario
 from scenario_gen.types.target import Pair
 
-Measure = Callable[[Scenario, str, Pair | None], float]  # a figure of a scenario; NaN if it has none
+Measure = Callable[
+    [Scenario, str, Pair | None], float
+]  # a figure of a scenario; NaN if it has none
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,9 @@ def token(vehicle_id: str) -> str:
     """
     escaped = re.sub(r"_+", "_", re.sub(r"[^0-9A-Za-z_]", "_", vehicle_id)).strip("_")
     if not escaped:
-        raise InputError(f"vehicle id {vehicle_id!r} holds no letter or digit, so no ROS name can be made of it")
+        raise InputError(
+            f"vehicle id {vehicle_id!r} holds no letter or digit, so no ROS name can be made of it"
+        )
     return escaped
 
 
@@ -32,7 +34,9 @@ def tokens(vehicle_ids: Iterable[str]) -> tuple[str, ...]:
     for vehicle_id in vehicle_ids:
         other = owner.setdefault(token(vehicle_id), vehicle_id)
         if other != vehicle_id:
-            raise InputError(f"vehicle ids {other!r} and {vehicle_id!r} are both {token(vehicle_id)!r} as ROS names; rename one")
+            raise InputError(
+                f"vehicle ids {other!r} and {vehicle_id!r} are both {token(vehicle_id)!r} as ROS names; rename one"
+            )
     return tuple(owner)
 
 
@@ -46,4 +50,6 @@ def vehicle_index(encounter: Encounter, name: str, what: str) -> int:
     for known in (ids, list(tokens(ids))):
         if name in known:
             return known.index(name)
-    raise InputError(f"{what}: no vehicle {name!r} in {encounter.name}; there are: {', '.join(ids)}{did_you_mean(name, ids)}")
+    raise InputError(
+        f"{what}: no vehicle {name!r} in {encounter.name}; there are: {', '.join(ids)}{did_you_mean(name, ids)}"
+    )

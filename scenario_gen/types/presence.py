@@ -12,7 +12,9 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, frozen, Ints, sealed
 
-ALWAYS: Ints = sealed(np.zeros((0, 2), dtype=np.int64))  # the default of a field `present`: everybody is there throughout
+ALWAYS: Ints = sealed(
+    np.zeros((0, 2), dtype=np.int64)
+)  # the default of a field `present`: everybody is there throughout
 
 
 def canonical_presence(present: Ints, count: int, samples: int, name: str) -> Ints:
@@ -31,10 +33,14 @@ def canonical_presence(present: Ints, count: int, samples: int, name: str) -> In
     if np.shape(present) == (0, 2):
         return sealed(np.tile(np.array([0, samples - 1], dtype=np.int64), (count, 1)))
     if np.asarray(present).dtype.kind not in "iu":
-        raise InputError(f"{name}: presence is of type {np.asarray(present).dtype}; whole numbers are needed")
+        raise InputError(
+            f"{name}: presence is of type {np.asarray(present).dtype}; whole numbers are needed"
+        )
     rows = np.array(present, dtype=np.int64, order="C")
     if rows.shape != (count, 2):
-        raise InputError(f"{name}: presence has shape {rows.shape}; {count} rows of first and last sample are needed")
+        raise InputError(
+            f"{name}: presence has shape {rows.shape}; {count} rows of first and last sample are needed"
+        )
     bad = np.flatnonzero((rows[:, 0] < 0) | (rows[:, 1] >= samples) | (rows[:, 0] >= rows[:, 1]))
     if len(bad):
         first, last = rows[bad[0]].tolist()
@@ -79,5 +85,7 @@ def together(present: Ints, a: int, b: int) -> slice:
 
 def cut(present: Ints, first: int, last: int) -> Ints:
     """Return the presence (N, 2) counted within samples `first` to before `last`; a row that is left empty has first > last."""
-    inside: Ints = np.column_stack((np.maximum(present[:, 0] - first, 0), np.minimum(present[:, 1], last - 1) - first))
+    inside: Ints = np.column_stack(
+        (np.maximum(present[:, 0] - first, 0), np.minimum(present[:, 1], last - 1) - first)
+    )
     return inside

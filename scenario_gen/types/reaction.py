@@ -73,7 +73,13 @@ class Reaction:
         if self.kind == FOLLOW:
             text = f"{who} follows {whom}, {self.headway[1]:.1f} s bumper to bumper, and answers its speed after {self.lag:.1f} s"
         else:
-            verb = f"waits for {whom}, then" if self.stands else f"slows for {whom} and" if self.since < self.until else ""
+            verb = (
+                f"waits for {whom}, then"
+                if self.stands
+                else f"slows for {whom} and"
+                if self.since < self.until
+                else ""
+            )
             when = f"{self.gap:.1f} s behind" if self.gap >= 0.05 else "right behind"
             text = f"{who} {verb} passes {when} it" if verb else f"{who} passes {when} {whom}"
             if self.gap == math.inf:
@@ -110,17 +116,32 @@ class ReactionGraph:
     cut: tuple[Reaction, ...] = ()
     why: str = ""
 
-    def sentences(self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None) -> tuple[str, ...]:
+    def sentences(
+        self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None
+    ) -> tuple[str, ...]:
         """Return one sentence for each edge of the graph, which also names those that are not among the `kept`."""
         free = "" if kept is None else ": the scenarios are not held to it"
-        sentences = [edge.words(vehicles) if edge in (kept or ()) else f"{edge.words(vehicles)}{free}" for edge in self.edges]
-        sentences += [f"{edge.words(vehicles)}: left out, for it closes a circle of reactions" for edge in self.cut]
-        return tuple(sentences) or (f"no vehicle is seen to react to another{self.why and ': '}{self.why}",)
+        sentences = [
+            edge.words(vehicles) if edge in (kept or ()) else f"{edge.words(vehicles)}{free}"
+            for edge in self.edges
+        ]
+        sentences += [
+            f"{edge.words(vehicles)}: left out, for it closes a circle of reactions"
+            for edge in self.cut
+        ]
+        return tuple(sentences) or (
+            f"no vehicle is seen to react to another{self.why and ': '}{self.why}",
+        )
 
-    def document(self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None) -> dict[str, Any]:
+    def document(
+        self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None
+    ) -> dict[str, Any]:
         """Return the graph as a document: edges, those that were cut, sentences; and of each edge whether it is `kept`."""
         return {
-            "edges": [edge.document(vehicles) | ({} if kept is None else {"kept": edge in kept}) for edge in self.edges],
+            "edges": [
+                edge.document(vehicles) | ({} if kept is None else {"kept": edge in kept})
+                for edge in self.edges
+            ],
             "cut": [edge.document(vehicles) for edge in self.cut],
             "sentences": list(self.sentences(vehicles, kept)),
         }
@@ -129,16 +150,25 @@ class ReactionGraph:
 def yielders_of(names: str, ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Return (who, whom) of the yielding reactions that an entry names ("2 yields to 1; 3 follows 2"), of vehicles `ids`."""
     pairs = [name.split(_YIELDS) for name in split_pieces(names) if _YIELDS in name]
-    return tuple((ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids)
+    return tuple(
+        (ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids
+    )
 
 
-def reaction_facts(names: Sequence[str], kept: Sequence[Reaction], lost: Iterable[Sequence[int]]) -> dict[str, str]:
+def reaction_facts(
+    names: Sequence[str], kept: Sequence[Reaction], lost: Iterable[Sequence[int]]
+) -> dict[str, str]:
     """Return the facts that name the reactions that a scenario keeps, and the pairs (who, whom) that it is not held to."""
-    pieces = {"reactions": [edge.name(names) for edge in kept], LOST: [f"{names[who]}>{names[whom]}" for who, whom in lost]}
+    pieces = {
+        "reactions": [edge.name(names) for edge in kept],
+        LOST: [f"{names[who]}>{names[whom]}" for who, whom in lost],
+    }
     return {key: join_pieces(found) for key, found in pieces.items() if found}
 
 
 def lost_pairs(facts: Mapping[str, str], ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Return the pairs (who, whom) that facts say a scenario is not held to, of vehicles `ids`."""
     pairs = [name.split(">") for name in split_pieces(facts.get(LOST, ""))]
-    return tuple((ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids)
+    return tuple(
+        (ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids
+    )

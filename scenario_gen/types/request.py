@@ -26,9 +26,14 @@ _FORM = "id: x y yaw [speed]"
 class Request(Parameters):
     """All that one request may demand."""
 
-    ego: str = parameter("", "id of the vehicle that is left out for a planner under test; its track is given instead")
+    ego: str = parameter(
+        "",
+        "id of the vehicle that is left out for a planner under test; its track is given instead",
+    )
     starts: str = parameter(
-        "", f"start states on the road, `{_FORM}`, vehicles parted by `;`; others are the fitting's", unit="m, rad, m/s"
+        "",
+        f"start states on the road, `{_FORM}`, vehicles parted by `;`; others are the fitting's",
+        unit="m, rad, m/s",
     )
     goals: str = parameter("", f"end states, likewise `{_FORM}`", unit="m, rad, m/s")
     target: str = parameter(
@@ -36,7 +41,9 @@ class Request(Parameters):
         "ranges to aim at, of pet, ttc, gap, arrival_gap, closing_speed, baseline_margin: `pet=0.5..1.5; ttc[1,2]=1..2`",
     )
     choose: str = parameter(
-        "natural", "natural: as sampled; diverse: of many valid candidates those that cover best", choices=("natural", "diverse")
+        "natural",
+        "natural: as sampled; diverse: of many valid candidates those that cover best",
+        choices=("natural", "diverse"),
     )
     order: str = parameter(
         "keep",
@@ -75,7 +82,10 @@ class Request(Parameters):
 
     def with_states(self, end: str, states: Mapping[str, State]) -> "Request":
         """Return the request with other states at one end."""
-        text = join_pieces(f"{name}: {' '.join(f'{value:.10g}' for value in state)}" for name, state in states.items())
+        text = join_pieces(
+            f"{name}: {' '.join(f'{value:.10g}' for value in state)}"
+            for name, state in states.items()
+        )
         return replace(self, **{end: text})
 
     def rows(self, end: str, encounter: Encounter) -> Floats:
@@ -109,7 +119,9 @@ def read_states(text: str, what: str) -> dict[str, State]:
         name, _, numbers = piece.rpartition(":")
         name, state = name.strip(), read_numbers(numbers)
         if not name or len(state) not in (3, 4):
-            raise InputError(f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, e.g. `1: 10.5 -1.75 0.0 8.0`")
+            raise InputError(
+                f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, e.g. `1: 10.5 -1.75 0.0 8.0`"
+            )
         if len(state) == 4 and state[3] < 0.0:
             raise InputError(f"{what}: {piece!r} asks for a negative speed")
         if name in states:

@@ -9,7 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, canonical_poses, Floats, freeze, frozen, frozen_bools, Ints
+from scenario_gen.numerics import (
+    Bools,
+    canonical_poses,
+    Floats,
+    freeze,
+    frozen,
+    frozen_bools,
+    Ints,
+)
 from scenario_gen.types.lanes import LaneNetwork
 
 FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones
@@ -55,7 +63,9 @@ class Road:
         if self.drivable.ndim != 2 or not self.drivable.any():
             raise InputError(f"road {self.name!r} has no drivable cell")
         if not FINEST <= self.resolution <= COARSEST:
-            raise InputError(f"road {self.name!r} has resolution {self.resolution:g} m; {FINEST:g} to {COARSEST:g} m are read")
+            raise InputError(
+                f"road {self.name!r} has resolution {self.resolution:g} m; {FINEST:g} to {COARSEST:g} m are read"
+            )
         if self.origin.shape != (2,) or not (np.abs(self.origin) <= FARTHEST).all():
             raise InputError(
                 f"road {self.name!r} has origin {self.origin}; at most {FARTHEST:g} m from the frame's origin are read"

@@ -53,7 +53,9 @@ class Route:
         """Return sentences about what a user should know: far from the fitted path, anchors left out."""
         sentences = []
         if self.farthest > FAR_OFF:
-            sentences.append(f"vehicle {vehicle}: its route passes {self.farthest:.1f} m from its fitted path")
+            sentences.append(
+                f"vehicle {vehicle}: its route passes {self.farthest:.1f} m from its fitted path"
+            )
         if self.left_out:
             which = ", ".join(str(k) for k in self.left_out)
             sentences.append(
@@ -68,7 +70,11 @@ def routes_in_words(routes: Sequence[Route]) -> str:
     What is not known is left out, up to nothing.
     """
     sentences = []
-    known = [(route.joined, route.searched) for route in routes if route.joined is not None and route.searched is not None]
+    known = [
+        (route.joined, route.searched)
+        for route in routes
+        if route.joined is not None and route.searched is not None
+    ]
     if known:
         joined, searched = (sum(int(each[k]) for each in known) for k in (0, 1))
         sentences.append(f"{joined} legs joined at once, {searched} searched for")

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.base.renaming import Renamed
-from scenario_gen.numerics import Bools, canonical_heading, canonical_poses, Floats, freeze, frozen, Ints
+from scenario_gen.numerics import (
+    Bools,
+    canonical_heading,
+    canonical_poses,
+    Floats,
+    freeze,
+    frozen,
+    Ints,
+)
 from scenario_gen.types.encounter import columns_of, Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 from scenario_gen.types.reaction import Reaction, ReactionGraph
@@ -24,7 +32,16 @@ if TYPE_CHECKING:
 
 NEARNESS = {"closest_approach": "gap", "pet": "pet"}
 """Facts that say how near vehicles come [m, s], and the figures (`UNITS`) that they are, of the most critical pair."""
-FACTS = (*NEARNESS, "rarity", "weight", "target.", "order", "passing_order", "reactions", "search.")
+FACTS = (
+    *NEARNESS,
+    "rarity",
+    "weight",
+    "target.",
+    "order",
+    "passing_order",
+    "reactions",
+    "search.",
+)
 """How the names of a scenario's facts begin."""
 
 
@@ -68,7 +85,9 @@ class Scenario:
     def __post_init__(self) -> None:
         n, t = len(self.vehicles), len(self.time)
         present = canonical_presence(self.present, n, t, f"scenario {self.index}")
-        freeze(self, time=frozen(np.round(self.time, 9)), present=present)  # whole nanoseconds, as on the wire
+        freeze(
+            self, time=frozen(np.round(self.time, 9)), present=present
+        )  # whole nanoseconds, as on the wire
         freeze(self, heading=held(canonical_heading(self.heading), present))
         for name in ("position", "speed", "acceleration"):
             freeze(self, **{name: held(frozen(getattr(self, name)), present)})
@@ -109,7 +128,11 @@ def dataframe(scenarios: Iterable[Scenario]) -> "DataFrame":
     import pandas as pd
 
     tables = [
-        pd.DataFrame({"scenario": one.index} | columns_of(one) | {"acceleration": one.acceleration[one.there]})
+        pd.DataFrame(
+            {"scenario": one.index}
+            | columns_of(one)
+            | {"acceleration": one.acceleration[one.there]}
+        )
         for one in scenarios
     ]
     names = ("scenario", "vehicle", "time", "x", "y", "heading", "speed", "acceleration")
@@ -131,7 +154,12 @@ class BoundaryStates:
 
     def __post_init__(self) -> None:
         relaxed = self.relaxed if len(self.relaxed) else np.zeros((len(self.start), 2, 2))
-        freeze(self, relaxed=frozen(relaxed), start=canonical_poses(self.start), end=canonical_poses(self.end))
+        freeze(
+            self,
+            relaxed=frozen(relaxed),
+            start=canonical_poses(self.start),
+            end=canonical_poses(self.end),
+        )
 
 
 class Cause(StrEnum):
@@ -149,8 +177,12 @@ class Cause(StrEnum):
     PASSING_ORDER = "passing_order"  # not the template's order at a conflict
     STOP_NOT_KEPT = "stop_not_kept"  # a vehicle does not keep a stop of the template
     TRAFFIC_RULE = "traffic_rule"  # a vehicle runs a stop line of the map, or takes another one's right of way
-    REACTION = "reaction"  # who reacts in the template goes too early, too late, or at another distance
-    CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
+    REACTION = (
+        "reaction"  # who reacts in the template goes too early, too late, or at another distance
+    )
+    CONFLICT_LOST = (
+        "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
+    )
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the requested range; it was not checked
     UNUSUAL = "unusual"  # valid, but rarer among encounters of its kind than the template

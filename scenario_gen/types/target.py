@@ -11,7 +11,14 @@ from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
 from scenario_gen.types.pieces import join_pieces, split_pieces
 
-UNITS = {"pet": "s", "ttc": "s", "gap": "m", "arrival_gap": "s", "closing_speed": "m/s", "baseline_margin": "s"}
+UNITS = {
+    "pet": "s",
+    "ttc": "s",
+    "gap": "m",
+    "arrival_gap": "s",
+    "closing_speed": "m/s",
+    "baseline_margin": "s",
+}
 """The figures that a target can be set on, with their units; `scenario_gen.method.evaluation.measures` defines them."""
 Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical
 _FORM = "NAME=LOW..HIGH, NAME[a]=LOW..HIGH or NAME[a,b]=LOW..HIGH"
@@ -40,7 +47,9 @@ class Target:
         return f"{self.name}[{','.join(self.vehicles)}]" if self.vehicles else self.name
 
     def __str__(self) -> str:
-        low, high = ("" if math.isinf(value) else f"{value:.10g}" for value in (self.low, self.high))
+        low, high = (
+            "" if math.isinf(value) else f"{value:.10g}" for value in (self.low, self.high)
+        )
         return f"{self.label}={low}..{high}"
 
     def holds(self, value: float) -> bool:
@@ -114,16 +123,25 @@ def read_targets(text: str) -> tuple[Target, ...]:
         name = _RENAMED.get(name.strip(), name.strip())
         ids = tuple(word.strip() for word in inside.rstrip("] ").split(",")) if bracket else ()
         words = bounds.split("..")
-        if len(words) != 2 or (bracket and not (head.strip().endswith("]") and len(ids) in (1, 2) and all(ids))):
+        if len(words) != 2 or (
+            bracket and not (head.strip().endswith("]") and len(ids) in (1, 2) and all(ids))
+        ):
             raise InputError(f"target: {piece!r} is not of the form `{_FORM}`, e.g. `{_EXAMPLE}`")
         if name not in UNITS:
             raise InputError(f"target: {name!r} is none of {', '.join(UNITS)}")
         try:
-            low, high = (float(word) if word.strip() else bound for word, bound in zip(words, (-math.inf, math.inf), strict=True))
+            low, high = (
+                float(word) if word.strip() else bound
+                for word, bound in zip(words, (-math.inf, math.inf), strict=True)
+            )
         except ValueError:
-            raise InputError(f"target: {piece!r}: the bounds must be numbers, as in `{_EXAMPLE}`") from None
+            raise InputError(
+                f"target: {piece!r}: the bounds must be numbers, as in `{_EXAMPLE}`"
+            ) from None
         if not low < high or (math.isinf(low) and math.isinf(high)):
-            raise InputError(f"target: {piece!r}: the lower bound must be below the upper one, and one of them finite")
+            raise InputError(
+                f"target: {piece!r}: the lower bound must be below the upper one, and one of them finite"
+            )
         target = Target(name, low, high, ids)
         if target.label in {other.label for other in targets}:
             raise InputError(f"target: {target.label} comes twice")

@@ -31,13 +31,31 @@ TEXTS = [
         "*a",
         "%s%n",
     ),
-    *("a: &a {b: *a}", "{a: [}", "!<tag:yaml.org,2002:python/name:os.system> x", "\x1b", "!!float x", "!!map [a]", "!!set {a}"),
+    *(
+        "a: &a {b: *a}",
+        "{a: [}",
+        "!<tag:yaml.org,2002:python/name:os.system> x",
+        "\x1b",
+        "!!float x",
+        "!!map [a]",
+        "!!set {a}",
+    ),
     *("!!binary a", '!!int ""'),
 ]
-TEXTS += ["9" * 5000, "0x" + "f" * 5000, "? [a]\n: b", "[" * 5000, "a" * 2_000_000, "\ud800", "--- a\n--- b"]
+TEXTS += [
+    "9" * 5000,
+    "0x" + "f" * 5000,
+    "? [a]\n: b",
+    "[" * 5000,
+    "a" * 2_000_000,
+    "\ud800",
+    "--- a\n--- b",
+]
 
 
-@pytest.mark.parametrize("file", crash_files("params/*", "params_*", "deep.yaml", "map_alias*"), indirect=True)
+@pytest.mark.parametrize(
+    "file", crash_files("params/*", "params_*", "deep.yaml", "map_alias*"), indirect=True
+)
 def test_a_broken_parameter_file_is_named(file):
     is_refused(lambda: loaded(PipelineConfig(), file), str(file))
 
@@ -51,7 +69,12 @@ def test_set_says_what_is_wrong(text):
 
 @given(
     st.sampled_from(NAMES),
-    st.one_of(st.text(), st.from_regex(r"[-+0-9.eE_:xob\[\]{}&*!'\"]{0,12}"), st.floats().map(repr), st.integers().map(str)),
+    st.one_of(
+        st.text(),
+        st.from_regex(r"[-+0-9.eE_:xob\[\]{}&*!'\"]{0,12}"),
+        st.floats().map(repr),
+        st.integers().map(str),
+    ),
 )
 @settings(max_examples=40)
 def test_any_text_is_a_valid_value_or_a_clear_error(name, text):
@@ -65,7 +88,18 @@ def test_any_text_is_a_valid_value_or_a_clear_error(name, text):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", "a: 1\nb: 2\n", "/**: 3", "/**: {ros__parameters: 3}", "/**: {ros__parameters: [1]}", "3", "null"]
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        "a: 1\nb: 2\n",
+        "/**: 3",
+        "/**: {ros__parameters: 3}",
+        "/**: {ros__parameters: [1]}",
+        "3",
+        "null",
+    ],
 )
 def test_a_file_of_another_form_is_refused(tmp_path, text):
     (tmp_path / "p.yaml").write_text(text)
@@ -82,7 +116,10 @@ def test_plain_values_are_read_as_they_are_written():
 
 
 def test_json_keeps_its_schema_and_the_path_is_named():
-    schema = {"type": "object", "properties": {"a": {"type": "array", "items": {"type": "number"}}}}
+    schema = {
+        "type": "object",
+        "properties": {"a": {"type": "array", "items": {"type": "number"}}},
+    }
     assert parse_json('{"a": [1, 2]}', "x", schema) == {"a": [1, 2]}
     with pytest.raises(InputError, match=r"x: a\[1\] is None; its schema asks for type number"):
         parse_json('{"a": [1, null]}', "x", schema)

@@ -7,7 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from scenario_gen.base.errors import guarded, InputError, LONGEST, LONGEST_REFUSAL, print_error, RefusedError
+from scenario_gen.base.errors import (
+    guarded,
+    InputError,
+    LONGEST,
+    LONGEST_REFUSAL,
+    print_error,
+    RefusedError,
+)
 
 
 @given(st.text(), st.integers(0, 3000))
@@ -19,17 +26,27 @@ def test_a_message_is_short_and_prints(text, times):
 
 
 def test_a_message_that_is_fit_stays_as_it_is():
-    assert str(InputError("σ of 3 m²: too much\nsecond line")) == "σ of 3 m²: too much\nsecond line"
+    assert (
+        str(InputError("σ of 3 m²: too much\nsecond line")) == "σ of 3 m²: too much\nsecond line"
+    )
 
 
 def test_of_joined_refusals_each_keeps_its_reason_and_remedy(capsys):
-    refusals = [f"road {name}: vehicle 1 {'drives on and on ' * 90}; choose road merge" for name in ("straight", "curve")]
+    refusals = [
+        f"road {name}: vehicle 1 {'drives on and on ' * 90}; choose road merge"
+        for name in ("straight", "curve")
+    ]
     print_error(RefusedError("; ".join(refusals)))
     said = capsys.readouterr().err
     assert said.count("choose road merge") == 2 and "road curve: vehicle 1 drives on" in said
     assert len(said) <= len("error: \n") + LONGEST_REFUSAL
     assert set(said.split()) <= {"error:", "…", *"; ".join(refusals).split()}, "no word is cut"
-    print_error(RefusedError("nothing could be generated:\n" + "\n".join(["road merge: " + "its arms differ " * 60] * 9)))
+    print_error(
+        RefusedError(
+            "nothing could be generated:\n"
+            + "\n".join(["road merge: " + "its arms differ " * 60] * 9)
+        )
+    )
     assert "…" not in capsys.readouterr().err, "each refusal has a line of its own"
 
 
@@ -38,7 +55,13 @@ def test_a_lone_surrogate_can_be_printed():
 
 
 @pytest.mark.parametrize(
-    "error", [KeyError("t_s"), MemoryError("Unable to allocate 596 GiB"), ValueError("two\n words"), EOFError()]
+    "error",
+    [
+        KeyError("t_s"),
+        MemoryError("Unable to allocate 596 GiB"),
+        ValueError("two\n words"),
+        EOFError(),
+    ],
 )
 def test_what_a_library_raises_becomes_an_error_of_the_place(error):
     with (

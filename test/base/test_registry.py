@@ -23,7 +23,9 @@ def install(tmp_path, monkeypatch):
         folder = tmp_path / f"{name}-1.2.dist-info"
         folder.mkdir()
         (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\n")
-        (folder / "entry_points.txt").write_text("\n".join([f"[{GROUP}]", *(f"{k} = {v}" for k, v in entries.items())]))
+        (folder / "entry_points.txt").write_text(
+            "\n".join([f"[{GROUP}]", *(f"{k} = {v}" for k, v in entries.items())])
+        )
         installed.cache_clear()
         return tmp_path
 
@@ -59,11 +61,27 @@ def test_what_is_built_in_needs_no_look_at_packages(monkeypatch):
 @pytest.mark.parametrize(
     ("entries", "kind", "message"),
     [
-        ({"broken": "no_such_module:f"}, None, r"plugin 'broken' of bad 1\.2 cannot be loaded: No module named 'no_such_module'"),
-        ({"broken": "builtins:no_such_name"}, None, r"plugin 'broken' of bad 1\.2 cannot be loaded: .*no_such_name"),
+        (
+            {"broken": "no_such_module:f"},
+            None,
+            r"plugin 'broken' of bad 1\.2 cannot be loaded: No module named 'no_such_module'",
+        ),
+        (
+            {"broken": "builtins:no_such_name"},
+            None,
+            r"plugin 'broken' of bad 1\.2 cannot be loaded: .*no_such_name",
+        ),
         ({"broken": "math:pi"}, None, r"plugin 'broken' of bad 1\.2 is no function: math:pi"),
-        ({"broken": "builtins:len"}, dict, r"plugin 'broken' of bad 1\.2 is no dict: builtins:len"),
-        ({"one": "builtins:len"}, None, r"bad 1\.2 has scenario_gen\.test 'one', which is built in"),
+        (
+            {"broken": "builtins:len"},
+            dict,
+            r"plugin 'broken' of bad 1\.2 is no dict: builtins:len",
+        ),
+        (
+            {"one": "builtins:len"},
+            None,
+            r"bad 1\.2 has scenario_gen\.test 'one', which is built in",
+        ),
         ({}, None, r"scenario_gen\.test has no 'broken'; choose one of one, two$"),
     ],
 )
@@ -73,22 +91,35 @@ def test_what_is_wrong_with_a_plugin_names_its_distribution(install, entries, ki
         Registry(GROUP, NUMBERS, kind)["broken"]
 
 
-@pytest.mark.parametrize(("body", "said"), [("raise SystemExit(0)", "SystemExit 0"), ("return 1 / 0", "division by zero")])
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [("raise SystemExit(0)", "SystemExit 0"), ("return 1 / 0", "division by zero")],
+)
 def test_a_plugin_that_raises_or_exits_is_named(install, body, said):
-    (install("bad", own="bad_plugin:make") / "bad_plugin.py").write_text(f"def make():\n    {body}\n")
+    (install("bad", own="bad_plugin:make") / "bad_plugin.py").write_text(
+        f"def make():\n    {body}\n"
+    )
     registry = Registry(GROUP, NUMBERS)
     make = registry["own"]
     del sys.modules["bad_plugin"]
-    with pytest.raises(InputError, match=rf"plugin 'own' of bad 1\.2 failed: {said}"), registry.running("own"):
+    with (
+        pytest.raises(InputError, match=rf"plugin 'own' of bad 1\.2 failed: {said}"),
+        registry.running("own"),
+    ):
         make()
     with pytest.raises(InputError, match="ours"), registry.running("own"):
         raise InputError("ours")
-    with pytest.raises(ZeroDivisionError), registry.running("one"):  # a fault of our own is not hidden
+    with (
+        pytest.raises(ZeroDivisionError),
+        registry.running("one"),
+    ):  # a fault of our own is not hidden
         1 / 0  # noqa: B018
 
 
 def test_two_distributions_with_one_name_are_both_named(install):
     install("left", same="builtins:len")
     install("right", same="builtins:abs")
-    with pytest.raises(InputError, match=r"left 1\.2 and right 1\.2 both have scenario_gen\.test 'same'"):
+    with pytest.raises(
+        InputError, match=r"left 1\.2 and right 1\.2 both have scenario_gen\.test 'same'"
+    ):
         Registry(GROUP, NUMBERS).names()

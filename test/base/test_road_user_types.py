@@ -38,10 +38,16 @@ def test_what_logs_call_types(word, name):
 
 def test_joint_names_say_types_and_older_ones_are_read():
     bicycle, car = Vehicle("b", 1.8, 0.65, "bicycle"), Vehicle("c", 4.8, 1.9)
-    assert joint_names((bicycle, car)) == ("b:1.8x0.65:bicycle", "c:4.8x1.9")  # cars as in older bags
+    assert joint_names((bicycle, car)) == (
+        "b:1.8x0.65:bicycle",
+        "c:4.8x1.9",
+    )  # cars as in older bags
     assert [vehicle_of(name) for name in joint_names((bicycle, car))] == [bicycle, car]
     assert (vehicle_of("t:12.0x2.5").type, vehicle_of("x").type) == ("truck", "car")
-    with pytest.raises(InputError, match=r"vehicle s is of type 'hoverboard'; known are car, van, .*install the package"):
+    with pytest.raises(
+        InputError,
+        match=r"vehicle s is of type 'hoverboard'; known are car, van, .*install the package",
+    ):
         vehicle_of("s:1.0x0.5:hoverboard")
 
 
@@ -54,7 +60,11 @@ def test_each_type_has_limits_of_its_own_to_set():
         assigned(PipelineConfig(), "limits.bus.max_acceleration=-1")
 
 
-@pytest.mark.parametrize("name", ["sampling.max_speed", "planning.max_curvature", "limits.max_acceleration"])
+@pytest.mark.parametrize(
+    "name", ["sampling.max_speed", "planning.max_curvature", "limits.max_acceleration"]
+)
 def test_a_name_of_before_is_refused_with_the_one_that_replaces_it(name):
-    with pytest.raises(InputError, match=rf"{name} is no longer there; set limits\.car\.{name.partition('.')[2]}"):
+    with pytest.raises(
+        InputError, match=rf"{name} is no longer there; set limits\.car\.{name.partition('.')[2]}"
+    ):
         assigned(PipelineConfig(), f"{name}=1")

@@ -29,16 +29,27 @@ def test_the_last_line_is_one_json_object(name):
     command = [sys.executable, "-m", "benchmarks", name, "--json", "--quick"]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr[-2000:]
-    said = json.loads(run.stdout.splitlines()[-1], parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
-    assert said["benchmark"] == name and said["quick"] is True and said["machine"]["cores"] >= 1 and said["rows"]
+    said = json.loads(
+        run.stdout.splitlines()[-1], parse_constant=lambda word: pytest.fail(f"{word} is no JSON")
+    )
+    assert (
+        said["benchmark"] == name
+        and said["quick"] is True
+        and said["machine"]["cores"] >= 1
+        and said["rows"]
+    )
     for row in said["rows"]:
         assert set(row) == {"id", "value", "unit", "better", "target", "peer", "met"}
         assert row["value"] is None or isinstance(row["value"], float)
-        assert row["met"] in (None, True, False) and (row["met"] is None) == (row["target"] is None)
+        assert row["met"] in (None, True, False) and (row["met"] is None) == (
+            row["target"] is None
+        )
         assert row["better"] in ("higher", "lower")
 
 
-@pytest.mark.parametrize("value", [np.float32(2.0), np.int64(2), np.bool_(True), 2, math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    "value", [np.float32(2.0), np.int64(2), np.bool_(True), 2, math.nan, math.inf, -math.inf]
+)
 def test_a_row_takes_the_numbers_of_numpy_and_what_is_not_finite_is_null(value):
     row = Row("a", value, "", "higher", np.float64(1.0)).document()
     assert json.loads(json.dumps(row, allow_nan=False)) == row and row["met"] is bool(value >= 1.0)
@@ -63,7 +74,10 @@ sys.exit(main.main())
 
 @pytest.mark.parametrize(
     ("how", "why"),
-    [("os.kill(os.getpid(), signal.SIGTERM)", "KeyboardInterrupt"), ("raise ValueError('peer')", "ValueError: peer")],
+    [
+        ("os.kill(os.getpid(), signal.SIGTERM)", "KeyboardInterrupt"),
+        ("raise ValueError('peer')", "ValueError: peer"),
+    ],
     ids=["signal", "error"],
 )
 def test_a_benchmark_that_is_stopped_keeps_what_it_has_measured(how, why):

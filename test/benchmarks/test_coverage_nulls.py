@@ -6,7 +6,14 @@
 import numpy as np
 import pytest
 
-from benchmarks._coverage_nulls import at_precision, deviations, jitters, joint_gain, scaled, speed_spread
+from benchmarks._coverage_nulls import (
+    at_precision,
+    deviations,
+    jitters,
+    joint_gain,
+    scaled,
+    speed_spread,
+)
 from scenario_gen.method.evaluation.population import FEATURES, Member, Members
 
 WIDTH = len(FEATURES)
@@ -16,9 +23,17 @@ WIDTH = len(FEATURES)
 def found():
     """Forty recorded encounters of eight recordings, and ten members of each that differ by 0.3 standard deviations."""
     rng = np.random.default_rng(7)
-    recorded = [Member("crossing", rng.standard_normal(WIDTH), f"{n // 5}", n, (0, 1)) for n in range(40)]
+    recorded = [
+        Member("crossing", rng.standard_normal(WIDTH), f"{n // 5}", n, (0, 1)) for n in range(40)
+    ]
     made = [
-        Member("crossing", own.features + 0.3 * rng.standard_normal(WIDTH), own.recording, own.template, (0, 1))
+        Member(
+            "crossing",
+            own.features + 0.3 * rng.standard_normal(WIDTH),
+            own.recording,
+            own.template,
+            (0, 1),
+        )
         for own in recorded
         for _ in range(10)
     ]
@@ -26,7 +41,9 @@ def found():
 
 
 def test_deviations_are_scaled_about_each_template(found):
-    np.testing.assert_allclose(deviations(scaled(found, 0.5), "crossing"), 0.5 * deviations(found, "crossing"))
+    np.testing.assert_allclose(
+        deviations(scaled(found, 0.5), "crossing"), 0.5 * deviations(found, "crossing")
+    )
 
 
 def test_a_null_becomes_as_precise_as_is_asked(found):

@@ -19,7 +19,12 @@ def drive(speed, turn=0.0, count=2):
     place = np.concatenate([np.zeros((1, 2)), np.cumsum(0.05 * (way[1:] + way[:-1]), axis=0)])
     position = np.stack([place + np.array([0.0, 4.0 * n]) for n in range(count)])
     return Signals.of(
-        {"time": time, "position": position, "heading": np.tile(heading, (count, 1)), "speed": np.tile(speed, (count, 1))}
+        {
+            "time": time,
+            "position": position,
+            "heading": np.tile(heading, (count, 1)),
+            "speed": np.tile(speed, (count, 1)),
+        }
     )
 
 
@@ -35,7 +40,9 @@ def test_roughness_of_a_known_drive():
     assert staircase["jerk"] == pytest.approx([20.0, 20.0])  # from 1 to -1 m/s² within 0.1 s
 
 
-@pytest.mark.parametrize(("other", "kept"), [(60.0, True), (80.0, True), (90.0, False), (10.0, False), (-60.0, False)])
+@pytest.mark.parametrize(
+    ("other", "kept"), [(60.0, True), (80.0, True), (90.0, False), (10.0, False), (-60.0, False)]
+)
 def test_a_turn_is_kept_within_25_degrees_and_by_its_kind(other, kept):
     speed = np.full(101, 8.0)
     template, sample = drive(speed, 60.0), drive(speed, other)
@@ -56,11 +63,22 @@ def test_windows_see_noise_and_nothing_else():
 
 def test_the_list_of_cuts_is_whole_and_its_last_third_is_apart():
     shown, held = cuts()
-    assert len(held) == (len(shown) + len(held)) // 3 and not {c.name for c in shown} & {c.name for c in held}
-    times = [(file, vehicle, cut.start, cut.end) for cut in (*shown, *held) for file in cut.files for vehicle in cut.vehicles]
+    assert len(held) == (len(shown) + len(held)) // 3 and not {c.name for c in shown} & {
+        c.name for c in held
+    }
+    times = [
+        (file, vehicle, cut.start, cut.end)
+        for cut in (*shown, *held)
+        for file in cut.files
+        for vehicle in cut.vehicles
+    ]
     for k, (file, vehicle, start, end) in enumerate(times):
         for other, name, begin, until in times[:k]:
-            assert (file, vehicle) != (other, name) or end <= begin or until <= start, (file, vehicle, start)
+            assert (file, vehicle) != (other, name) or end <= begin or until <= start, (
+                file,
+                vehicle,
+                start,
+            )
 
 
 @pytest.mark.long()
@@ -70,12 +88,19 @@ def test_the_classifier_tells_rough_from_calm_and_calm_from_calm_not():
 
     def drives(noise):
         phase, size = rng.uniform(0.0, 6.0), rng.uniform(0.5, 2.0)
-        return [drive(8.0 + size * np.sin(time + phase) + rng.normal(0.0, noise, 101)) for _ in range(2)]
+        return [
+            drive(8.0 + size * np.sin(time + phase) + rng.normal(0.0, noise, 101))
+            for _ in range(2)
+        ]
 
     calm = [drives(0.01) for _ in range(8)]
     alike = [Windows(str(k), windows(one), windows(other)) for k, (one, other) in enumerate(calm)]
-    rough = [Windows(str(k), windows(one), windows(drives(0.05)[0])) for k, (one, _) in enumerate(calm)]
+    rough = [
+        Windows(str(k), windows(one), windows(drives(0.05)[0])) for k, (one, _) in enumerate(calm)
+    ]
     told = told_apart(rough, GROUPS["longitudinal"], importances=True)
-    assert told.area > 0.95 and told.giveaways(1).startswith(("jerk", "acceleration", "speed: high"))
+    assert told.area > 0.95 and told.giveaways(1).startswith(
+        ("jerk", "acceleration", "speed: high")
+    )
     assert told_apart(alike, GROUPS["longitudinal"]).area < 0.75
     assert told_apart(rough[:4], GROUPS["lateral"]) is None  # fewer than folds

@@ -30,7 +30,11 @@ def case():
 
 
 def test_the_paper_grid_is_used_and_the_given_ends_are_met(case):
-    assert case.road.name == "t_intersection" and case.road.drivable.shape == (1000, 1000) and case.road.resolution == 1.0
+    assert (
+        case.road.name == "t_intersection"
+        and case.road.drivable.shape == (1000, 1000)
+        and case.road.resolution == 1.0
+    )
     for arm in case.arms.values():
         asked = np.stack([arm.fit.requested.start[:, :2], arm.fit.requested.end[:, :2]])
         found = np.stack([arm.position[:, :, 0], arm.position[:, :, -1]])
@@ -66,19 +70,33 @@ def test_priors_are_compared_on_a_path_that_bends(case):
 
 
 def test_the_page_has_four_figures_with_claims_and_asks_for_nothing(case, tmp_path):
-    write_page(tmp_path / "one", [case], quality=["7 rows <b>dropped</b>"], provenance={"seed": "7"})
-    write_page(tmp_path / "two", [case], quality=["7 rows <b>dropped</b>"], provenance={"seed": "7"})
+    write_page(
+        tmp_path / "one", [case], quality=["7 rows <b>dropped</b>"], provenance={"seed": "7"}
+    )
+    write_page(
+        tmp_path / "two", [case], quality=["7 rows <b>dropped</b>"], provenance={"seed": "7"}
+    )
     page = (tmp_path / "one" / "paper.html").read_text()
     assert page == (tmp_path / "two" / "paper.html").read_text()
     assert [int(n) for n in re.findall(r"<h3>Figure (\d)</h3>", page)] == [2, 3, 4, 5]
     assert page.count("<b>The paper:</b>") == 4 and "rows <b>dropped" not in page
-    own = "".join(part for part in re.split(r"(<script>.*?</script>)", page, flags=re.S) if len(part) < 1_000_000)
+    own = "".join(
+        part
+        for part in re.split(r"(<script>.*?</script>)", page, flags=re.S)
+        if len(part) < 1_000_000
+    )
     assert "default-src 'none'" in own and "http" not in own.replace("http-equiv", "")
     document = json.loads((tmp_path / "one" / "paper.json").read_text())
     figures = {figure["figure"]: figure for figure in document["cases"][0]["figures"]}
-    assert figures[5]["values"]["e_speed with changepoints"] == pytest.approx(case.similarity[WITH]["e_speed"].value)
+    assert figures[5]["values"]["e_speed with changepoints"] == pytest.approx(
+        case.similarity[WITH]["e_speed"].value
+    )
     assert figures[4]["holds"] is True
-    swapped = replace(case, similarity={WITH: case.similarity[WITHOUT], WITHOUT: case.similarity[WITH]}, off_road={WITH: 0.1})
+    swapped = replace(
+        case,
+        similarity={WITH: case.similarity[WITHOUT], WITHOUT: case.similarity[WITH]},
+        off_road={WITH: 0.1},
+    )
     claims = {claim.number: claim.holds for claim in claims_of(swapped)}
     assert claims[4] is False and claims[5] is False, "claims that fail are said to"
 
@@ -86,8 +104,14 @@ def test_the_page_has_four_figures_with_claims_and_asks_for_nothing(case, tmp_pa
 def test_what_fits_no_road_of_the_paper_says_so_on_the_page(tmp_path):
     """Two cars that cross straight on: neither a lane nor a T has a way for both."""
     case = run_case(crossing(), count=5, seed=7)
-    assert case.road is None and "straight:" in case.refused[""] and "t_intersection:" in case.refused[""]
-    assert [claim.number for claim in claims_of(case)] == [3], "the primitives can be shown all the same"
+    assert (
+        case.road is None
+        and "straight:" in case.refused[""]
+        and "t_intersection:" in case.refused[""]
+    )
+    assert [claim.number for claim in claims_of(case)] == [3], (
+        "the primitives can be shown all the same"
+    )
     write_page(tmp_path / "out", [case], quality=[], provenance={})
     assert "cannot be placed" in refusals(case)[0]
     assert "cannot be placed" in (tmp_path / "out" / "paper.html").read_text()

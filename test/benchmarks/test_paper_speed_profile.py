@@ -27,7 +27,11 @@ def driven(speed, clock=CLOCK):
 
 
 @settings(max_examples=20)
-@given(st.lists(st.floats(0.85, 1.15), min_size=4, max_size=4), st.floats(0.0, 9.0), st.floats(8.0, 11.0))
+@given(
+    st.lists(st.floats(0.85, 1.15), min_size=4, max_size=4),
+    st.floats(0.0, 9.0),
+    st.floats(8.0, 11.0),
+)
 def test_lengths_ends_and_limits_hold(factors, depth, first):
     template, limits = dip(depth), Dynamics().planned
     knots = speed_knots(CLOCK, NO_DWELL, [], TIME, template, (first, 10.0))
@@ -48,7 +52,9 @@ def test_constant_acceleration_within_primitives_is_given_back():
     """Where the template keeps to its primitives, so does the profile: no interior knot bends."""
     template = np.interp(TIME, CLOCK, [8.0, 11.0, 4.0, 4.0, 9.0])
     knots = speed_knots(CLOCK, NO_DWELL, [], TIME, template, (8.0, 9.0))
-    speed, ok = SpeedProfileQP(knots, Dynamics().planned).solve(knots.knot[None], driven(template)[None])
+    speed, ok = SpeedProfileQP(knots, Dynamics().planned).solve(
+        knots.knot[None], driven(template)[None]
+    )
     assert ok[0]
     assert speed[0] == pytest.approx(np.interp(knots.knot, TIME, template), abs=1e-5)
 
@@ -74,7 +80,9 @@ def test_chained_law_would_ring_and_this_does_not():
 
 def test_wait_inside_a_primitive_stands_exactly():
     template = np.interp(TIME, [0.0, 5.0, 7.4, 15.3, 18.0, 20.0], [6.0, 6.0, 0.0, 0.0, 6.0, 6.0])
-    knots = speed_knots(CLOCK, np.array([False, False, True, False]), [(7.4, 15.3)], TIME, template, (6.0, 6.0))
+    knots = speed_knots(
+        CLOCK, np.array([False, False, True, False]), [(7.4, 15.3)], TIME, template, (6.0, 6.0)
+    )
     lengths = np.array([[35.0, 3.0, 20.5]])
     speed, ok = SpeedProfileQP(knots, Dynamics().planned).solve(knots.knot[None], lengths)
     assert ok[0]
@@ -107,5 +115,7 @@ def test_knot_is_where_the_template_bends():
 def test_knot_can_be_put_elsewhere_and_keeps_its_distance():
     one = speed_knots(CLOCK, NO_DWELL, [], TIME, dip(), (10.0, 10.0), 0.25)
     assert one.knot == pytest.approx([0.0, 1.5, 6.0, 6.75, 9.0, 10.25, 14.0, 15.5, 20.0])
-    short = speed_knots(np.array([0.0, 1.0, 20.0]), NO_DWELL[:2], [], TIME, dip(), (10.0, 10.0), 0.1)
+    short = speed_knots(
+        np.array([0.0, 1.0, 20.0]), NO_DWELL[:2], [], TIME, dip(), (10.0, 10.0), 0.1
+    )
     assert short.knot[1] == pytest.approx(0.25)

@@ -52,7 +52,10 @@ def results(code_of, once):
 
     def write(folder):
         for seed in (1, 7):
-            assert code_of("generate", LOG, *QUICK, "--seed", seed, "--out", folder / f"seed_{seed}") == 0
+            assert (
+                code_of("generate", LOG, *QUICK, "--seed", seed, "--out", folder / f"seed_{seed}")
+                == 0
+            )
         return folder
 
     return once("cli_results", write)

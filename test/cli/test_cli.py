@@ -23,8 +23,16 @@ def test_generate_leaves_bag_report_and_figures_and_is_reproducible(ran, made, t
         and "2 of 2 scenarios" in err
     )
     assert answer["cases"][0]["scenarios"] == 2 and answer["cases"][0]["vehicles"]
-    one, two = ([(m.topic, m.data) for m in read_messages(folder / "bag")] for folder in (made, tmp_path / "out"))
-    assert one == two and {topic for topic, _ in one} >= {"/map", "/tracks", "/changepoints", "/scenarios"}
+    one, two = (
+        [(m.topic, m.data) for m in read_messages(folder / "bag")]
+        for folder in (made, tmp_path / "out")
+    )
+    assert one == two and {topic for topic, _ in one} >= {
+        "/map",
+        "/tracks",
+        "/changepoints",
+        "/scenarios",
+    }
     figures = json.loads((tmp_path / "out" / "evaluation.json").read_text())
     assert figures["provenance"]["seed"] == "7"
     assert (tmp_path / "out" / "report.html").read_text().startswith("<!doctype html>")
@@ -32,6 +40,8 @@ def test_generate_leaves_bag_report_and_figures_and_is_reproducible(ran, made, t
 
 
 def test_an_unknown_topic_type_is_named(run, tmp_path, data):
-    code, printed = run("generate", data / "bags" / "mcap" / "talker", "--road", "straight", "--out", "out")
+    code, printed = run(
+        "generate", data / "bags" / "mcap" / "talker", "--road", "straight", "--out", "out"
+    )
     assert code == 2
     assert "talker" in printed and "std_msgs/msg/String" in printed

@@ -18,11 +18,22 @@ import pytest
 from scenario_gen.base.folders.scratch import PREFIX
 from scenario_gen.logs.synthetic import bundled
 
-GENERATE = ("generate", bundled("c"), "--road", "straight", "--count", 2, "--set", "evaluation.resamples=20")
+GENERATE = (
+    "generate",
+    bundled("c"),
+    "--road",
+    "straight",
+    "--count",
+    2,
+    "--set",
+    "evaluation.resamples=20",
+)
 
 
 def files(folder):
-    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()
+    }
 
 
 def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
@@ -35,7 +46,11 @@ def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
     (tmp_path / "page").mkdir()
     (tmp_path / "page" / "report.html").write_text("a report of mine")
     code, said = run(*GENERATE, "--out", "page")
-    assert code == 2 and "report.html" in said and (tmp_path / "page" / "report.html").read_text() == "a report of mine"
+    assert (
+        code == 2
+        and "report.html" in said
+        and (tmp_path / "page" / "report.html").read_text() == "a report of mine"
+    )
 
 
 def test_inputs_stay(run, made, tmp_path):
@@ -45,7 +60,16 @@ def test_inputs_stay(run, made, tmp_path):
     before = files(tmp_path)
     for words in (
         ("generate", "o2/log", "--road", "straight", "--out", "o2"),
-        ("generate", bundled("c"), "--road", "o2/map.yaml", "--params", "o2/p.yaml", "--out", "o2"),
+        (
+            "generate",
+            bundled("c"),
+            "--road",
+            "o2/map.yaml",
+            "--params",
+            "o2/p.yaml",
+            "--out",
+            "o2",
+        ),
         ("regenerate", bag, 0, "--out", bag),
         ("regenerate", bag, 0, "--out", "o2"),
         ("evaluate", bag, "--out", "o2"),
@@ -73,15 +97,26 @@ NAME = "[red]a\x1b[31m*b*\u202e[/]"
 def test_names_are_shown_letter_by_letter(run, tmp_path):
     rows = ["t_s,vehicle_id,x_m,y_m,speed_mps"]
     rows += [
-        f"{k / 10},{who},{start + 0.8 * k},0,8" for who, start in (("[bold]lead[/]", 20), ("ta\x1bil", 0)) for k in range(120)
+        f"{k / 10},{who},{start + 0.8 * k},0,8"
+        for who, start in (("[bold]lead[/]", 20), ("ta\x1bil", 0))
+        for k in range(120)
     ]
     log = tmp_path / f"{NAME.replace('[/]', '')}.csv"
     log.write_text("\n".join(rows) + "\n")
     literal = r"[red]a\x1b[31m*b*\u202e"
     out = f"[out]{NAME.replace('/', '')}"
     code, said = run("generate", log, "--road", "straight", "--count", 2, "--out", out)
-    assert code == 0 and f"{literal} on straight" in said and rf"report: [out]{literal}[]/report.html" in said, said
-    more = (("compare", out, out), ("validate", f"{out}/bag"), ("evaluate", log), ("generate", NAME, "--road", "straight"))
+    assert (
+        code == 0
+        and f"{literal} on straight" in said
+        and rf"report: [out]{literal}[]/report.html" in said
+    ), said
+    more = (
+        ("compare", out, out),
+        ("validate", f"{out}/bag"),
+        ("evaluate", log),
+        ("generate", NAME, "--road", "straight"),
+    )
     told = [run(*words)[1] for words in more]
     assert f"{literal} on straight" in told[0]
     assert all("\x1b" not in text and "\u202e" not in text for text in (said, *told))
@@ -91,7 +126,10 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
     ("error", "words"),
     [
         (OSError(errno.EIO, os.strerror(errno.EIO), "some/file"), "some/file: Input/output error"),
-        (PermissionError(errno.EACCES, os.strerror(errno.EACCES), "secret"), "secret: Permission denied"),
+        (
+            PermissionError(errno.EACCES, os.strerror(errno.EACCES), "secret"),
+            "secret: Permission denied",
+        ),
         (MemoryError(), "not enough memory"),
         (OSError("no number, no name"), "no number, no name"),
     ],
@@ -109,17 +147,23 @@ def test_whatever_the_system_says_is_one_message(run, monkeypatch, error, words)
 def started(tmp_path, *words, **options):
     command = [sys.executable, "-m", "scenario_gen", *map(str, words)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    hears_ctrl_c = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # which a shell may have it ignore
+    hears_ctrl_c = partial(
+        signal.signal, signal.SIGINT, signal.SIG_DFL
+    )  # which a shell may have it ignore
     return subprocess.Popen(command, cwd=tmp_path, preexec_fn=hears_ctrl_c, **pipes, **options)  # noqa: PLW1509 - one thread
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
+)
 def test_a_signal_ends_it_with_its_code_and_leaves_nothing(made, tmp_path, number):
     shutil.copytree(made, tmp_path / "out")
     before = files(tmp_path)
     process = started(tmp_path, *GENERATE[:5], 10_000, "--out", "out")
     end = time.monotonic() + 300.0
-    while process.poll() is None and not any(tmp_path.glob(f"{PREFIX}*")) and time.monotonic() < end:
+    while (
+        process.poll() is None and not any(tmp_path.glob(f"{PREFIX}*")) and time.monotonic() < end
+    ):
         time.sleep(0.01)
     process.send_signal(number)
     _, said = process.communicate()
@@ -129,7 +173,9 @@ def test_a_signal_ends_it_with_its_code_and_leaves_nothing(made, tmp_path, numbe
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="no /proc to see what a process has loaded")
+@pytest.mark.skipif(
+    not Path("/proc/self/maps").exists(), reason="no /proc to see what a process has loaded"
+)
 def test_a_signal_while_the_libraries_load(tmp_path):
     process = started(tmp_path, "parameters")
     while process.poll() is None and "numpy" not in Path(f"/proc/{process.pid}/maps").read_text():
@@ -142,8 +188,14 @@ def test_a_signal_while_the_libraries_load(tmp_path):
 def test_a_full_standard_output_is_an_error_and_a_closed_one_is_quiet(tmp_path):
     with Path("/dev/full").open("w") as full:
         command = [sys.executable, "-m", "scenario_gen", "parameters"]
-        ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert ended.returncode == 2 and "No space left on device" in ended.stderr and "Traceback" not in ended.stderr
+        ended = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert (
+        ended.returncode == 2
+        and "No space left on device" in ended.stderr
+        and "Traceback" not in ended.stderr
+    )
     process = started(tmp_path, "parameters")
     process.stdout.close()  # it writes later: it has libraries to load
     assert "Traceback" not in process.stderr.read()

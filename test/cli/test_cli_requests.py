@@ -22,7 +22,9 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
     assert code == 0, said
     messages = list(read_messages(tmp_path / "one" / "bag"))
     assert {"/ego/start", "/ego/goal", "/ego/witness"} <= {message.topic for message in messages}
-    scenarios = [decode_scenario(message.data)[1] for message in messages if message.topic == "/scenarios"]
+    scenarios = [
+        decode_scenario(message.data)[1] for message in messages if message.topic == "/scenarios"
+    ]
     assert len(scenarios) == 2
     for scenario in scenarios:
         assert [vehicle.id for vehicle in scenario.vehicles] == ["2"]
@@ -34,11 +36,28 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
     assert run("evaluate", "one/bag", "--out", "page")[0] == 0
     assert "Vehicle 1 is left out" in (tmp_path / "page" / "report.html").read_text()
     code, said = run(
-        "drive", "one/bag", "--planner", "scenario_gen.closed_loop.planners:IdmFollower", "--workers", 1, "--out", "driven"
+        "drive",
+        "one/bag",
+        "--planner",
+        "scenario_gen.closed_loop.planners:IdmFollower",
+        "--workers",
+        1,
+        "--out",
+        "driven",
     )
     driven = json.loads((tmp_path / "driven" / "drives.json").read_text())
     assert len(driven["drives"]) == 2, said
-    assert run("drive", "one/bag", "--planner", "scenario_gen.closed_loop.planners:IdmFollower", "--ego", 2)[0] == 2
+    assert (
+        run(
+            "drive",
+            "one/bag",
+            "--planner",
+            "scenario_gen.closed_loop.planners:IdmFollower",
+            "--ego",
+            2,
+        )[0]
+        == 2
+    )
     assert run("export", "one/bag", "--to", "commonroad", "--out", "exported")[0] == 0
     code, said = run("regenerate", "one/bag", 0, "--out", "again")
     assert code == 0 and "the same" in said

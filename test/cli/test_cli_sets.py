@@ -14,13 +14,23 @@ from scenario_gen.base.folders import MARKER
 
 def test_two_seeds_are_compared_metric_by_metric(results, run):
     code, said = run("compare", results / "seed_1", results / "seed_7")
-    assert code == 0 and "seed_1" in said and "seed_7" in said and "synthetic_c on straight" in said
+    assert (
+        code == 0 and "seed_1" in said and "seed_7" in said and "synthetic_c on straight" in said
+    )
     row = next(line for line in said.splitlines() if "E, position" in line or "E position" in line)
-    figures = [json.loads((results / f"seed_{k}" / "evaluation.json").read_text())["cases"][0] for k in (1, 7)]
-    values = [next(r for r in case["rows"] if r["name"] == "with changepoints")["values"]["e_position"] for case in figures]
+    figures = [
+        json.loads((results / f"seed_{k}" / "evaluation.json").read_text())["cases"][0]
+        for k in (1, 7)
+    ]
+    values = [
+        next(r for r in case["rows"] if r["name"] == "with changepoints")["values"]["e_position"]
+        for case in figures
+    ]
     assert values[0]["value"] != values[1]["value"], "another seed, other scenarios"
     assert all(f"{value['value']:.3g}" in row for value in values)
-    assert not any(row["name"] == "uniform changepoints" for case in figures for row in case["rows"]), "only with --compare"
+    assert not any(
+        row["name"] == "uniform changepoints" for case in figures for row in case["rows"]
+    ), "only with --compare"
 
 
 def test_sets_without_a_case_in_common_are_refused(results, run, tmp_path):
@@ -34,7 +44,12 @@ def test_sets_without_a_case_in_common_are_refused(results, run, tmp_path):
 def test_a_bag_is_evaluated_to_a_page_figures_and_a_table(results, run, tmp_path):
     out = tmp_path / "again"
     assert run("evaluate", results / "seed_1" / "bag", "--out", out)[0] == 0
-    assert sorted(path.name for path in out.iterdir()) == [MARKER, "evaluation.json", "evaluation.md", "report.html"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        MARKER,
+        "evaluation.json",
+        "evaluation.md",
+        "report.html",
+    ]
     page = (out / "report.html").read_text()
     assert page.startswith("<!doctype html>") and "<b>2</b> of 2 requested scenarios" in page
     made = json.loads((results / "seed_1" / "evaluation.json").read_text())["cases"][0]
@@ -51,7 +66,10 @@ def test_coverage_measures_recordings_and_their_sets_and_draws_a_page(run, tmp_p
         (encounter,) = read_log(bundled(case)).encounters
         bags.append(generate(encounter, road, count=2, seed=3).save(tmp_path / case))
     code, said = run("coverage", *bags, "--templates", 1)
-    assert code == 0 and "2 encounters whose vehicles share an area (1 following, 1 turn), 4 scenarios" in said
+    assert (
+        code == 0
+        and "2 encounters whose vehicles share an area (1 following, 1 turn), 4 scenarios" in said
+    )
     assert "with generated" in said and "never reached" in said
     page = (tmp_path / "coverage.html").read_text()
     assert page.count("not reached: ") == 2 and page.count("like nothing recorded: scenario ") == 4
@@ -69,15 +87,48 @@ def test_recordings_are_recombined_and_what_is_generated_from_them_counts_for_bo
         logs[-1].parent.mkdir()
         labelled(kind, seed).encounter.to_dataframe().to_csv(logs[-1], index=False)
     more = [option for log in logs[1:] for option in ("--recording", log)]
-    code, said = run("generate", logs[0], *more, "--road", "corridor", "--count", 2, "--recombine", 9, "--out", tmp_path / "out")
+    code, said = run(
+        "generate",
+        logs[0],
+        *more,
+        "--road",
+        "corridor",
+        "--count",
+        2,
+        "--recombine",
+        9,
+        "--out",
+        tmp_path / "out",
+    )
     assert code == 0 and "recombined encounters: 2 of 9" in said
     flat = " ".join(said.split())
     assert "log + log (2) on corridor" in flat and "log (2) + log on corridor" in flat
     made = [load(tmp_path / "out" / "bag", name) for name in ("/case_4", "/case_5")]
     assert all("was not recorded" in " ".join(case.generated.adaptations) for case in made)
     provenance = json.loads((tmp_path / "out" / "evaluation.json").read_text())["provenance"]
-    assert provenance["recombine"] == "9" and sum(key.startswith("log ") for key in provenance) == 3
+    assert (
+        provenance["recombine"] == "9" and sum(key.startswith("log ") for key in provenance) == 3
+    )
     code, said = run("coverage", tmp_path / "out" / "bag", "--templates", 1)
-    assert code == 0 and "3 encounters whose vehicles share an area (2 crossing, 1 following), 10 scenarios" in said
-    code, said = run("generate", logs[2], "--road", "corridor", "--count", 2, "--recombine", 9, "--out", tmp_path / "one")
-    assert code == 0 and "recombined encounters: 0 of 9 (no more pairs are of one kind; --recording adds some)" in said
+    assert (
+        code == 0
+        and "3 encounters whose vehicles share an area (2 crossing, 1 following), 10 scenarios"
+        in said
+    )
+    code, said = run(
+        "generate",
+        logs[2],
+        "--road",
+        "corridor",
+        "--count",
+        2,
+        "--recombine",
+        9,
+        "--out",
+        tmp_path / "one",
+    )
+    assert (
+        code == 0
+        and "recombined encounters: 0 of 9 (no more pairs are of one kind; --recording adds some)"
+        in said
+    )

@@ -12,7 +12,9 @@ import numpy as np
 from PIL import Image
 import pytest
 
-ROWS = "".join(f"{k / 10},a,{-60 + 0.8 * k:.2f},0,8\n{k / 10},b,0,{-70 + 0.8 * k:.2f},8\n" for k in range(150))
+ROWS = "".join(
+    f"{k / 10},a,{-60 + 0.8 * k:.2f},0,8\n{k / 10},b,0,{-70 + 0.8 * k:.2f},8\n" for k in range(150)
+)
 LOG = f"t,id,x,y,speed\n{ROWS}"
 ROAD = ("--road", "four_way", "--count", "2")
 GENERATE = ("generate", "my log ü.csv", *ROAD)
@@ -32,7 +34,9 @@ def folder(code_of, tmp_path_factory):
     (place / "bad.yaml").write_text("a: [")
     (place / "bad.json").write_text("{")
     (place / "cut.mcap").write_bytes(b"\x89MCAP0\r\n" + b"\xff" * 100)
-    (place / "disorder.csv").write_text("\n".join([(lines := LOG.split("\n"))[0], *lines[20:], *lines[1:20]]))
+    (place / "disorder.csv").write_text(
+        "\n".join([(lines := LOG.split("\n"))[0], *lines[20:], *lines[1:20]])
+    )
     cells = np.full((900, 900), 254, dtype=np.uint8)
     cells[:, ::100] = 0  # strips of road with walls between, none of them long enough
     Image.fromarray(cells).save(place / "walled.pgm")
@@ -46,7 +50,10 @@ def folder(code_of, tmp_path_factory):
 
 
 def files(folder):
-    return {path.relative_to(folder): path.read_bytes() if path.is_file() else b"" for path in folder.rglob("*")}
+    return {
+        path.relative_to(folder): path.read_bytes() if path.is_file() else b""
+        for path in folder.rglob("*")
+    }
 
 
 MISTAKES = [  # words of the command line, and what the message says: what is wrong, and what to do
@@ -60,16 +67,25 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ((*GENERATE, "--set", "sampling.laterl_sigma=1"), "did you mean sampling.lateral_sigma?"),
     ((*DRIVE, "--ego", "zz"), "no vehicle 'zz' to be the ego; it has a, b"),
     (("drive", "made/bag", "--planner", "idm"), "write it as MODULE:CLASS"),
-    (("drive", "made/bag", "--planner", PLANNER.replace("Follower", "Folower")), "did you mean IdmFollower?"),
+    (
+        ("drive", "made/bag", "--planner", PLANNER.replace("Follower", "Folower")),
+        "did you mean IdmFollower?",
+    ),
     (("regenerate", "made/bag", "99"), "no scenario 99; there are: "),
     # what is missing
     (("generate",), "Missing argument 'log' (The recording: "),
     (("generate", "my log ü.csv"), "Missing option '--road' (straight, curve, "),
-    ((*GENERATE, "--for-testing"), "--for-testing: name the vehicle in whose place the planner drives by --ego"),
+    (
+        (*GENERATE, "--for-testing"),
+        "--for-testing: name the vehicle in whose place the planner drives by --ego",
+    ),
     (("find", "nothing"), "holds no scenarios; write them with `scenario-gen batch"),
     # numbers
     ((*GENERATE, "--count", "0"), "'--count': it must be at least 1"),
-    ((*GENERATE, "--set", "sampling.lateral_sigma=nan"), "sampling.lateral_sigma is nan; give a finite number"),
+    (
+        (*GENERATE, "--set", "sampling.lateral_sigma=nan"),
+        "sampling.lateral_sigma is nan; give a finite number",
+    ),
     ((*GENERATE, "--set", "sampling.lateral_sigma=much"), "must be a number, not 'much'"),
     ((*GENERATE, "--set", "road=1"), "road"),
     ((*GENERATE, "--params", "none.yaml"), "none.yaml"),
@@ -90,13 +106,22 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("generate", "disorder.csv", *ROAD, "--set", "log.strict=true"), "disorder.csv, line "),
     (("generate", "columns.csv", *ROAD), "--set log.columns=time=…; is it tyme?"),
     ((*GENERATE, "--params", "bad.yaml"), "bad.yaml: not YAML (line 2"),
-    ((*DRIVE, "--against", "bad.json"), "bad.json (give a drives.json of `scenario-gen drive`): not JSON"),
+    (
+        (*DRIVE, "--against", "bad.json"),
+        "bad.json (give a drives.json of `scenario-gen drive`): not JSON",
+    ),
     (("validate", "none"), "none does not exist; name a folder"),
     (("validate", "my log ü.csv"), "is not a bag; name a folder"),
     (("compare", "made", "nothing"), "nothing/evaluation.json is no evaluation"),
     *(
         ((name, "cut.mcap", *more), "cut.mcap")
-        for name, *more in (("validate",), ("evaluate",), ("regenerate", "0"), ("reindex",), ("generate", *ROAD))
+        for name, *more in (
+            ("validate",),
+            ("evaluate",),
+            ("regenerate", "0"),
+            ("reindex",),
+            ("generate", *ROAD),
+        )
     ),
     (("reindex", "nothing"), "no .mcap file here; name the folder of a recorded bag"),
     # folders that are written
@@ -105,7 +130,9 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
 ]
 
 
-@pytest.mark.parametrize(("words", "said"), MISTAKES, ids=[" ".join(words) for words, _ in MISTAKES])
+@pytest.mark.parametrize(
+    ("words", "said"), MISTAKES, ids=[" ".join(words) for words, _ in MISTAKES]
+)
 def test_a_mistake_is_one_line_and_loses_nothing(folder, run, monkeypatch, words, said):
     monkeypatch.chdir(folder)
     before = files(folder)
@@ -125,10 +152,18 @@ def test_a_road_with_no_way_through_is_refused(folder, run, monkeypatch):
 
 def test_a_disk_that_is_full_is_one_line_and_loses_nothing(folder):
     """A file may not become longer than 20 kB, as if the disk were full there."""
-    before, words = files(folder), [sys.executable, "-m", "scenario_gen", *GENERATE, "--seed", "1", "--out", "made"]
+    before, words = (
+        files(folder),
+        [sys.executable, "-m", "scenario_gen", *GENERATE, "--seed", "1", "--out", "made"],
+    )
     limited = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (20_000, 20_000))
-    ended = subprocess.run(words, cwd=folder, text=True, stderr=subprocess.PIPE, preexec_fn=limited, check=False)
+    ended = subprocess.run(
+        words, cwd=folder, text=True, stderr=subprocess.PIPE, preexec_fn=limited, check=False
+    )
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
-    assert line.startswith("error: made") and "File too large; what was there is untouched; make room" in line
+    assert (
+        line.startswith("error: made")
+        and "File too large; what was there is untouched; make room" in line
+    )
     assert files(folder) == before

@@ -47,16 +47,28 @@ def test_json_is_one_object_and_messages_go_to_standard_error(ran, made, words, 
     words = [word.format(bag=made / "bag", made=made) for word in words]
     code, out, err = ran(*words, "--json")
     answer = one_object(out)
-    assert (code, answer["exit_code"], answer["command"], answer[key]) == (0, 0, words[0], value) and err
+    assert (code, answer["exit_code"], answer["command"], answer[key]) == (
+        0,
+        0,
+        words[0],
+        value,
+    ) and err
     if words == ["parameters"]:
         assert one_object(ran("--json", *words)[1]) == answer
 
 
-@pytest.mark.parametrize(("words", "said"), [(("validate", "none"), "none does not exist"), (("validate",), "Missing argument")])
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(("validate", "none"), "none does not exist"), (("validate",), "Missing argument")],
+)
 def test_json_of_an_error_has_it(ran, words, said):
     code, out, err = ran(*words, "--json")
     answer = one_object(out)
-    assert code == 2 == answer["exit_code"] and said in answer["error"] and err.startswith(f"error: {said}")
+    assert (
+        code == 2 == answer["exit_code"]
+        and said in answer["error"]
+        and err.startswith(f"error: {said}")
+    )
 
 
 def test_quiet_prints_errors_only(ran, made):
@@ -73,8 +85,18 @@ class Body:
 
 
 def test_plain_values_are_json():
-    value = {"path": Path("a"), "body": Body("x", float("nan")), 1: (1, True, None, float("inf")), "odd": "\x1b"}
-    expected = {"path": "a", "body": {"name": "x", "size": None}, "1": [1, True, None, None], "odd": "\\x1b"}
+    value = {
+        "path": Path("a"),
+        "body": Body("x", float("nan")),
+        1: (1, True, None, float("inf")),
+        "odd": "\x1b",
+    }
+    expected = {
+        "path": "a",
+        "body": {"name": "x", "size": None},
+        "1": [1, True, None, None],
+        "odd": "\\x1b",
+    }
     assert output.plain(value) == expected
 
 
@@ -88,7 +110,12 @@ class Narrow(Terminal):
 
 
 COLUMNS = ("template", "kind", "road", *(f"figure_{k}" for k in range(8)))
-ROW = ("20120401-0815-encounter-000017", "crossing", "t_intersection", *("123.45" for _ in range(8)))
+ROW = (
+    "20120401-0815-encounter-000017",
+    "crossing",
+    "t_intersection",
+    *("123.45" for _ in range(8)),
+)
 
 
 def test_a_table_for_a_program_has_tabs(capsys):
@@ -97,7 +124,14 @@ def test_a_table_for_a_program_has_tabs(capsys):
 
 
 def test_figures_are_short():
-    assert [shown(value) for value in (123.4, 12.34, 0.1, 99.96, -9.996, None)] == ["123", "12.3", "0.10", "100", "-10.0", ""]
+    assert [shown(value) for value in (123.4, 12.34, 0.1, 99.96, -9.996, None)] == [
+        "123",
+        "12.3",
+        "0.10",
+        "100",
+        "-10.0",
+        "",
+    ]
 
 
 @pytest.mark.parametrize("columns", [3, 11])
@@ -110,7 +144,9 @@ def test_a_table_in_80_columns_cuts_nothing_off(monkeypatch, columns):
     assert all(word in text for word in (*ROW[:columns], *COLUMNS[3:columns]))
 
 
-def test_the_page_of_generate_is_that_of_its_bag_and_another_one_is_written_beside_it(ran, made, tmp_path):
+def test_the_page_of_generate_is_that_of_its_bag_and_another_one_is_written_beside_it(
+    ran, made, tmp_path
+):
     for bag in (made, made / "bag"):
         _, out, _ = ran("report", bag, "--no-open")
         assert out.strip() == f"report: {made / 'report.html'}"
@@ -134,6 +170,10 @@ def test_a_page_is_opened_where_somebody_looks(monkeypatch, tmp_path):
 def test_no_word_of_a_help_is_cut_at_80_columns(name, monkeypatch):
     monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 80)
     shown = CliRunner().invoke(app, [name, "--help"]).output
-    options = (one for one in typer.main.get_command(app).commands[name].params if not getattr(one, "hidden", False))
+    options = (
+        one
+        for one in typer.main.get_command(app).commands[name].params
+        if not getattr(one, "hidden", False)
+    )
     helps = " ".join(option.help or "" for option in options).replace("\\[", "[")
     assert "Usage" in shown and not [word for word in helps.split() if word not in shown]

@@ -41,37 +41,68 @@ def objects(url):
     return {below(one, place(url)): read(one) for one in place(url).rglob("*")}
 
 
-def test_what_is_written_to_a_store_is_what_is_written_to_a_folder_and_is_read_there(bucket, run, tmp_path):
+def test_what_is_written_to_a_store_is_what_is_written_to_a_folder_and_is_read_there(
+    bucket, run, tmp_path
+):
     assert run("generate", bundled("c"), *GENERATE, "--out", "made")[0] == 0
-    code, text = run("generate", f"{bucket}/logs/synthetic_c", *GENERATE, "--out", f"{bucket}/made")
+    code, text = run(
+        "generate", f"{bucket}/logs/synthetic_c", *GENERATE, "--out", f"{bucket}/made"
+    )
     assert code == 0 and f"report: {bucket}/made/report.html" in text and "copies" not in text
-    files = {path.relative_to(tmp_path / "made").as_posix(): path for path in (tmp_path / "made").rglob("*") if path.is_file()}
-    stored, differ = objects(f"{bucket}/made"), {"report.html", ".scenario_gen.json"}  # which say from where the log is
-    assert {name: stored[name] for name in stored.keys() - differ} == {n: files[n].read_bytes() for n in files.keys() - differ}
+    files = {
+        path.relative_to(tmp_path / "made").as_posix(): path
+        for path in (tmp_path / "made").rglob("*")
+        if path.is_file()
+    }
+    stored, differ = (
+        objects(f"{bucket}/made"),
+        {"report.html", ".scenario_gen.json"},
+    )  # which say from where the log is
+    assert {name: stored[name] for name in stored.keys() - differ} == {
+        n: files[n].read_bytes() for n in files.keys() - differ
+    }
     assert (
         stored["report.html"].decode().replace(f"{bucket}/logs/synthetic_c", str(bundled("c")))
         == files["report.html"].read_text()
     )
     assert "2 of 2 scenarios are valid" in run("validate", f"{bucket}/made/bag")[1]
     code, text = run("evaluate", f"{bucket}/made/bag", "--out", f"{bucket}/figures", "--json")
-    assert code == 0 and json.loads(text[text.index("{") :].splitlines()[0])["folder"] == f"{bucket}/figures", text
+    assert (
+        code == 0
+        and json.loads(text[text.index("{") :].splitlines()[0])["folder"] == f"{bucket}/figures"
+    ), text
     assert {"evaluation.json", "report.html"} < set(objects(f"{bucket}/figures"))
     code, text = run("report", f"{bucket}/made/bag")
-    assert code == 2 and f"--out is missing: name a folder or a place in a store, for nothing is written beside {bucket}" in text
-    assert run("report", f"{bucket}/made/bag", "--out", "page")[0] == 0 and (tmp_path / "page" / "report.html").exists()
+    assert (
+        code == 2
+        and f"--out is missing: name a folder or a place in a store, for nothing is written beside {bucket}"
+        in text
+    )
+    assert (
+        run("report", f"{bucket}/made/bag", "--out", "page")[0] == 0
+        and (tmp_path / "page" / "report.html").exists()
+    )
     assert run("report", f"{bucket}/made") == (0, f"report: {bucket}/made/report.html\n")
     assert not list((tmp_path / "copies").iterdir())
 
 
 def test_nothing_in_a_store_is_replaced_and_what_fails_writes_nothing(bucket, run, tmp_path):
     before = objects(bucket)
-    code, text = run("generate", f"{bucket}/logs/synthetic_c", *GENERATE, "--out", f"{bucket}/logs")
-    assert code == 2 and f"{bucket}/logs is there already, and nothing in a store is replaced" in text
+    code, text = run(
+        "generate", f"{bucket}/logs/synthetic_c", *GENERATE, "--out", f"{bucket}/logs"
+    )
+    assert (
+        code == 2 and f"{bucket}/logs is there already, and nothing in a store is replaced" in text
+    )
     code, text = run("generate", f"{bucket}/none.csv", *GENERATE, "--out", f"{bucket}/made")
     assert code == 2 and f"{bucket}/none.csv does not exist" in text
-    code, text = run("generate", f"{bucket}/logs/synthetic_c", "--road", "no_road", "--out", f"{bucket}/made")
+    code, text = run(
+        "generate", f"{bucket}/logs/synthetic_c", "--road", "no_road", "--out", f"{bucket}/made"
+    )
     assert code == 2 and "no_road" in text
-    code, text = run("generate", f"{bucket}/logs/synthetic_c", *GENERATE, "--out", "https://127.0.0.1/made")
+    code, text = run(
+        "generate", f"{bucket}/logs/synthetic_c", *GENERATE, "--out", "https://127.0.0.1/made"
+    )
     assert code == 2 and "https is only read" in text
     assert objects(bucket) == before and not list((tmp_path / "copies").iterdir())
 
@@ -89,7 +120,9 @@ AUTO = ("--road", "auto", *GENERATE[2:])
 
 def test_a_log_is_read_from_the_web_and_a_file_url_is_a_path(run, tmp_path):
     handler = type("Silent", (SimpleHTTPRequestHandler,), {"log_message": lambda *_: None})
-    with ThreadingHTTPServer(("127.0.0.1", 0), partial(handler, directory=str(LOG.parent))) as server:
+    with ThreadingHTTPServer(
+        ("127.0.0.1", 0), partial(handler, directory=str(LOG.parent))
+    ) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         url = f"http://127.0.0.1:{server.server_address[1]}/{LOG.name}"

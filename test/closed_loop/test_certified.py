@@ -36,7 +36,10 @@ class Slower:
 
 
 def generated(encounter, count):
-    road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
+    road, segmentation = (
+        build_road("corridor", encounter, CONFIG.road),
+        segment(encounter, CONFIG.segmentation, 1),
+    )
     return Chain(encounter, segmentation, road, CONFIG, count=count, seed=1).run().generated
 
 
@@ -63,7 +66,9 @@ def test_a_yielder_among_the_others_waits_for_one_that_the_ego_holds_up(led, sha
             assert conflict.second == 1
             lag = lag_behind(motion, conflict)
             if kept:
-                assert conflict.exit_first > conflict_of(driven, 1, 0).exit_first + 0.5, "the ego did hold it up"
+                assert conflict.exit_first > conflict_of(driven, 1, 0).exit_first + 0.5, (
+                    "the ego did hold it up"
+                )
                 assert own - 0.2 <= lag <= own + 0.5
             else:
                 early += lag < own - 0.4
@@ -73,7 +78,9 @@ def test_a_yielder_among_the_others_waits_for_one_that_the_ego_holds_up(led, sha
 def test_it_waits_for_nobody_when_all_drive_as_certified(led):
     for scenario in led:
         last = len(scenario.time) - 1
-        drive = ClosedLoop(scenario, "3").drive(Witness(scenario, 2), lambda state, last=last: state.step >= last)
+        drive = ClosedLoop(scenario, "3").drive(
+            Witness(scenario, 2), lambda state, last=last: state.step >= last
+        )
         assert np.abs(drive.motion.position - scenario.position).max() < 1e-6
 
 

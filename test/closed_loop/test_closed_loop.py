@@ -32,7 +32,9 @@ def prepared(seed, reactions=False, **config):
     ids = [vehicle.id for vehicle in scenario.vehicles]
     if reactions:
         found = [conflict_of(scenario, a, b) for b in range(len(ids)) for a in range(b)]
-        names = "; ".join(f"{ids[c.second]} yields to {ids[c.first]}" for c in found if c is not None)
+        names = "; ".join(
+            f"{ids[c.second]} yields to {ids[c.first]}" for c in found if c is not None
+        )
         scenario = replace(scenario, facts={"reactions": names})
     ego = seed % len(ids)
     return scenario, ego, ClosedLoop(scenario, ego, config=ClosedLoopConfig(**config))
@@ -40,7 +42,9 @@ def prepared(seed, reactions=False, **config):
 
 @settings(max_examples=EXAMPLES)
 @given(seed=st.integers(0, 10**9), reactions=st.booleans())
-@example(seed=1092, reactions=False)  # two with the earliest clock may leave neither each other behind nor the next one
+@example(
+    seed=1092, reactions=False
+)  # two with the earliest clock may leave neither each other behind nor the next one
 @example(seed=7114, reactions=False)
 def test_others_never_meet_and_come_to_their_ends_whatever_the_ego_does(seed, reactions):
     scenario, ego, loop = prepared(seed, reactions)
@@ -87,15 +91,23 @@ def test_the_others_wait_for_the_ego_where_the_template_did(yields, waits):
 def test_others_keep_their_order_behind_one_who_waits_for_the_ego():
     """Vehicle 0 crosses before vehicle 1 and is held up by the ego ahead of it: vehicle 1 waits for it, then both go on."""
     base, time = crossing(), np.arange(150) * PERIOD
-    lead = (np.stack([-20.0 + 8.0 * time, np.zeros_like(time)], axis=1), np.zeros_like(time), np.full_like(time, 8.0))
+    lead = (
+        np.stack([-20.0 + 8.0 * time, np.zeros_like(time)], axis=1),
+        np.zeros_like(time),
+        np.full_like(time, 8.0),
+    )
     motions = [(base.position[i], base.heading[i], base.speed[i]) for i in range(2)]
     scenario = as_scenario([*motions, lead], len(time))
     loop = ClosedLoop(scenario, 2)
     state = loop.start()
     for _ in range(150):
         state = loop.step(state, Command(-6.0, 0.0))
-    assert state.vehicles[2, 0] < -10.0 and state.vehicles[0, 0] < -10.0  # both stand before the crossing
-    assert state.vehicles[1, 1] < -3.0 and state.vehicles[1, 3] < 0.5  # so does the one whose turn comes later
+    assert (
+        state.vehicles[2, 0] < -10.0 and state.vehicles[0, 0] < -10.0
+    )  # both stand before the crossing
+    assert (
+        state.vehicles[1, 1] < -3.0 and state.vehicles[1, 3] < 0.5
+    )  # so does the one whose turn comes later
     for _ in range(250):
         state = loop.step(state, FAR)
     assert (state.clock[:2] >= scenario.time[-1]).all()
@@ -109,7 +121,10 @@ def test_the_body_keeps_to_its_limits_and_drives_arcs():
     centre = np.hypot(state.x, state.y - 10.0)
     assert centre == pytest.approx(10.0, abs=1e-9) and state.yaw == pytest.approx(5.0 * 20.0 * 0.1)
     fast = move(state, Command(100.0, 9.0), config, limits).state
-    assert fast.acceleration == pytest.approx(limits.max_acceleration) and fast.curvature == limits.max_curvature
+    assert (
+        fast.acceleration == pytest.approx(limits.max_acceleration)
+        and fast.curvature == limits.max_curvature
+    )
     state = EgoState(0.0, 0.0, 0.0, 0.45)
     stopped = move(state, Command(-9.0, 0.0), config, limits).state
     assert stopped.speed == 0.0 and stopped.x == pytest.approx(0.45**2 / 18.0)
@@ -136,7 +151,9 @@ def test_who_comes_late_and_leaves_early_is_there_for_that_time_only():
     scenario = replace(base, present=present)
     loop = ClosedLoop(scenario, 0)
     drive = loop.drive(Witness(scenario, 0), lambda state: state.step >= 149)
-    assert (drive.here == scenario.there).sum() >= drive.here.size - 1  # at the very end of its presence it has gone
+    assert (
+        drive.here == scenario.there
+    ).sum() >= drive.here.size - 1  # at the very end of its presence it has gone
     assert np.abs((drive.motion.position - scenario.position)[drive.here]).max() < 1e-9
     x, y = scenario.position[1, 30].tolist()
     state = loop.start()
@@ -147,7 +164,9 @@ def test_who_comes_late_and_leaves_early_is_there_for_that_time_only():
         state = loop.step(state, FAR)
     assert state.here[1]
     late = ClosedLoop(replace(base, present=np.array([[0, 149], [30, 149]])), 1)
-    assert late.start().vehicles[1].tolist() == pytest.approx([*base.position[1, 30].tolist(), np.pi / 2, 8.0])
+    assert late.start().vehicles[1].tolist() == pytest.approx(
+        [*base.position[1, 30].tolist(), np.pi / 2, 8.0]
+    )
     drive = late.drive(Late(base, 1, 3.0))
     verdict = judge(late, drive)
     assert verdict.passed and verdict.delay == pytest.approx(0.0, abs=1e-9)
@@ -168,7 +187,12 @@ def test_limits_of_its_type_bind_the_ego_and_their_former_names_are_refused():
     config = assigned(ClosedLoopConfig(), "limits.car.max_acceleration=1.2")
     loop = ClosedLoop(crossing(), 0, config=config)
     state = loop.step(loop.start(), Command(9.0, 0.0))
-    assert state.ego.acceleration == pytest.approx(1.2) and loop.task().limits.max_acceleration == 1.2
+    assert (
+        state.ego.acceleration == pytest.approx(1.2) and loop.task().limits.max_acceleration == 1.2
+    )
     for name in ("acceleration", "braking", "speed", "curvature"):
-        with pytest.raises(InputError, match=rf"ego_{name} is no longer there; set limits\.<type of the ego>\.max_"):
+        with pytest.raises(
+            InputError,
+            match=rf"ego_{name} is no longer there; set limits\.<type of the ego>\.max_",
+        ):
             assigned(ClosedLoopConfig(), f"ego_{name}=1")

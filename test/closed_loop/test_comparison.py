@@ -45,7 +45,11 @@ def driven(failed, encounters):
 
 
 def earlier(failed):
-    return Earlier("before", PARAMETERS, {str(k): (f"digest {k}", not bad) for k, bad in enumerate(failed.tolist())})
+    return Earlier(
+        "before",
+        PARAMETERS,
+        {str(k): (f"digest {k}", not bad) for k, bad in enumerate(failed.tolist())},
+    )
 
 
 def test_the_same_verdicts_give_exactly_nothing():
@@ -75,7 +79,12 @@ def test_a_worse_planner_is_found_and_named():
     before = np.arange(300) % 10 == 0
     now = before | (np.arange(300) % 10 == 1)
     found = compared(driven(now, 13), ClosedLoopConfig(), earlier(before))
-    assert found.worse and found.difference.value == pytest.approx(0.1) and len(found.now_fail) == 30 and not found.now_pass
+    assert (
+        found.worse
+        and found.difference.value == pytest.approx(0.1)
+        and len(found.now_fail) == 30
+        and not found.now_pass
+    )
     better = compared(driven(before, 13), ClosedLoopConfig(), earlier(now))
     assert not better.worse and better.difference.high < 0.0 and len(better.now_pass) == 30
 
@@ -84,7 +93,11 @@ def test_other_scenarios_or_parameters_are_refused():
     failed = np.zeros(4, dtype=np.bool_)
     known = earlier(failed)
     with pytest.raises(InputError, match=r"1 of 4 scenarios are not the same \(first: 2\)"):
-        compared(driven(failed, 1), ClosedLoopConfig(), replace(known, drives=known.drives | {"2": ("other", True)}))
+        compared(
+            driven(failed, 1),
+            ClosedLoopConfig(),
+            replace(known, drives=known.drives | {"2": ("other", True)}),
+        )
     with pytest.raises(InputError, match=r"1 of 4 scenarios are not the same \(first: 3\)"):
         compared(driven(failed[:3], 1), ClosedLoopConfig(), known)
     with pytest.raises(InputError, match=r"other parameters \(step\)"):
@@ -99,16 +112,47 @@ def bag(tmp_path_factory):
 
 def test_the_command_compares_and_says_what_a_planner_that_looks_at_nobody_passes(bag, tmp_path):
     def drive(planner, *more):
-        words = ["drive", str(bag), "--planner", f"{PLANNERS}:{planner}", "--workers", "1", "--set", "overtime=1.0"]
-        loose = [f"bars.{name}=1.0" for name in ("collisions", "at_fault", "off_road")] + ["bars.progress=0.0"]
-        return CliRunner().invoke(app, [*words, *(word for one in loose for word in ("--set", one)), *more])
+        words = [
+            "drive",
+            str(bag),
+            "--planner",
+            f"{PLANNERS}:{planner}",
+            "--workers",
+            "1",
+            "--set",
+            "overtime=1.0",
+        ]
+        loose = [f"bars.{name}=1.0" for name in ("collisions", "at_fault", "off_road")] + [
+            "bars.progress=0.0"
+        ]
+        return CliRunner().invoke(
+            app, [*words, *(word for one in loose for word in ("--set", one)), *more]
+        )
 
     first = drive("IdmFollower", "--out", str(tmp_path / "one"))
-    assert first.exit_code == 0 and "the non-reactive baseline passes" in first.output, first.output
-    again = drive("IdmFollower", "--out", str(tmp_path / "two"), "--against", str(tmp_path / "one"), "--no-baseline")
-    assert again.exit_code == 0 and "failures +0.0 %" in again.output and "non-reactive" not in again.output
+    assert first.exit_code == 0 and "the non-reactive baseline passes" in first.output, (
+        first.output
+    )
+    again = drive(
+        "IdmFollower",
+        "--out",
+        str(tmp_path / "two"),
+        "--against",
+        str(tmp_path / "one"),
+        "--no-baseline",
+    )
+    assert (
+        again.exit_code == 0
+        and "failures +0.0 %" in again.output
+        and "non-reactive" not in again.output
+    )
     said = (tmp_path / "two" / "drives.html").read_text()
     assert "Scenarios that changed sides" in said and "failures +0.0 %" in said
     trials = read_trials(bag)
-    outcomes = with_origins(run_trials(trials, f"{PLANNERS}:IdmFollower", ClosedLoopConfig(overtime=1.0)), trials)
-    assert Drives(outcomes, "", ClosedLoopConfig()).document()["drives"][0]["scenario"] == outcomes[0].origin.digest
+    outcomes = with_origins(
+        run_trials(trials, f"{PLANNERS}:IdmFollower", ClosedLoopConfig(overtime=1.0)), trials
+    )
+    assert (
+        Drives(outcomes, "", ClosedLoopConfig()).document()["drives"][0]["scenario"]
+        == outcomes[0].origin.digest
+    )

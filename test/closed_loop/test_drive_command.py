@@ -34,15 +34,35 @@ def bag(tmp_path_factory):
 
 def test_a_bag_is_driven_and_the_bars_decide_the_exit_code(bag, tmp_path):
     for bar in (0.0, 1.0):
-        words = ["drive", str(bag), "--planner", PLANNER, "--workers", "1", "--count", "2", "--out", str(tmp_path / "out")]
+        words = [
+            "drive",
+            str(bag),
+            "--planner",
+            PLANNER,
+            "--workers",
+            "1",
+            "--count",
+            "2",
+            "--out",
+            str(tmp_path / "out"),
+        ]
         loose = [f"bars.{name}=1.0" for name in ("collisions", "at_fault", "off_road")]
-        sets = [word for value in ("overtime=1.0", f"bars.goals={bar}", *loose) for word in ("--set", value)]
+        sets = [
+            word
+            for value in ("overtime=1.0", f"bars.goals={bar}", *loose)
+            for word in ("--set", value)
+        ]
         told = CliRunner().invoke(app, [*words, *sets])
         said = json.loads((tmp_path / "out" / "drives.json").read_text())
         reached = said["summary"]["goals"]["share"] >= bar
-        assert told.exit_code == (0 if reached else 1) and ("bars not kept: goals" in told.output) != reached, told.output
+        assert (
+            told.exit_code == (0 if reached else 1)
+            and ("bars not kept: goals" in told.output) != reached
+        ), told.output
         assert len(said["drives"]) == 2 and said["parameters"]["overtime"] == 1.0
-        assert (tmp_path / "out" / "junit.xml").is_file() and (tmp_path / "out" / "drives.html").is_file()
+        assert (tmp_path / "out" / "junit.xml").is_file() and (
+            tmp_path / "out" / "drives.html"
+        ).is_file()
 
 
 def test_scenarios_on_one_road_share_it(bag):
@@ -127,22 +147,38 @@ class Nowhere(Still):
 )
 def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, workers, said):
     with pytest.raises(InputError, match=said):
-        drive_bag(DriveRequest(bag, f"{__name__}:{planner}", count=2), tmp_path / "out", run=in_processes(workers))
+        drive_bag(
+            DriveRequest(bag, f"{__name__}:{planner}", count=2),
+            tmp_path / "out",
+            run=in_processes(workers),
+        )
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
     Hangs.drives = 0
-    with pytest.raises(InputError, match=r"scenario 1: the planner did not come to an end in 5 s") as caught:
-        request = DriveRequest(bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=5", "overtime=1"])
+    with pytest.raises(
+        InputError, match=r"scenario 1: the planner did not come to an end in 5 s"
+    ) as caught:
+        request = DriveRequest(
+            bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=5", "overtime=1"]
+        )
         drive_bag(request, tmp_path / "out", run=in_processes(1))
-    assert "of the 1 drives before: failures 1, collisions" in str(caught.value) and not (tmp_path / "out").exists()
+    assert (
+        "of the 1 drives before: failures 1, collisions" in str(caught.value)
+        and not (tmp_path / "out").exists()
+    )
 
 
 @pytest.mark.long
 def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
-    with pytest.raises(InputError, match=r"has ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time"):
-        request = DriveRequest(bag, f"{__name__}:HangsInCompiledCode", count=2, assignments=["drive_time=0.5"])
+    with pytest.raises(
+        InputError,
+        match=r"has ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time",
+    ):
+        request = DriveRequest(
+            bag, f"{__name__}:HangsInCompiledCode", count=2, assignments=["drive_time=0.5"]
+        )
         drive_bag(request, tmp_path, run=in_processes(2))
 
 
@@ -151,10 +187,14 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
     for planner in ("Slow", "Still"):
         sets = ["decision_time=0.04", "overtime=1.0"]
         result = drive_bag(
-            DriveRequest(bag, f"{__name__}:{planner}", count=1, assignments=sets), tmp_path / planner, run=in_processes(1)
+            DriveRequest(bag, f"{__name__}:{planner}", count=1, assignments=sets),
+            tmp_path / planner,
+            run=in_processes(1),
         )
         known[planner] = json.loads((tmp_path / planner / "drives.json").read_text())
-        assert any(line.startswith("progress: 0.0 %") for line in result.broken)  # who never moves breaks a bar by default
+        assert any(
+            line.startswith("progress: 0.0 %") for line in result.broken
+        )  # who never moves breaks a bar by default
         if planner == "Slow":
             (outcome,) = result.outcomes
             assert outcome.decisions.slow >= 1 and outcome.decisions.longest >= 0.05
@@ -163,7 +203,9 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
 
 @pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
 def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path, planner):
-    drive_bag(DriveRequest(bag, f"{__name__}:{planner}", count=1), tmp_path / "out", run=in_processes(1))
+    drive_bag(
+        DriveRequest(bag, f"{__name__}:{planner}", count=1), tmp_path / "out", run=in_processes(1)
+    )
     (drive,) = json.loads((tmp_path / "out" / "drives.json").read_text())["drives"]
     assert drive["faults"] > 0 and not drive["passed"]
 
@@ -186,8 +228,22 @@ class Busy:
 @pytest.mark.long
 def test_processes_of_a_killed_drive_end_with_it_whatever_they_are_at(bag, tmp_path):
     (tmp_path / "busy.py").write_text(BUSY)
-    words = [sys.executable, "-m", "scenario_gen", "drive", str(bag), "--planner", "busy:Busy", "--workers", "2", "--out", "out"]
-    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as drive:
+    words = [
+        sys.executable,
+        "-m",
+        "scenario_gen",
+        "drive",
+        str(bag),
+        "--planner",
+        "busy:Busy",
+        "--workers",
+        "2",
+        "--out",
+        "out",
+    ]
+    with subprocess.Popen(
+        words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as drive:
         while drive.poll() is None and not list(tmp_path.glob("*.busy")):
             time.sleep(0.01)
         assert drive.poll() is None, "it ended before it could be killed"

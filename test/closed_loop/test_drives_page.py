@@ -37,11 +37,16 @@ def test_drives_are_sorted_chosen_and_played(browser, file):
     row.click()
     assert row.get_attribute("aria-current") == "true"
     assert tab.page.locator("#figures dt").all_inner_texts()[1:3] == ["gap [m]", "minimum PET [s]"]
-    assert tab.page.locator("#figures dd").nth(1).inner_text() == row.locator("td").nth(3).inner_text()
+    assert (
+        tab.page.locator("#figures dd").nth(1).inner_text()
+        == row.locator("td").nth(3).inner_text()
+    )
     tab.page.locator("h1").click()
     tab.page.keyboard.press("Space")
     assert tab.page.locator("#play").inner_text() == "❚❚", "it plays"
-    assert tab.page.evaluate("scrollY") == 0 and tab.troubles == [] and tab.asked() == [file.as_uri()]
+    assert (
+        tab.page.evaluate("scrollY") == 0 and tab.troubles == [] and tab.asked() == [file.as_uri()]
+    )
     tab.page.close()
 
 
@@ -60,9 +65,14 @@ def test_the_page_of_a_search_without_a_failure_raises_no_error(browser, tmp_pat
         "sentences": ["no failure in 60 drives"],
     }
     scripts = ("scene.js", "drives.js", "tables.js")
-    page = render_page("search.html.j2", scripts, drawings([], [], []), **words, kinds={}, rows=[], parameters={})
+    page = render_page(
+        "search.html.j2", scripts, drawings([], [], []), **words, kinds={}, rows=[], parameters={}
+    )
     file = tmp_path / "search.html"
     file.write_text(page)
     tab = Tab(browser, file, DESKTOP)
-    assert tab.troubles == [] and "a failure is a collision by its fault" in tab.page.locator("header").inner_text()
+    assert (
+        tab.troubles == []
+        and "a failure is a collision by its fault" in tab.page.locator("header").inner_text()
+    )
     tab.page.close()

@@ -37,7 +37,11 @@ def drive(env, seed):
 @pytest.mark.filterwarnings("error::UserWarning")
 def test_gymnasium_finds_nothing_wrong():
     env = gymnasium.make(ID, trials=TRIALS, render_mode="rgb_array")
-    assert env.spec.id == ID and np.isfinite(env.observation_space.low).all() and np.isfinite(env.observation_space.high).all()
+    assert (
+        env.spec.id == ID
+        and np.isfinite(env.observation_space.low).all()
+        and np.isfinite(env.observation_space.high).all()
+    )
     check_env(env.unwrapped)
 
 
@@ -50,7 +54,14 @@ def test_actions_that_are_not_finite_are_refused(bad):
 
 
 def test_the_picture_shows_road_route_ego_and_others():
-    road = Road("r", np.ones((40, 40), dtype=bool), 1.0, np.array((-20.0, -20.0)), np.zeros((0, 3)), np.zeros((0, 3)))
+    road = Road(
+        "r",
+        np.ones((40, 40), dtype=bool),
+        1.0,
+        np.array((-20.0, -20.0)),
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+    )
     env = DriveEnv([replace(TRIALS[0], road=road)], render_mode="rgb_array")
     env.reset(seed=1)
     image = env.render()
@@ -73,7 +84,11 @@ def test_vectors_of_it_are_made_by_gymnasium(way):
 def test_the_same_seed_gives_the_same_drive():
     env = DriveEnv(TRIALS)
     (one, verdict), (other, again) = (drive(env, 3) for _ in range(2))
-    assert (one == other).all() and verdict == again and all(env.observation_space.contains(row) for row in one)
+    assert (
+        (one == other).all()
+        and verdict == again
+        and all(env.observation_space.contains(row) for row in one)
+    )
     assert env.reset(options={"index": 2})[1]["name"] == "5"
     with pytest.raises(InputError, match="no scenario 3; there are 3"):
         env.reset(options={"index": 3})
@@ -84,7 +99,9 @@ def test_off_the_road_is_what_the_verdict_says(edge):
     """A footprint that is outside by less than counts goes on."""
     scenario = following(8.0, 20.0)  # along y = 0
     corner = np.array((-200.0, edge - 0.5 * scenario.vehicles[0].width))
-    road = Road("r", np.ones((400, 400), dtype=bool), 1.0, corner, np.zeros((0, 3)), np.zeros((0, 3)))
+    road = Road(
+        "r", np.ones((400, 400), dtype=bool), 1.0, corner, np.zeros((0, 3)), np.zeros((0, 3))
+    )
     env = DriveEnv([Trial("edge", scenario, 0, road)])
     env.reset(seed=1)
     _, reward, terminated, _, info = env.step(np.array((-1.0, 0.0), dtype=np.float32))

@@ -42,7 +42,9 @@ def waiting_car(begin, end, speed=8.0, y=0.0):
 def scene(*motions):
     """A car, a pedestrian, and other cars."""
     kinds = ((4.8, 1.9, "car"), (0.5, 0.5, "pedestrian"), (4.8, 1.9, "car"))
-    vehicles = tuple(Vehicle(str(n), *kind) for n, kind in zip(range(len(motions)), kinds, strict=False))
+    vehicles = tuple(
+        Vehicle(str(n), *kind) for n, kind in zip(range(len(motions)), kinds, strict=False)
+    )
     return replace(as_scenario(motions, len(TIME)), vehicles=vehicles)
 
 
@@ -66,7 +68,9 @@ SPEEDS_UP = Accelerates(lambda seen: 4.0 if seen.ego.speed < 14.0 else 0.0)
 
 @pytest.mark.parametrize("walks", [0.8, 1.4, 2.0])
 @pytest.mark.parametrize("late", [0.0, 0.4, 0.8])
-def test_a_pedestrian_waits_at_the_kerb_for_a_car_that_cannot_stop_and_goes_on_behind_it(walks, late):
+def test_a_pedestrian_waits_at_the_kerb_for_a_car_that_cannot_stop_and_goes_on_behind_it(
+    walks, late
+):
     """The car does not slow down from 3 s on, as it should; its front passes at 5.3 s."""
     scenario = scene(waiting_car(7.0, 16.0), walker(-walks * (4.8 + late) - 2.0, walks))
     loop = ClosedLoop(scenario, 0)
@@ -85,19 +89,30 @@ def test_a_pedestrian_that_steps_out_beside_a_parked_car_waits_too():
     loop = ClosedLoop(scene(waiting_car(7.0, 16.0), walker(-9.0), parked), 0)
     drive = loop.drive(KEEPS, lambda state: state.step >= 150)
     y = drive.motion.position[1, :, 1]
-    assert judge(loop, drive).collision is None and (np.abs(y[drive.motion.speed[1] < 0.5]) > LANE + 0.5).all() and y[-1] > 2.0
+    assert (
+        judge(loop, drive).collision is None
+        and (np.abs(y[drive.motion.speed[1] < 0.5]) > LANE + 0.5).all()
+        and y[-1] > 2.0
+    )
 
 
 def test_a_pedestrian_goes_on_before_a_car_that_can_stop():
     scenario = scene(waiting_car(7.0, 16.0), walker(-9.0))
     drive = ClosedLoop(scenario, 0).drive(BRAKES, lambda state: state.step >= 150)
-    assert np.abs(drive.motion.position[1] - scenario.position[1, : len(drive.motion.time)]).max() < 1e-6
+    assert (
+        np.abs(drive.motion.position[1] - scenario.position[1, : len(drive.motion.time)]).max()
+        < 1e-6
+    )
 
 
 def test_a_pedestrian_on_the_lane_goes_on_and_the_ego_that_runs_into_it_is_at_fault():
     """The ego brakes until the pedestrian is on its lane, then speeds up."""
     scenario = scene(waiting_car(7.0, 16.0), walker(-9.0))
-    hits = Accelerates(lambda seen: -2.0 if seen.others[0, 1] < -1.0 and seen.ego.x > -25.0 else 4.0 * (seen.ego.x > -25.0))
+    hits = Accelerates(
+        lambda seen: (
+            -2.0 if seen.others[0, 1] < -1.0 and seen.ego.x > -25.0 else 4.0 * (seen.ego.x > -25.0)
+        )
+    )
     loop = ClosedLoop(scenario, 0)
     drive = loop.drive(hits)
     collision = judge(loop, drive).collision
@@ -111,7 +126,9 @@ def test_a_pedestrian_waits_for_an_ego_that_goes_first_in_the_template_until_its
     loop = ClosedLoop(scene(car, walker(-10.0)), 0, config=ClosedLoopConfig(patience=4.0))
     drive = loop.drive(Accelerates(lambda seen: -4.0), lambda state: state.step >= 230)
     stands = drive.motion.speed[1] < 0.05
-    assert 0.1 * stands.sum() == pytest.approx(4.0, abs=1.0) and drive.motion.position[1, -1, 1] > 3.0
+    assert (
+        0.1 * stands.sum() == pytest.approx(4.0, abs=1.0) and drive.motion.position[1, -1, 1] > 3.0
+    )
     assert (drive.motion.position[1, stands, 1] < -LANE - 0.5).all()
 
 
@@ -133,7 +150,9 @@ def test_with_pedestrians_nobody_meets_nobody_stays_and_the_witness_drives_as_ce
     ego = seed % len(drawn.vehicles)
     walks = (ego + 1) % len(drawn.vehicles)
     kinds = ["pedestrian" if n == walks else "car" for n in range(len(drawn.vehicles))]
-    vehicles = tuple(replace(one, type=kind) for one, kind in zip(drawn.vehicles, kinds, strict=True))
+    vehicles = tuple(
+        replace(one, type=kind) for one, kind in zip(drawn.vehicles, kinds, strict=True)
+    )
     scenario = replace(drawn, vehicles=vehicles)
     loop = ClosedLoop(scenario, ego)
     drive = loop.drive(Witness(scenario, ego), lambda state: state.step >= len(scenario.time) - 1)

@@ -34,7 +34,9 @@ def test_depth_and_room_are_those_of_points_and_cells(seed):
     drivable[8:22, 4:26] = True
     drivable[rng.random((30, 30)) < 0.004] ^= True
     road = Road("patches", drivable, res, np.zeros(2), np.empty((0, 3)), np.empty((0, 3)))
-    poses = np.column_stack([rng.uniform(-6.0, 30.0 * res + 6.0, (12, 2)), rng.uniform(-3.0, 3.0, 12)])
+    poses = np.column_stack(
+        [rng.uniform(-6.0, 30.0 * res + 6.0, (12, 2)), rng.uniform(-3.0, 3.0, 12)]
+    )
     for outside in (True, False):
         found = _measured(road, poses, HALF, outside=outside)[:, 0]
         expected = [plain(drivable, res, pose, outside=outside) for pose in poses]

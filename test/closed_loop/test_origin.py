@@ -23,8 +23,15 @@ def moved(scenario, x, y, yaw):
 def test_a_scenario_on_another_road_is_a_copy_if_all_move_likewise():
     one, other = draw_scenario(1), draw_scenario(2)
     scenarios = [one, moved(one, 30.0, -4.0, 1.2), other, moved(one, 5.0, 0.0, 0.0), one]
-    found = origins_of([Trial(*each) for each in zip("abcde", scenarios, [0, 0, 0, 0, 1], [None] * 5, "xxxyx", strict=True)])
-    assert [each.copy_of for each in found] == ["", "a", "", "", ""] and len({each.digest for each in found}) == 5
+    found = origins_of(
+        [
+            Trial(*each)
+            for each in zip("abcde", scenarios, [0, 0, 0, 0, 1], [None] * 5, "xxxyx", strict=True)
+        ]
+    )
+    assert [each.copy_of for each in found] == ["", "a", "", "", ""] and len(
+        {each.digest for each in found}
+    ) == 5
 
 
 def test_drives_count_by_encounter_and_copies_once():
@@ -37,25 +44,44 @@ def test_drives_count_by_encounter_and_copies_once():
 
 def test_rates_of_copies_have_the_interval_of_one_of_each():
     scenarios = [draw_scenario(seed, 2) for seed in range(6)]
-    trials = [Trial(str(k), moved(s, 9.0 * (k // 6), 0.0, 0.3 * (k // 6)), 0, None, "x") for k, s in enumerate(scenarios * 2)]
-    outcomes = with_origins(run_trials(trials, "scenario_gen.closed_loop.planners:IdmFollower"), trials)
+    trials = [
+        Trial(str(k), moved(s, 9.0 * (k // 6), 0.0, 0.3 * (k // 6)), 0, None, "x")
+        for k, s in enumerate(scenarios * 2)
+    ]
+    outcomes = with_origins(
+        run_trials(trials, "scenario_gen.closed_loop.planners:IdmFollower"), trials
+    )
     assert sum(bool(one.origin.copy_of) for one in outcomes) == 6
     goals = rates(outcomes)["off_road"]
-    assert (goals.count, goals.of) == (0, 12) and goals.share.high == pytest.approx(wilson(0, 6, 0.95).high)
+    assert (goals.count, goals.of) == (0, 12) and goals.share.high == pytest.approx(
+        wilson(0, 6, 0.95).high
+    )
 
 
 @pytest.mark.parametrize(
     ("rate", "alike", "encounters", "least"),
-    [(0.1, 0.2, 20, 0.92), (0.3, 0.5, 10, 0.92), (0.2, 0.0, 12, 0.92), (0.05, 0.1, 40, 0.92), (0.02, 0.3, 40, 0.87)],
+    [
+        (0.1, 0.2, 20, 0.92),
+        (0.3, 0.5, 10, 0.92),
+        (0.2, 0.0, 12, 0.92),
+        (0.05, 0.1, 40, 0.92),
+        (0.02, 0.3, 40, 0.87),
+    ],
 )
-def test_intervals_hold_the_rate_where_drives_of_an_encounter_are_alike(rate, alike, encounters, least):
+def test_intervals_hold_the_rate_where_drives_of_an_encounter_are_alike(
+    rate, alike, encounters, least
+):
     """Rates of encounters are beta distributed around `rate`; plain intervals miss it far more often than 5 %."""
     rng = np.random.default_rng(3)
     unit = np.repeat(np.arange(encounters), 20)
     held, plain, runs = 0, 0, 250
     for _ in range(runs):
         spread = 1.0 / alike - 1.0 if alike else None
-        own = rng.beta(rate * spread, (1.0 - rate) * spread, encounters) if spread else np.full(encounters, rate)
+        own = (
+            rng.beta(rate * spread, (1.0 - rate) * spread, encounters)
+            if spread
+            else np.full(encounters, rate)
+        )
         hits = rng.random(len(unit)) < own[unit]
         found, other = clustered_wilson(hits, unit, 0.95), wilson(int(hits.sum()), len(hits), 0.95)
         held += found.low <= rate <= found.high

@@ -58,30 +58,48 @@ def test_nobody_answers_before_its_reaction_time_is_over(seed, differ, step):
     assume(len(scenario.vehicles) == 2)
     loop = ClosedLoop(scenario, 0, config=ClosedLoopConfig(step=step))
     late = round(float(loop.reactions[1]) / step)
-    one, two = (states(loop, braking_after(differ, braking), differ + late + 5) for braking in (0.0, 9.0))
+    one, two = (
+        states(loop, braking_after(differ, braking), differ + late + 5) for braking in (0.0, 9.0)
+    )
     for k in range(differ + late + 1):
         assert one[k].clock[1] == two[k].clock[1] and one[k].rate[1] == two[k].rate[1]
 
 
 @settings(max_examples=EXAMPLES)
-@given(st.floats(2.0, 20.0), st.floats(0.5, 9.0), st.floats(0.0, 20.0), st.sampled_from([0.05, 0.1]))
-def test_a_follower_stops_for_the_ego_with_room_for_its_reaction_and_its_foot(speed, braking, spare, step):
+@given(
+    st.floats(2.0, 20.0), st.floats(0.5, 9.0), st.floats(0.0, 20.0), st.sampled_from([0.05, 0.1])
+)
+def test_a_follower_stops_for_the_ego_with_room_for_its_reaction_and_its_foot(
+    speed, braking, spare, step
+):
     """The gap holds what it drives in its reaction time and while its foot gets to full braking, two steps, and 0.6 m."""
     config = ClosedLoopConfig(step=step)
     reaction = reaction_time(following(speed, 50.0), "v0", config.reaction)
     need = 0.5 * speed**2 / config.strongest_braking - 0.5 * speed**2 / braking
     late = reaction + config.strongest_braking / config.jerk + 2.0 * step
-    loop = ClosedLoop(following(speed, max(need, 0.0) + speed * late + 0.6 + spare), 1, config=config)
+    loop = ClosedLoop(
+        following(speed, max(need, 0.0) + speed * late + 0.6 + spare), 1, config=config
+    )
     assert not touches(loop, braking_after(1, braking), int(12 / step))
 
 
 @settings(max_examples=EXAMPLES)
-@given(st.integers(0, 10**9), st.sampled_from([0.05, 0.1]), st.sampled_from([3.0, 10.0]), st.integers(2, 4))
-def test_acceleration_changes_by_the_jerk_at_most_unless_the_order_forces_it(seed, step, jerk, vehicles):
+@given(
+    st.integers(0, 10**9),
+    st.sampled_from([0.05, 0.1]),
+    st.sampled_from([3.0, 10.0]),
+    st.integers(2, 4),
+)
+def test_acceleration_changes_by_the_jerk_at_most_unless_the_order_forces_it(
+    seed, step, jerk, vehicles
+):
     """On certified motions of one speed, which have no jerk of their own; whatever the ego does."""
     scenario = replace(following(12.0, 10.0, vehicles) if seed % 2 else crossing(), seed=seed)
     ego = seed % len(scenario.vehicles)
-    loop, planner = ClosedLoop(scenario, ego, config=ClosedLoopConfig(step=step, jerk=jerk)), Anything(seed)
+    loop, planner = (
+        ClosedLoop(scenario, ego, config=ClosedLoopConfig(step=step, jerk=jerk)),
+        Anything(seed),
+    )
     planner.reset(loop.task())
     drive = [loop.start()]
     for _ in range(int(12 / step)):
@@ -94,7 +112,9 @@ def test_acceleration_changes_by_the_jerk_at_most_unless_the_order_forces_it(see
     free = stays & ~(forced[1:] | forced[:-1])[:, None]
     most = (jerk * step * step + 0.051) / step
     assert change[free].min() >= -most  # braking grows
-    assert change[free & (speed[2:] > 0.2)].max() <= most  # and lessens, but where the order ends what is left of a stop
+    assert (
+        change[free & (speed[2:] > 0.2)].max() <= most
+    )  # and lessens, but where the order ends what is left of a stop
 
 
 def test_braking_is_as_sudden_as_that_of_recorded_drivers_whatever_the_ego_does():
@@ -103,7 +123,9 @@ def test_braking_is_as_sudden_as_that_of_recorded_drivers_whatever_the_ego_does(
     for seed in range(10_000 if LONG else 50):
         scenario = draw_scenario(seed)
         loop = ClosedLoop(scenario, seed % len(scenario.vehicles))
-        drive = loop.drive(Anything(seed), lambda state, last=len(scenario.time) // 2: state.step >= last)
+        drive = loop.drive(
+            Anything(seed), lambda state, last=len(scenario.time) // 2: state.step >= last
+        )
         found.append(braking_jerks(scenario, drive))
     jerk = np.concatenate(found)
     assert len(jerk) > 250 and np.percentile(jerk, 99) <= 10.0
@@ -166,7 +188,9 @@ def test_who_stands_at_its_end_has_no_speed():
     time = 0.1 * np.arange(60)
     zero, slow = np.zeros_like(time), np.full_like(time, 0.4)
     motions = [(np.stack([x + 0.4 * time, zero], axis=1), zero, slow) for x in (0.0, 20.0)]
-    drive = states(ClosedLoop(as_scenario(motions, len(time)), 1), lambda _: Command(-1.0, 0.0), 80)
+    drive = states(
+        ClosedLoop(as_scenario(motions, len(time)), 1), lambda _: Command(-1.0, 0.0), 80
+    )
     assert drive[30].vehicles[0, 3] == pytest.approx(0.4) and drive[-1].vehicles[0, 3] == 0.0
 
 

@@ -26,7 +26,9 @@ def drive_along(points, speed, start=0.0):
     """A motion along points (M, 2) [m] at a speed [m/s], or at speeds (T,), from a station [m] on."""
     curve = Curve.through(np.asarray(points, dtype=np.float64))
     speed = np.broadcast_to(np.asarray(speed, dtype=np.float64), TIME.shape)
-    poses = curve.at(start + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * PERIOD)]))
+    poses = curve.at(
+        start + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * PERIOD)])
+    )
     return poses[:, :2], poses[:, 2], speed.copy()
 
 
@@ -47,7 +49,9 @@ def turn(radius=8.0):
     angle = np.linspace(0.0, np.pi / 2, 20)
     arc = np.column_stack([radius * np.cos(angle), radius * np.sin(angle) - radius])
     south = np.column_stack([np.full(80, radius), np.linspace(-100.0, -radius - 1.0, 80)])
-    return np.concatenate([south, arc, np.column_stack([np.linspace(-1.0, -100.0, 80), np.zeros(80)])])
+    return np.concatenate(
+        [south, arc, np.column_stack([np.linspace(-1.0, -100.0, 80), np.zeros(80)])]
+    )
 
 
 def up():
@@ -80,12 +84,17 @@ def pulls_out_and_is_hit(rng):
 
 
 def pulls_out_and_hits(rng):
-    return crosses(rng, lambda fast, slow: (0.5 * LENGTH + 0.5 * WIDTH) / slow + rng.uniform(-0.1, 0.1))
+    return crosses(
+        rng, lambda fast, slow: (0.5 * LENGTH + 0.5 * WIDTH) / slow + rng.uniform(-0.1, 0.1)
+    )
 
 
 def pulls_out_and_stops(rng):
     other = to_pass(lane(0.0), 150.0, rng.uniform(5.0, 6.5), rng.uniform(8.0, 14.0))
-    speed, start = np.where(TIME < 2.0, 6.0, np.maximum(6.0 - 6.0 * (TIME - 2.0), 0.0)), 135.0 + rng.uniform(-1.0, 1.0)
+    speed, start = (
+        np.where(TIME < 2.0, 6.0, np.maximum(6.0 - 6.0 * (TIME - 2.0), 0.0)),
+        135.0 + rng.uniform(-1.0, 1.0),
+    )
     return drive_along(up(), 1.6, start), other, drive_along(up(), speed, start)
 
 
@@ -130,13 +139,21 @@ def merges_before_its_turn(rng):
 def drifts_sideways(rng):
     speed, beside = rng.uniform(7.0, 14.0), rng.uniform(-2.0, 2.0)
     other = to_pass(lane(0.0), 60.0 + beside, 0.0, speed)
-    return to_pass(lane(3.5), 60.0, 0.0, speed), other, to_pass(over(3.5, 0.0, -40.0, 60.0), 60.0, 0.0, speed)
+    return (
+        to_pass(lane(3.5), 60.0, 0.0, speed),
+        other,
+        to_pass(over(3.5, 0.0, -40.0, 60.0), 60.0, 0.0, speed),
+    )
 
 
 def head_on_in_the_wrong_lane(rng):
     mine, its = rng.uniform(6.0, 12.0, 2)
     other = to_pass(lane(1.75, reverse=True), 150.0, 6.0, its)
-    return to_pass(lane(-1.75), 150.0, 6.0, mine), other, to_pass(over(-1.75, 1.75, -30.0), 150.0, 6.0, mine)
+    return (
+        to_pass(lane(-1.75), 150.0, 6.0, mine),
+        other,
+        to_pass(over(-1.75, 1.75, -30.0), 150.0, 6.0, mine),
+    )
 
 
 def stops_in_the_oncoming_lane(rng):
@@ -144,13 +161,19 @@ def stops_in_the_oncoming_lane(rng):
     speed = np.where(TIME < 3.0, mine, np.maximum(mine - 5.0 * (TIME - 3.0), 0.0))
     start = 150.0 - 30.0 - 3.0 * mine
     other = to_pass(lane(1.75, reverse=True), 150.0, rng.uniform(7.0, 9.0), its)
-    return drive_along(lane(-1.75), mine, start), other, drive_along(over(-1.75, 1.75, -35.0), speed, start)
+    return (
+        drive_along(lane(-1.75), mine, start),
+        other,
+        drive_along(over(-1.75, 1.75, -35.0), speed, start),
+    )
 
 
 def brakes_for_nothing(rng):
     speed, braking, begin = rng.uniform(8.0, 15.0), rng.uniform(4.0, 8.0), rng.uniform(2.0, 4.0)
     other = drive_along(lane(0.0), speed, 20.0)
-    slower = np.where(begin > TIME, speed, np.maximum(speed - braking * (TIME - begin), rng.choice([0.0, 2.0])))
+    slower = np.where(
+        begin > TIME, speed, np.maximum(speed - braking * (TIME - begin), rng.choice([0.0, 2.0]))
+    )
     start = 20.0 + LENGTH + 0.5 * speed
     return drive_along(lane(0.0), speed, start), other, drive_along(lane(0.0), slower, start)
 
@@ -158,7 +181,9 @@ def brakes_for_nothing(rng):
 def has_priority_and_is_hit(rng):
     fast, slow, when = rng.uniform(8.0, 12.0), rng.uniform(3.0, 5.0), rng.uniform(4.0, 6.0)
     other = to_pass(lane(0.0), 150.0, when, fast)
-    witness, ego = both_to_pass(up(), 150.0, (when - 2.4, when + rng.uniform(-0.8, 0.8) * 0.5 * LENGTH / slow), slow)
+    witness, ego = both_to_pass(
+        up(), 150.0, (when - 2.4, when + rng.uniform(-0.8, 0.8) * 0.5 * LENGTH / slow), slow
+    )
     return witness, other, ego
 
 
@@ -176,7 +201,11 @@ def reverses(rng):
     other = drive_along(lane(0.0), 0.0, 100.0)
     position, yaw, speed = drive_along(lane(0.0), 0.0, 100.0 + LENGTH + gap)
     position = position - np.column_stack([back * np.maximum(TIME - 1.0, 0.0), np.zeros(STEPS)])
-    return drive_along(lane(0.0), np.minimum(2.0 * TIME, 8.0), 100.0 + LENGTH + gap), other, (position, yaw, speed)
+    return (
+        drive_along(lane(0.0), np.minimum(2.0 * TIME, 8.0), 100.0 + LENGTH + gap),
+        other,
+        (position, yaw, speed),
+    )
 
 
 SITUATIONS = {
@@ -226,9 +255,13 @@ def judged(situation, seed):
     rng = np.random.default_rng([seed, *situation.__name__.encode()])
     angle, mirrored = rng.uniform(-np.pi, np.pi), rng.random() < 0.5
     witness, other, ego = (placed(motion, angle, mirrored) for motion in situation(rng))
-    loop = ClosedLoop(as_scenario([witness, other], STEPS), 0, config=ClosedLoopConfig(policy="replay"))
+    loop = ClosedLoop(
+        as_scenario([witness, other], STEPS), 0, config=ClosedLoopConfig(policy="replay")
+    )
     proven = judge(loop, loop.drive(Plays(witness)))
-    assert proven.passed, f"{situation.__name__} {seed}: {proven.sentence()}; {conflicts_in(loop.scenario)}"
+    assert proven.passed, (
+        f"{situation.__name__} {seed}: {proven.sentence()}; {conflicts_in(loop.scenario)}"
+    )
     return judge(loop, loop.drive(Plays(ego)))
 
 
@@ -237,14 +270,26 @@ def test_fault_is_that_of_who_was_out_of_place(situation):
     for seed in range(VARIATIONS):
         verdict = judged(situation, seed)
         assert verdict.collision is not None, f"{seed}: nobody was met; {verdict.sentence()}"
-        assert verdict.collision.reason.value in SITUATIONS[situation], f"{seed}: {verdict.sentence()}"
-        assert verdict.at_fault == verdict.document()["at_fault"] == (situation not in NOT_AT_FAULT)
+        assert verdict.collision.reason.value in SITUATIONS[situation], (
+            f"{seed}: {verdict.sentence()}"
+        )
+        assert (
+            verdict.at_fault == verdict.document()["at_fault"] == (situation not in NOT_AT_FAULT)
+        )
 
 
 def test_a_cut_in_says_its_gap_beside_what_is_asked_for():
     cut_in = judged(cuts_in_unsafely, 0).collision.cut_in
-    assert 0.0 < cut_in.gap < cut_in.safe_gap and not cut_in.safe and cut_in.ttc > 0.0 and cut_in.least_ttc > 0.35
-    assert "came in" in (verdict := judged(cuts_in_safely, 0)).sentence() and verdict.collision.cut_in.safe
+    assert (
+        0.0 < cut_in.gap < cut_in.safe_gap
+        and not cut_in.safe
+        and cut_in.ttc > 0.0
+        and cut_in.least_ttc > 0.35
+    )
+    assert (
+        "came in" in (verdict := judged(cuts_in_safely, 0)).sentence()
+        and verdict.collision.cut_in.safe
+    )
     assert verdict.sentence().count("not at fault") == 1
     assert float(safe_gap(14.0, 14.0)) == pytest.approx(14.0 + 196.0 / 12.0 - 196.0 / 18.0)
 
@@ -252,4 +297,6 @@ def test_a_cut_in_says_its_gap_beside_what_is_asked_for():
 def test_who_has_priority_is_at_fault_by_nuplan_alone():
     shown = [judged(has_priority_and_is_hit, seed) for seed in range(12)]
     assert not any(one.at_fault for one in shown)
-    assert any(one.terms.no_at_fault_collision == 0.0 for one in shown)  # its front touched the other
+    assert any(
+        one.terms.no_at_fault_collision == 0.0 for one in shown
+    )  # its front touched the other

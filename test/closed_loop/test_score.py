@@ -20,7 +20,10 @@ def test_a_drive_that_is_as_its_witness_has_the_full_score():
 def test_who_stands_has_no_progress_and_who_brakes_hard_no_comfort():
     motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
     verdict, _ = verdict_of(motions, lambda _: Command(-3.0, 0.0))
-    assert verdict.terms.making_progress == 0.0 == verdict.terms.nuplan and verdict.fault == "standing"
+    assert (
+        verdict.terms.making_progress == 0.0 == verdict.terms.nuplan
+        and verdict.fault == "standing"
+    )
     assert 0.5 < verdict.terms.pdms < 0.65  # (5 TTC + 2 comfort) / 12 and little progress
     verdict, _ = verdict_of(motions, lambda seen: Command(-8.0 * (1.0 < seen.time < 2.0), 0.0))
     assert verdict.terms.comfort == 0.0 and verdict.terms.making_progress == 1.0
@@ -30,7 +33,9 @@ def test_at_fault_is_the_one_who_hits_with_the_front_or_what_stands():
     """As nuPlan has it: not the one that stands, nor the one that is hit from behind."""
     stands, comes = straight(40.0, 0, 0, 0.0), straight(0, 0, 0, 10.0)
     hit, _ = verdict_of([comes, stands], go_on)
-    assert hit.terms.no_at_fault_collision == 0.0 and hit.terms.ttc == 0.0 and hit.fault == "rear_end"
+    assert (
+        hit.terms.no_at_fault_collision == 0.0 and hit.terms.ttc == 0.0 and hit.fault == "rear_end"
+    )
     hit, _ = verdict_of([stands, comes], go_on)
     assert hit.terms.no_at_fault_collision == 1.0 == hit.terms.ttc and hit.fault == "standing"
     hit, _ = verdict_of([straight(30.0, 0, 0, 4.0), comes], go_on)
@@ -38,25 +43,45 @@ def test_at_fault_is_the_one_who_hits_with_the_front_or_what_stands():
 
 
 def test_a_jump_fails_whatever_the_goal_says():
-    verdict, _ = verdict_of([straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)], lambda _: Pose(149.0, 0.0, 0.0, 10.0))
+    verdict, _ = verdict_of(
+        [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)],
+        lambda _: Pose(149.0, 0.0, 0.0, 10.0),
+    )
     assert np.isnan(verdict.goal) and verdict.jumps == 1 and verdict.collision is None
-    assert not verdict.passed and verdict.fault == verdict.failure == "jump" and "1 teleport(s)" in verdict.sentence()
+    assert (
+        not verdict.passed
+        and verdict.fault == verdict.failure == "jump"
+        and "1 teleport(s)" in verdict.sentence()
+    )
 
 
 def test_a_jump_over_others_and_off_the_road_is_a_jump_and_nothing_else():
     """From one lane across another car to a place beyond the road's edge."""
     drivable = np.ones((100, 1000), dtype=np.bool_)
-    road = Road("field", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3)))
+    road = Road(
+        "field", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3))
+    )
     motions = [straight(0, 0, 0, 10.0), straight(0.0, 4.0, 0, 10.0)]
-    verdict, _ = verdict_of(motions, lambda seen: Pose(10.0 * (seen.time + 0.1), 80.0 * (seen.time > 0.45), 0.0, 10.0), road=road)
-    assert verdict.failure == "jump" and verdict.collision is None and np.isnan(verdict.off_road) and verdict.road_margin > 0.0
+    verdict, _ = verdict_of(
+        motions,
+        lambda seen: Pose(10.0 * (seen.time + 0.1), 80.0 * (seen.time > 0.45), 0.0, 10.0),
+        road=road,
+    )
+    assert (
+        verdict.failure == "jump"
+        and verdict.collision is None
+        and np.isnan(verdict.off_road)
+        and verdict.road_margin > 0.0
+    )
 
 
 @pytest.mark.parametrize(("aside", "counted"), [(0.02, False), (0.3, True)])
 def test_off_the_road_counts_from_a_depth(aside, counted):
     drivable = np.zeros((100, 1000), dtype=np.bool_)
     drivable[40:60] = True  # y from -2 to 2 m
-    road = Road("strip", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3)))
+    road = Road(
+        "strip", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3))
+    )
     motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
 
     def beside(seen):
@@ -64,9 +89,15 @@ def test_off_the_road_counts_from_a_depth(aside, counted):
         return Pose(10.0 * time, min(time, 1.1 + aside), 0.0, 10.0)
 
     verdict, drive = verdict_of(motions, beside, road=road)
-    assert verdict.road_margin == pytest.approx(-aside, abs=1e-6) and np.isfinite(verdict.off_road) == counted
+    assert (
+        verdict.road_margin == pytest.approx(-aside, abs=1e-6)
+        and np.isfinite(verdict.off_road) == counted
+    )
     assert verdict.passed != counted and (f"{aside:.2f} m deep" in verdict.sentence()) == counted
-    assert verdict.off_road_area == pytest.approx(4.0 * aside, abs=0.4) and drive.motion.position[0, -1, 1] > 1.1
+    assert (
+        verdict.off_road_area == pytest.approx(4.0 * aside, abs=0.4)
+        and drive.motion.position[0, -1, 1] > 1.1
+    )
     verdict, _ = verdict_of(motions, beside, road=road, off_road_depth=0.0)
     assert np.isfinite(verdict.off_road)
     verdict, _ = verdict_of(motions, go_on, road=road)

@@ -34,7 +34,9 @@ def straight(x, y, yaw, speed):
 
 def verdict_of(motions, act, policy="replay", road=None, **config):
     """The verdict on an ego in place of vehicle 0 that does `act(seen)`."""
-    loop = ClosedLoop(as_scenario(motions, len(TIME)), 0, road, ClosedLoopConfig(policy=policy, **config))
+    loop = ClosedLoop(
+        as_scenario(motions, len(TIME)), 0, road, ClosedLoopConfig(policy=policy, **config)
+    )
 
     class Planner:
         def reset(self, task):
@@ -53,13 +55,29 @@ def go_on(_):
 
 def test_who_runs_into_a_stand_is_the_one_that_moves():
     """Lengths are 4.0 and 4.5 m: at 10 m/s the front reaches the tail after (40 - 4.25) / 10 s."""
-    verdict, drive = verdict_of([straight(0, 0, 0, 10.0), straight(40.0, 0, 0, 0.0)], lambda _: Command(0.0, 0.0))
-    assert verdict.collision.time == pytest.approx(3.575, abs=1e-4) == pytest.approx(seen_at(drive), abs=2e-3)
+    verdict, drive = verdict_of(
+        [straight(0, 0, 0, 10.0), straight(40.0, 0, 0, 0.0)], lambda _: Command(0.0, 0.0)
+    )
+    assert (
+        verdict.collision.time
+        == pytest.approx(3.575, abs=1e-4)
+        == pytest.approx(seen_at(drive), abs=2e-3)
+    )
     assert verdict.collision.ran is Runner.EGO and verdict.collision.speed == pytest.approx(10.0)
-    assert verdict.collision.vehicle == "v1" and not verdict.passed and "the ego ran into v1 at 3.57 s" in verdict.sentence()
-    verdict, _ = verdict_of([straight(40.0, 0, 0, 0.0), straight(0, 0, 0, 10.0)], lambda _: Command(0.0, 0.0))
-    assert verdict.collision.ran is Runner.OTHER and verdict.collision.time == pytest.approx(3.575, abs=1e-4)
-    verdict, _ = verdict_of([straight(0, 0, 0, 10.0), straight(60.0, 0, np.pi, 10.0)], lambda _: Command(0.0, 0.0))
+    assert (
+        verdict.collision.vehicle == "v1"
+        and not verdict.passed
+        and "the ego ran into v1 at 3.57 s" in verdict.sentence()
+    )
+    verdict, _ = verdict_of(
+        [straight(40.0, 0, 0, 0.0), straight(0, 0, 0, 10.0)], lambda _: Command(0.0, 0.0)
+    )
+    assert verdict.collision.ran is Runner.OTHER and verdict.collision.time == pytest.approx(
+        3.575, abs=1e-4
+    )
+    verdict, _ = verdict_of(
+        [straight(0, 0, 0, 10.0), straight(60.0, 0, np.pi, 10.0)], lambda _: Command(0.0, 0.0)
+    )
     assert verdict.collision.ran is Runner.BOTH and verdict.collision.speed == pytest.approx(20.0)
 
 
@@ -67,31 +85,62 @@ def test_a_contact_between_two_instants_is_found():
     """The ego passes through the other's corner in less than a step: at no instant do they overlap."""
     side = straight(0.0, 30.0, -np.pi / 2, 0.0)  # stands across the way, its end at y = 27.75
     verdict, drive = verdict_of(
-        [straight(-40.0, 27.75 - 0.95 + 0.06, 0, 40.0), side], lambda seen: Command(0.0, 0.0), step=0.5, goal_width=0.1
+        [straight(-40.0, 27.75 - 0.95 + 0.06, 0, 40.0), side],
+        lambda seen: Command(0.0, 0.0),
+        step=0.5,
+        goal_width=0.1,
     )
-    assert verdict.collision is not None and seen_at(drive) == pytest.approx(verdict.collision.time, abs=2e-3)
+    assert verdict.collision is not None and seen_at(drive) == pytest.approx(
+        verdict.collision.time, abs=2e-3
+    )
 
 
 def test_leaving_the_road_goal_progress_and_comfort():
     drivable = np.zeros((100, 1000), dtype=np.bool_)
     drivable[40:60] = True  # y from -2 to 2 m
-    road = Road("strip", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3)))
+    road = Road(
+        "strip", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3))
+    )
     motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
     verdict, _ = verdict_of(motions, go_on, road=road)
-    assert verdict.passed and verdict.goal == pytest.approx(14.9) and verdict.delay == pytest.approx(0.0) and verdict.jerk == 0.0
-    assert verdict.min_gap == pytest.approx(50.0 - 1.8) and verdict.min_ttc == 8.0 and math.isnan(verdict.min_pet)
-    verdict, _ = verdict_of(motions, lambda seen: Pose(10.0 * (seen.time + 0.1), 2.0 * (seen.time + 0.1), 0.0, 10.0), road=road)
-    assert verdict.off_road == pytest.approx(0.6, abs=2e-3) and not verdict.passed  # 1.1 m of room, 0.1 m allowed, at 2 m/s
+    assert (
+        verdict.passed
+        and verdict.goal == pytest.approx(14.9)
+        and verdict.delay == pytest.approx(0.0)
+        and verdict.jerk == 0.0
+    )
+    assert (
+        verdict.min_gap == pytest.approx(50.0 - 1.8)
+        and verdict.min_ttc == 8.0
+        and math.isnan(verdict.min_pet)
+    )
+    verdict, _ = verdict_of(
+        motions,
+        lambda seen: Pose(10.0 * (seen.time + 0.1), 2.0 * (seen.time + 0.1), 0.0, 10.0),
+        road=road,
+    )
+    assert (
+        verdict.off_road == pytest.approx(0.6, abs=2e-3) and not verdict.passed
+    )  # 1.1 m of room, 0.1 m allowed, at 2 m/s
     verdict, _ = verdict_of(motions, lambda _: Command(-5.0, 0.0), road=road)
     assert math.isnan(verdict.goal) and verdict.progress == pytest.approx(10.0 / 149.0, abs=0.01)
-    assert verdict.hardest_braking == pytest.approx(5.0) and verdict.hard_braking == pytest.approx(2.0)
+    assert verdict.hardest_braking == pytest.approx(5.0) and verdict.hard_braking == pytest.approx(
+        2.0
+    )
     verdict, _ = verdict_of(motions, lambda seen: None if seen.time < 0.25 else Command(1.0, 0.0))
-    assert verdict.faults == 3 and not verdict.road_known and "3 faulty command(s)" in verdict.sentence()
+    assert (
+        verdict.faults == 3
+        and not verdict.road_known
+        and "3 faulty command(s)" in verdict.sentence()
+    )
 
 
 def test_time_to_collision_and_post_encroachment_time():
     """Closing at 5 m/s from a gap of 20 - 4.25 m; crossing 2 s after the other has left."""
-    verdict, _ = verdict_of([straight(0, 0, 0, 10.0), straight(20.0, 0, 0, 5.0)], lambda s: Command(-5.0 * (s.time >= 0.95), 0.0))
+    verdict, _ = verdict_of(
+        [straight(0, 0, 0, 10.0), straight(20.0, 0, 0, 5.0)],
+        lambda s: Command(-5.0 * (s.time >= 0.95), 0.0),
+    )
     assert verdict.collision is None and verdict.min_ttc == pytest.approx(10.75 / 5.0, abs=0.1)
     crossing = [straight(-60.0, 0, 0, 10.0), straight(0.0, -30.0, np.pi / 2, 10.0)]
     verdict, _ = verdict_of(crossing, go_on)
@@ -101,9 +150,15 @@ def test_time_to_collision_and_post_encroachment_time():
 
 @pytest.fixture(scope="module")
 def trials():
-    meet = as_scenario([straight(-60.0, 0, 0, 9.0), straight(0.0, -60.0, np.pi / 2, 6.0)], len(TIME))
+    meet = as_scenario(
+        [straight(-60.0, 0, 0, 9.0), straight(0.0, -60.0, np.pi / 2, 6.0)], len(TIME)
+    )
     free = as_scenario([straight(0.0, 0, 0, 8.0), straight(0.0, 60.0, 0, 8.0)], len(TIME))
-    return [Trial("meet", meet, 1, None), Trial("free", free, 0, None), Trial("first", meet, 0, None)]
+    return [
+        Trial("meet", meet, 1, None),
+        Trial("free", free, 0, None),
+        Trial("first", meet, 0, None),
+    ]
 
 
 def test_many_drives_give_the_same_bytes_with_two_workers(trials):
@@ -112,18 +167,33 @@ def test_many_drives_give_the_same_bytes_with_two_workers(trials):
     first, second = (Drives(outcomes, name, config, trials) for outcomes in (one, two))
     assert first.json() == second.json() and as_junit(one, name) == as_junit(two, name)
     assert first.page() == second.page() and all(trial.name in first.page() for trial in trials)
-    assert [outcome.name for outcome in one] == ["meet", "free", "first"] and all(o.verdict.passed for o in one)
+    assert [outcome.name for outcome in one] == ["meet", "free", "first"] and all(
+        o.verdict.passed for o in one
+    )
 
 
 def test_json_junit_rates_and_bars(trials):
-    outcomes = run_trials(trials, lambda: ConstantSpeed(speed=9.3), ClosedLoopConfig(policy="replay"))
+    outcomes = run_trials(
+        trials, lambda: ConstantSpeed(speed=9.3), ClosedLoopConfig(policy="replay")
+    )
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     found = rates(outcomes)
-    assert found["collisions"].count == len([o for o in outcomes if o.verdict.collision]) == 1 and found["goals"].count == 2
+    assert (
+        found["collisions"].count == len([o for o in outcomes if o.verdict.collision]) == 1
+        and found["goals"].count == 2
+    )
     suite = ElementTree.fromstring(as_junit(outcomes, "p:C"))
     assert suite.get("tests") == "3" and suite.get("failures") == str(len(failed))
-    assert [case.get("name") for case in suite if case.find("failure") is not None] == [f"scenario {o.name}" for o in failed]
+    assert [case.get("name") for case in suite if case.find("failure") is not None] == [
+        f"scenario {o.name}" for o in failed
+    ]
     said = json.loads(Drives(outcomes, "p:C", ClosedLoopConfig()).json())
     assert said["summary"]["collisions"]["count"] == 1 and len(said["drives"]) == 3
-    assert [line.split(":")[0] for line in broken_bars(found, Bars())] == ["collisions", "goals", "at_fault"]
-    assert broken_bars(found, Bars(collisions=0.4, at_fault=0.4, goals=0.9)) == ["goals: 66.7 %; at least 90.0 % is required"]
+    assert [line.split(":")[0] for line in broken_bars(found, Bars())] == [
+        "collisions",
+        "goals",
+        "at_fault",
+    ]
+    assert broken_bars(found, Bars(collisions=0.4, at_fault=0.4, goals=0.9)) == [
+        "goals: 66.7 %; at least 90.0 % is required"
+    ]

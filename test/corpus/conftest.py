@@ -8,7 +8,9 @@ import pytest
 
 from scenario_gen.corpus.mine import mine
 
-SMALL = ArchiveConfig(rows=40_000, hours=2.0, encounters=12, outside=5, repeated_ids=0.1, damaged=0.001)
+SMALL = ArchiveConfig(
+    rows=40_000, hours=2.0, encounters=12, outside=5, repeated_ids=0.1, damaged=0.001
+)
 
 
 @pytest.fixture(scope="session")

@@ -31,11 +31,17 @@ pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")
 REQUEST, TEMPLATES = BatchRequest(count=3, seed=5), 3
 PATIENCE = 300.0  # seconds in which a process is at work
-interruptible = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell may have it ignored
+interruptible = partial(
+    signal.signal, signal.SIGINT, signal.SIG_DFL
+)  # a shell may have it ignored
 
 
 def digests(out):
-    return {path.relative_to(out): sha256_of(path) for path in out.rglob("*") if path.suffix in (".parquet", ".mcap", ".yaml")}
+    return {
+        path.relative_to(out): sha256_of(path)
+        for path in out.rglob("*")
+        if path.suffix in (".parquet", ".mcap", ".yaml")
+    }
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +55,11 @@ def test_every_case_is_accounted_for(batch):
     cases = list(rows_of(sorted((out / "cases").rglob("*.parquet"))))
     assert made.cases == len(cases) == 6 and made.requested == 18 and not made.failed
     assert sum(case["published"] for case in cases) == made.scenarios == len(find(out).rows) > 6
-    assert all(case["cause"] and (case["why"] or case["candidates"]) for case in cases if not case["published"])
+    assert all(
+        case["cause"] and (case["why"] or case["candidates"])
+        for case in cases
+        if not case["published"]
+    )
     assert len({case["seed"] for case in cases}) == 6
 
 
@@ -60,14 +70,30 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(batch, tmp_pa
     assert found.rows[0]["road"] == "corridor"
     for row in found.rows[:2]:
         assert make_again(out, row).sha256 == row["sha256"]
-    words = ["--json", "find", str(out), condition, "--limit", "1", "--bag", str(tmp_path / "hits")]
+    words = [
+        "--json",
+        "find",
+        str(out),
+        condition,
+        "--limit",
+        "1",
+        "--bag",
+        str(tmp_path / "hits"),
+    ]
     told = CliRunner().invoke(app, words)
     total = len(found.rows)
-    assert total > 1 and f"{total} found, the first 1 are listed; --limit 0 lists all" in told.stderr, told.output
-    assert len(json.loads(told.stdout)["scenarios"]) == total, "a limit of what is listed leaves nothing out of the results"
+    assert (
+        total > 1 and f"{total} found, the first 1 are listed; --limit 0 lists all" in told.stderr
+    ), told.output
+    assert len(json.loads(told.stdout)["scenarios"]) == total, (
+        "a limit of what is listed leaves nothing out of the results"
+    )
     namespaces = read_recording(tmp_path / "hits").namespaces
     assert {one.hashes for one in namespaces.values()} == {(row["sha256"],) for row in found.rows}
-    assert sum(count for *_, count in found.coverage) == made.scenarios and "coverage" in coverage_lines(found, out)[0]
+    assert (
+        sum(count for *_, count in found.coverage) == made.scenarios
+        and "coverage" in coverage_lines(found, out)[0]
+    )
     with pytest.raises(ScenarioGenError, match="is not that of the table"):
         make_again(out, found.rows[0] | {"sha256": "0"})
     with pytest.raises(InputError, match="the columns are"):
@@ -90,10 +116,14 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(batch, tmp_pa
 def test_recorded_encounters_are_found_by_their_figures(corpus):
     encounters = {row["name"]: encounter_of(row) for row in rows_of(tables_of(corpus[0]))}
     found = find(corpus[0], "pet < 3 and gap < 6")
-    assert 0 < len(found.rows) < len(encounters) and "crossing on recorded" in "".join(coverage_lines(found, corpus[0]))
+    assert 0 < len(found.rows) < len(encounters) and "crossing on recorded" in "".join(
+        coverage_lines(found, corpus[0])
+    )
     for row in found.rows:
         measures = criticality(at_period(encounters[row["template"]], 0.1), 10.0)
-        assert row["pet"] == pytest.approx(measures.pet, abs=1e-6) and row["ttc"] == pytest.approx(measures.min_ttc, abs=1e-6)
+        assert row["pet"] == pytest.approx(measures.pet, abs=1e-6) and row["ttc"] == pytest.approx(
+            measures.min_ttc, abs=1e-6
+        )
     with pytest.raises(InputError, match="holds recordings; for a bag write scenarios with"):
         make_again(corpus[0], found.rows[0])
 
@@ -101,7 +131,9 @@ def test_recorded_encounters_are_found_by_their_figures(corpus):
 def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
     out, _ = batch
     before = digests(out)
-    (out / "cases" / "road=straight" / "part-00000.parquet").unlink()  # as if killed before its last file
+    (
+        out / "cases" / "road=straight" / "part-00000.parquet"
+    ).unlink()  # as if killed before its last file
     assert not find(out, "road = 'straight'").rows
     run_batch(corpus[0], ROADS, out, REQUEST, templates=TEMPLATES)
     assert digests(out) == before
@@ -113,7 +145,9 @@ def at_work(run, folder, pattern):
     """Wait until a process has made what matches a pattern; it must not end before, nor take for ever."""
     end = time.monotonic() + PATIENCE
     while not list(folder.rglob(pattern)):
-        assert run.poll() is None and time.monotonic() < end, "it ended, or did nothing, before it could be stopped"
+        assert run.poll() is None and time.monotonic() < end, (
+            "it ended, or did nothing, before it could be stopped"
+        )
         time.sleep(0.01)
 
 
@@ -121,9 +155,23 @@ def at_work(run, folder, pattern):
 def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus, tmp_path):
     """The run is killed with its workers as soon as its first file is there, and then done by Dask to the end."""
     out = tmp_path / "again"
-    words = [sys.executable, "-m", "scenario_gen", "batch", str(corpus[0]), "--out", str(out), "--count", "3", "--seed", "5"]
+    words = [
+        sys.executable,
+        "-m",
+        "scenario_gen",
+        "batch",
+        str(corpus[0]),
+        "--out",
+        str(out),
+        "--count",
+        "3",
+        "--seed",
+        "5",
+    ]
     words += ["--templates", str(TEMPLATES), "--roads", ",".join(ROADS), "--workers", "2"]
-    with subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+    with subprocess.Popen(
+        words, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as run:
         at_work(run, out, "*.mcap")
         os.killpg(run.pid, signal.SIGKILL)
     made = run_batch(corpus[0], ROADS, out, REQUEST, templates=TEMPLATES, workers=Workers(2))
@@ -135,21 +183,38 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
 def test_a_batch_of_two_processes_that_is_ended_leaves_only_what_is_done(corpus, tmp_path, number):
     """By Ctrl-C in a terminal, which all processes get, at once; after SIGKILL with the next command."""
     out, own = tmp_path / "out", os.environ | {"TMPDIR": str(tmp_path)}
-    words = [sys.executable, "-m", "scenario_gen", "batch", str(corpus[0]), "--out", str(out), "--count", "200"]
+    words = [
+        sys.executable,
+        "-m",
+        "scenario_gen",
+        "batch",
+        str(corpus[0]),
+        "--out",
+        str(out),
+        "--count",
+        "200",
+    ]
     words += ["--roads", ",".join(ROADS), "--workers", "2"]
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(words, start_new_session=True, env=own, preexec_fn=interruptible, **pipes) as run:  # noqa: PLW1509
+    with subprocess.Popen(
+        words, start_new_session=True, env=own, preexec_fn=interruptible, **pipes
+    ) as run:  # noqa: PLW1509
         at_work(run, out, ".scenario_gen-*/new/*")
         os.kill(run.pid, number) if number == signal.SIGKILL else os.killpg(run.pid, number)
         said = run.stderr.read()  # up to the end of the last process
     assert said.strip() == ("" if number == signal.SIGKILL else "stopped by SIGINT")
     if number == signal.SIGKILL:
-        subprocess.run([*words[:3], "validate", str(out)], env=own, capture_output=True, check=False)
-    assert not list(tmp_path.rglob(".scenario_gen*")) and [path.name for path in tmp_path.iterdir()] == ["out"]
+        subprocess.run(
+            [*words[:3], "validate", str(out)], env=own, capture_output=True, check=False
+        )
+    assert not list(tmp_path.rglob(".scenario_gen*")) and [
+        path.name for path in tmp_path.iterdir()
+    ] == ["out"]
 
 
 @pytest.mark.parametrize(
-    ("inside", "said"), [("", "of which it would"), ("batch", "of which it would"), ("archive.json", "is a file")]
+    ("inside", "said"),
+    [("", "of which it would"), ("batch", "of which it would"), ("archive.json", "is a file")],
 )
 def test_a_batch_is_written_beside_its_corpus(corpus, inside, said):
     before = sorted(corpus[0].rglob("*"))
@@ -161,7 +226,9 @@ def test_a_batch_is_written_beside_its_corpus(corpus, inside, said):
 FOREVER = "(SELECT count(*) FROM range(100000000) a, range(100000000) b WHERE a.range * b.range % 7 = 3) > pet"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.long)]
+)
 def test_a_find_that_is_ended_leaves_nothing(batch, number):
     """Ctrl-C leaves nothing; after SIGKILL any other command on the batch takes away what was left."""
     out = batch[0]
@@ -178,27 +245,44 @@ def test_a_find_that_is_ended_leaves_nothing(batch, number):
 
 def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
-        run_batch(corpus[0], ["straight", "nowhere"], tmp_path / "out", BatchRequest(count=1), templates=1)
+        run_batch(
+            corpus[0],
+            ["straight", "nowhere"],
+            tmp_path / "out",
+            BatchRequest(count=1),
+            templates=1,
+        )
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
     ("kind", "why", "failures"),
     [
-        (LostEncounterError, "has no place that keeps the encounter: vehicles 1 and 2 do not meet", {LOST_CONFLICT: 4}),
+        (
+            LostEncounterError,
+            "has no place that keeps the encounter: vehicles 1 and 2 do not meet",
+            {LOST_CONFLICT: 4},
+        ),
         (
             RefusedError,
             "has 4 arms, and the recorded vehicles enter and leave by 3 (one each: vehicles 1, 2)",
-            {f"road {name} has … arms, and the recorded vehicles enter and leave by …": 2 for name in ROADS},
+            {
+                f"road {name} has … arms, and the recorded vehicles enter and leave by …": 2
+                for name in ROADS
+            },
         ),
     ],
 )
-def test_like_refusals_are_counted_under_one_cause(corpus, tmp_path, monkeypatch, kind, why, failures):
+def test_like_refusals_are_counted_under_one_cause(
+    corpus, tmp_path, monkeypatch, kind, why, failures
+):
     def refuse(attempt):
         raise kind(f"road {attempt.road.name} {why}")
 
     monkeypatch.setattr(batches.Chain, "run", refuse)
-    made = run_batch(corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1))
+    made = run_batch(
+        corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1)
+    )
     assert made.failures == failures and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
     assert {case["why"].split()[1] for case in cases} == set(ROADS)

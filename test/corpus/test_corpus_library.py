@@ -24,7 +24,9 @@ def following(order):
     ways = {"early": 10.0 * time, "late": 10.0 * time - 15.0}
     position = np.array([np.stack([ways[name], np.zeros(100)], axis=1) for name in order])
     vehicles = tuple(Vehicle(name) for name in order)
-    return Encounter("e", vehicles, 0, 100_000_000, position, np.zeros((2, 100)), np.full((2, 100), 10.0))
+    return Encounter(
+        "e", vehicles, 0, 100_000_000, position, np.zeros((2, 100)), np.full((2, 100), 10.0)
+    )
 
 
 def test_who_is_first_does_not_depend_on_the_order_in_the_log():
@@ -39,7 +41,9 @@ def test_agreement_is_that_of_scikit_learn():
     random = np.random.default_rng(1)
     for _ in range(20):
         one, other = random.integers(0, 4, 60), random.integers(0, 3, 60)
-        assert adjusted_rand(one, other) == pytest.approx(adjusted_rand_score(one, other), abs=1e-12)
+        assert adjusted_rand(one, other) == pytest.approx(
+            adjusted_rand_score(one, other), abs=1e-12
+        )
     assert adjusted_rand(one, 3 - one) == 1.0
 
 
@@ -48,14 +52,21 @@ def test_a_library_of_a_corpus(corpus):
     built = build(out, most=8)
     assert built.fitted == 8 and built.assigned >= mined.encounters and built.primitives >= 2
     library = PrimitiveLibrary.load(out / "library" / "library.json")
-    pairs = {pair.name: pair for row in rows_of(tables_of(out)) for pair in pair_encounters(encounter_of(row), 6.0)}
+    pairs = {
+        pair.name: pair
+        for row in rows_of(tables_of(out))
+        for pair in pair_encounters(encounter_of(row), 6.0)
+    }
     rows = list(rows_of(sorted((out / "library" / "segments").glob("*.parquet"))))
     assert {row["pair"] for row in rows} == set(pairs)
     for row in rows:
-        assert len(row["primitives"]) == len(row["changepoints"]) + 1 and max(row["primitives"]) < len(library.means)
+        assert len(row["primitives"]) == len(row["changepoints"]) + 1 and max(
+            row["primitives"]
+        ) < len(library.means)
         assert all(0 < point < len(pairs[row["pair"]].time) for point in row["changepoints"])
         assert json.loads(row["reactions"])["edges"] == [
-            edge.document(pairs[row["pair"]].vehicles) for edge in reactions_of(pairs[row["pair"]]).edges
+            edge.document(pairs[row["pair"]].vehicles)
+            for edge in reactions_of(pairs[row["pair"]]).edges
         ]
     page = (out / "library" / "library.html").read_text()
     assert "the second follows in" in page and "nobody reacts in" in page

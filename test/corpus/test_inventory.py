@@ -27,8 +27,18 @@ def test_each_file_of_an_archive_is_one_thing(tmp_path):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     messages, logs, others = inventory([tmp_path])
-    names = [[path.relative_to(tmp_path).as_posix() for path in own] for own in (messages, *logs, others)]
-    assert names == [["a/deep/two.txt", "a/one.csv"], ["b/log.csv"], ["c/d/log.csv"], ["bag"], ["c/loose.mcap"], ["b/readme.md"]]
+    names = [
+        [path.relative_to(tmp_path).as_posix() for path in own]
+        for own in (messages, *logs, others)
+    ]
+    assert names == [
+        ["a/deep/two.txt", "a/one.csv"],
+        ["b/log.csv"],
+        ["c/d/log.csv"],
+        ["bag"],
+        ["c/loose.mcap"],
+        ["b/readme.md"],
+    ]
 
 
 def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, monkeypatch):
@@ -44,6 +54,10 @@ def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, mon
     made = mine([logs], tmp_path / "corpus")
     assert made.encounters == 1 and not made.failed
     assert {one["name"] for one in made.refused} == {"alone", "apart", "labels", "notes"}
-    assert "--set log.proximity=510 takes two" in [one["why"].rpartition("; ")[2] for one in made.refused]
-    monkeypatch.setattr("scenario_gen.corpus.encounters.read_log", lambda *_: pytest.fail("it is read again"))
+    assert "--set log.proximity=510 takes two" in [
+        one["why"].rpartition("; ")[2] for one in made.refused
+    ]
+    monkeypatch.setattr(
+        "scenario_gen.corpus.encounters.read_log", lambda *_: pytest.fail("it is read again")
+    )
     assert mine([logs], tmp_path / "corpus").encounters == 1

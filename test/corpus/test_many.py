@@ -16,7 +16,9 @@ def test_workers_do_not_change_results_and_a_refusal_keeps_its_place():
     alone, spread = (generate_many(cases, count=1, seed=3, workers=workers) for workers in (1, 2))
     assert [type(answer).__name__ for answer in alone] == ["RefusedError", "GenerationResult"]
     assert isinstance(spread[0], RefusedError) and str(spread[0]) == str(alone[0])
-    assert all(np.array_equal(a.position, b.position) for a, b in zip(alone[1], spread[1], strict=True))
+    assert all(
+        np.array_equal(a.position, b.position) for a, b in zip(alone[1], spread[1], strict=True)
+    )
     assert spread[1].evaluation.to_json() == alone[1].evaluation.to_json()
     assert generate_many([]) == []
     with pytest.raises(InputError, match="fourway"):

@@ -31,10 +31,15 @@ pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
 
 def found_in(out):
     rows = rows_of(tables_of(out), ["vehicles", "kind"])
-    return {frozenset(int(name.partition("x")[0]) for name in row["vehicles"]): row["kind"] for row in rows}
+    return {
+        frozenset(int(name.partition("x")[0]) for name in row["vehicles"]): row["kind"]
+        for row in rows
+    }
 
 
-def test_planted_encounters_are_found_with_their_kinds_and_those_just_outside_are_not(archive, corpus):
+def test_planted_encounters_are_found_with_their_kinds_and_those_just_outside_are_not(
+    archive, corpus
+):
     planted = {frozenset(one.devices): one.kind for one in read_planted(archive) if one.inside}
     found = found_in(corpus[0])
     assert found.keys() == planted.keys()
@@ -46,8 +51,12 @@ def test_every_row_that_is_left_out_is_counted_by_file(archive, corpus):
     truth = json.loads((archive / "synthetic.json").read_text())
     assert mined.account["rows"] == truth["rows"]
     assert mined.account["left out: no row of 19 fields with numbers"] == truth["damaged"]
-    wrong = sum(mined.account[cause] for cause in mined.account if "clocks" in cause or "2004" in cause)
-    assert 0.9 * truth["wrong_times"] <= wrong <= truth["wrong_times"]  # a few agree with the other clock by chance
+    wrong = sum(
+        mined.account[cause] for cause in mined.account if "clocks" in cause or "2004" in cause
+    )
+    assert (
+        0.9 * truth["wrong_times"] <= wrong <= truth["wrong_times"]
+    )  # a few agree with the other clock by chance
     assert any("shared by several vehicles" in note for note in mined.notes)
     page = (corpus[0] / "encounters.html").read_text()
     assert page.count("<svg") == mined.encounters and "<script" not in page
@@ -58,11 +67,19 @@ def test_who_reacts_to_whom_stands_in_table_and_page(corpus):
     page, kinds = (corpus[0] / "encounters.html").read_text(), {}
     for row in rows_of(tables_of(corpus[0])):
         found, encounter = json.loads(row["reactions"]), encounter_of(row)
-        assert (encounter.name, encounter.duration, encounter.origin) == (row["name"], row["seconds"], (row["lat"], row["lon"]))
-        assert found["edges"] == [edge.document(encounter.vehicles) for edge in reactions_of(encounter).edges]
+        assert (encounter.name, encounter.duration, encounter.origin) == (
+            row["name"],
+            row["seconds"],
+            (row["lat"], row["lon"]),
+        )
+        assert found["edges"] == [
+            edge.document(encounter.vehicles) for edge in reactions_of(encounter).edges
+        ]
         assert all(sentence in page for sentence in found["sentences"])
         kinds.setdefault(row["kind"], []).append([edge["kind"] for edge in found["edges"]])
-    assert ["follow"] in kinds["following"] and not any("follow" in found for found in kinds["opposing"])
+    assert ["follow"] in kinds["following"] and not any(
+        "follow" in found for found in kinds["opposing"]
+    )
 
 
 def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
@@ -76,13 +93,23 @@ def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
         tables = sorted((tmp_path / name / "messages").glob("*.parquet"))
         rows = np.concatenate(
             [
-                np.stack([parquet.read_table(t, filters=[("cause", "=", 0)])[c].to_numpy() for c in ("device", "t", "lat")])
+                np.stack(
+                    [
+                        parquet.read_table(t, filters=[("cause", "=", 0)])[c].to_numpy()
+                        for c in ("device", "t", "lat")
+                    ]
+                )
                 for t in tables
             ],
             1,
         )
         counts = [json.loads(t.with_suffix(".json").read_text())["files"] for t in tables]
-        seen.append((rows[:, np.lexsort(rows)], sum(causes["rows"] for one in counts for causes in one.values())))
+        seen.append(
+            (
+                rows[:, np.lexsort(rows)],
+                sum(causes["rows"] for one in counts for causes in one.values()),
+            )
+        )
     assert len(tables) > 5
     assert (seen[0][0] == seen[1][0]).all() and seen[0][1] == seen[1][1]
 
@@ -114,15 +141,28 @@ def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
 def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive, tmp_path):
     (tmp_path / "in").mkdir()
     row = "1,1,7,259200000000000,0,0,0,42.3,-83.7,250,0,0,0,0,0,0,0,0,100\n"
-    (tmp_path / "in" / "a.csv").write_text(row + "0,0\n" + row.replace(",7,", ",,").replace("42.3", "95.0") + row[:40])
+    (tmp_path / "in" / "a.csv").write_text(
+        row + "0,0\n" + row.replace(",7,", ",,").replace("42.3", "95.0") + row[:40]
+    )
     (tmp_path / "in" / "one.csv").write_text("t,x,y\n0,0,0\n1,1,0\n")
     (tmp_path / "in" / "wide.csv").write_text("1," * 100_000)
     (tmp_path / "in" / "packed.csv.gz").write_bytes(b"\x1f\x8b")
     mined = mine([tmp_path / "in"], tmp_path / "out")
-    assert mined.encounters == 0 and len(mined.failed) == 2 and "one.csv" in mined.failed[0] and "unpacked" in mined.failed[1]
-    assert [one["name"] for one in mined.refused] == ["wide"] and "no table" in mined.refused[0]["why"]
+    assert (
+        mined.encounters == 0
+        and len(mined.failed) == 2
+        and "one.csv" in mined.failed[0]
+        and "unpacked" in mined.failed[1]
+    )
+    assert [one["name"] for one in mined.refused] == ["wide"] and "no table" in mined.refused[0][
+        "why"
+    ]
     assert not list((tmp_path / "out").glob("found/*"))
-    assert mined.account == {"rows": 4, "left out: no row of 19 fields with numbers": 2, "left out: no vehicle": 1}
+    assert mined.account == {
+        "rows": 4,
+        "left out: no row of 19 fields with numbers": 2,
+        "left out: no vehicle": 1,
+    }
 
 
 def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_path):
@@ -131,13 +171,26 @@ def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_p
     lines = (archive / sorted(archive.glob("*.csv"))[0].name).read_text().splitlines()[:8000]
     for name, add in (("TripStart_bsmrx_41000_p001.csv", 20_000), ("plain.csv", 0)):
         rows = [line.split(",") for line in lines]
-        rows = [[*row[:6], str((int(row[6]) + add) % 60_000), *row[7:]] for row in rows if len(row) == 19]
+        rows = [
+            [*row[:6], str((int(row[6]) + add) % 60_000), *row[7:]]
+            for row in rows
+            if len(row) == 19
+        ]
         (tmp_path / "in" / name).write_text("\n".join(map(",".join, rows)) + "\n")
     mined = mine([tmp_path / "in"], tmp_path / "out")
-    assert [note for note in mined.notes if "DSecond" in note and "41000" in note] and not mined.failed
-    off, good = (mined.files[str(tmp_path / "in" / name)] for name in ("TripStart_bsmrx_41000_p001.csv", "plain.csv"))
-    assert off["kept: stamps of another day"] > 3000 and not [why for why in off if "clocks" in why]
-    assert 0 < good["kept: stamps that run backwards"] <= off["kept: stamps that run backwards"]  # one clock tells less
+    assert [
+        note for note in mined.notes if "DSecond" in note and "41000" in note
+    ] and not mined.failed
+    off, good = (
+        mined.files[str(tmp_path / "in" / name)]
+        for name in ("TripStart_bsmrx_41000_p001.csv", "plain.csv")
+    )
+    assert off["kept: stamps of another day"] > 3000 and not [
+        why for why in off if "clocks" in why
+    ]
+    assert (
+        0 < good["kept: stamps that run backwards"] <= off["kept: stamps that run backwards"]
+    )  # one clock tells less
 
 
 def test_nothing_to_read_is_an_error(tmp_path):
@@ -169,7 +222,10 @@ def straight(x, y, heading, speed, seconds=12.0):
 def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case):
     kind, *both = case
     cos, sin = np.cos(turned), np.sin(turned)
-    a, b = (straight(cos * x - sin * y, sin * x + cos * y, heading + turned, 10.0) for x, y, heading in both)
+    a, b = (
+        straight(cos * x - sin * y, sin * x + cos * y, heading + turned, 10.0)
+        for x, y, heading in both
+    )
     assert kind_of(a, b, 0.1) == kind == kind_of(b, a, 0.1)
 
 
@@ -180,7 +236,10 @@ def meeting(a, b, start, end, gap):
 def test_who_is_joined_to_whom():
     config = LogConfig()
     platoon = [meeting(k, k + 1, 0, 20, 1.0 + k) for k in range(3)]
-    assert [one.devices for one in group(platoon, config)] == [(0, 1, 2), (2, 3)]  # 3 meets one of three: too few
+    assert [one.devices for one in group(platoon, config)] == [
+        (0, 1, 2),
+        (2, 3),
+    ]  # 3 meets one of three: too few
     apart = [meeting(1, 2, 0, 20, 1.0), meeting(2, 3, 30, 50, 1.0)]
     assert [one.devices for one in group(apart, config)] == [(1, 2), (2, 3)]
     crowd = [meeting(a, b, 0, 20, 1.0 + a) for b in range(15) for a in range(b)]
@@ -192,21 +251,32 @@ def test_who_is_joined_to_whom():
 
 @given(
     rows=strategies.lists(
-        strategies.tuples(*(strategies.integers(0, high) for high in (4, 3, 150, 40, 9))).filter(lambda row: row[3] >= 3),
+        strategies.tuples(*(strategies.integers(0, high) for high in (4, 3, 150, 40, 9))).filter(
+            lambda row: row[3] >= 3
+        ),
         max_size=40,
     ),
     least=strategies.integers(1, 6),
 )
 def test_partitions_of_meetings_give_the_encounters_of_all(rows, least):
     config = LogConfig(max_vehicles=3)
-    meetings = [meeting(a, a + 1 + more, start, start + length, float(gap)) for a, more, start, length, gap in rows]
-    spans = partitions(np.array([m.start for m in meetings]), np.array([m.end for m in meetings]), least)
+    meetings = [
+        meeting(a, a + 1 + more, start, start + length, float(gap))
+        for a, more, start, length, gap in rows
+    ]
+    spans = partitions(
+        np.array([m.start for m in meetings]), np.array([m.end for m in meetings]), least
+    )
     divided = [[m for m in meetings if begin <= m.start < end] for begin, end in spans]
-    assert sum(map(len, divided)) == len(meetings) and all(len(own) >= least for own in divided[:-1])
+    assert sum(map(len, divided)) == len(meetings) and all(
+        len(own) >= least for own in divided[:-1]
+    )
     assert [one for own in divided for one in group(own, config)] == group(meetings, config)
 
 
-def test_small_partitions_give_the_same_corpus_by_small_tasks(archive, corpus, tmp_path, monkeypatch):
+def test_small_partitions_give_the_same_corpus_by_small_tasks(
+    archive, corpus, tmp_path, monkeypatch
+):
     monkeypatch.setattr(grouping, "PARTITION", 2)
     config = CorpusConfig(task_encounters=3)
     mine([archive], tmp_path / "out", config)
@@ -215,4 +285,7 @@ def test_small_partitions_give_the_same_corpus_by_small_tasks(archive, corpus, t
     for table in (tmp_path / "out" / "encounters").glob("*.parquet"):
         table.unlink()
     tasks = clean_tasks(tmp_path / "out", config)
-    assert max(len(task.found) for task in tasks) > 1 and max(len(pickle.dumps(replace(t, config=None))) for t in tasks) <= 500
+    assert (
+        max(len(task.found) for task in tasks) > 1
+        and max(len(pickle.dumps(replace(t, config=None))) for t in tasks) <= 500
+    )

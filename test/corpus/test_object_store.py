@@ -59,7 +59,11 @@ def tables(out):
 def contents(out):
     """{name: bytes} of all files of a batch, or of a library, in a folder or in a store."""
     if isinstance(out, Path):
-        return {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("[!.]*") if path.is_file()}
+        return {
+            path.relative_to(out).as_posix(): path.read_bytes()
+            for path in out.rglob("[!.]*")
+            if path.is_file()
+        }
     return {below(one, out): read(one) for one in out.rglob("[!.]*")}
 
 
@@ -70,7 +74,9 @@ def written(one):
 
 
 @pytest.mark.parametrize("to_store", [True, pytest.param(False, marks=pytest.mark.long)])
-def test_the_corpus_is_the_same_wherever_archive_and_corpus_lie(bucket, archive, corpus, tmp_path, to_store):
+def test_the_corpus_is_the_same_wherever_archive_and_corpus_lie(
+    bucket, archive, corpus, tmp_path, to_store
+):
     """And what is done is not done again."""
     out = place(f"{bucket}/out", to_write=True) if to_store else tmp_path / "out"
     made = mine([place(f"{bucket}/spmd")], out)
@@ -86,20 +92,28 @@ def test_the_corpus_is_the_same_wherever_archive_and_corpus_lie(bucket, archive,
 
 
 def test_a_batch_and_what_it_finds_are_the_same_in_a_store(bucket, corpus, tmp_path):
-    stored, local, request = place(f"{bucket}/corpus"), tmp_path / "batch", BatchRequest(count=2, seed=5)
+    stored, local, request = (
+        place(f"{bucket}/corpus"),
+        tmp_path / "batch",
+        BatchRequest(count=2, seed=5),
+    )
     upload(corpus[0] / "encounters", stored / "encounters")
     out = place(f"{bucket}/batch")
     made = run_batch(stored, ["corridor"], out, request, templates=2)
     assert made.lines() == run_batch(corpus[0], ["corridor"], local, request, templates=2).lines()
     assert made.scenarios and contents(out) == contents(local)
-    assert find(out).rows == find(local).rows and coverage_lines(find(out), out) == coverage_lines(find(local), local)
+    assert find(out).rows == find(local).rows and coverage_lines(find(out), out) == coverage_lines(
+        find(local), local
+    )
     row = find(out).rows[0]
     assert make_again(out, row).sha256 == row["sha256"]
     namespaces = read_recording(export_hits(out, [row], tmp_path / "hits")).namespaces
     assert [one.hashes for one in namespaces.values()] == [(row["sha256"],)]
     with pytest.raises(InputError, match="batch of other count"):
         run_batch(stored, ["corridor"], out, BatchRequest(count=3, seed=5), templates=2)
-    remove(out / "cases" / "road=corridor" / "part-00000.parquet")  # as if killed before its last object
+    remove(
+        out / "cases" / "road=corridor" / "part-00000.parquet"
+    )  # as if killed before its last object
     with pytest.raises(InputError, match="holds no scenarios"):
         find(out)
 
@@ -123,13 +137,20 @@ def test_a_library_is_the_same_in_a_store(bucket, corpus, tmp_path):
 class Failing(BaseHTTPRequestHandler):
     """Passes requests on to a server; every fifth gets 503 instead, every seventh nothing."""
 
-    protocol_version, to, requests = "HTTP/1.1", "", count(1)  # 1.1: who sends a body waits for 100 Continue
+    protocol_version, to, requests = (
+        "HTTP/1.1",
+        "",
+        count(1),
+    )  # 1.1: who sends a body waits for 100 Continue
 
     def log_message(self, *_):
         """Be silent."""
 
     def _pass(self):
-        number, body = next(self.requests), self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        number, body = (
+            next(self.requests),
+            self.rfile.read(int(self.headers.get("Content-Length", 0))),
+        )
         if number % 7 == 0:
             self.close_connection = True
             self.connection.shutdown(socket.SHUT_RDWR)
@@ -144,7 +165,10 @@ class Failing(BaseHTTPRequestHandler):
             for name, value in answer.getheaders():
                 if name.lower() not in ("transfer-encoding", "connection", "content-length"):
                     self.send_header(name, value)
-            self.send_header("Content-Length", answer.getheader("Content-Length", "0") if self.command == "HEAD" else len(data))
+            self.send_header(
+                "Content-Length",
+                answer.getheader("Content-Length", "0") if self.command == "HEAD" else len(data),
+            )
             self.send_header("Connection", "close")
             self.end_headers()
             self.wfile.write(data)
@@ -169,7 +193,17 @@ def test_a_store_that_fails_now_and_then_gives_the_same_bytes(bucket, server, co
 @pytest.mark.long
 @pytest.mark.parametrize("seconds", [1.5, 2.5, 3.5])
 def test_a_killed_run_is_gone_on_with(bucket, corpus, seconds):
-    words = [sys.executable, "-m", "scenario_gen", "mine", f"{bucket}/spmd", "--out", f"{bucket}/killed", "--workers", "1"]
+    words = [
+        sys.executable,
+        "-m",
+        "scenario_gen",
+        "mine",
+        f"{bucket}/spmd",
+        "--out",
+        f"{bucket}/killed",
+        "--workers",
+        "1",
+    ]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
         time.sleep(seconds)
         process.kill()
@@ -181,23 +215,36 @@ def test_a_killed_run_is_gone_on_with(bucket, corpus, seconds):
     ("words", "said"),
     [
         (("mine", "BUCKET/nothing", "--out", "BUCKET/out"), "s3://.*/nothing does not exist"),
-        (("mine", "s3://no-such-bucket/a", "--out", "BUCKET/out"), "s3://no-such-bucket/a does not exist; check bucket and name"),
+        (
+            ("mine", "s3://no-such-bucket/a", "--out", "BUCKET/out"),
+            "s3://no-such-bucket/a does not exist; check bucket and name",
+        ),
         (("mine", "BUCKET/spmd", "--out", "https://example.org/x"), "https is only read"),
         (("mine", "ftp://host/a", "--out", "BUCKET/out"), "ftp is not read or written"),
         (("batch", "BUCKET/out", "--roads", "straight", "--out", "x"), "out holds no encounters/"),
         (("library", "BUCKET/out"), "out holds no encounters/"),
         (("find", "BUCKET/out"), "out holds no scenarios"),
-        (("roads", "BUCKET/a.xodr", "--out", "x.svg"), "a.xodr: a map takes a file or folder; copy it first"),
+        (
+            ("roads", "BUCKET/a.xodr", "--out", "x.svg"),
+            "a.xodr: a map takes a file or folder; copy it first",
+        ),
     ],
 )
 def test_what_cannot_be_is_said_with_its_url(bucket, tmp_path, monkeypatch, words, said):
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, [word.replace("BUCKET", bucket) for word in words])
-    assert isinstance(done.exception, InputError) and re.search(said, str(done.exception)), done.output
+    assert isinstance(done.exception, InputError) and re.search(said, str(done.exception)), (
+        done.output
+    )
 
 
 def test_without_credentials_the_url_and_the_remedy_are_named(bucket, monkeypatch, tmp_path):
-    nobody = {"AWS_ACCESS_KEY_ID": "", "AWS_SECRET_ACCESS_KEY": "", "AWS_EC2_METADATA_DISABLED": "true", "HOME": str(tmp_path)}
+    nobody = {
+        "AWS_ACCESS_KEY_ID": "",
+        "AWS_SECRET_ACCESS_KEY": "",
+        "AWS_EC2_METADATA_DISABLED": "true",
+        "HOME": str(tmp_path),
+    }
     for name, value in nobody.items():
         monkeypatch.setenv(name, value)
     fsspec.get_filesystem_class("s3").clear_instance_cache()

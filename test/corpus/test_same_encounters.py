@@ -25,7 +25,20 @@ def column(folder, count, behind, speed):
         for tick in range(200):
             longitude, latitude = GLOBE(speed * (0.1 * tick - behind * k), 0.0, inverse=True)
             stamp = 259_203_600_000_000 + 100_000 * tick
-            row = [9, 1, k + 1, stamp, 0, 0, stamp // 1000 % 60_000, f"{latitude:.7f}", f"{longitude:.7f}", 250, speed, 90]
+            row = [
+                9,
+                1,
+                k + 1,
+                stamp,
+                0,
+                0,
+                stamp // 1000 % 60_000,
+                f"{latitude:.7f}",
+                f"{longitude:.7f}",
+                250,
+                speed,
+                90,
+            ]
             lines.append(",".join(map(str, [*row, 0, 0, 0, 0, 0, 0, 100])))
     (folder / "a.csv").write_text("\n".join(lines) + "\n")
     return folder
@@ -38,7 +51,11 @@ def both(folder, out):
     read = read_log(sorted(folder.glob("*.csv"))).encounters
     return (
         sorted(
-            (sorted(int(v.id) for v in one.vehicles), round(one.start_ns * 1e-9), round(one.start_ns * 1e-9 + one.duration))
+            (
+                sorted(int(v.id) for v in one.vehicles),
+                round(one.start_ns * 1e-9),
+                round(one.start_ns * 1e-9 + one.duration),
+            )
             for one in found
         )
         for found in (mined, read)
@@ -59,4 +76,6 @@ def test_an_archive(tmp_path, seed):
     mined, read = both(tmp_path / "in", tmp_path / "out")
     assert [names for names, _, _ in read] == [names for names, _, _ in mined]
     assert np.allclose([times for _, *times in read], [times for _, *times in mined], atol=1.0)
-    assert {tuple(names) for names, _, _ in read} == {tuple(sorted(one.devices)) for one in planted if one.inside}
+    assert {tuple(names) for names, _, _ in read} == {
+        tuple(sorted(one.devices)) for one in planted if one.inside
+    }

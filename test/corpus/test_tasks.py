@@ -59,6 +59,13 @@ def test_a_task_that_is_refused_does_not_end_the_others():
     told = []
     with spread(Workers(1, "", lambda *how: told.append(how))) as go:
         b, c, d = go(refuse, ["a", "b", "c", "d"])
-        assert b == "b: b is none" and c.startswith("c: KeyError at refusing.py:") and c.endswith(": KeyError 'c'")
-        assert d == "d: d.parquet: No space left on device; make room there, or name a place on another disk"
+        assert (
+            b == "b: b is none"
+            and c.startswith("c: KeyError at refusing.py:")
+            and c.endswith(": KeyError 'c'")
+        )
+        assert (
+            d
+            == "d: d.parquet: No space left on device; make room there, or name a place on another disk"
+        )
     assert [done for done, *_ in told] == [1, 2, 3, 4]

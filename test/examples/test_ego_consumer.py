@@ -65,10 +65,30 @@ def test_it_drives_a_scenario_in_lock_step(tmp_path):
     (encounter,) = read_log(RESOURCES / "synthetic_c").encounters
     bag = write_recording(tmp_path / "bag", generate(encounter, "straight", count=1, seed=7))
     with free_domain() as domain:
-        traffic = start_nodes("traffic", "--ros-args", "-p", f"bag:={bag}", "-p", "lock_step:=true", ROS_DOMAIN_ID=str(domain))
-        command = [sys.executable, str(EXAMPLE), "--ros-args", "-p", "speed:=10.0", "-p", "lock_step:=true"]
+        traffic = start_nodes(
+            "traffic",
+            "--ros-args",
+            "-p",
+            f"bag:={bag}",
+            "-p",
+            "lock_step:=true",
+            ROS_DOMAIN_ID=str(domain),
+        )
+        command = [
+            sys.executable,
+            str(EXAMPLE),
+            "--ros-args",
+            "-p",
+            "speed:=10.0",
+            "-p",
+            "lock_step:=true",
+        ]
         ego = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ | {"ROS_DOMAIN_ID": str(domain)}
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
         )
         client = Client(domain)
         try:

@@ -20,7 +20,9 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 def test_the_script_generates_from_the_bundled_log_without_ros():
     script = f"runpy.run_path({str(EXAMPLES / 'generate.py')!r}, run_name='__main__')"
     command = f"import runpy, sys; sys.modules['rclpy'] = None; sys.argv = ['generate.py', '--count', '4']; {script}"
-    ran = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=False)
+    ran = subprocess.run(
+        [sys.executable, "-c", command], capture_output=True, text=True, check=False
+    )
     assert ran.returncode == 0, ran.stderr
     assert "synthetic_a on t_intersection: 4 of " in ran.stdout
     assert "without vehicle 1: 2; its reference drive is there" in ran.stdout
@@ -32,23 +34,40 @@ def test_the_notebook_was_executed_and_runs(name, pictures, capsys):
     from matplotlib import pyplot
 
     matplotlib.use("agg")
-    cells = [cell for cell in json.loads((EXAMPLES / name).read_text())["cells"] if cell["cell_type"] == "code"]
+    cells = [
+        cell
+        for cell in json.loads((EXAMPLES / name).read_text())["cells"]
+        if cell["cell_type"] == "code"
+    ]
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
     namespace = {}
     for cell in cells:
-        shown = "".join("".join(output["text"]) for output in cell["outputs"] if output["output_type"] == "stream")
+        shown = "".join(
+            "".join(output["text"])
+            for output in cell["outputs"]
+            if output["output_type"] == "stream"
+        )
         assert not [output for output in cell["outputs"] if output["output_type"] == "error"]
         exec(compile("".join(cell["source"]), name, "exec"), namespace)
         assert capsys.readouterr().out == shown, "execute the notebook again"
     pyplot.close("all")
-    assert sum("image/png" in output.get("data", {}) for cell in cells for output in cell["outputs"]) == pictures
+    assert (
+        sum("image/png" in output.get("data", {}) for cell in cells for output in cell["outputs"])
+        == pictures
+    )
 
 
 def test_the_notebook_of_drive_env_was_executed_without_errors():
     """Its training takes minutes, and stable-baselines3 is not in the locks: so it is not run here."""
-    cells = [cell for cell in json.loads((EXAMPLES / "drive_env.ipynb").read_text())["cells"] if cell["cell_type"] == "code"]
+    cells = [
+        cell
+        for cell in json.loads((EXAMPLES / "drive_env.ipynb").read_text())["cells"]
+        if cell["cell_type"] == "code"
+    ]
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
-    assert not [output for cell in cells for output in cell["outputs"] if output["output_type"] == "error"]
+    assert not [
+        output for cell in cells for output in cell["outputs"] if output["output_type"] == "error"
+    ]
     namespace = {}
     for cell in cells:
         code = "".join(cell["source"])

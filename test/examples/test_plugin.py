@@ -33,13 +33,20 @@ def python(tmp_path_factory):
     encounter = read_log(bundled("a")).encounters[0]
     with (work / "log.jsonl").open("w") as file:
         for n, vehicle in enumerate(encounter.vehicles):
-            for t, (x, y), yaw in zip(encounter.time, encounter.position[n], encounter.heading[n], strict=True):
-                print(json.dumps({"vehicle": vehicle.id, "t": t, "x": x, "y": y, "heading": yaw}), file=file)
+            for t, (x, y), yaw in zip(
+                encounter.time, encounter.position[n], encounter.heading[n], strict=True
+            ):
+                print(
+                    json.dumps({"vehicle": vehicle.id, "t": t, "x": x, "y": y, "heading": yaw}),
+                    file=file,
+                )
     path = os.pathsep.join([str(work / "installed"), str(ROOT), os.environ.get("PYTHONPATH", "")])
 
     def run(*arguments):
         variables, command = os.environ | {"PYTHONPATH": path}, [sys.executable, *arguments]
-        found = subprocess.run(command, cwd=work, env=variables, capture_output=True, text=True, check=False)
+        found = subprocess.run(
+            command, cwd=work, env=variables, capture_output=True, text=True, check=False
+        )
         assert found.returncode == 0, found.stdout + found.stderr
         return found.stdout
 
@@ -48,13 +55,29 @@ def python(tmp_path_factory):
 
 
 def test_the_command_takes_all_by_name(python):
-    options = ("--road", "skew_crossing", "--count", "2", "--out", "out", "--set", "planning.planner=one_corner")
-    said = python("-m", "scenario_gen", "generate", "log.jsonl", *options, "--set", "log.format=json_lines")
+    options = (
+        "--road",
+        "skew_crossing",
+        "--count",
+        "2",
+        "--out",
+        "out",
+        "--set",
+        "planning.planner=one_corner",
+    )
+    said = python(
+        "-m", "scenario_gen", "generate", "log.jsonl", *options, "--set", "log.format=json_lines"
+    )
     assert "log on skew_crossing" in said
     (evaluation,) = json.loads((python.folder / "out" / "evaluation.json").read_text())["cases"]
-    assert evaluation["metrics"][-1]["id"] == "mean_speed" and evaluation["road"] == "skew_crossing"
+    assert (
+        evaluation["metrics"][-1]["id"] == "mean_speed" and evaluation["road"] == "skew_crossing"
+    )
     rows = {row["name"]: row["values"]["mean_speed"] for row in evaluation["rows"]}
-    assert rows["recording"]["value"] > 1.0 and rows["with changepoints"]["value"] > 0.5 * rows["recording"]["value"]
+    assert (
+        rows["recording"]["value"] > 1.0
+        and rows["with changepoints"]["value"] > 0.5 * rows["recording"]["value"]
+    )
 
     python("-m", "scenario_gen", "export", "out/bag", "--to", "csv", "--out", "tables")
     manifest = json.loads((python.folder / "tables" / "export.json").read_text())

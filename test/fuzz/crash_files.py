@@ -15,8 +15,12 @@ from scenario_gen.base.errors import InputError, LONGEST
 
 def crash_files(*patterns: str) -> list:
     """Return one parameter of the fixture `file` for each file that is made, and for each that was found, marked `recorded`."""
-    made = [Path(name) for name in broken.FILES if any(fnmatch(name, pattern) for pattern in patterns)]
-    found = sorted(file for pattern in patterns for file in CRASHES.glob(pattern) if file.is_file())
+    made = [
+        Path(name) for name in broken.FILES if any(fnmatch(name, pattern) for pattern in patterns)
+    ]
+    found = sorted(
+        file for pattern in patterns for file in CRASHES.glob(pattern) if file.is_file()
+    )
     assert made, patterns
     return [
         *(pytest.param(file, id=f"made {file}") for file in made),

@@ -40,7 +40,9 @@ DATA = Path(os.environ.get("SCENARIO_GEN_DATA", HERE.parents[2] / "shared" / "da
 CRASHES = DATA.parent / "crashes"
 SECONDS = 5.0  # of CPU that one execution may take
 MEMORY = 1 << 30  # bytes that the process may hold at its peak
-HEADROOM = 3 << 30  # bytes of address space that an execution may ask for: more is refused, so that the machine lives on
+HEADROOM = (
+    3 << 30
+)  # bytes of address space that an execution may ask for: more is refused, so that the machine lives on
 SILENT = 300  # s that an execution may take: after that it hangs outside of Python
 BATCH = 5000  # executions of one child
 SAVED = 30.0  # s after which a child makes room for the next, and progress is kept: who is stopped loses no more
@@ -96,7 +98,10 @@ class OverTimeError(BaseException):
 def tests_on_path() -> None:
     """Let modules of tests find each other as they do under pytest."""
     project = tomllib.loads((HERE.parents[1] / "pyproject.toml").read_text())
-    folders = [str(HERE.parents[1] / folder) for folder in project["tool"]["pytest"]["ini_options"]["pythonpath"]]
+    folders = [
+        str(HERE.parents[1] / folder)
+        for folder in project["tool"]["pytest"]["ini_options"]["pythonpath"]
+    ]
     sys.path += [folder for folder in folders if folder not in sys.path]
 
 
@@ -113,13 +118,19 @@ def corpus(target: Target, *, found: bool = True) -> list[bytes]:
 
     with tempfile.TemporaryDirectory() as folder:
         seeds = list(target.seeds(Path(folder)))
-    seeds += [make() for name, make in broken.FILES.items() if any(fnmatch(name, pattern) for pattern in target.crashes)]
+    seeds += [
+        make()
+        for name, make in broken.FILES.items()
+        if any(fnmatch(name, pattern) for pattern in target.crashes)
+    ]
     return seeds + (found_crashes(target) if found else [])
 
 
 def found_crashes(target: Target) -> list[bytes]:
     """Return the files that once broke a target, where they are."""
-    files = sorted(file for pattern in target.crashes for file in CRASHES.glob(pattern) if file.is_file())
+    files = sorted(
+        file for pattern in target.crashes for file in CRASHES.glob(pattern) if file.is_file()
+    )
     return [file.read_bytes() for file in files]
 
 
@@ -134,13 +145,17 @@ def damaged(target: Target, seeds: Sequence[bytes], number: int) -> bytes:
     return data
 
 
-def execute(target: Target, data: bytes, folder: Path, most: int = MEMORY) -> tuple[str, str] | None:
+def execute(
+    target: Target, data: bytes, folder: Path, most: int = MEMORY
+) -> tuple[str, str] | None:
     """Run a target on one input in this process; return signature and message of what must not come out, or None."""
     folder.mkdir()
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         target.run(data, folder)
-    except UnforeseenError as error:  # what a user gets instead of a traceback is a finding all the same
+    except (
+        UnforeseenError
+    ) as error:  # what a user gets instead of a traceback is a finding all the same
         return signature(error.__cause__ or error), str(error)
     except ScenarioGenError as error:
         said = str(error)
@@ -166,7 +181,9 @@ def signature(error: BaseException) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     places = [f"{Path(frame.filename).name}:{frame.lineno} {frame.name}" for frame in frames]
     ours = [
-        place for place, frame in zip(places, frames, strict=True) if re.search("scenario_gen/|msg_conventions/", frame.filename)
+        place
+        for place, frame in zip(places, frames, strict=True)
+        if re.search("scenario_gen/|msg_conventions/", frame.filename)
     ]
     return f"{type(error).__name__} @ {(ours or places)[-1]} <- {places[-1]}"
 
@@ -177,7 +194,13 @@ def over_time(_signal: int, _frame: object) -> None:
 
 
 def child(
-    target: Target, seeds: Sequence[bytes], last: int, until: float, parent: int, number: "Synchronized[int]", out: TextIO
+    target: Target,
+    seeds: Sequence[bytes],
+    last: int,
+    until: float,
+    parent: int,
+    number: "Synchronized[int]",
+    out: TextIO,
 ) -> None:
     """Execute inputs from `number` on to before `last`, or up to a time, or while the parent lives; failures go to a file."""
     warnings.simplefilter("ignore")
@@ -195,7 +218,9 @@ def child(
     with tempfile.TemporaryDirectory() as scratch:
         while number.value < last and time.monotonic() < until and os.getppid() == parent:
             signal.alarm(SILENT)  # ends the process: it hangs outside of Python
-            found = execute(target, damaged(target, seeds, number.value), Path(scratch) / "input", most)
+            found = execute(
+                target, damaged(target, seeds, number.value), Path(scratch) / "input", most
+            )
             if found:
                 print(json.dumps([number.value, *found]), file=out, flush=True)
             number.value += 1
@@ -210,18 +235,28 @@ def batch(
     context = multiprocessing.get_context("fork")
     number = context.Value("q", first, lock=False)
     with tempfile.TemporaryFile("w+") as out:
-        process = context.Process(target=child, args=(target, seeds, last, until, os.getpid(), number, out))
+        process = context.Process(
+            target=child, args=(target, seeds, last, until, os.getpid(), number, out)
+        )
         process.start()
         process.join()
         out.seek(0)
         found = [tuple(json.loads(line)) for line in out]
     if process.exitcode:
-        found.append((number.value, f"exit code {process.exitcode}", "a signal, if it is negative"))
+        found.append(
+            (number.value, f"exit code {process.exitcode}", "a signal, if it is negative")
+        )
         number.value += 1
     return number.value, found
 
 
-def fuzz(target: Target, state: Path, executions: int, seconds: float, seeds: Sequence[bytes] | None = None) -> Record:
+def fuzz(
+    target: Target,
+    state: Path,
+    executions: int,
+    seconds: float,
+    seeds: Sequence[bytes] | None = None,
+) -> Record:
     """Fuzz a target until it has had so many executions or so much time, those of earlier runs on `state` included.
 
     Args:

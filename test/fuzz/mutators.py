@@ -32,20 +32,69 @@ TEXTS = """nan NaN inf -inf 1e308 -1e308 1e-320 -0 0 1 -1 None null NA True fals
 NUMBERS = (*re.split(r"\s+", TEXTS), "", " ", "a\tb", "1" * 400, "x" * 3000)
 WORDS = (
     *(text.encode("utf-8", "surrogatepass") for text in NUMBERS),
-    *(b"\x00", b"\x00" * 8, b"\xff" * 4, b"\xff" * 8, b"\xef\xbb\xbf", b"\xff\xfe", b"\n", b"\r", b"\r\n", b",", b";", b"#"),
+    *(
+        b"\x00",
+        b"\x00" * 8,
+        b"\xff" * 4,
+        b"\xff" * 8,
+        b"\xef\xbb\xbf",
+        b"\xff\xfe",
+        b"\n",
+        b"\r",
+        b"\r\n",
+        b",",
+        b";",
+        b"#",
+    ),
     *(struct.pack("<d", value) for value in (math.nan, math.inf, 1e308, -0.0, 5e-324)),
     *(struct.pack("<q", value) for value in (-(2**63), 2**63 - 1, 2**31, 2**32 - 1)),
 )
 REALS = (None, 0.0, -1.0, 1e308, -0.0, 5e-324, math.nan, math.inf, -math.inf, 2.0**53)
 WHOLE = (None, 0, 1, -1, 127, 2**31, 2**53, 2**62, 2**63 - 1, -(2**63))
 TYPES = (
-    *(pa.int8(), pa.int64(), pa.uint64(), pa.uint8(), pa.float32(), pa.float64(), pa.float16(), pa.bool_(), pa.null()),
-    *(pa.string(), pa.large_string(), pa.binary(), pa.dictionary(pa.int32(), pa.string()), pa.decimal128(38, 6)),
-    *(pa.timestamp("s"), pa.timestamp("ms", "UTC"), pa.timestamp("us"), pa.timestamp("us", "Europe/Berlin"), pa.timestamp("ns")),
-    *(pa.timestamp("ns", "+05:30"), pa.date32(), pa.date64(), pa.time32("ms"), pa.time64("ns"), pa.duration("us")),
+    *(
+        pa.int8(),
+        pa.int64(),
+        pa.uint64(),
+        pa.uint8(),
+        pa.float32(),
+        pa.float64(),
+        pa.float16(),
+        pa.bool_(),
+        pa.null(),
+    ),
+    *(
+        pa.string(),
+        pa.large_string(),
+        pa.binary(),
+        pa.dictionary(pa.int32(), pa.string()),
+        pa.decimal128(38, 6),
+    ),
+    *(
+        pa.timestamp("s"),
+        pa.timestamp("ms", "UTC"),
+        pa.timestamp("us"),
+        pa.timestamp("us", "Europe/Berlin"),
+        pa.timestamp("ns"),
+    ),
+    *(
+        pa.timestamp("ns", "+05:30"),
+        pa.date32(),
+        pa.date64(),
+        pa.time32("ms"),
+        pa.time64("ns"),
+        pa.duration("us"),
+    ),
     *(pa.list_(pa.int64()), pa.struct([("a", pa.int64())]), pa.map_(pa.string(), pa.int64())),
 )
-PANDAS = (b"{}", b"[]", b"null", b"{", b'{"columns": 3, "index_columns": []}', b'{"index_columns": ["t_s"], "columns": []}')
+PANDAS = (
+    b"{}",
+    b"[]",
+    b"null",
+    b"{",
+    b'{"columns": 3, "index_columns": []}',
+    b'{"index_columns": ["t_s"], "columns": []}',
+)
 
 
 def flip(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -63,7 +112,11 @@ def cut(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     if not data:
         return data
     at = rng.randrange(len(data))
-    return data[:at] if rng.random() < 0.5 else data[:at] + data[at + rng.choice((1, 2, 4, 8, rng.randrange(len(data)) + 1)) :]
+    return (
+        data[:at]
+        if rng.random() < 0.5
+        else data[:at] + data[at + rng.choice((1, 2, 4, 8, rng.randrange(len(data)) + 1)) :]
+    )
 
 
 def splice(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -91,7 +144,21 @@ def integer(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     there = int.from_bytes(data[at : at + size], order)
     top = 1 << 8 * size
     value = (
-        rng.choice((0, 1, top - 1, top // 2, top // 2 - 1, there + 1, there - 1, there * 2, there << 8, rng.randrange(top))) % top
+        rng.choice(
+            (
+                0,
+                1,
+                top - 1,
+                top // 2,
+                top // 2 - 1,
+                there + 1,
+                there - 1,
+                there * 2,
+                there << 8,
+                rng.randrange(top),
+            )
+        )
+        % top
     )
     return data[:at] + value.to_bytes(size, order) + data[at + size :]
 
@@ -106,7 +173,13 @@ def lines_of(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     rng.shuffle(extra := [*rows])
     more = [*rows, rng.choice(lines)]
     turned = (rows[::-1], rows[:: rng.choice((2, 3, 10, 50))])
-    ways = (head + extra, head + rows * rng.choice((2, 5)), *(head + each for each in turned), rows, more)
+    ways = (
+        head + extra,
+        head + rows * rng.choice((2, 5)),
+        *(head + each for each in turned),
+        rows,
+        more,
+    )
     return b"\n".join(rng.choice(ways))
 
 
@@ -165,16 +238,35 @@ def changed(rng: random.Random, table: pa.Table) -> pa.Table:
             return table.set_column(at, name, values.cast(rng.choice(TYPES), safe=False))
         case 1:
             few = rng.choice((WHOLE, REALS, NUMBERS))
-            return table.set_column(at, name, pa.array([rng.choice(few) for _ in range(len(values))]))
+            return table.set_column(
+                at, name, pa.array([rng.choice(few) for _ in range(len(values))])
+            )
         case 2:
             return table.set_column(
-                at, name, pa.array([None if rng.random() < 0.1 else v.as_py() for v in values], type=values.type)
+                at,
+                name,
+                pa.array(
+                    [None if rng.random() < 0.1 else v.as_py() for v in values], type=values.type
+                ),
             )
         case 3:
-            numbers = values.cast(pa.float64(), safe=False).to_numpy() * rng.choice((0.0, -1.0, 1e-9, 1e3, 1e6, 1e9, 1e300))
+            numbers = values.cast(pa.float64(), safe=False).to_numpy() * rng.choice(
+                (0.0, -1.0, 1e-9, 1e3, 1e6, 1e9, 1e300)
+            )
             return table.set_column(at, name, pa.array(numbers).cast(values.type, safe=False))
         case 4:
-            names = [*table.column_names, "t_s", "time", "utc", "lat", "id", "speed", "", "\x00", "x" * 3000]
+            names = [
+                *table.column_names,
+                "t_s",
+                "time",
+                "utc",
+                "lat",
+                "id",
+                "speed",
+                "",
+                "\x00",
+                "x" * 3000,
+            ]
             return table.set_column(at, rng.choice(names), values)
         case 5:
             return table.remove_column(at)
@@ -204,18 +296,44 @@ def records(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
 
 def sentence(rng: random.Random, base: sqlite3.Connection) -> tuple[str, tuple[object, ...]]:
     """Return an SQL statement that damages one table, with its values."""
-    table = rng.choice([name.decode() for (name,) in base.execute("select name from sqlite_master where type = 'table'")])
-    column = rng.choice([entry[1].decode() for entry in base.execute(f'pragma table_info("{table}")')])
+    table = rng.choice(
+        [
+            name.decode()
+            for (name,) in base.execute("select name from sqlite_master where type = 'table'")
+        ]
+    )
+    column = rng.choice(
+        [entry[1].decode() for entry in base.execute(f'pragma table_info("{table}")')]
+    )
     value = rng.choice(
-        (*WHOLE, *REALS, "text", "", b"", b"\xff\x00", b"\x00\x01\x00\x00", "é" * 2000, rng.randbytes(40), "{", "[]")
+        (
+            *WHOLE,
+            *REALS,
+            "text",
+            "",
+            b"",
+            b"\xff\x00",
+            b"\x00\x01\x00\x00",
+            "é" * 2000,
+            rng.randbytes(40),
+            "{",
+            "[]",
+        )
     )
     name = rng.choice(("id", "data", "x", "timestamp", "name", "type", "topic_id"))
     some = f"rowid * {rng.randrange(1, 97)} % 97 < {rng.choice((1, 10, 97))}"
     statement = rng.choice(
         (
             *[f'update "{table}" set "{column}" = ? where {some}'] * 2,
-            *(f'alter table "{table}" {how}' for how in (f'rename column "{column}" to "{name}"', f'drop column "{column}"')),
-            *(f'alter table "{table}" rename to "{name}"', f'drop table "{table}"', f'delete from "{table}" where {some}'),
+            *(
+                f'alter table "{table}" {how}'
+                for how in (f'rename column "{column}" to "{name}"', f'drop column "{column}"')
+            ),
+            *(
+                f'alter table "{table}" rename to "{name}"',
+                f'drop table "{table}"',
+                f'delete from "{table}" where {some}',
+            ),
             f'insert into "{table}" select * from "{table}" limit 3',
         )
     )
@@ -229,7 +347,9 @@ def header(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     one, other = rng.randrange(width), rng.randrange(width)
     how = rng.randrange(5)
     if how == 4:
-        table[0][one] = rng.choice((*table[0], b"", b"x", b" " + table[0][one], table[0][one].upper()))
+        table[0][one] = rng.choice(
+            (*table[0], b"", b"x", b" " + table[0][one], table[0][one].upper())
+        )
     for row in table if how < 4 else ():
         if len(row) != width:
             continue
@@ -286,7 +406,9 @@ def fields(kind: str) -> Mutator:
             for _ in range(rng.choice((1, 1, 2, 5))):
                 message = other_value(rng, message)
             return bytes(STORE.serialize_cdr(message, kind))
-        except Exception:  # what was damaged before is no message; a value that its field cannot hold
+        except (
+            Exception
+        ):  # what was damaged before is no message; a value that its field cannot hold
             return rng.choice(BYTES)(rng, data, seeds)
 
     return change
@@ -295,13 +417,23 @@ def fields(kind: str) -> Mutator:
 def other_value(rng: random.Random, value: Any) -> Any:
     """Return a value of the same kind with one thing changed, at any depth."""
     if is_dataclass(value):
-        name = rng.choice([field.name for field in dataclasses.fields(value) if not field.name.startswith("__")])
+        name = rng.choice(
+            [field.name for field in dataclasses.fields(value) if not field.name.startswith("__")]
+        )
         return dataclasses.replace(value, **{name: other_value(rng, getattr(value, name))})
     if isinstance(value, np.ndarray):
         if not len(value) or rng.random() < 0.3:
-            return np.resize(value, rng.choice((0, 1, len(value) + 1, 3 * len(value)))) if len(value) else value
+            return (
+                np.resize(value, rng.choice((0, 1, len(value) + 1, 3 * len(value))))
+                if len(value)
+                else value
+            )
         out = value.copy()
-        few = (math.nan, math.inf, -1e308, 1e-320, 0.0, -1.0) if out.dtype.kind == "f" else (0, 1, np.iinfo(out.dtype).max)
+        few = (
+            (math.nan, math.inf, -1e308, 1e-320, 0.0, -1.0)
+            if out.dtype.kind == "f"
+            else (0, 1, np.iinfo(out.dtype).max)
+        )
         out[rng.randrange(len(out))] = rng.choice(few)
         return out
     if isinstance(value, list):
@@ -314,5 +446,7 @@ def other_value(rng: random.Random, value: Any) -> Any:
     if isinstance(value, int):
         return rng.choice((0, 1, 2, 127, 255, 2**31 - 1, -(2**31), 2**32 - 1, value + 1))
     if isinstance(value, float):
-        return rng.choice((math.nan, math.inf, -math.inf, 0.0, -0.0, -1.0, 1e308, 5e-324, value * 1e9, -value))
+        return rng.choice(
+            (math.nan, math.inf, -math.inf, 0.0, -0.0, -1.0, 1e308, 5e-324, value * 1e9, -value)
+        )
     return rng.choice((*NUMBERS, value + value, value[:-1]))

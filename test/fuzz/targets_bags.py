@@ -39,7 +39,12 @@ from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.journal import open_journal, read_journal
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.evaluation import compare, comparison_table, EvaluationConfig, read_evaluations
+from scenario_gen.method.evaluation import (
+    compare,
+    comparison_table,
+    EvaluationConfig,
+    read_evaluations,
+)
 from scenario_gen.method.segmentation import assign, build_library, PrimitiveLibrary
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.evaluation import bag_results
@@ -70,7 +75,8 @@ def generated(folder: Path) -> list[bytes]:
     (encounter,) = read_log([bundled("b")]).encounters
     case = generate(encounter, "t_intersection", CONFIG, count=2, seed=7)
     bag = write_recording(
-        folder / "bag", replace(case, provenance=provenance_of([bundled("b")], 7, 2, ["t_intersection"], CONFIG))
+        folder / "bag",
+        replace(case, provenance=provenance_of([bundled("b")], 7, 2, ["t_intersection"], CONFIG)),
     )
     return [(bag / "bag_0.mcap").read_bytes()]
 
@@ -86,7 +92,13 @@ def ros1(folder: Path) -> list[bytes]:
             text = writer.add_connection("/a", "std_msgs/msg/String", typestore=types)
             head = writer.add_connection("/b", "std_msgs/msg/Header", typestore=types)
             for k in range(40):
-                writer.write(text, k, store.cdr_to_ros1(b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00", "std_msgs/msg/String"))
+                writer.write(
+                    text,
+                    k,
+                    store.cdr_to_ros1(
+                        b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00", "std_msgs/msg/String"
+                    ),
+                )
                 writer.write(head, k, bytes(16))
     return [path.read_bytes() for path in sorted(folder.glob("*.bag"))]
 
@@ -104,10 +116,21 @@ def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
                 for k, message in enumerate(found):
                     if k in chosen:
                         other = rng.choice(found)
-                        content = rng.choice(BYTES)(rng, message.data, [message.data for message in found])
-                        stamp = rng.choice((0, 1, 2**62, message.stamp_ns + 1, rng.randrange(2**40)))
-                        changes = ({"topic": other.topic}, {"stamp_ns": stamp}, {"data": other.data}, {"type": other.type})
-                        message = replace(message, **(changes[how] if how < len(changes) else {"data": content}))  # noqa: PLW2901
+                        content = rng.choice(BYTES)(
+                            rng, message.data, [message.data for message in found]
+                        )
+                        stamp = rng.choice(
+                            (0, 1, 2**62, message.stamp_ns + 1, rng.randrange(2**40))
+                        )
+                        changes = (
+                            {"topic": other.topic},
+                            {"stamp_ns": stamp},
+                            {"data": other.data},
+                            {"type": other.type},
+                        )
+                        message = replace(
+                            message, **(changes[how] if how < len(changes) else {"data": content})
+                        )  # noqa: PLW2901
                     bag.add_topic(message.topic, message.type)
                     bag.write(message.topic, message.data, message.stamp_ns)
             return (folder / "out" / "out_0.mcap").read_bytes()
@@ -130,7 +153,11 @@ def in_file(name: str, read: Callable[[Path], object]) -> Callable[[bytes, Path]
 
 def read_bag(path: Path) -> None:
     """Read all that a bag has."""
-    for each in (lambda: bag_topics(path), lambda: list(read_messages(path)), lambda: read_recording(path).provenance):
+    for each in (
+        lambda: bag_topics(path),
+        lambda: list(read_messages(path)),
+        lambda: read_recording(path).provenance,
+    ):
         with_errors(each)
     read_scenario_set(path)
 
@@ -183,8 +210,18 @@ def maps(_folder: Path) -> list[bytes]:
     grey = Image.fromarray(pixels)
     alpha = Image.merge("LA", (grey, Image.fromarray(np.full_like(pixels, 255))))
     for name, image in (
-        *(("map.pgm", grey), ("map.png", grey), ("map.png", alpha), ("map.bmp", grey), ("map.jpg", grey)),
-        *(("map.png", grey.convert("P")), ("map.pbm", grey.convert("1")), ("map.ppm", grey.convert("RGB"))),
+        *(
+            ("map.pgm", grey),
+            ("map.png", grey),
+            ("map.png", alpha),
+            ("map.bmp", grey),
+            ("map.jpg", grey),
+        ),
+        *(
+            ("map.png", grey.convert("P")),
+            ("map.pbm", grey.convert("1")),
+            ("map.ppm", grey.convert("RGB")),
+        ),
     ):
         text = f"image: {name}\nresolution: 0.2\norigin: [-5.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
         file = io.BytesIO()
@@ -211,7 +248,19 @@ def parameter_files(_folder: Path) -> list[bytes]:
 
 def assignments(_folder: Path) -> list[bytes]:
     """One assignment for each parameter, and values of all kinds."""
-    odd = ["'", '"', "[1, 2]", "{a: [}", "!!int ''", "!!bool x", "*a", "&a [*a]", "%YAML 9.9", "...", "2024-99-99"]
+    odd = [
+        "'",
+        '"',
+        "[1, 2]",
+        "{a: [}",
+        "!!int ''",
+        "!!bool x",
+        "*a",
+        "&a [*a]",
+        "%YAML 9.9",
+        "...",
+        "2024-99-99",
+    ]
     values = (*TEXTS.split(), "", *odd)
     names = list(flatten(PipelineConfig()))
     kept = [f"{name}={value}" for name, (_, value) in flatten(PipelineConfig()).items()]
@@ -245,9 +294,15 @@ def use_library(path: Path) -> None:
 def evaluations(folder: Path) -> list[bytes]:
     """evaluation.json of a run, and one evaluation alone."""
     found = [
-        case.evaluation.to_json() for case in bag_results(write_recording(folder / "bag", hand_made_run()), CONFIG.evaluation)
+        case.evaluation.to_json()
+        for case in bag_results(
+            write_recording(folder / "bag", hand_made_run()), CONFIG.evaluation
+        )
     ]
-    return [json.dumps({"provenance": {}, "cases": [json.loads(text) for text in found]}).encode(), found[0].encode()]
+    return [
+        json.dumps({"provenance": {}, "cases": [json.loads(text) for text in found]}).encode(),
+        found[0].encode(),
+    ]
 
 
 def drives(folder: Path) -> list[bytes]:
@@ -259,7 +314,9 @@ def drives(folder: Path) -> list[bytes]:
 def refuse_other_drives(path: Path) -> None:
     """Read drives, and compare with none."""
     earlier = read_drives(path)
-    refuse_others({name: digest for name, (digest, _) in earlier.drives.items()}, ClosedLoopConfig(), earlier)
+    refuse_others(
+        {name: digest for name, (digest, _) in earlier.drives.items()}, ClosedLoopConfig(), earlier
+    )
 
 
 def journals(folder: Path) -> list[bytes]:
@@ -285,7 +342,9 @@ def compare_with_itself(path: Path) -> None:
 
 
 EXTREMES = '[0, -1, 1, 9007199254740992, 9223372036854775808, 1e308, -1e308, 1e-320, 0.5, null, true, "", "x", [], {}, [[]]]'
-DEEP = re.findall(rb"[^|]+", b'[|{a: |- |? |{"a":|&a |*a|!!float |!!binary |!!set |<<: |%TAG ! x\n')
+DEEP = re.findall(
+    rb"[^|]+", b'[|{a: |- |? |{"a":|&a |*a|!!float |!!binary |!!set |<<: |%TAG ! x\n'
+)
 
 
 def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -295,12 +354,22 @@ def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
         holder, place = None, None
         node = document
         while isinstance(node, dict | list) and node and (holder is None or rng.random() < 0.85):
-            holder, place = node, rng.choice(list(node) if isinstance(node, dict) else range(len(node)))
+            holder, place = (
+                node,
+                rng.choice(list(node) if isinstance(node, dict) else range(len(node))),
+            )
             node = node[place]
         if holder is None:
             return rng.choice(BYTES)(rng, data, seeds)
         extremes = [*json.loads(EXTREMES), 10**400, "é" * 500]
-        more = [float("nan"), float("inf"), [node], {"a": node}, [node] * 3, node[:-1] if isinstance(node, list) else node]
+        more = [
+            float("nan"),
+            float("inf"),
+            [node],
+            {"a": node},
+            [node] * 3,
+            node[:-1] if isinstance(node, list) else node,
+        ]
         if rng.random() < 0.15:
             del holder[place]
         else:
@@ -320,19 +389,62 @@ JSON = (*BYTES, deep, *[values] * 6)
 YAML = (*TEXT, deep, deep)
 SQLITE = partial(bags, StoragePlugin.SQLITE3)
 TARGETS = (
-    Target("mcap_reader", runs, in_file("a.mcap", read_bag), BYTES, ("mcap_reader/*", "mcap_zstd*", "reindex_huge*"), "a.mcap"),
-    Target("sqlite_reader", SQLITE, in_file("a.db3", read_bag), (*BYTES, *[records] * 5), ("sqlite/*",), "a.db3"),
+    Target(
+        "mcap_reader",
+        runs,
+        in_file("a.mcap", read_bag),
+        BYTES,
+        ("mcap_reader/*", "mcap_zstd*", "reindex_huge*"),
+        "a.mcap",
+    ),
+    Target(
+        "sqlite_reader",
+        SQLITE,
+        in_file("a.db3", read_bag),
+        (*BYTES, *[records] * 5),
+        ("sqlite/*",),
+        "a.db3",
+    ),
     Target("ros1_reader", ros1, in_file("a.bag", read_bag), BYTES, named="a.bag"),
-    Target("reindex", runs, in_file("a.mcap", save_and_read), BYTES, ("reindex/*", "reindex_*", "mcap_zstd*")),
-    Target("validate", runs, in_file("a.mcap", validate_bag), BAG, ("validate/*", "mcap_reader/*")),
+    Target(
+        "reindex",
+        runs,
+        in_file("a.mcap", save_and_read),
+        BYTES,
+        ("reindex/*", "reindex_*", "mcap_zstd*"),
+    ),
+    Target(
+        "validate", runs, in_file("a.mcap", validate_bag), BAG, ("validate/*", "mcap_reader/*")
+    ),
     Target("evaluate", runs, in_file("a.mcap", measure), BAG),
-    Target("regenerate", generated, in_file("a.mcap", lambda path: regenerate_scenario(path, 1)), BAG),
-    Target("metadata", metadata, in_file("metadata.yaml", read_folder), YAML, ("meta/*",), "metadata.yaml"),
+    Target(
+        "regenerate", generated, in_file("a.mcap", lambda path: regenerate_scenario(path, 1)), BAG
+    ),
+    Target(
+        "metadata",
+        metadata,
+        in_file("metadata.yaml", read_folder),
+        YAML,
+        ("meta/*",),
+        "metadata.yaml",
+    ),
     Target("map", maps, read_map, (*BYTES, deep), ("map/*.yaml", "*.yaml")),
-    Target("parameters", parameter_files, in_file("p.yaml", lambda path: loaded(PipelineConfig(), path)), YAML, ("params/*",)),
+    Target(
+        "parameters",
+        parameter_files,
+        in_file("p.yaml", lambda path: loaded(PipelineConfig(), path)),
+        YAML,
+        ("params/*",),
+    ),
     Target("assignment", assignments, assign_one, (*BYTES, deep)),
     Target("library", libraries, in_file("library.json", use_library), JSON, ("library/*",)),
-    Target("evaluation_json", evaluations, in_file("evaluation.json", compare_with_itself), JSON, ("result/*",)),
+    Target(
+        "evaluation_json",
+        evaluations,
+        in_file("evaluation.json", compare_with_itself),
+        JSON,
+        ("result/*",),
+    ),
     Target("drives_json", drives, in_file("drives.json", refuse_other_drives), JSON),
     Target("journal", journals, in_file("a.journal.jsonl", read_journal), (*BYTES, *TEXT)),
 )

@@ -15,12 +15,27 @@ from small_scenarios import crossing
 from targets_bags import JSON
 from targets_logs import PARQUET, safety_messages, SHORT
 from targets_maps import MAP
-from test_adapters import argoverse2, commonroad, highd, ind, interaction, nocturne, omega_prime, osi
+from test_adapters import (
+    argoverse2,
+    commonroad,
+    highd,
+    ind,
+    interaction,
+    nocturne,
+    omega_prime,
+    osi,
+)
 from test_commonroad import case_of
 
 from scenario_gen.corpus.batch import CASE_COLUMNS, SCENARIO_COLUMNS
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import account_of, encounter_of, row_of, tables_of, write_encounters
+from scenario_gen.corpus.encounters import (
+    account_of,
+    encounter_of,
+    row_of,
+    tables_of,
+    write_encounters,
+)
 from scenario_gen.corpus.find import coverage_lines, find
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.tables import rows_of
@@ -42,7 +57,10 @@ WAYS: dict[str, Sequence[Mutator]] = {
 def packed(folder: Path) -> bytes:
     """Return the files below a folder as one input."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return b"".join(b"\n\x00FILE %s\x00\n%s" % (str(path.relative_to(folder)).encode(), path.read_bytes()) for path in files)
+    return b"".join(
+        b"\n\x00FILE %s\x00\n%s" % (str(path.relative_to(folder)).encode(), path.read_bytes())
+        for path in files
+    )
 
 
 def one_file(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -61,7 +79,12 @@ def one_file(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     return b"".join(b"\n\x00FILE %s\x00\n%s" % (key, content) for key, content in files.items())
 
 
-def files_target(name: str, seeds: Callable[[Path], object], read: Callable[[Path], object], named: str = "input") -> Target:
+def files_target(
+    name: str,
+    seeds: Callable[[Path], object],
+    read: Callable[[Path], object],
+    named: str = "input",
+) -> Target:
     """Return a target whose input is a folder of files; messages name the folder, or what is in it."""
 
     def make(folder: Path) -> list[bytes]:
@@ -83,7 +106,11 @@ def files_target(name: str, seeds: Callable[[Path], object], read: Callable[[Pat
 
 def read_all(folder: Path) -> None:
     """Read a folder of tables, or its only file, as a log."""
-    main = [path for path in sorted(folder.iterdir()) if path.suffix in (".parquet", ".xml", ".xosc", ".mcap")]
+    main = [
+        path
+        for path in sorted(folder.iterdir())
+        if path.suffix in (".parquet", ".xml", ".xosc", ".mcap")
+    ]
     read_log(main[0] if main else folder, SHORT)
 
 
@@ -94,7 +121,9 @@ def openscenario(folder: Path) -> None:
 
 def corpus_tables(folder: Path) -> None:
     """Write a table of two encounters as a corpus has it."""
-    rows = [row_of(read_log([bundled(case)]).encounters[0], "log", CorpusConfig()) for case in "bc"]
+    rows = [
+        row_of(read_log([bundled(case)]).encounters[0], "log", CorpusConfig()) for case in "bc"
+    ]
     write_encounters(folder / "encounters" / "log-0.parquet", rows, {"refused": [], "quality": []})
 
 

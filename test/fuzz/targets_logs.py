@@ -40,7 +40,14 @@ SHORT = LogConfig(min_duration=1.0, travel=1.0)
 def cars() -> pd.DataFrame:
     """Rows of two cars that meet: 6 s at 10 Hz, one driving east at 8 m/s, one driving north and braking."""
     time = np.arange(61) / 10.0
-    east = {"t_s": 1000.0 + time, "vehicle_id": "a", "x_m": 8.0 * time - 40.0, "y_m": 0.0, "speed_mps": 8.0, "heading_rad": 0.0}
+    east = {
+        "t_s": 1000.0 + time,
+        "vehicle_id": "a",
+        "x_m": 8.0 * time - 40.0,
+        "y_m": 0.0,
+        "speed_mps": 8.0,
+        "heading_rad": 0.0,
+    }
     braking = 6.0 * time - 0.5 * time**2
     north = {
         "t_s": 1000.0 + time,
@@ -80,14 +87,20 @@ def variants() -> list[pd.DataFrame]:
         on_globe(rows),
         rows.assign(timestamp=dates.astype(str)).drop(columns="t_s"),
         rows.assign(timestamp=dates).drop(columns="t_s"),
-        rows.assign(time_ns=(rows["t_s"] * 1e9).round().astype(np.int64).astype("Int64")).drop(columns="t_s"),
+        rows.assign(time_ns=(rows["t_s"] * 1e9).round().astype(np.int64).astype("Int64")).drop(
+            columns="t_s"
+        ),
     ]
 
 
 def texts(_folder: Path) -> list[bytes]:
     """Tables in text with commas, semicolons and tabs."""
     tables = [rows.to_csv(index=False).encode() for rows in variants()[:3]]
-    return [*tables, cars().to_csv(index=False, sep=";").encode(), cars().to_csv(index=False, sep="\t").encode()]
+    return [
+        *tables,
+        cars().to_csv(index=False, sep=";").encode(),
+        cars().to_csv(index=False, sep="\t").encode(),
+    ]
 
 
 def parquets(_folder: Path) -> list[bytes]:
@@ -99,7 +112,10 @@ def safety_messages(_folder: Path) -> list[bytes]:
     """Basic safety messages of two units."""
     rows = on_globe(cars())
     table = pd.DataFrame(0, index=rows.index, columns=list(COLUMNS)).astype(object)
-    table["TxDevice"], table["Gentime"] = rows["id"], 300_000_000_000_000 + (cars()["t_s"] * 1e6).round().astype(np.int64)
+    table["TxDevice"], table["Gentime"] = (
+        rows["id"],
+        300_000_000_000_000 + (cars()["t_s"] * 1e6).round().astype(np.int64),
+    )
     table["Latitude"], table["Longitude"] = rows["latitude"], rows["longitude"]
     table["Speed"], table["Heading"] = cars()["speed_mps"], rows["course"]
     return [table.to_csv(index=False, header=False).encode()]
@@ -109,11 +125,26 @@ def pilots(_folder: Path) -> list[bytes]:
     """Basic safety messages in JSON, of Wyoming and of an event of New York."""
     messages, event = [], []
     for row in cars().itertuples():
-        core = {"id": row.vehicle_id, "secMark": round(row.t_s * 1000) % 60_000, "speed": row.speed_mps, "heading": 90.0}
-        place = {"position": {"latitude": 48.0 + row.y_m * 1e-5, "longitude": 11.0 + row.x_m * 1e-5}}
+        core = {
+            "id": row.vehicle_id,
+            "secMark": round(row.t_s * 1000) % 60_000,
+            "speed": row.speed_mps,
+            "heading": 90.0,
+        }
+        place = {
+            "position": {"latitude": 48.0 + row.y_m * 1e-5, "longitude": 11.0 + row.x_m * 1e-5}
+        }
         metadata = {"recordGeneratedAt": f"{pd.Timestamp(row.t_s, unit='s')}"}
-        messages.append(json.dumps({"metadata": metadata, "payload": {"data": {"coreData": core | place}}}))
-        own = {"X_m": row.x_m, "Y_m": row.y_m, "T_s": row.t_s, "speed_mps": row.speed_mps, "heading_deg": 90.0}
+        messages.append(
+            json.dumps({"metadata": metadata, "payload": {"data": {"coreData": core | place}}})
+        )
+        own = {
+            "X_m": row.x_m,
+            "Y_m": row.y_m,
+            "T_s": row.t_s,
+            "speed_mps": row.speed_mps,
+            "heading_deg": 90.0,
+        }
         event.append({"bsmRecord": {"bsmMsg": {"coreData": core | own}}})
     return ["\n".join(messages).encode(), json.dumps({"bsmList": event}).encode()]
 
@@ -138,13 +169,25 @@ def bags(storage: StoragePlugin, folder: Path) -> list[bytes]:
     (encounter,) = read_log(folder / "log.csv", SHORT).encounters
     with Reader(bundled("b")) as reader:
         until = reader.start_time + 7 * 10**9
-        streams = [(c.topic, c.msgtype, stamp, bytes(data)) for c, stamp, data in reader.messages(stop=until)]
+        streams = [
+            (c.topic, c.msgtype, stamp, bytes(data))
+            for c, stamp, data in reader.messages(stop=until)
+        ]
     tracks = [("/tracks", TRACKS, until, encode_tracks(encounter))]
     odometry = []
-    for vehicle, *track in zip(encounter.vehicles, encounter.position, encounter.heading, encounter.speed, strict=True):
+    for vehicle, *track in zip(
+        encounter.vehicles, encounter.position, encounter.heading, encounter.speed, strict=True
+    ):
         for k, state in enumerate(np.column_stack(track)):
             stamp = encounter.start_ns + k * encounter.dt_ns
-            odometry.append((f"/vehicle_{vehicle.id}/odom", ODOMETRY, stamp, encode_state(state, "car", "map", stamp)))
+            odometry.append(
+                (
+                    f"/vehicle_{vehicle.id}/odom",
+                    ODOMETRY,
+                    stamp,
+                    encode_state(state, "car", "map", stamp),
+                )
+            )
     perceived = [("/objects", TRACKED, stamp, data) for stamp, data in objects(encounter)]
     contents = {"s": streams, "t": tracks, "o": odometry, "p": perceived}
     return [written(folder / name, storage, content) for name, content in contents.items()]
@@ -168,11 +211,16 @@ def objects(encounter: Encounter) -> Iterator[tuple[int, bytes]]:
         yield stamp, encoder.tracked_objects(k, stamp)
 
 
-def written(bag: Path, storage: StoragePlugin, messages: Sequence[tuple[str, str, int, bytes]]) -> bytes:
+def written(
+    bag: Path, storage: StoragePlugin, messages: Sequence[tuple[str, str, int, bytes]]
+) -> bytes:
     """Write messages (topic, type, stamp, CDR bytes) as a bag; return its one file."""
     with Writer(bag, version=9, storage_plugin=storage) as writer:
         kinds = {topic: kind for topic, kind, _, _ in messages}
-        connections = {topic: writer.add_connection(topic, kind, typestore=type_store()) for topic, kind in kinds.items()}
+        connections = {
+            topic: writer.add_connection(topic, kind, typestore=type_store())
+            for topic, kind in kinds.items()
+        }
         for topic, _, stamp, data in messages:
             writer.write(connections[topic], stamp, data)
     (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
@@ -198,13 +246,19 @@ def recorded() -> dict[str, list[tuple[str, int, bytes]]]:
             (Path(folder) / f"{k}.mcap").write_bytes(data)
             with Reader(Path(folder) / f"{k}.mcap") as reader:
                 for connection, stamp, message in reader.messages():
-                    found.setdefault(connection.msgtype, []).append((connection.topic, stamp, bytes(message)))
+                    found.setdefault(connection.msgtype, []).append(
+                        (connection.topic, stamp, bytes(message))
+                    )
     return found
 
 
 def payloads(_folder: Path) -> list[bytes]:
     """A number of a type, and CDR bytes of that type."""
-    return [bytes([k]) + message for k, kind in enumerate(USED) for _, _, message in recorded()[kind][:3]]
+    return [
+        bytes([k]) + message
+        for k, kind in enumerate(USED)
+        for _, _, message in recorded()[kind][:3]
+    ]
 
 
 def decode(data: bytes, _folder: Path) -> None:
@@ -229,7 +283,9 @@ def put(data: bytes, _folder: Path) -> None:
     """Feed records (vehicle, kind, stamp, two values) to streams as they come, and read what they amount to."""
     streams = Streams(SHORT)
     whole = len(data) // struct.calcsize(RECORD) * struct.calcsize(RECORD)
-    for number, (vehicle, kind, stamp, a, b) in enumerate(struct.iter_unpack(RECORD, data[:whole])):
+    for number, (vehicle, kind, stamp, a, b) in enumerate(
+        struct.iter_unpack(RECORD, data[:whole])
+    ):
         streams.breaks(stamp)
         if kind % 2:
             streams.put_speed(str(vehicle % 5), stamp, a)
@@ -259,13 +315,28 @@ MCAP_BAGS, SQLITE_BAGS = partial(bags, StoragePlugin.MCAP), partial(bags, Storag
 TARGETS = (
     Target("table", texts, read_as("log.csv"), TEXT, ("table/*.csv", "table_*.csv"), "log.csv"),
     Target("table_asked", texts, read_as("log.txt", NAMELESS), TEXT, ("table/*.csv",), "log.txt"),
-    Target("spmd", safety_messages, read_as("log.csv"), TEXT, ("spmd/*.csv", "spmd_*.csv"), "log.csv"),
-    Target("spmd_asked", safety_messages, read_as("log.csv", SPMD), TEXT, ("spmd/*.csv",), "log.csv"),
+    Target(
+        "spmd", safety_messages, read_as("log.csv"), TEXT, ("spmd/*.csv", "spmd_*.csv"), "log.csv"
+    ),
+    Target(
+        "spmd_asked", safety_messages, read_as("log.csv", SPMD), TEXT, ("spmd/*.csv",), "log.csv"
+    ),
     Target("bsm", pilots, read_as("log.json", replace(SHORT, format="bsm")), TEXT),
-    Target("fcd", simulated, read_as("log.xml", replace(SHORT, format="fcd")), (*TEXT, *[tree] * 3)),
+    Target(
+        "fcd", simulated, read_as("log.xml", replace(SHORT, format="fcd")), (*TEXT, *[tree] * 3)
+    ),
     Target("packed", packed, read_as("log.csv.gz"), BYTES),
-    Target("parquet", parquets, read_as("log.parquet"), PARQUET, ("parquet/*", "*.parquet"), "log.parquet"),
-    Target("mcap_log", MCAP_BAGS, read_as("log.mcap"), BYTES, ("mcap_reader/*", "*.mcap"), "log.mcap"),
+    Target(
+        "parquet",
+        parquets,
+        read_as("log.parquet"),
+        PARQUET,
+        ("parquet/*", "*.parquet"),
+        "log.parquet",
+    ),
+    Target(
+        "mcap_log", MCAP_BAGS, read_as("log.mcap"), BYTES, ("mcap_reader/*", "*.mcap"), "log.mcap"
+    ),
     Target("sqlite_log", SQLITE_BAGS, read_as("log.db3"), SQLITE, ("sqlite/*",), "log.db3"),
     Target("payloads", payloads, decode, BYTES, named="log"),
     Target("streams", heard, put, BYTES),

@@ -38,7 +38,11 @@ def attributes(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes
     found = list(re.finditer(rb' ([\w:]+)="([^"]*)"', data))
     if len(found) < 2:
         return rng.choice(BYTES)(rng, data, seeds)
-    word = rng.choice((*NUMBERS, "0", "-1", "1e7", "1e8", "99999999", "nan")).encode("utf-8", "surrogatepass").replace(b'"', b"")
+    word = (
+        rng.choice((*NUMBERS, "0", "-1", "1e7", "1e8", "99999999", "nan"))
+        .encode("utf-8", "surrogatepass")
+        .replace(b'"', b"")
+    )
     one = rng.choice(found)
     match rng.randrange(5):
         case 0:
@@ -62,7 +66,11 @@ def texts(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     if not found:
         return attributes(rng, data, seeds)
     one = rng.choice(found)
-    return data[: one.start(1)] + rng.choice(NUMBERS).encode("utf-8", "surrogatepass") + data[one.end(1) :]
+    return (
+        data[: one.start(1)]
+        + rng.choice(NUMBERS).encode("utf-8", "surrogatepass")
+        + data[one.end(1) :]
+    )
 
 
 @cache
@@ -81,7 +89,13 @@ def place(path: Path) -> None:
 def lanes() -> list[bytes]:
     """Lanes as a bag has them."""
     border = np.column_stack((np.arange(3.0), np.zeros(3)))
-    network = LaneNetwork("m", (Lane("7", border + 1.0, border, (1,)), Lane("8", border + 1.0, border, (), (0,), 13.9, "j")))
+    network = LaneNetwork(
+        "m",
+        (
+            Lane("7", border + 1.0, border, (1,)),
+            Lane("8", border + 1.0, border, (), (0,), 13.9, "j"),
+        ),
+    )
     return [encode_lanes(network, "map", 5), encode_lanes(None, "map", 5)]
 
 
@@ -98,8 +112,15 @@ def said(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
 MAP = (*TEXT, *[attributes] * 8, *[texts] * 4, *[tree] * 6)
 TARGETS = (
     *(
-        Target(f"vector_map_{suffix[1:]}", partial(written, suffix), in_file(f"a{suffix}", place), MAP)
+        Target(
+            f"vector_map_{suffix[1:]}", partial(written, suffix), in_file(f"a{suffix}", place), MAP
+        )
         for suffix in (".osm", ".xodr", ".xml")
     ),
-    Target("message_lanes", lambda _: lanes(), lambda data, _: decode_lanes(data), (*BYTES, *[said] * 6)),
+    Target(
+        "message_lanes",
+        lambda _: lanes(),
+        lambda data, _: decode_lanes(data),
+        (*BYTES, *[said] * 6),
+    ),
 )

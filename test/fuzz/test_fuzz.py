@@ -21,7 +21,9 @@ def test_nothing_but_errors_of_ours_comes_out(name, tmp_path):
     executions = len(seeds) + DAMAGED
     record = fuzz(TARGETS[name], tmp_path, executions, seconds=600.0, seeds=seeds)
     assert record.executions == executions
-    assert not record.failures, "\n".join(f"{f.signature}: {f.message} ({tmp_path / f.file})" for f in record.failures.values())
+    assert not record.failures, "\n".join(
+        f"{f.signature}: {f.message} ({tmp_path / f.file})" for f in record.failures.values()
+    )
 
 
 def test_every_format_of_logs_has_a_target():
@@ -37,4 +39,6 @@ def test_what_once_broke_a_reader_does_so_no_more(name, tmp_path):
         pytest.skip(f"{NO_RECORDS}: {CRASHES}")
     record = fuzz(TARGETS[name], tmp_path, len(seeds), seconds=600.0, seeds=seeds)
     assert record.executions == len(seeds)
-    assert not record.failures, "\n".join(f"{f.signature}: {f.message}" for f in record.failures.values())
+    assert not record.failures, "\n".join(
+        f"{f.signature}: {f.message}" for f in record.failures.values()
+    )

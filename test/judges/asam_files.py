@@ -26,13 +26,26 @@ def judge(path, folder):
         f'<Config><Param name="InputFile" value={quoteattr(str(path.resolve()))}/><CheckerBundle application="{bundle}">'
         f'<Param name="resultFile" value={quoteattr(str(result))}/></CheckerBundle></Config>'
     )
-    run = subprocess.run([Path(sys.executable).parent / program, "-c", config], capture_output=True, text=True, check=False)
+    run = subprocess.run(
+        [Path(sys.executable).parent / program, "-c", config],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     if not result.is_file():
         return 0, [f"no result: {run.stderr[-300:]}"]
     root = ET.parse(result).getroot()
-    rules = [checker for checker in root.iter("Checker") if checker.attrib.get("status") == "completed"]
-    broken = [checker.attrib["checkerId"] for checker in root.iter("Checker") if checker.attrib.get("status") == "error"]
-    return len(rules), [issue.attrib.get("description", "") for issue in root.iter("Issue")] + broken
+    rules = [
+        checker for checker in root.iter("Checker") if checker.attrib.get("status") == "completed"
+    ]
+    broken = [
+        checker.attrib["checkerId"]
+        for checker in root.iter("Checker")
+        if checker.attrib.get("status") == "error"
+    ]
+    return len(rules), [
+        issue.attrib.get("description", "") for issue in root.iter("Issue")
+    ] + broken
 
 
 def main(folder):

@@ -41,20 +41,38 @@ def with_fault(source, target, fault):
                     thing.base.orientation.yaw = 7.0
                 else:
                     message.moving_object = message.moving_object[1:]
-            writer.add(message, topic="ground_truth", log_time=message.timestamp.seconds * 10**9 + message.timestamp.nanos)
+            writer.add(
+                message,
+                topic="ground_truth",
+                log_time=message.timestamp.seconds * 10**9 + message.timestamp.nanos,
+            )
 
 
 def main(folder):
     paths = sorted(folder.rglob("*.mcap"))
     faults = {str(path.relative_to(folder)): fault for path in paths if (fault := fault_of(path))}
-    drawn = sum(type(omega_prime.Recording.from_file(path, parse_map=True).map).__name__ == "MapOdr" for path in paths[:5])
+    drawn = sum(
+        type(omega_prime.Recording.from_file(path, parse_map=True).map).__name__ == "MapOdr"
+        for path in paths[:5]
+    )
     missed = []
     with tempfile.TemporaryDirectory() as scratch:
         for fault in PLANTED:
             target = Path(scratch) / f"{fault}.mcap"
             with_fault(paths[0], target, fault)
             missed += [] if fault_of(target) else [fault]
-    print(json.dumps({"files": len(paths), "faults": faults, "maps": drawn, "of": len(paths[:5]), "missed": missed}), flush=True)
+    print(
+        json.dumps(
+            {
+                "files": len(paths),
+                "faults": faults,
+                "maps": drawn,
+                "of": len(paths[:5]),
+                "missed": missed,
+            }
+        ),
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

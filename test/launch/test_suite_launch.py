@@ -38,7 +38,14 @@ LOG = Path(__file__).resolve().parents[2] / "scenario_gen" / "resources" / "synt
 
 @pytest.mark.launch_test
 def generate_test_description():
-    arguments = {"log": LOG, "road": "straight", "count": SCENARIOS, "seed": 7, "namespace": SPACE, "bag": FOLDER / "bag"}
+    arguments = {
+        "log": LOG,
+        "road": "straight",
+        "count": SCENARIOS,
+        "seed": 7,
+        "namespace": SPACE,
+        "bag": FOLDER / "bag",
+    }
     suite = actions.IncludeLaunchDescription(
         sources.PythonLaunchDescriptionSource(str(SHARE / "launch" / "suite.launch.py")),
         launch_arguments=[(name, str(value)) for name, value in arguments.items()],

@@ -13,7 +13,15 @@ METRES_PER_DEGREE = 111_320.0
 def crossing(seconds=12.0, rate=10.0, start=1000.0):
     """Rows of two cars: `a` drives east at 8 m/s; `b` drives north, brakes to a stop and stands."""
     time = np.arange(round(seconds * rate) + 1) / rate
-    east = pd.DataFrame({"t_s": start + time, "vehicle_id": "a", "x_m": -40.0 + 8.0 * time, "y_m": 0.0, "speed_mps": 8.0})
+    east = pd.DataFrame(
+        {
+            "t_s": start + time,
+            "vehicle_id": "a",
+            "x_m": -40.0 + 8.0 * time,
+            "y_m": 0.0,
+            "speed_mps": 8.0,
+        }
+    )
     braking = np.minimum(time, 6.0)
     north = pd.DataFrame(
         {
@@ -24,7 +32,9 @@ def crossing(seconds=12.0, rate=10.0, start=1000.0):
             "speed_mps": 6.0 - braking,
         }
     )
-    return pd.concat([east, north], ignore_index=True).sort_values(["t_s", "vehicle_id"], ignore_index=True)
+    return pd.concat([east, north], ignore_index=True).sort_values(
+        ["t_s", "vehicle_id"], ignore_index=True
+    )
 
 
 def geographic(rows):

@@ -22,7 +22,14 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from scenario_gen.bags.storage.definitions import type_store
@@ -37,8 +44,16 @@ ORIGIN = (42.3, -83.7)  # degrees; the roads are invented, nothing was recorded 
 START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00:00 UTC
 PERIOD = 0.1  # s between messages
 LANE = 3.5  # m
-COLOURED, COLOUR_TIME, WHITE = 0.3, 20.0, 0.03  # m, s, m: GPS noise per axis (first-order Gauss-Markov, and white)
-SPEED_BIAS, SPEED_WHITE, SPEED_QUANTUM = 0.01, 0.05, 0.02  # 1, m/s, m/s: a wheel sensor in a basic safety message
+COLOURED, COLOUR_TIME, WHITE = (
+    0.3,
+    20.0,
+    0.03,
+)  # m, s, m: GPS noise per axis (first-order Gauss-Markov, and white)
+SPEED_BIAS, SPEED_WHITE, SPEED_QUANTUM = (
+    0.01,
+    0.05,
+    0.02,
+)  # 1, m/s, m/s: a wheel sensor in a basic safety message
 JITTER = 0.015  # s by which stamps are off the clock
 LOST, REPEATED = 0.04, 0.02  # shares of messages
 OUTAGE = 0.6  # s without any message, once per vehicle
@@ -106,7 +121,9 @@ class Drive:
     @property
     def changepoints(self) -> tuple[float, ...]:
         """Times [s] at which the acceleration changes."""
-        return tuple((self.begin + np.cumsum([phase.seconds for phase in self.phases[:-1]])).tolist())
+        return tuple(
+            (self.begin + np.cumsum([phase.seconds for phase in self.phases[:-1]])).tolist()
+        )
 
 
 def along(x: float, y: float, heading: float, curvature: float, metres: Floats) -> Floats:
@@ -115,7 +132,11 @@ def along(x: float, y: float, heading: float, curvature: float, metres: Floats) 
     if curvature == 0.0:
         return np.column_stack([x + metres * np.cos(heading), y + metres * np.sin(heading), end])
     return np.column_stack(
-        [x + (np.sin(end) - np.sin(heading)) / curvature, y - (np.cos(end) - np.cos(heading)) / curvature, end]
+        [
+            x + (np.sin(end) - np.sin(heading)) / curvature,
+            y - (np.cos(end) - np.cos(heading)) / curvature,
+            end,
+        ]
     )
 
 
@@ -134,7 +155,16 @@ class Case:
     @property
     def changepoints(self) -> tuple[float, ...]:
         """Times [s] at which any vehicle's acceleration changes while all are there."""
-        return tuple(sorted({time for drive in self.drives for time in drive.changepoints if 0.0 < time < self.duration}))
+        return tuple(
+            sorted(
+                {
+                    time
+                    for drive in self.drives
+                    for time in drive.changepoints
+                    if 0.0 < time < self.duration
+                }
+            )
+        )
 
 
 def quarter(radius: float, side: int) -> Leg:
@@ -145,10 +175,17 @@ def quarter(radius: float, side: int) -> Leg:
 def make_case(name: str) -> Case:
     """Return one of the three cases; the main road runs east, a side road joins from the south at x = 0."""
     east, west, north = 0.0, np.pi, np.pi / 2.0
-    near, far = -LANE / 2.0, LANE / 2.0  # y of the eastbound and the westbound lane; x of the lanes of the side road
+    near, far = (
+        -LANE / 2.0,
+        LANE / 2.0,
+    )  # y of the eastbound and the westbound lane; x of the lanes of the side road
     first, second = Vehicle("1"), Vehicle("2")
     if name == "a":
-        arrives = (Phase(2.0), Phase(4.0, -1.25), Phase(20.0))  # heard before the other comes into range, so its heading is known
+        arrives = (
+            Phase(2.0),
+            Phase(4.0, -1.25),
+            Phase(20.0),
+        )  # heard before the other comes into range, so its heading is known
         waits = Drive(first, (far, -9.0 - 20.0, north), 5.0, (Leg(1.0),), arrives, begin=-8.0)
         brakes = 11.0 / 7.0
         stop = near - 8.0 - 2.0  # 2 m before the turn of radius 8 m begins
@@ -203,7 +240,9 @@ def record(case: Case, seed: int = 0) -> tuple[Recorded, ...]:
     """Return the messages that a receiver records of a case, in the order of reception."""
     messages: list[Recorded] = []
     for number, drive in enumerate(case.drives):
-        rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, CASES.index(case.name[-1]), number])))
+        rng = np.random.Generator(
+            np.random.PCG64(np.random.SeedSequence([seed, CASES.index(case.name[-1]), number]))
+        )
         messages += record_drive(drive, rng)
     return tuple(sorted(messages))
 
@@ -216,8 +255,12 @@ def record_drive(drive: Drive, rng: np.random.Generator) -> Iterator[Recorded]:
     jitter[[0, -1]] = 0.0
     state = drive.state(clock + jitter)
     east, north = state[:, :2].T + coloured_noise(count, rng).T
-    latitude, longitude = np.round(geodetic(np.stack([east, north], axis=-1), ORIGIN), 7)  # as in a basic safety message
-    speed = state[:, 3] * (1.0 + SPEED_BIAS) + np.where(state[:, 3] > 0.0, rng.normal(0.0, SPEED_WHITE, count), 0.0)
+    latitude, longitude = np.round(
+        geodetic(np.stack([east, north], axis=-1), ORIGIN), 7
+    )  # as in a basic safety message
+    speed = state[:, 3] * (1.0 + SPEED_BIAS) + np.where(
+        state[:, 3] > 0.0, rng.normal(0.0, SPEED_WHITE, count), 0.0
+    )
     speed = np.maximum(np.round(speed / SPEED_QUANTUM) * SPEED_QUANTUM, 0.0)
     lost = rng.random((count, 2)) < LOST
     outage = rng.uniform(0.3, 0.6) * drive.end
@@ -265,7 +308,9 @@ def fix_message(header: object, latitude: float, longitude: float) -> object:
         latitude=latitude,
         longitude=longitude,
         altitude=260.0,
-        position_covariance=np.array([variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, 4.0 * variance]),
+        position_covariance=np.array(
+            [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, 4.0 * variance]
+        ),
         position_covariance_type=2,
     )
 

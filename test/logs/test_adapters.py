@@ -32,10 +32,28 @@ def argoverse2(folder):
     rows = []
     for track, kind in (("7", "vehicle"), ("8", "bus"), ("9", "pedestrian"), ("AV", "static")):
         x, y, vx, vy, heading = motion(track, T)
-        rows += [(True, track, kind, 2, k, x[k], y[k], heading, vx, vy, "s1", 0, 0, len(T), "7", "austin") for k in range(len(T))]
-    names = (
-        "observed track_id object_type object_category timestep position_x position_y heading velocity_x velocity_y scenario_id"
-    )
+        rows += [
+            (
+                True,
+                track,
+                kind,
+                2,
+                k,
+                x[k],
+                y[k],
+                heading,
+                vx,
+                vy,
+                "s1",
+                0,
+                0,
+                len(T),
+                "7",
+                "austin",
+            )
+            for k in range(len(T))
+        ]
+    names = "observed track_id object_type object_category timestep position_x position_y heading velocity_x velocity_y scenario_id"
     names += " start_timestamp end_timestamp num_timestamps focal_track_id city"
     path = folder / "scenario_s1.parquet"
     pd.DataFrame(rows, columns=names.split()).to_parquet(path)
@@ -46,19 +64,30 @@ def interaction(folder):
     rows = []
     for track, size in SIZES.items():
         x, y, vx, vy, heading = motion(track, T)
-        rows += [(track, k + 1, 100 * (k + 1), "car", x[k], y[k], vx, vy, heading, *size) for k in range(len(T))]
+        rows += [
+            (track, k + 1, 100 * (k + 1), "car", x[k], y[k], vx, vy, heading, *size)
+            for k in range(len(T))
+        ]
     names = "track_id frame_id timestamp_ms agent_type x y vx vy psi_rad length width"
-    pd.DataFrame(rows, columns=names.split()).to_csv(folder / "vehicle_tracks_000.csv", index=False)
+    pd.DataFrame(rows, columns=names.split()).to_csv(
+        folder / "vehicle_tracks_000.csv", index=False
+    )
     x, y, vx, vy, _ = motion("9", T)
-    walker = [("9", k, 100 * (k + 1), "pedestrian/bicycle", x[k], y[k], vx, vy) for k in range(len(T))]
-    pd.DataFrame(walker, columns=names.split()[:8]).to_csv(folder / "pedestrian_tracks_000.csv", index=False)
+    walker = [
+        ("9", k, 100 * (k + 1), "pedestrian/bicycle", x[k], y[k], vx, vy) for k in range(len(T))
+    ]
+    pd.DataFrame(walker, columns=names.split()[:8]).to_csv(
+        folder / "pedestrian_tracks_000.csv", index=False
+    )
     return folder, ("car", "car", "pedestrian")
 
 
 def levelx(folder, tracks, classes):
     tracks.to_csv(folder / "00_tracks.csv", index=False)
     classes.to_csv(folder / "00_tracksMeta.csv", index=False)
-    pd.DataFrame({"recordingId": [0], "frameRate": [25]}).to_csv(folder / "00_recordingMeta.csv", index=False)
+    pd.DataFrame({"recordingId": [0], "frameRate": [25]}).to_csv(
+        folder / "00_recordingMeta.csv", index=False
+    )
 
 
 def ind(folder):
@@ -67,10 +96,15 @@ def ind(folder):
         x, y, vx, vy, heading = motion(track, np.arange(200) / 25.0)
         length, width = SIZES.get(track, (0.0, 0.0))
         turned = math.degrees(heading) % 360.0
-        rows += [(0, int(track), k, k, x[k], y[k], turned, width, length, vx, vy, 0.0, 0.0) for k in range(200)]
+        rows += [
+            (0, int(track), k, k, x[k], y[k], turned, width, length, vx, vy, 0.0, 0.0)
+            for k in range(200)
+        ]
     names = "recordingId trackId frame trackLifetime xCenter yCenter heading width length xVelocity yVelocity"
     names += " xAcceleration yAcceleration"
-    classes = pd.DataFrame({"recordingId": 0, "trackId": [7, 8, 9], "class": ["car", "truck_bus", "bicycle"]})
+    classes = pd.DataFrame(
+        {"recordingId": 0, "trackId": [7, 8, 9], "class": ["car", "truck_bus", "bicycle"]}
+    )
     levelx(folder, pd.DataFrame(rows, columns=names.split()), classes)
     return folder / "00_tracks.csv", ("car", "truck", "bicycle")
 
@@ -82,7 +116,21 @@ def highd(folder):
         sign = 1.0 if track == "7" else -1.0
         for k in range(200):
             x, y = sign * (-40.0 + 10.0 * k / 25.0), 4.0 if track == "7" else 8.0  # ours; y is up
-            rows.append((k + 1, int(track), x - length / 2.0, -y - width / 2.0, length, width, 10.0 * sign, 0.0, 0.0, 0.0, 2))
+            rows.append(
+                (
+                    k + 1,
+                    int(track),
+                    x - length / 2.0,
+                    -y - width / 2.0,
+                    length,
+                    width,
+                    10.0 * sign,
+                    0.0,
+                    0.0,
+                    0.0,
+                    2,
+                )
+            )
     names = "frame id x y width height xVelocity yVelocity xAcceleration yAcceleration laneId"
     classes = pd.DataFrame({"id": [7, 8], "class": ["Car", "Truck"]})
     levelx(folder, pd.DataFrame(rows, columns=names.split()), classes)
@@ -109,7 +157,9 @@ def commonroad(folder):
             f"<trajectory>{states}</trajectory></dynamicObstacle>"
         )
     path = folder / "scenario.xml"
-    path.write_text(f'<?xml version="1.0"?><commonRoad commonRoadVersion="2020a" timeStepSize="0.1">{text}</commonRoad>')
+    path.write_text(
+        f'<?xml version="1.0"?><commonRoad commonRoadVersion="2020a" timeStepSize="0.1">{text}</commonRoad>'
+    )
     return path, ("car", "bus", "pedestrian")
 
 
@@ -122,7 +172,10 @@ def nocturne(folder, unit=math.degrees):
         there = [track != "8" or k < len(T) - 3 for k in range(len(T))]
         objects.append(
             {
-                "position": [{"x": float(a), "y": float(b)} if at else ABSENT for a, b, at in zip(x, y, there, strict=True)],
+                "position": [
+                    {"x": float(a), "y": float(b)} if at else ABSENT
+                    for a, b, at in zip(x, y, there, strict=True)
+                ],
                 "width": width,
                 "length": length,
                 "heading": [unit(heading) if at else -10000.0 for at in there],
@@ -154,12 +207,17 @@ def omega_prime(folder):
 def pulling(betterosi, kind, trailer):
     """A class of OSI, of a vehicle that may have a trailer."""
     number = betterosi.Identifier(value=int(trailer)) if trailer else None
-    return betterosi.MovingObject.VehicleClassification(type=kind, has_trailer=bool(trailer), trailer_id=number)
+    return betterosi.MovingObject.VehicleClassification(
+        type=kind, has_trailer=bool(trailer), trailer_id=number
+    )
 
 
 def test_whose_trailer_it_is_is_said(tmp_path):
     found = read.read_raw([osi(tmp_path)[0]], LogConfig())
-    assert "trailer 7 belongs to 8: read as a road user by itself" in found.notes and len(found.vehicles) == 3
+    assert (
+        "trailer 7 belongs to 8: read as a road user by itself" in found.notes
+        and len(found.vehicles) == 3
+    )
 
 
 def osi(folder):
@@ -175,19 +233,28 @@ def osi(folder):
                 things.append(
                     betterosi.MovingObject(
                         id=betterosi.Identifier(value=int(track)),
-                        type=betterosi.MovingObject.Type.VEHICLE if kind else betterosi.MovingObject.Type.PEDESTRIAN,
+                        type=betterosi.MovingObject.Type.VEHICLE
+                        if kind
+                        else betterosi.MovingObject.Type.PEDESTRIAN,
                         base=betterosi.BaseMoving(
-                            dimension=betterosi.Dimension3d(length=length, width=width, height=1.5),
+                            dimension=betterosi.Dimension3d(
+                                length=length, width=width, height=1.5
+                            ),
                             position=betterosi.Vector3d(x=float(x[k]), y=float(y[k]), z=0.75),
                             orientation=betterosi.Orientation3d(roll=0.0, pitch=0.0, yaw=heading),
                             velocity=betterosi.Vector3d(x=vx, y=vy, z=0.0),
                         ),
-                        vehicle_classification=kind and pulling(betterosi, kind, "7" if track == "8" else ""),
+                        vehicle_classification=kind
+                        and pulling(betterosi, kind, "7" if track == "8" else ""),
                     )
                 )
             nanos = round(t * 1e9)
             stamp = betterosi.Timestamp(seconds=nanos // 10**9, nanos=nanos % 10**9)
-            writer.add(betterosi.GroundTruth(timestamp=stamp, moving_object=things), topic="ground_truth", log_time=nanos)
+            writer.add(
+                betterosi.GroundTruth(timestamp=stamp, moving_object=things),
+                topic="ground_truth",
+                log_time=nanos,
+            )
     return path, ("car", "bus", "pedestrian")
 
 
@@ -207,29 +274,46 @@ def tracked(folder):
         return types[name](**values)
 
     def zero(name, count):
-        return make(f"geometry_msgs/msg/{name}", **dict.fromkeys(("x", "y", "z", "w")[:count], 0.0))
+        return make(
+            f"geometry_msgs/msg/{name}", **dict.fromkeys(("x", "y", "z", "w")[:count], 0.0)
+        )
 
     def with_covariance(kind, **values):
         body = make(f"geometry_msgs/msg/{kind}", **values)
-        return make(f"geometry_msgs/msg/{kind}WithCovariance", covariance=np.zeros(36), **{kind.lower(): body})
+        return make(
+            f"geometry_msgs/msg/{kind}WithCovariance",
+            covariance=np.zeros(36),
+            **{kind.lower(): body},
+        )
 
     path = folder / "perception"
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        connection = bag.add_connection("/perception/object_recognition/tracking/objects", TRACKED, typestore=type_store())
+        connection = bag.add_connection(
+            "/perception/object_recognition/tracking/objects", TRACKED, typestore=type_store()
+        )
         for k, t in enumerate(T):
             objects = []
             for track, label in (("7", "car"), ("8", "bus"), ("9", "pedestrian")):
                 x, y, vx, vy, heading = motion(track, T)
                 length, width = SIZES.get(track, (0.5, 0.5))
                 point, turn = zero("Point", 3), zero("Quaternion", 4)
-                point.x, point.y, turn.z, turn.w = float(x[k]), float(y[k]), math.sin(heading / 2.0), math.cos(heading / 2.0)
+                point.x, point.y, turn.z, turn.w = (
+                    float(x[k]),
+                    float(y[k]),
+                    math.sin(heading / 2.0),
+                    math.cos(heading / 2.0),
+                )
                 linear, size = zero("Vector3", 3), zero("Vector3", 3)
                 linear.x, size.x, size.y = math.hypot(vx, vy), length, width
                 kinematics = make(
                     "autoware_perception_msgs/msg/TrackedObjectKinematics",
                     pose_with_covariance=with_covariance("Pose", position=point, orientation=turn),
-                    twist_with_covariance=with_covariance("Twist", linear=linear, angular=zero("Vector3", 3)),
-                    acceleration_with_covariance=with_covariance("Accel", linear=zero("Vector3", 3), angular=zero("Vector3", 3)),
+                    twist_with_covariance=with_covariance(
+                        "Twist", linear=linear, angular=zero("Vector3", 3)
+                    ),
+                    acceleration_with_covariance=with_covariance(
+                        "Accel", linear=zero("Vector3", 3), angular=zero("Vector3", 3)
+                    ),
                     orientation_availability=2,
                     is_stationary=False,
                 )
@@ -239,9 +323,17 @@ def tracked(folder):
                     footprint=make("geometry_msgs/msg/Polygon", points=[]),
                     dimensions=size,
                 )
-                kind = make("autoware_perception_msgs/msg/ObjectClassification", label=KINDS.index(label), probability=0.9)
-                doubt = make("autoware_perception_msgs/msg/ObjectClassification", label=0, probability=0.1)
-                number = make("unique_identifier_msgs/msg/UUID", uuid=np.full(16, int(track), dtype=np.uint8))
+                kind = make(
+                    "autoware_perception_msgs/msg/ObjectClassification",
+                    label=KINDS.index(label),
+                    probability=0.9,
+                )
+                doubt = make(
+                    "autoware_perception_msgs/msg/ObjectClassification", label=0, probability=0.1
+                )
+                number = make(
+                    "unique_identifier_msgs/msg/UUID", uuid=np.full(16, int(track), dtype=np.uint8)
+                )
                 objects.append(
                     make(
                         "autoware_perception_msgs/msg/TrackedObject",
@@ -253,20 +345,31 @@ def tracked(folder):
                     )
                 )
             stamp = make("builtin_interfaces/msg/Time", sec=int(t), nanosec=round((t % 1.0) * 1e9))
-            message = make(TRACKED, header=make("std_msgs/msg/Header", stamp=stamp, frame_id="map"), objects=objects)
+            message = make(
+                TRACKED,
+                header=make("std_msgs/msg/Header", stamp=stamp, frame_id="map"),
+                objects=objects,
+            )
             bag.write(connection, round(t * 1e9), type_store().serialize_cdr(message, TRACKED))
     return path, ("car", "bus", "pedestrian")
 
 
-MADE = {f.__name__: f for f in (argoverse2, interaction, ind, highd, commonroad, nocturne, omega_prime, osi, tracked)}
+MADE = {
+    f.__name__: f
+    for f in (argoverse2, interaction, ind, highd, commonroad, nocturne, omega_prime, osi, tracked)
+}
 
 
 @pytest.mark.parametrize("name", MADE)
 def test_what_was_written_is_read(tmp_path, name):
     path, types = MADE[name](tmp_path)
     (encounter,) = read_log(path).encounters
-    ids = [bytes([int(track)] * 16).hex() if name == "tracked" else track for track in (*SIZES, "9")]
-    assert [(vehicle.id, vehicle.type) for vehicle in encounter.vehicles] == list(zip(ids, types, strict=False))
+    ids = [
+        bytes([int(track)] * 16).hex() if name == "tracked" else track for track in (*SIZES, "9")
+    ]
+    assert [(vehicle.id, vehicle.type) for vehicle in encounter.vehicles] == list(
+        zip(ids, types, strict=False)
+    )
     if "pedestrian" in types:
         assert (encounter.vehicles[2].length, encounter.vehicles[2].width) == (0.5, 0.5)
     for n, track in enumerate(SIZES):
@@ -276,7 +379,9 @@ def test_what_was_written_is_read(tmp_path, name):
             assert (vehicle.length, vehicle.width) == pytest.approx(SIZES[track], abs=0.06)
         if name == "highd":
             sign = 1.0 if track == "7" else -1.0
-            assert np.allclose(encounter.heading[n] % (2 * math.pi), 0.0 if sign > 0 else math.pi, atol=0.01)
+            assert np.allclose(
+                encounter.heading[n] % (2 * math.pi), 0.0 if sign > 0 else math.pi, atol=0.01
+            )
             assert np.allclose(encounter.speed[n], 10.0, atol=0.1)
             assert abs(encounter.position[n, 5, 1] - (4.0 if track == "7" else 8.0)) < 0.1
             assert np.sign(encounter.position[n, -1, 0] - encounter.position[n, 0, 0]) == sign
@@ -302,20 +407,30 @@ def test_a_repeated_column_is_named(tmp_path, column):
     path, _ = argoverse2(tmp_path)
     table = parquet.read_table(path)
     parquet.write_table(table.append_column(column, table.column(column)), path)
-    with pytest.raises(InputError, match=rf"scenario_s1\.parquet has more than one column '{column}'"):
+    with pytest.raises(
+        InputError, match=rf"scenario_s1\.parquet has more than one column '{column}'"
+    ):
         read_log(path)
 
 
 def test_who_is_of_no_known_type_is_counted_and_some_can_be_left_out(tmp_path):
     folder, _ = interaction(tmp_path)
     tracks_file = folder / "vehicle_tracks_000.csv"
-    tracks_file.write_text(tracks_file.read_text() + "98,1,100,tram,0,0,0,1,0,30,2.5\n99,1,100,hovercraft,0,0,0,1,0,30,2.5\n")
+    tracks_file.write_text(
+        tracks_file.read_text()
+        + "98,1,100,tram,0,0,0,1,0,30,2.5\n99,1,100,hovercraft,0,0,0,1,0,30,2.5\n"
+    )
     notes = read_log(folder).quality.notes
-    assert "left out: 1 × tram" in notes and "types that are not known, read by size: 1 × hovercraft" in notes
+    assert (
+        "left out: 1 × tram" in notes
+        and "types that are not known, read by size: 1 × hovercraft" in notes
+    )
     cars = read_log(folder, LogConfig(types="car"))
     assert [vehicle.type for vehicle in cars.encounters[0].vehicles] == ["car", "car"]
     assert "left out: 1 × hovercraft, 1 × pedestrian/bicycle, 1 × tram" in cars.quality.notes
-    with pytest.raises(InputError, match=r"log\.types: there is no type 'cars'; choose of car, van"):
+    with pytest.raises(
+        InputError, match=r"log\.types: there is no type 'cars'; choose of car, van"
+    ):
         read_log(folder, LogConfig(types="cars"))
 
 
@@ -324,13 +439,22 @@ def test_a_type_that_contradicts_its_motion_is_said(tmp_path):
     tracks_file = folder / "vehicle_tracks_000.csv"
     tracks_file.write_text(tracks_file.read_text().replace("car", "pedestrian"))
     result = read_log(folder)
-    assert [vehicle.type for vehicle in result.encounters[0].vehicles] == ["other", "pedestrian", "pedestrian"]
-    assert any("vehicle 7 is a pedestrian by the log and as fast as 8" in note for note in result.quality.notes)
+    assert [vehicle.type for vehicle in result.encounters[0].vehicles] == [
+        "other",
+        "pedestrian",
+        "pedestrian",
+    ]
+    assert any(
+        "vehicle 7 is a pedestrian by the log and as fast as 8" in note
+        for note in result.quality.notes
+    )
 
 
 def test_two_recordings_are_refused(tmp_path):
     interaction(tmp_path)
-    (tmp_path / "vehicle_tracks_001.csv").write_bytes((tmp_path / "vehicle_tracks_000.csv").read_bytes())
+    (tmp_path / "vehicle_tracks_001.csv").write_bytes(
+        (tmp_path / "vehicle_tracks_000.csv").read_bytes()
+    )
     with pytest.raises(InputError, match="give one at a time"):
         read_log(tmp_path)
 
@@ -360,15 +484,23 @@ def test_the_unit_of_headings_of_a_scene_is_told_from_its_velocities(tmp_path):
     assert any("headings in degrees" in note for note in in_degrees.quality.notes)
     assert any("headings in rad" in note for note in in_radians.quality.notes)
     (one,), (other,) = in_degrees.encounters, in_radians.encounters
-    assert np.allclose(one.heading, other.heading, atol=1e-6) and np.allclose(one.position, other.position, atol=1e-6)
+    assert np.allclose(one.heading, other.heading, atol=1e-6) and np.allclose(
+        one.position, other.position, atol=1e-6
+    )
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         (lambda scene: scene["objects"][0].pop("valid"), "object 1 has no 'valid'"),
-        (lambda scene: scene["objects"][1]["heading"].pop(), "object 2: position, velocity, heading and valid have"),
-        (lambda scene: scene["objects"][1]["position"].__setitem__(0, {"x": "a", "y": 0}), "object 2: .*no list of numbers"),
+        (
+            lambda scene: scene["objects"][1]["heading"].pop(),
+            "object 2: position, velocity, heading and valid have",
+        ),
+        (
+            lambda scene: scene["objects"][1]["position"].__setitem__(0, {"x": "a", "y": 0}),
+            "object 2: .*no list of numbers",
+        ),
         (lambda scene: scene.update(objects=[1] * 20), "`objects` is no list of objects"),
     ],
     ids=["key", "length", "numbers", "vehicles"],

@@ -48,7 +48,10 @@ def streams(rows, stamped=True, prefix=""):
         space = f"{prefix}/vehicle_{row.vehicle_id}"
         fix = STORES.serialize_cdr(fix_message(head, row.lat_deg, row.lon_deg), FIX)
         speed = STORES.serialize_cdr(twist_message(head, row.speed_mps), TWIST)
-        lines += [Line(f"{space}/fix", FIX, stamp + 20_000_000, bytes(fix)), Line(f"{space}/speed", TWIST, stamp, bytes(speed))]
+        lines += [
+            Line(f"{space}/fix", FIX, stamp + 20_000_000, bytes(fix)),
+            Line(f"{space}/speed", TWIST, stamp, bytes(speed)),
+        ]
     return lines
 
 
@@ -59,9 +62,15 @@ def odometry(rows, topic="/{}/odom", frame="map"):
     lines = []
     for row in rows.itertuples():
         yaw = 0.0 if row.vehicle_id == "a" else np.pi / 2.0
-        turn = types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=np.sin(yaw / 2.0), w=np.cos(yaw / 2.0))
-        pose = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](row.x_m, row.y_m, 0.0), turn)
-        twist = types["geometry_msgs/msg/Twist"](vector(**zero | {"x": row.speed_mps}), vector(**zero))
+        turn = types["geometry_msgs/msg/Quaternion"](
+            x=0.0, y=0.0, z=np.sin(yaw / 2.0), w=np.cos(yaw / 2.0)
+        )
+        pose = types["geometry_msgs/msg/Pose"](
+            types["geometry_msgs/msg/Point"](row.x_m, row.y_m, 0.0), turn
+        )
+        twist = types["geometry_msgs/msg/Twist"](
+            vector(**zero | {"x": row.speed_mps}), vector(**zero)
+        )
         message = types[ODOMETRY](
             header=header(round(row.t_s * 1e9), frame.format(row.vehicle_id)),
             child_frame_id="base_link",
@@ -69,7 +78,12 @@ def odometry(rows, topic="/{}/odom", frame="map"):
             twist=types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
         )
         lines.append(
-            Line(topic.format(row.vehicle_id), ODOMETRY, round(row.t_s * 1e9), bytes(STORES.serialize_cdr(message, ODOMETRY)))
+            Line(
+                topic.format(row.vehicle_id),
+                ODOMETRY,
+                round(row.t_s * 1e9),
+                bytes(STORES.serialize_cdr(message, ODOMETRY)),
+            )
         )
     return lines
 
@@ -80,7 +94,9 @@ def write(path, lines, plugin=StoragePlugin.MCAP):
         connections = {}
         for line in lines:
             if line.topic not in connections:
-                connections[line.topic] = writer.add_connection(line.topic, line.type, typestore=STORES)
+                connections[line.topic] = writer.add_connection(
+                    line.topic, line.type, typestore=STORES
+                )
             writer.write(connections[line.topic], line.stamp, line.data)
     return path
 
@@ -110,7 +126,9 @@ def test_fixes_and_speeds(tmp_path, plain, plugin):
 def test_a_bag_of_ros_1_is_read_like_one_of_ros_2(tmp_path, compression):
     """Its headers have a number, its types other names, and one topic is of a type that nobody knows."""
     types = get_typestore(Stores.ROS1_NOETIC)
-    types.register(get_types_from_msg("std_msgs/Header header\ntime at\nstring[] words", "my_msgs/msg/Odd"))
+    types.register(
+        get_types_from_msg("std_msgs/Header header\ntime at\nstring[] words", "my_msgs/msg/Odd")
+    )
     lines = [*streams(crossing()), *odometry(crossing())]
     writer = Ros1Writer(tmp_path / "drive.bag")
     if compression:
@@ -128,15 +146,23 @@ def test_a_bag_of_ros_1_is_read_like_one_of_ros_2(tmp_path, compression):
         writer.write(odd, 5, types.serialize_ros1(message, "my_msgs/msg/Odd"))
     write(tmp_path / "drive", lines)
     for kinds in (FIX, TWIST), (ODOMETRY,):
-        config = LogConfig(topics=",".join(dict.fromkeys(line.topic for line in lines if line.type in kinds)))
-        first, second = (read_log(tmp_path / name, config).encounters[0] for name in ("drive.bag", "drive"))
+        config = LogConfig(
+            topics=",".join(dict.fromkeys(line.topic for line in lines if line.type in kinds))
+        )
+        first, second = (
+            read_log(tmp_path / name, config).encounters[0] for name in ("drive.bag", "drive")
+        )
         for name in ("position", "heading", "speed"):
             assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
     (latched,) = (topic for topic in bag_topics(tmp_path / "drive.bag") if topic.name == "/odd")
     assert (latched.count, latched.quality.transient_local) == (1, True)
     (found,) = read_messages(tmp_path / "drive.bag", lambda name: name == "/odd")
     ros2 = get_typestore(Stores.ROS2_JAZZY)
-    ros2.register(get_types_from_msg("std_msgs/Header header\nbuiltin_interfaces/Time at\nstring[] words", "my_msgs/msg/Odd"))
+    ros2.register(
+        get_types_from_msg(
+            "std_msgs/Header header\nbuiltin_interfaces/Time at\nstring[] words", "my_msgs/msg/Odd"
+        )
+    )
     assert ros2.deserialize_cdr(found.data, "my_msgs/msg/Odd").words == ["a", "bc"]
 
 
@@ -157,7 +183,9 @@ def test_a_bag_of_ros_1_that_cannot_be_read_is_named(tmp_path, damage):
     elif damage == "not closed":
         place = whole.index(b"index_pos=") + 10
         path.write_bytes(whole[:place] + bytes(8) + whole[place + 8 :])
-    with pytest.raises(InputError, match=r"drive\.bag.*(rosbag reindex|choose other topics|most_chunk_bytes)"):
+    with pytest.raises(
+        InputError, match=r"drive\.bag.*(rosbag reindex|choose other topics|most_chunk_bytes)"
+    ):
         read_log(path)
 
 
@@ -166,14 +194,21 @@ def test_a_channel_without_schema_or_of_another_kind_breaks_nothing(tmp_path):
         writer = McapWriter(stream)
         writer.start(profile="ros2")
         other = writer.register_schema("Status", "jsonschema", b"{}")
-        channels = [writer.register_channel("/bare", "json", 0), writer.register_channel("/status", "json", other)]
+        channels = [
+            writer.register_channel("/bare", "json", 0),
+            writer.register_channel("/status", "json", other),
+        ]
         for line in odometry(crossing()):
             if line.topic not in channels:
                 channels.append(line.topic)
-                schema = writer.register_schema(line.type, "ros2msg", definition(line.type)[0].encode())
+                schema = writer.register_schema(
+                    line.type, "ros2msg", definition(line.type)[0].encode()
+                )
                 channels.append(writer.register_channel(line.topic, "cdr", schema))
             number = channels[channels.index(line.topic) + 1]
-            writer.add_message(number, log_time=line.stamp, data=line.data, publish_time=line.stamp)
+            writer.add_message(
+                number, log_time=line.stamp, data=line.data, publish_time=line.stamp
+            )
             for bare in channels[:2]:
                 writer.add_message(bare, log_time=line.stamp, data=b"{}", publish_time=line.stamp)
         writer.finish()
@@ -189,7 +224,9 @@ def test_without_header_stamps_the_reception_counts_and_is_said(tmp_path, plain)
 
 
 def test_without_speeds_the_positions_tell(tmp_path, plain):
-    result = read_log(write(tmp_path / "bag", [line for line in streams(crossing()) if line.type == FIX]))
+    result = read_log(
+        write(tmp_path / "bag", [line for line in streams(crossing()) if line.type == FIX])
+    )
     np.testing.assert_allclose(result.encounters[0].speed, plain.speed, atol=0.8)
     assert any("has no speeds" in line for line in result.quality.lines())
 
@@ -241,17 +278,28 @@ def test_odometries_have_one_frame_that_stands(tmp_path, own, frame, said):
 
 def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):
     data = encode_tracks(plain)
-    lines = [Line("/case/tracks", TRACKS, 5, data), Line("/case/tracks", TRACKS, 6, data), *streams(crossing())]
+    lines = [
+        Line("/case/tracks", TRACKS, 5, data),
+        Line("/case/tracks", TRACKS, 6, data),
+        *streams(crossing()),
+    ]
     result = read_log(write(tmp_path / "bag", lines))
     (encounter,) = result.encounters
     assert encounter.name == "bag"
     for field in ("position", "heading", "speed"):
         assert getattr(encounter, field).tobytes() == getattr(plain, field).tobytes()
-    assert (encounter.vehicles, encounter.start_ns, encounter.dt_ns) == (plain.vehicles, plain.start_ns, plain.dt_ns)
+    assert (encounter.vehicles, encounter.start_ns, encounter.dt_ns) == (
+        plain.vehicles,
+        plain.start_ns,
+        plain.dt_ns,
+    )
     assert "/vehicle_a/fix" in result.quality.notes[0]
     part = read_log(tmp_path / "bag", LogConfig(start=2.0, end=5.0)).encounters[0]
     np.testing.assert_array_equal(part.position, plain.position[:, 20:51])
-    chosen = read_log(tmp_path / "bag", LogConfig(topics="/vehicle_a/fix,/vehicle_a/speed,/vehicle_b/fix,/vehicle_b/speed"))
+    chosen = read_log(
+        tmp_path / "bag",
+        LogConfig(topics="/vehicle_a/fix,/vehicle_a/speed,/vehicle_b/fix,/vehicle_b/speed"),
+    )
     np.testing.assert_allclose(chosen.encounters[0].position, plain.position, atol=1e-3)
     for config, words in (
         (LogConfig(vehicles="a,z"), "no vehicle 'z'"),
@@ -265,9 +313,18 @@ def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"position": np.full((2, 50, 2), 1e300)}, r"topic /tracks, message 1: a position is 1e\+300; at most 1e\+08"),
-        ({"speed": np.full((2, 50), 1e308)}, r"topic /tracks, message 1: a speed is 1e\+308; at most 10000"),
-        ({"vehicles": (Vehicle("a", 1e308, 1.0), Vehicle("b"))}, r"joint name .*0.01 to 1000 m each"),
+        (
+            {"position": np.full((2, 50, 2), 1e300)},
+            r"topic /tracks, message 1: a position is 1e\+300; at most 1e\+08",
+        ),
+        (
+            {"speed": np.full((2, 50), 1e308)},
+            r"topic /tracks, message 1: a speed is 1e\+308; at most 10000",
+        ),
+        (
+            {"vehicles": (Vehicle("a", 1e308, 1.0), Vehicle("b"))},
+            r"joint name .*0.01 to 1000 m each",
+        ),
         ({"dt_ns": 1}, "topic /tracks, message 1: 49 steps of 1e-09 s"),
     ],
 )
@@ -286,14 +343,22 @@ def test_tracks_of_no_road_are_refused(tmp_path, change, said):
 
 def test_several_tracks_are_several_encounters(tmp_path, plain):
     part = encode_tracks(read_log(tmp_path / "log.csv", LogConfig(end=8.0)).encounters[0])
-    lines = [Line("/a/tracks", TRACKS, 5, encode_tracks(plain)), Line("/b/tracks", TRACKS, 6, part)]
-    assert [e.name for e in read_log(write(tmp_path / "bag", lines)).encounters] == ["bag-1", "bag-2"]
+    lines = [
+        Line("/a/tracks", TRACKS, 5, encode_tracks(plain)),
+        Line("/b/tracks", TRACKS, 6, part),
+    ]
+    assert [e.name for e in read_log(write(tmp_path / "bag", lines)).encounters] == [
+        "bag-1",
+        "bag-2",
+    ]
 
 
 def test_unknown_types_are_named(tmp_path):
     text = bytes(STORES.serialize_cdr(STORES.types[STRING](data="hi"), STRING))
     bag = write(tmp_path / "bag", [Line("/chatter", STRING, 1, text)])
-    with pytest.raises(InputError, match=rf"no topic to read. It has /chatter \({STRING}\). Needed is {FIX}"):
+    with pytest.raises(
+        InputError, match=rf"no topic to read. It has /chatter \({STRING}\). Needed is {FIX}"
+    ):
         read_log(bag)
     with pytest.raises(InputError, match=rf"topic /chatter: type {STRING} is not one of"):
         read_log(bag, LogConfig(topics="/chatter"))
@@ -323,6 +388,9 @@ def test_genuine_bags_without_vehicles_are_refused_by_their_topics(data):
     bags = sorted(path for path in data.glob("bags/*/*") if path.is_dir())
     assert len(bags) == 8
     for bag in bags:
-        for path in (bag, next(file for file in sorted(bag.iterdir()) if file.suffix in (".mcap", ".db3"))):
+        for path in (
+            bag,
+            next(file for file in sorted(bag.iterdir()) if file.suffix in (".mcap", ".db3")),
+        ):
             with pytest.raises(InputError, match=r"no topic to read\. It has .*msgs"):
                 read_log(path)

@@ -20,7 +20,9 @@ PLAIN = LogConfig()
 
 
 def drops(result):
-    return {drop.reason: (drop.count, drop.first.rpartition(" ")[2]) for drop in result.quality.dropped}
+    return {
+        drop.reason: (drop.count, drop.first.rpartition(" ")[2]) for drop in result.quality.dropped
+    }
 
 
 def assert_close_to(result, rows, tmp_path, config=PLAIN, atol=0.3):
@@ -124,16 +126,33 @@ def test_a_slow_source_is_not_cut_to_bits(tmp_path):
             r"log\.csv holds no usable position.*242 × position is not a number, first at .*line 2",
         ),
         (lambda rows: rows[rows["vehicle_id"] == "a"], r"log\.csv: only vehicle a"),
-        (lambda rows: rows.assign(t_s=5.0), r"log\.csv, line 4: the clock of vehicle a stands still"),
-        (lambda rows: rows.iloc[::-1], r"log\.csv, line \d+: the clock of vehicle [ab] runs backwards"),
-        (lambda rows: rows.assign(x_m=rows["x_m"] + 500.0 * (rows["vehicle_id"] == "a")), "come closest, to 4"),
+        (
+            lambda rows: rows.assign(t_s=5.0),
+            r"log\.csv, line 4: the clock of vehicle a stands still",
+        ),
+        (
+            lambda rows: rows.iloc[::-1],
+            r"log\.csv, line \d+: the clock of vehicle [ab] runs backwards",
+        ),
+        (
+            lambda rows: rows.assign(x_m=rows["x_m"] + 500.0 * (rows["vehicle_id"] == "a")),
+            "come closest, to 4",
+        ),
         (lambda rows: rows.iloc[:40], "no two vehicles"),
         (
             lambda rows: rows.assign(t_s=rows["t_s"] + 100.0 * (rows["vehicle_id"] == "a")),
             "no two vehicles are recorded at the same",
         ),
     ],
-    ids=["all NaN", "one vehicle", "clock stands", "clock runs backwards", "far apart", "too short", "at different times"],
+    ids=[
+        "all NaN",
+        "one vehicle",
+        "clock stands",
+        "clock runs backwards",
+        "far apart",
+        "too short",
+        "at different times",
+    ],
 )
 def test_what_cannot_be_used_is_refused(tmp_path, damage, words):
     with pytest.raises(InputError, match=words):
@@ -177,18 +196,26 @@ def test_whatever_the_damage_no_nan_leaves(tmp_path, seed, noise, lost, repeated
     rng = np.random.Generator(np.random.PCG64(seed))
     rows = crossing()
     rows = rows[rng.random(len(rows)) >= lost]
-    rows = pd.concat([rows, rows[rng.random(len(rows)) < repeated]]).sample(frac=1.0, random_state=seed).sort_values("t_s")
+    rows = (
+        pd.concat([rows, rows[rng.random(len(rows)) < repeated]])
+        .sample(frac=1.0, random_state=seed)
+        .sort_values("t_s")
+    )
     rows["t_s"] += rng.normal(0.0, 0.02, len(rows))
     rows[["x_m", "y_m"]] += rng.normal(0.0, noise, (len(rows), 2))
     rows["speed_mps"] = np.maximum(rows["speed_mps"] * 1.02 + rng.normal(0.0, 0.2, len(rows)), 0.0)
     where = rng.integers(0, len(rows), outliers)
-    rows.iloc[where, rows.columns.get_loc("x_m")] = rng.choice([np.nan, 1e6, np.inf, -500.0], outliers)
+    rows.iloc[where, rows.columns.get_loc("x_m")] = rng.choice(
+        [np.nan, 1e6, np.inf, -500.0], outliers
+    )
     try:
         result = read_log(save(rows, tmp_path))
     except InputError:
         good = rows.drop(rows.index[where])
         longest = max(np.diff(np.sort(own)).max() for _, own in good.groupby("vehicle_id")["t_s"])
-        assert longest > 0.8  # a gap above a second is cut; beside it a noisy fix on either side may go, 0.1 s each
+        assert (
+            longest > 0.8
+        )  # a gap above a second is cut; beside it a noisy fix on either side may go, 0.1 s each
         return
     for encounter in result.encounters:
         assert np.isfinite(encounter.position).all() and (encounter.speed >= 0.0).all()
@@ -205,7 +232,10 @@ def test_whatever_the_damage_no_nan_leaves(tmp_path, seed, noise, lost, repeated
             LogConfig(min_duration=30.0),
             r"are within 100 m for \d+\.\d s and come as near as 12 m; --set log\.min_duration=[\d.]+ takes",
         ),
-        (LogConfig(travel=1000.0), r"the faster one drives \d+\.\d m; --set log\.travel=\d+ takes them"),
+        (
+            LogConfig(travel=1000.0),
+            r"the faster one drives \d+\.\d m; --set log\.travel=\d+ takes them",
+        ),
     ],
     ids=["never near", "too short", "hardly driven"],
 )
@@ -214,4 +244,6 @@ def test_why_two_are_no_encounter_is_said_with_what_would_take_them(tmp_path, co
     with pytest.raises(NoEncounterError, match=words) as error:
         read_log(path, config)
     name, value = re.search(r"--set log\.(\w+)=([\d.]+)", str(error.value)).groups()
-    assert len(read_log(path, replace(config, **{name: float(value)})).encounters) == 1, "what it says helps"
+    assert len(read_log(path, replace(config, **{name: float(value)})).encounters) == 1, (
+        "what it says helps"
+    )

@@ -21,7 +21,8 @@ def test_a_stamp_of_another_age_is_named_before_the_clock_is_made(tmp_path):
     rows = crossing()
     rows.loc[40, "t_s"] += 3e8
     with pytest.raises(
-        InputError, match=r"log\.csv, line 42: the stamp of vehicle a is 3e\+08 s after .* at most 2000000 .*tick_limit"
+        InputError,
+        match=r"log\.csv, line 42: the stamp of vehicle a is 3e\+08 s after .* at most 2000000 .*tick_limit",
     ):
         read_log(save(rows, tmp_path))
 
@@ -34,7 +35,8 @@ def test_the_clock_of_all_vehicles_counts(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("factor", "name", "unit"), [(1e3, "milliseconds", "ms"), (1e6, "microseconds", "us"), (1e9, "nanoseconds", "ns")]
+    ("factor", "name", "unit"),
+    [(1e3, "milliseconds", "ms"), (1e6, "microseconds", "us"), (1e9, "nanoseconds", "ns")],
 )
 def test_another_unit_of_time_is_recognised(tmp_path, factor, name, unit):
     rows = crossing(start=0.0)
@@ -54,7 +56,9 @@ def test_another_unit_of_time_is_recognised(tmp_path, factor, name, unit):
 )
 @pytest.mark.parametrize("name", ["log.csv", "log.parquet"])
 def test_limits_are_named_with_the_figure(tmp_path, limit, said, name):
-    rows = pd.concat([crossing(), crossing().query("vehicle_id == 'a'").assign(vehicle_id="c", y_m=20.0)])
+    rows = pd.concat(
+        [crossing(), crossing().query("vehicle_id == 'a'").assign(vehicle_id="c", y_m=20.0)]
+    )
     path = tmp_path / name
     rows.to_csv(path, index=False) if name == "log.csv" else rows.to_parquet(path)
     with pytest.raises(InputError, match=said):
@@ -82,10 +86,15 @@ def test_parquet_that_grows_a_thousandfold_is_refused_by_its_own_figures(tmp_pat
     """A few kilobytes of repetition: 500 MB of numbers, or of text that repeats."""
     count = 2_000_000
     columns = {name: pa.array(np.zeros(count)) for name in ("x_m", "y_m", "speed_mps")}
-    columns |= {"t_s": pa.array(np.repeat(np.arange(4.0), count // 4)), "vehicle_id": pa.array(["a", "b"] * (count // 2))}
+    columns |= {
+        "t_s": pa.array(np.repeat(np.arange(4.0), count // 4)),
+        "vehicle_id": pa.array(["a", "b"] * (count // 2)),
+    }
     parquet.write_table(pa.table(columns), tmp_path / "log.parquet", compression="zstd")
     assert (tmp_path / "log.parquet").stat().st_size < 1 << 20
-    with pytest.raises(InputError, match=r"log\.parquet holds 2000000 rows or more; at most 1000000"):
+    with pytest.raises(
+        InputError, match=r"log\.parquet holds 2000000 rows or more; at most 1000000"
+    ):
         read_log(tmp_path / "log.parquet", LogConfig(row_limit=1_000_000))
     with pytest.raises(InputError, match=r"log\.parquet holds .* MiB .*; at most 8 MiB"):
         read_log(tmp_path / "log.parquet", LogConfig(size_limit=8))
@@ -93,7 +102,9 @@ def test_parquet_that_grows_a_thousandfold_is_refused_by_its_own_figures(tmp_pat
 
 def table_with(tmp_path, stamps):
     """The crossing as Parquet with an Arrow array of stamps, row by row of `crossing`."""
-    rows = pa.Table.from_pandas(crossing(start=1_700_000_000.0).drop(columns="t_s"), preserve_index=False)
+    rows = pa.Table.from_pandas(
+        crossing(start=1_700_000_000.0).drop(columns="t_s"), preserve_index=False
+    )
     path = tmp_path / "log.parquet"
     parquet.write_table(rows.append_column("time", stamps), path)
     return path
@@ -112,7 +123,13 @@ NS = (crossing(start=1_700_000_000.0)["t_s"] * 1000.0).round().astype(np.int64).
             pa.timestamp("us", "UTC"),
             pa.timestamp("ns", "Europe/Berlin"),
         ),
-        *(pa.timestamp("ms", "+05:30"), pa.float64(), pa.decimal128(30, 9), pa.string(), pa.large_string()),
+        *(
+            pa.timestamp("ms", "+05:30"),
+            pa.float64(),
+            pa.decimal128(30, 9),
+            pa.string(),
+            pa.large_string(),
+        ),
         pa.dictionary(pa.int32(), pa.string()),
     ],
     ids=str,
@@ -122,25 +139,45 @@ def test_kinds_of_stamps_are_read_alike(tmp_path, kind, missing):
     """Each kind gives the same instants, with rows that miss theirs left out and counted."""
     stamps = pa.array([None if missing and k == 60 else int(ns) for k, ns in enumerate(NS)])
     if pa.types.is_timestamp(kind):
-        values = stamps.cast(pa.timestamp("ns")).cast(pa.timestamp(kind.unit)).cast(pa.int64()).cast(kind)
+        values = (
+            stamps.cast(pa.timestamp("ns"))
+            .cast(pa.timestamp(kind.unit))
+            .cast(pa.int64())
+            .cast(kind)
+        )
     else:
-        seconds = [None if value is None else f"{value // 10**9}.{value % 10**9:09d}" for value in stamps.to_pylist()]
-        values = pa.array(seconds).dictionary_encode() if pa.types.is_dictionary(kind) else pa.array(seconds).cast(kind)
+        seconds = [
+            None if value is None else f"{value // 10**9}.{value % 10**9:09d}"
+            for value in stamps.to_pylist()
+        ]
+        values = (
+            pa.array(seconds).dictionary_encode()
+            if pa.types.is_dictionary(kind)
+            else pa.array(seconds).cast(kind)
+        )
     result = read_log(table_with(tmp_path, values))
     (encounter,) = result.encounters
     assert encounter.start_ns == 1_700_000_000 * 10**9
     assert encounter.duration == pytest.approx(12.0)
-    assert {drop.reason: drop.count for drop in result.quality.dropped} == ({"stamp is not a number": 1} if missing else {})
+    assert {drop.reason: drop.count for drop in result.quality.dropped} == (
+        {"stamp is not a number": 1} if missing else {}
+    )
 
 
 @pytest.mark.parametrize(
     ("stamps", "said"),
     [
         (pa.array([True] * len(NS)), r"column 'time' \(time\): a bool is no time"),
-        (pa.array(NS).cast(pa.duration("ns")), r"column 'time' \(time\): a duration\[ns\] is no time"),
+        (
+            pa.array(NS).cast(pa.duration("ns")),
+            r"column 'time' \(time\): a duration\[ns\] is no time",
+        ),
         (pa.array([[1]] * len(NS)), r"column 'time' \(time\): a list<.*> is no time"),
         (pa.array([b"1"] * len(NS)), r"column 'time' \(time\): a binary is no time"),
-        (pa.array([253402214400] * len(NS)).cast(pa.timestamp("s")), r"\d+ × stamp is out of range, first at .*row 1"),
+        (
+            pa.array([253402214400] * len(NS)).cast(pa.timestamp("s")),
+            r"\d+ × stamp is out of range, first at .*row 1",
+        ),
         (pa.array([2**62] * len(NS)).cast(pa.timestamp("us")), r"stamp is out of range"),
         (pa.array([-(2**63)] * len(NS)), r"stamp is out of range"),
         (pa.array([2**64 - 1] * len(NS), type=pa.uint64()), r"stamp is out of range"),
@@ -157,13 +194,23 @@ def test_stamps_that_are_none_are_refused_by_name(tmp_path, stamps, said):
 
 def test_what_pandas_says_in_a_file_is_not_believed(tmp_path):
     rows = pa.Table.from_pandas(crossing().set_index("t_s"))
-    for meta in (b"[]", b"{", b'{"columns": 3, "index_columns": ["no"]}', rows.schema.metadata[b"pandas"]):
-        parquet.write_table(rows.replace_schema_metadata({b"pandas": meta}), tmp_path / "log.parquet")
+    for meta in (
+        b"[]",
+        b"{",
+        b'{"columns": 3, "index_columns": ["no"]}',
+        rows.schema.metadata[b"pandas"],
+    ):
+        parquet.write_table(
+            rows.replace_schema_metadata({b"pandas": meta}), tmp_path / "log.parquet"
+        )
         assert len(read_log(tmp_path / "log.parquet").encounters) == 1
 
 
 TEXTS = {
-    "a row with more fields": (lambda text: text.replace(",8.0\n", ",8.0,1\n", 1), "more fields|Expected 5 fields in line"),
+    "a row with more fields": (
+        lambda text: text.replace(",8.0\n", ",8.0,1\n", 1),
+        "more fields|Expected 5 fields in line",
+    ),
     "rows with more fields": (
         lambda text: "\n".join(line + ",1" * (k > 0) for k, line in enumerate(text.split("\n"))),
         "more fields",
@@ -172,10 +219,16 @@ TEXTS = {
     "UTF-16": (lambda text: text.encode("utf-16-le"), "not a text file .or UTF-16"),
     "Latin-1": (lambda text: text.replace("a,", "ä,").encode("latin-1"), "not UTF-8 text"),
     "a long name": (lambda text: "a" * 50_000 + text, "no column for time"),
-    "an endless line": (lambda text: "a" * 100_000 + text, "its first line has 65536 characters or more"),
+    "an endless line": (
+        lambda text: "a" * 100_000 + text,
+        "its first line has 65536 characters or more",
+    ),
     "no rows": (lambda text: text.split("\n", 1)[0] + "\n", "has a header but no rows"),
     "no text": (lambda text: "\n\n\n", "cannot be read as a table|no column"),
-    "an open quote": (lambda text: text.replace("a,", '"a,', 1), "cannot be read as a table: .*EOF inside string"),
+    "an open quote": (
+        lambda text: text.replace("a,", '"a,', 1),
+        "cannot be read as a table: .*EOF inside string",
+    ),
     "zeros": (lambda text: "\0" * 1000, "not a text file"),
 }
 
@@ -207,13 +260,21 @@ def test_numbers_of_any_length_and_names_of_any_length(tmp_path):
 
 
 def test_sizes_that_no_vehicle_has_are_not_taken(tmp_path):
-    (encounter,) = read_log(save(crossing().assign(length_m=1e308, width_m=2.5), tmp_path)).encounters
-    assert [(vehicle.length, vehicle.width) for vehicle in encounter.vehicles] == [(4.8, 2.5), (4.8, 2.5)]
+    (encounter,) = read_log(
+        save(crossing().assign(length_m=1e308, width_m=2.5), tmp_path)
+    ).encounters
+    assert [(vehicle.length, vehicle.width) for vehicle in encounter.vehicles] == [
+        (4.8, 2.5),
+        (4.8, 2.5),
+    ]
 
 
 def test_what_is_no_file(tmp_path):
     os.mkfifo(tmp_path / "log.csv")
-    for path, said in ((tmp_path / "log.csv", "neither a file nor a folder"), (tmp_path / ("x" * 300), "name too long")):
+    for path, said in (
+        (tmp_path / "log.csv", "neither a file nor a folder"),
+        (tmp_path / ("x" * 300), "name too long"),
+    ):
         with pytest.raises(InputError, match=said):
             read_log(path)
     with pytest.raises(InputError, match="does not exist"):

@@ -15,7 +15,9 @@ TIME = DT * np.arange(120)
 def drive(random):
     """Steady driving along a straight line or an arc, near the middle at 6 s."""
     speed = random.uniform(0.0, 40.0)
-    heading = random.uniform(-3.0, 3.0) + random.uniform(-0.3, 0.3) / max(speed / 10.0, 1.0) * (TIME - 6.0)
+    heading = random.uniform(-3.0, 3.0) + random.uniform(-0.3, 0.3) / max(speed / 10.0, 1.0) * (
+        TIME - 6.0
+    )
     way = np.cumsum(DT * speed * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
     return way - way[60] + random.uniform(-20.0, 20.0, 2)
 
@@ -24,14 +26,21 @@ def by_all_pairs(a, b):
     """The gap by comparing all pairs of moments, 5 ms apart."""
     fine = np.linspace(0.0, TIME[-1], 20 * (len(TIME) - 1) + 1)
     p, q = (np.column_stack([np.interp(fine, TIME, way[:, k]) for k in (0, 1)]) for way in (a, b))
-    return min(float((np.hypot(*(p[k] - q).T) + 2.0 * np.abs(fine[k] - fine)).min()) for k in range(len(fine)))
+    return min(
+        float((np.hypot(*(p[k] - q).T) + 2.0 * np.abs(fine[k] - fine)).min())
+        for k in range(len(fine))
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_follower_has_twice_its_time_gap_at_any_speed(seed):
     random = np.random.default_rng(seed)
     for _ in range(100):
-        speed, behind, turned = random.uniform(10.0, 40.0), random.uniform(0.5, 3.0), random.uniform(-3.0, 3.0)
+        speed, behind, turned = (
+            random.uniform(10.0, 40.0),
+            random.uniform(0.5, 3.0),
+            random.uniform(-3.0, 3.0),
+        )
         along = np.array([np.cos(turned), np.sin(turned)])
         a, b = speed * TIME[:, None] * along, speed * (TIME[:, None] - behind) * along
         for one, other in ((a, b), (b, a)):
@@ -51,6 +60,9 @@ def test_the_gap_is_the_least_of_all_pairs_of_moments(seed):
 
 
 def test_two_that_pass_each_other_beside_are_apart_by_that():
-    a, b = np.column_stack([20.0 * (TIME - 6.0), 0.0 * TIME]), np.column_stack([-20.0 * (TIME - 6.0), 3.5 + 0.0 * TIME])
+    a, b = (
+        np.column_stack([20.0 * (TIME - 6.0), 0.0 * TIME]),
+        np.column_stack([-20.0 * (TIME - 6.0), 3.5 + 0.0 * TIME]),
+    )
     assert space_time_gap(a, b, DT) == (pytest.approx(3.5, abs=1e-3), 60, 60)
     assert space_time_gap(a, a, DT)[0] == 0.0

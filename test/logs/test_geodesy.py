@@ -10,7 +10,14 @@ import pyproj
 import pytest
 
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.geodesy import geodetic, latitude_longitude, local_frame, metres_per_degree, middle_of, sites_of
+from scenario_gen.logs.geodesy import (
+    geodetic,
+    latitude_longitude,
+    local_frame,
+    metres_per_degree,
+    middle_of,
+    sites_of,
+)
 
 GLOBE = pyproj.Geod(ellps="WGS84")
 
@@ -26,9 +33,21 @@ def crossing(origin, number=0, begin=0.0):
     frames = []
     for k, way in enumerate((east, left)):
         longitude, latitude, _ = GLOBE.fwd(
-            np.full(len(way), origin[1]), np.full(len(way), origin[0]), np.degrees(np.arctan2(*way.T)), np.hypot(*way.T)
+            np.full(len(way), origin[1]),
+            np.full(len(way), origin[0]),
+            np.degrees(np.arctan2(*way.T)),
+            np.hypot(*way.T),
         )
-        frames.append(pd.DataFrame({"utc_s": begin + time, "vehicle_id": f"v{number}{k}", "lat": latitude, "lon": longitude}))
+        frames.append(
+            pd.DataFrame(
+                {
+                    "utc_s": begin + time,
+                    "vehicle_id": f"v{number}{k}",
+                    "lat": latitude,
+                    "lon": longitude,
+                }
+            )
+        )
     return pd.concat(frames), np.stack([east, left])
 
 
@@ -38,11 +57,16 @@ def assert_right(encounter, metres, within=0.25):
     wanted = metres[:, : encounter.position.shape[1]].reshape(-1, 2)
     off = (places - places.mean(axis=0)) - (wanted - wanted.mean(axis=0))
     assert np.abs(off).max() < within
-    assert encounter.heading[1, -1] - encounter.heading[1, 0] == pytest.approx(np.pi / 2.0, abs=0.05)
+    assert encounter.heading[1, -1] - encounter.heading[1, 0] == pytest.approx(
+        np.pi / 2.0, abs=0.05
+    )
     assert np.median(encounter.speed, axis=1) == pytest.approx([10.0, 7.2], rel=0.01)
 
 
-@pytest.mark.parametrize("origin", [(-16.8, 179.9999), (-16.8, -180.0), (64.0, 180.0), (42.3, -83.7), (0.0, 0.001), (51.5, 0.0)])
+@pytest.mark.parametrize(
+    "origin",
+    [(-16.8, 179.9999), (-16.8, -180.0), (64.0, 180.0), (42.3, -83.7), (0.0, 0.001), (51.5, 0.0)],
+)
 def test_a_junction_is_right_wherever_it_lies(tmp_path, origin):
     rows, metres = crossing(origin)
     (encounter,) = read_log(save(rows, tmp_path)).encounters
@@ -50,21 +74,32 @@ def test_a_junction_is_right_wherever_it_lies(tmp_path, origin):
 
 
 def test_sites_far_apart_are_each_right(tmp_path):
-    sites = [(42.3, -83.7), (48.1, 11.6), (-16.8, 180.0), (42.3, -83.65)]  # 6,700 km, the other side, and 4 km
+    sites = [
+        (42.3, -83.7),
+        (48.1, 11.6),
+        (-16.8, 180.0),
+        (42.3, -83.65),
+    ]  # 6,700 km, the other side, and 4 km
     made = [crossing(origin, number, 3.0 * number) for number, origin in enumerate(sites)]
-    found = read_log(save(pd.concat([rows for rows, _ in made]), tmp_path), LogConfig(max_vehicles=2))
+    found = read_log(
+        save(pd.concat([rows for rows, _ in made]), tmp_path), LogConfig(max_vehicles=2)
+    )
     assert len(found.encounters) == len(sites)
     for encounter, origin, (_, metres) in zip(found.encounters, sites, made, strict=True):
         assert_right(encounter, metres)
         degrees = latitude_longitude(encounter).reshape(-1, 2)
-        away = GLOBE.inv(*np.broadcast_arrays(origin[1], origin[0], degrees[:, 1], degrees[:, 0]))[2]
+        away = GLOBE.inv(*np.broadcast_arrays(origin[1], origin[0], degrees[:, 1], degrees[:, 0]))[
+            2
+        ]
         assert away.max() < 100.0 and np.hypot(*encounter.position.reshape(-1, 2).T).max() < 4000.0
 
 
 def test_an_origin_that_is_given_counts_for_all_and_one_far_away_is_said(tmp_path):
     rows, metres = crossing((42.3, -83.7))
     near = read_log(save(rows, tmp_path), LogConfig(origin="42.31,-83.7"))
-    assert near.encounters[0].origin == (42.31, -83.7) and not [note for note in near.quality.notes if "origin" in note]
+    assert near.encounters[0].origin == (42.31, -83.7) and not [
+        note for note in near.quality.notes if "origin" in note
+    ]
     assert_right(near.encounters[0], metres)
     far = read_log(save(rows, tmp_path), LogConfig(origin="48.1,11.6"))
     assert any("km from the parameter origin" in note for note in far.quality.notes)
@@ -82,7 +117,9 @@ def test_a_chain_of_places_is_one_site():
     along = np.column_stack([np.full(100, 50.0), np.linspace(-181.0, -170.0, 100)])
     assert set(sites_of(along)) == {0}
     assert len(set(sites_of(np.vstack([along, along + 1.0])))) == 2
-    assert middle_of(along) == (50.0, -175.5) and middle_of(np.array([[1.0, 179.0], [1.0, -179.0]])) == (1.0, -180.0)
+    assert middle_of(along) == (50.0, -175.5) and middle_of(
+        np.array([[1.0, 179.0], [1.0, -179.0]])
+    ) == (1.0, -180.0)
 
 
 def test_there_and_back():
@@ -90,5 +127,11 @@ def test_there_and_back():
     for origin in ((42.3, -83.7), (65.0, 179.9999)):
         assert local_frame(*geodetic(wanted, origin), origin) == pytest.approx(wanted, abs=1e-6)
         north, east = metres_per_degree(origin)
-        found = local_frame(np.array([origin[0] + 0.001, origin[0]]), np.array([origin[1], origin[1] + 0.001]), origin)
-        assert found == pytest.approx(np.array([[0.0, 0.001 * north], [0.001 * east, 0.0]]), abs=0.01)
+        found = local_frame(
+            np.array([origin[0] + 0.001, origin[0]]),
+            np.array([origin[1], origin[1] + 0.001]),
+            origin,
+        )
+        assert found == pytest.approx(
+            np.array([[0.0, 0.001 * north], [0.001 * east, 0.0]]), abs=0.01
+        )

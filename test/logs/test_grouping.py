@@ -18,12 +18,22 @@ def car(name, begin, end, x, y, vx=0.0, vy=0.0):
     """A car with constant velocity from `begin` to `end` [s]; (x, y) is where it is at 0 s."""
     time = np.round(np.arange(begin, end + 0.05, 0.1), 3)
     speed = float(np.hypot(vx, vy))
-    return pd.DataFrame({"t_s": time, "vehicle_id": name, "x_m": x + vx * time, "y_m": y + vy * time, "speed_mps": speed})
+    return pd.DataFrame(
+        {
+            "t_s": time,
+            "vehicle_id": name,
+            "x_m": x + vx * time,
+            "y_m": y + vy * time,
+            "speed_mps": speed,
+        }
+    )
 
 
 def groups(tmp_path, *cars, **options):
     result = read_log(save(pd.concat(cars), tmp_path), LogConfig(**options))
-    return [(",".join(v.id for v in e.vehicles), round(e.duration, 1)) for e in result.encounters], result.quality
+    return [
+        (",".join(v.id for v in e.vehicles), round(e.duration, 1)) for e in result.encounters
+    ], result.quality
 
 
 def test_a_vehicle_that_is_there_for_most_of_it_shortens_the_encounter(tmp_path):
@@ -42,11 +52,19 @@ def test_a_vehicle_that_is_there_for_little_is_left_out(tmp_path):
 
 def presence(tmp_path, *cars, **options):
     result = read_log(save(pd.concat(cars), tmp_path), LogConfig(whole=False, **options))
-    return [{v.id: tuple(row) for v, row in zip(e.vehicles, e.present.tolist(), strict=True)} for e in result.encounters], result
+    return [
+        {v.id: tuple(row) for v, row in zip(e.vehicles, e.present.tolist(), strict=True)}
+        for e in result.encounters
+    ], result
 
 
 def test_a_vehicle_may_arrive_late_and_leave_early(tmp_path):
-    cars = car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 8, 20, 20, 0, 8), car("4", 5, 9, 20, 4, 8)
+    cars = (
+        car("1", 0, 20, 0, 0, 8),
+        car("2", 0, 20, 0, 4, 8),
+        car("3", 8, 20, 20, 0, 8),
+        car("4", 5, 9, 20, 4, 8),
+    )
     (found,), result = presence(tmp_path, *cars)
     assert found == {"1": (0, 200), "2": (0, 200), "3": (80, 200), "4": (50, 90)}
     (encounter,) = result.encounters
@@ -57,35 +75,56 @@ def test_a_vehicle_may_arrive_late_and_leave_early(tmp_path):
 
 
 def test_who_comes_nearer_than_100_m_arrives_then(tmp_path):
-    (found,), _ = presence(tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 20, 250, 8, -8))
+    (found,), _ = presence(
+        tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 20, 250, 8, -8)
+    )
     assert found["1"] == found["2"] == (0, 200)
     assert found["3"] == pytest.approx((94, 200), abs=2)  # 250 m at 16 m/s
 
 
 def test_a_moment_at_the_edge_shortens_the_encounter(tmp_path):
-    (found,), result = presence(tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0.8, 20, 20, 0, 8))
+    (found,), result = presence(
+        tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0.8, 20, 20, 0, 8)
+    )
     assert set(found.values()) == {(0, 192)}
     assert not result.quality.notes
 
 
 def test_nobody_is_left_out_in_silence(tmp_path):
-    cars = [car(str(k), 0, 10, 12 * k, 0, 10) for k in range(4)] + [car("brief", 0, 2, 0, 4, 10), car("far", 0, 10, 9e3, 0, 1)]
+    cars = [car(str(k), 0, 10, 12 * k, 0, 10) for k in range(4)] + [
+        car("brief", 0, 2, 0, 4, 10),
+        car("far", 0, 10, 9e3, 0, 1),
+    ]
     _, result = presence(tmp_path, *cars)
     assert result.quality.notes == tuple(
         f"vehicle {name} is in no encounter; it was recorded for {seconds} s"
         for name, seconds in (("brief", "2.0"), ("far", "10.0"))
     )
     _, result = presence(tmp_path, *cars, max_vehicles=3)
-    assert any("left out of an encounter of 3 vehicles (max_vehicles)" in note for note in result.quality.notes)
-    once = pd.DataFrame({"t_s": [0.0], "vehicle_id": "once", "x_m": 0.0, "y_m": 0.0, "speed_mps": 1.0})
+    assert any(
+        "left out of an encounter of 3 vehicles (max_vehicles)" in note
+        for note in result.quality.notes
+    )
+    once = pd.DataFrame(
+        {"t_s": [0.0], "vehicle_id": "once", "x_m": 0.0, "y_m": 0.0, "speed_mps": 1.0}
+    )
     _, result = presence(tmp_path, *cars, once)
     assert "fewer than two usable positions: vehicle once" in result.quality.notes
 
 
-@given(st.lists(st.tuples(st.integers(0, 8), st.integers(1, 20), st.integers(-60, 60)), min_size=2, max_size=6))
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 8), st.integers(1, 20), st.integers(-60, 60)),
+        min_size=2,
+        max_size=6,
+    )
+)
 @settings(max_examples=10)
 def test_everybody_is_in_an_encounter_or_named(tmp_path_factory, cars):
-    tracks = [car(f"v{k}", begin, begin + lasts, x - 8 * begin, 3.5 * k, 8) for k, (begin, lasts, x) in enumerate(cars)]
+    tracks = [
+        car(f"v{k}", begin, begin + lasts, x - 8 * begin, 3.5 * k, 8)
+        for k, (begin, lasts, x) in enumerate(cars)
+    ]
     try:
         _, result = presence(tmp_path_factory.mktemp("log"), *tracks)
     except InputError:
@@ -124,7 +163,11 @@ def test_a_long_standstill_ends_an_encounter(tmp_path):
 
 def test_long_meetings_are_cut(tmp_path):
     found, _ = groups(
-        tmp_path, car("1", 0, 100, 0, 0, 8), car("2", 0, 100, 0, 4, 8), car("3", 0, 100, 0, 8, 8), max_duration=30.0
+        tmp_path,
+        car("1", 0, 100, 0, 0, 8),
+        car("2", 0, 100, 0, 4, 8),
+        car("3", 0, 100, 0, 8, 8),
+        max_duration=30.0,
     )
     assert {name for name, _ in found} == {"1,2,3"}
     assert all(seconds <= 30.0 for _, seconds in found)
@@ -163,6 +206,8 @@ def test_a_reversal_cuts_the_track(tmp_path):
 
 
 def test_a_column_of_13_is_encounters_of_three_and_who_is_in_two_is_named(tmp_path):
-    found, quality = groups(tmp_path, *(car(str(k + 1), 0, 19.9, -66 * k, 0, 33) for k in range(13)))
+    found, quality = groups(
+        tmp_path, *(car(str(k + 1), 0, 19.9, -66 * k, 0, 33) for k in range(13))
+    )
     assert [names for names, _ in found] == [f"{k},{k + 1},{k + 2}" for k in range(1, 13, 2)]
     assert [note for note in quality.notes if note.endswith("vehicle 3, 5, 7, 9, 11")]

@@ -46,7 +46,9 @@ def fed(messages, streams=None):
 
 def same(one, other):
     return len(one) == len(other) and all(
-        a.stamp_ns == b.stamp_ns and a.vehicles == b.vehicles and np.array_equal(a.position, b.position)
+        a.stamp_ns == b.stamp_ns
+        and a.vehicles == b.vehicles
+        and np.array_equal(a.position, b.position)
         for a, b in zip(one, other, strict=True)
     )
 
@@ -56,16 +58,24 @@ def test_samples_are_the_vehicles_states_on_the_common_clock(encounter):
     stamps = np.array([sample.stamp_ns for sample in samples])
     assert (np.diff(stamps) == TICK).all() and stamps[0] == encounter.start_ns
     assert len(samples) >= len(encounter.time) - 7  # the last half second is still waiting
-    moved = np.array([s.position for s in samples]).swapaxes(0, 1) - encounter.position[:, : len(samples)]
+    moved = (
+        np.array([s.position for s in samples]).swapaxes(0, 1)
+        - encounter.position[:, : len(samples)]
+    )
     assert np.ptp(moved, axis=(0, 1)).max() < 0.01  # another origin, nothing else
-    assert np.abs(np.array([s.speed for s in samples]).T - encounter.speed[:, : len(samples)]).max() < 1e-9
+    assert (
+        np.abs(np.array([s.speed for s in samples]).T - encounter.speed[:, : len(samples)]).max()
+        < 1e-9
+    )
     assert streams.origin.count(",") == 1
 
 
 def test_disorder_and_repetition_change_nothing(encounter):
     messages = messages_of(encounter)
     rng = np.random.Generator(np.random.PCG64(5))
-    late = np.argsort(np.arange(len(messages)) + rng.uniform(0.0, 16.0, len(messages)))  # by up to 0.4 s
+    late = np.argsort(
+        np.arange(len(messages)) + rng.uniform(0.0, 16.0, len(messages))
+    )  # by up to 0.4 s
     mixed = [messages[i] for i in late for _ in range(1 + (rng.uniform() < 0.2))]
     expected, streams = fed(messages)
     got, again = fed(mixed)
@@ -81,14 +91,24 @@ def test_lost_and_wrong_messages_are_bridged(encounter):
         chance = rng.uniform()
         if chance < 0.1:
             continue
-        wrong = [math.nan] * len(values) if chance < 0.2 else [value + 0.01 for value in values] if chance < 0.22 else values
+        wrong = (
+            [math.nan] * len(values)
+            if chance < 0.2
+            else [value + 0.01 for value in values]
+            if chance < 0.22
+            else values
+        )
         strange = stamp + 3600 * 10**9 if 0.22 < chance < 0.24 else stamp
-        damaged.append((kind, vehicle, strange, *(values if chance < 0.24 and strange != stamp else wrong)))
+        damaged.append(
+            (kind, vehicle, strange, *(values if chance < 0.24 and strange != stamp else wrong))
+        )
     samples, streams = fed(damaged)
     expected, _ = fed(messages_of(encounter))
     assert len(samples) >= len(expected) - 3
     by_stamp = {sample.stamp_ns: sample for sample in expected}
-    errors = [np.abs(np.diff(s.position - by_stamp[s.stamp_ns].position, axis=0)).max() for s in samples]
+    errors = [
+        np.abs(np.diff(s.position - by_stamp[s.stamp_ns].position, axis=0)).max() for s in samples
+    ]
     assert max(errors) < 1.0
     (again,) = encounters_of(streams.take("live"), streams.config).encounters
     assert again.duration > encounter.duration - 1.0
@@ -110,7 +130,12 @@ def test_a_first_fix_off_the_globe_is_no_origin():
     streams, found = Streams(), []
     for k in range(60):
         for number, vehicle in enumerate(("1", "2")):
-            streams.put_fix(vehicle, 10**18 + k * TICK, 300.0 if k == 0 else 42.0 + 1e-6 * k, -83.0 + 1e-4 * number)
+            streams.put_fix(
+                vehicle,
+                10**18 + k * TICK,
+                300.0 if k == 0 else 42.0 + 1e-6 * k,
+                -83.0 + 1e-4 * number,
+            )
         found += streams.samples()
     assert found and streams.origin.startswith("42.0")
 
@@ -123,7 +148,11 @@ def test_a_clock_that_runs_backwards_is_said_and_survived():
     with pytest.raises(InputError, match="runs backwards"):
         streams.samples()
     assert streams.samples() == []
-    later = [("fix", vehicle, 10**18 + k * TICK, 42.0, -83.0) for k in range(20) for vehicle in ("1", "2")]
+    later = [
+        ("fix", vehicle, 10**18 + k * TICK, 42.0, -83.0)
+        for k in range(20)
+        for vehicle in ("1", "2")
+    ]
     assert len(fed(later, streams)[0]) > 10
 
 
@@ -131,7 +160,9 @@ def test_vehicles_come_and_go(encounter):
     """A third vehicle is there for four seconds in the middle."""
     messages = messages_of(encounter)
     begin = encounter.start_ns + 5 * 10**9
-    extra = [(m[0], "9", *m[2:]) for m in messages if m[1] == "1" and begin <= m[2] <= begin + 4 * 10**9]
+    extra = [
+        (m[0], "9", *m[2:]) for m in messages if m[1] == "1" and begin <= m[2] <= begin + 4 * 10**9
+    ]
     samples, _ = fed(sorted(messages + extra, key=lambda m: m[2]))
     there = [len(sample.vehicles) for sample in samples]
     assert [there[0], there[60], there[-1]] == [2, 3, 2]
@@ -140,7 +171,11 @@ def test_vehicles_come_and_go(encounter):
 
 
 def test_a_slower_source_is_waited_for(encounter):
-    messages = [m for m in messages_of(encounter) if m[1] == "1" or (m[2] - encounter.start_ns) % 10**9 == 0]
+    messages = [
+        m
+        for m in messages_of(encounter)
+        if m[1] == "1" or (m[2] - encounter.start_ns) % 10**9 == 0
+    ]
     samples, _ = fed(messages)
     assert {len(sample.vehicles) for sample in samples} == {2}
     assert len(samples) > 140
@@ -160,7 +195,13 @@ def test_memory_is_bounded(encounter):
 def test_a_clock_that_was_set_is_noticed_and_one_wrong_stamp_is_not():
     streams = Streams()
     streams.put_speed("1", 10**18, 1.0)
-    assert [streams.breaks(10**18 + FAR_NS + 1) for _ in range(5)] == [False, False, False, False, True]
+    assert [streams.breaks(10**18 + FAR_NS + 1) for _ in range(5)] == [
+        False,
+        False,
+        False,
+        False,
+        True,
+    ]
     assert not streams.breaks(10**18 + TICK)
     assert not streams.breaks(10**18 + FAR_NS + 1)
     streams.put_speed("1", 10**18 + FAR_NS + 1, 1.0)

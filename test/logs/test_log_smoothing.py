@@ -39,7 +39,9 @@ def test_the_motion_is_the_minimum_of_its_quadratic_program():
         {"type": "ineq", "fun": lambda c: 1.0 - np.diff(c, 2) / 0.01},
         {"type": "ineq", "fun": lambda c: 2.0 + np.diff(c, 2) / 0.01},
     ]
-    best = minimize(cost, found + 0.01, constraints=limits, options={"maxiter": 2000, "ftol": 1e-14})
+    best = minimize(
+        cost, found + 0.01, constraints=limits, options={"maxiter": 2000, "ftol": 1e-14}
+    )
     assert cost(found) <= best.fun * (1.0 + 1e-4)
     acceleration = np.diff(found, 2) / 0.01
     assert acceleration.max() <= 1.0 + 1e-5 and acceleration.min() >= -2.0 - 1e-5
@@ -54,7 +56,9 @@ def test_between_samples_the_acceleration_is_constant():
     np.testing.assert_allclose(np.diff(place), (speed[1:] + speed[:-1]) / 2.0 * 0.1, atol=1e-12)
     np.testing.assert_allclose(motion.place(coefficients, 0.1 * np.arange(30)), place, atol=1e-9)
     half = motion.place(coefficients, 0.1 * np.arange(29) + 0.05)
-    np.testing.assert_allclose(half, place[:-1] + 0.05 * (3.0 * speed[:-1] + speed[1:]) / 4.0, atol=1e-9)
+    np.testing.assert_allclose(
+        half, place[:-1] + 0.05 * (3.0 * speed[:-1] + speed[1:]) / 4.0, atol=1e-9
+    )
 
 
 @given(seed=st.integers(0, 10_000), radius=st.floats(8.0, 200.0), noise=st.floats(0.0, 0.4))
@@ -64,7 +68,13 @@ def test_a_path_through_noisy_points_of_an_arc(seed, radius, noise):
     along = np.linspace(0.0, min(60.0, 4.0 * radius), 120)
     angle = along / radius
     truth = radius * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
-    path = fit_path(along, truth + rng.normal(0.0, noise, truth.shape), np.ones(120), max(noise, 0.1), np.full(120, 5.0))
+    path = fit_path(
+        along,
+        truth + rng.normal(0.0, noise, truth.shape),
+        np.ones(120),
+        max(noise, 0.1),
+        np.full(120, 5.0),
+    )
     arc, aside = path.project(along, truth)
     assert aside.max() < 0.15 + 1.5 * noise
     np.testing.assert_allclose(np.ptp(arc), np.ptp(along), rtol=0.03)
@@ -88,7 +98,9 @@ def drive(speed, noise, seed=0, rate=10.0, sensor=1.0):
     stamps = (np.arange(len(speed)) / rate * 1e9).astype(np.int64)
     fix = np.column_stack([place, np.zeros(len(speed))]) + rng.normal(0.0, noise, (len(speed), 2))
     rows = np.arange(len(speed))
-    return place, Observations("v", stamps, fix, rows, np.full(len(speed), np.nan), stamps, speed * sensor, rows, 4.8, 1.9)
+    return place, Observations(
+        "v", stamps, fix, rows, np.full(len(speed), np.nan), stamps, speed * sensor, rows, 4.8, 1.9
+    )
 
 
 def test_standing_is_still_and_keeps_its_heading():
@@ -114,7 +126,9 @@ def test_a_sensor_that_is_off_by_three_percent_does_not_lengthen_the_way():
 def test_a_stuck_speed_sensor_does_not_stop_the_car():
     speed = np.full(100, 10.0)
     place, track = drive(speed, noise=0.1, sensor=0.0)
-    assert not standing(0.1 * np.arange(100), track.fix_ns * 1e-9, track.fix, track.speed_ns * 1e-9, track.speed).any()
+    assert not standing(
+        0.1 * np.arange(100), track.fix_ns * 1e-9, track.fix, track.speed_ns * 1e-9, track.speed
+    ).any()
     smooth = smooth_piece(track, 0, CONFIG)
     assert np.abs(smooth.position[:, 0] - place).max() < 1.5
 
@@ -145,14 +159,21 @@ def turning(noise, heading_noise):
     xy = np.cumsum(0.2 * np.column_stack((np.cos(course), np.sin(course))), axis=0)
     _, track = drive(np.full(120, 2.0), noise=0.0)
     fix = xy + rng.normal(0.0, noise, xy.shape)
-    return xy, course, replace(track, fix=fix, heading=course + rng.normal(0.0, heading_noise, 120))
+    return (
+        xy,
+        course,
+        replace(track, fix=fix, heading=course + rng.normal(0.0, heading_noise, 120)),
+    )
 
 
 def test_recorded_headings_are_used_where_a_car_is_slow():
     _, course, track = turning(1.0, np.radians(1.0))
     with_them = smooth_piece(track, 0, CONFIG)
     without = smooth_piece(replace(track, heading=np.full(120, np.nan)), 0, CONFIG)
-    off = [np.sqrt(np.square(np.degrees(smooth.heading - course)).mean()) for smooth in (with_them, without)]
+    off = [
+        np.sqrt(np.square(np.degrees(smooth.heading - course)).mean())
+        for smooth in (with_them, without)
+    ]
     assert off[0] < 2.0
     assert off[1] > 4.0
     assert with_them.headings.all()

@@ -13,7 +13,10 @@ from scenario_gen.template.interaction import find_waits
 
 
 def test_the_list_is_complete(data):
-    found = {str(path.relative_to(data / "trajectories")) for path in data.glob("trajectories/*/encounter_*.csv")}
+    found = {
+        str(path.relative_to(data / "trajectories"))
+        for path in data.glob("trajectories/*/encounter_*.csv")
+    }
     assert found == set(VEHICLES)
 
 
@@ -44,7 +47,9 @@ def assert_driven(position, heading, speed, dt, config):
     assert acceleration.max() <= config.acceleration_limit + 1e-3
     assert acceleration.min() >= -config.braking_limit - 1e-3
     turned = np.abs(np.diff(heading, axis=1))
-    assert (turned <= 0.5 * steps + 1e-6).all(), "a heading that turns without driving"  # a car's circle is above 2 m
+    assert (turned <= 0.5 * steps + 1e-6).all(), (
+        "a heading that turns without driving"
+    )  # a car's circle is above 2 m
     stands = (speed[:, 1:] == 0.0) & (speed[:, :-1] == 0.0)
     assert (steps[stands] < 1e-6).all()
     moving = steps > 0.2
@@ -63,13 +68,18 @@ def test_an_encounter_file_is_one_encounter_of_all_its_vehicles(one):
     assert_drivable(encounter, LogConfig())
     quality = result.quality
     assert quality.rows > 100
-    assert all(vehicle.speed_after <= min(0.08, vehicle.speed_before + 0.02) for vehicle in quality.vehicles)
+    assert all(
+        vehicle.speed_after <= min(0.08, vehicle.speed_before + 0.02)
+        for vehicle in quality.vehicles
+    )
     assert all(vehicle.moved < 0.6 for vehicle in quality.vehicles)
     assert quality.lines()[0].startswith(name.rpartition("/")[2].removesuffix(".csv"))
 
 
 def test_recorded_overlaps_are_reported(data):
-    quality = read_log(data / "trajectories" / next(name for name in VEHICLES if "four_vehicles" in name)).quality
+    quality = read_log(
+        data / "trajectories" / next(name for name in VEHICLES if "four_vehicles" in name)
+    ).quality
     (overlap,) = quality.encounters[0].overlaps
     assert (overlap.first, overlap.second) == ("1", "2")
     assert 0.4 < overlap.share < 0.7  # the data folder's README: they overlap for half of it
@@ -104,7 +114,8 @@ def test_jittering_vehicles_have_steady_headings(data):
 
 
 @pytest.mark.parametrize(
-    "pattern", ["psu_2obu/*_full.csv", "openacc_zalazone/*first150s.csv", "ngsim_commonroad/*Peach*all*.csv"]
+    "pattern",
+    ["psu_2obu/*_full.csv", "openacc_zalazone/*first150s.csv", "ngsim_commonroad/*Peach*all*.csv"],
 )
 def test_long_logs_give_sensible_encounters(data, pattern):
     (path,) = data.glob(f"trajectories/{pattern}")

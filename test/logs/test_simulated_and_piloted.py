@@ -23,8 +23,15 @@ def drive():
 
 def message(row, core):
     at = pd.Timestamp(row.t_s + 0.03, unit="s", tz="UTC")  # when it was received
-    core |= {"id": f"0{row.vehicle_id}E1", "secMark": round(row.t_s * 1000) % 60_000, "size": {"length": 450, "width": 180}}
-    return {"metadata": {"recordGeneratedAt": f"{at:%Y-%m-%dT%H:%M:%S.%f}Z[UTC]"}, "payload": {"data": {"coreData": core}}}
+    core |= {
+        "id": f"0{row.vehicle_id}E1",
+        "secMark": round(row.t_s * 1000) % 60_000,
+        "size": {"length": 450, "width": 180},
+    }
+    return {
+        "metadata": {"recordGeneratedAt": f"{at:%Y-%m-%dT%H:%M:%S.%f}Z[UTC]"},
+        "payload": {"data": {"coreData": core}},
+    }
 
 
 def wyoming(row):
@@ -33,7 +40,12 @@ def wyoming(row):
 
 
 def tampa(row):
-    raw = {"lat": row.lat_deg * 1e7, "long": row.lon_deg * 1e7, "speed": row.speed_mps / 0.02, "heading": row.course / 0.0125}
+    raw = {
+        "lat": row.lat_deg * 1e7,
+        "long": row.lon_deg * 1e7,
+        "speed": row.speed_mps / 0.02,
+        "heading": row.course / 0.0125,
+    }
     return message(row, {name: str(round(value)) for name, value in raw.items()})
 
 
@@ -45,7 +57,11 @@ def new_york(row):
         "T_s": row.t_s - 1006.0,
         "size": {"length": 450, "width": 180},
     }
-    return {"bsmRecord": {"bsmMsg": {"coreData": core | {"speed_mps": row.speed_mps, "heading_deg": row.course}}}}
+    return {
+        "bsmRecord": {
+            "bsmMsg": {"coreData": core | {"speed_mps": row.speed_mps, "heading_deg": row.course}}
+        }
+    }
 
 
 def as_table(records):
@@ -54,11 +70,22 @@ def as_table(records):
     for record in records:
         core = record["payload"]["data"]["coreData"]
         place = core.get("position", {"latitude": core.get("lat"), "longitude": core.get("long")})
-        own = {f"coreData_{name}": core[name] for name in ("id", "secMark", "speed", "heading")} | {
-            "coreData_size": json.dumps(core["size"])
+        own = {
+            f"coreData_{name}": core[name] for name in ("id", "secMark", "speed", "heading")
+        } | {"coreData_size": json.dumps(core["size"])}
+        own |= {
+            "coreData_position_lat": place["latitude"],
+            "coreData_position_long": place["longitude"],
+            "randomNum": 0.5,
         }
-        own |= {"coreData_position_lat": place["latitude"], "coreData_position_long": place["longitude"], "randomNum": 0.5}
-        rows.append({"metadata_generatedAt": record["metadata"]["recordGeneratedAt"][:19].replace("T", " ")} | own)
+        rows.append(
+            {
+                "metadata_generatedAt": record["metadata"]["recordGeneratedAt"][:19].replace(
+                    "T", " "
+                )
+            }
+            | own
+        )
     return pd.DataFrame(rows).to_csv(index=False)
 
 
@@ -72,7 +99,11 @@ def test_messages_of_the_pilots(tmp_path, pilot):
         "pretty": "".join(json.dumps(r, indent=1) for r in records),
     }
     if pilot is new_york:
-        texts = {"events": "\n".join(json.dumps({"eventHeader": {}, "bsmList": records}) for _ in range(2))}
+        texts = {
+            "events": "\n".join(
+                json.dumps({"eventHeader": {}, "bsmList": records}) for _ in range(2)
+            )
+        }
     names = {f"{name}.json": text for name, text in texts.items()}
     names |= {} if pilot is new_york else {"table.csv": as_table(records)}
     for name, own in names.items():
@@ -80,8 +111,13 @@ def test_messages_of_the_pilots(tmp_path, pilot):
         found = read_log(tmp_path / name).encounters
         assert len(found) == (2 if pilot is new_york else 1)
         for encounter in found:
-            assert [(one.id, one.length, one.width) for one in encounter.vehicles] == [("0aE1", 4.5, 1.8), ("0bE1", 4.5, 1.8)]
-            np.testing.assert_allclose(np.ptp(encounter.position[:2], axis=1), np.ptp(plain.position, axis=1), atol=0.3)
+            assert [(one.id, one.length, one.width) for one in encounter.vehicles] == [
+                ("0aE1", 4.5, 1.8),
+                ("0bE1", 4.5, 1.8),
+            ]
+            np.testing.assert_allclose(
+                np.ptp(encounter.position[:2], axis=1), np.ptp(plain.position, axis=1), atol=0.3
+            )
             np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.02)
     (tmp_path / "cut.json").write_text(own[:-20] if pilot is new_york else texts["pretty"][:-20])
     with pytest.raises(InputError, match=r"cut\.json"):
@@ -99,13 +135,19 @@ def test_floating_car_data(tmp_path, geo):
             f'angle="{row.course}" speed="{row.speed_mps}" type="DEFAULT_VEHTYPE"/>'
             for row, (x, y) in zip(rows.itertuples(), front, strict=True)
         ]
-        steps.append(f'<timestep time="{time:.2f}">{"".join(own)}<person id="p" x="1" y="2"/></timestep>')
+        steps.append(
+            f'<timestep time="{time:.2f}">{"".join(own)}<person id="p" x="1" y="2"/></timestep>'
+        )
     text = f'\n<?xml version="1.0" encoding="UTF-8"?>\n<!-- {"options " * 2000} -->\n<fcd-export>{"".join(steps)}</fcd-export>'
     with gzip.open(tmp_path / "fcd.xml.gz", "wt") as file:
         file.write(text)
     result = read_log(tmp_path / "fcd.xml.gz")
     (encounter,) = result.encounters
-    np.testing.assert_allclose(np.ptp(encounter.position[:2], axis=1), np.ptp(plain.position, axis=1), atol=0.3)
-    assert [vehicle.type for vehicle in encounter.vehicles] == (["car", "car"] if geo else ["car", "car", "pedestrian"])
+    np.testing.assert_allclose(
+        np.ptp(encounter.position[:2], axis=1), np.ptp(plain.position, axis=1), atol=0.3
+    )
+    assert [vehicle.type for vehicle in encounter.vehicles] == (
+        ["car", "car"] if geo else ["car", "car", "pedestrian"]
+    )
     if not geo:
         np.testing.assert_allclose(encounter.position[:2], plain.position, atol=0.1)

@@ -58,7 +58,11 @@ def swapped(rows):
 
 def ahead(rows, metres):
     east = rows.vehicle_id == "a"
-    return rows.assign(x_m=rows.x_m + metres * east, y_m=rows.y_m + metres * ~east, heading=np.where(east, 0.0, np.pi / 2.0))
+    return rows.assign(
+        x_m=rows.x_m + metres * east,
+        y_m=rows.y_m + metres * ~east,
+        heading=np.where(east, 0.0, np.pi / 2.0),
+    )
 
 
 def sized(rows, length, width):
@@ -66,7 +70,9 @@ def sized(rows, length, width):
 
 
 def plain(rows):
-    return rows.rename(columns={"t_s": "t", "vehicle_id": "id", "x_m": "x", "y_m": "y", "speed_mps": "speed"})
+    return rows.rename(
+        columns={"t_s": "t", "vehicle_id": "id", "x_m": "x", "y_m": "y", "speed_mps": "speed"}
+    )
 
 
 def with_headings(rows):
@@ -74,10 +80,23 @@ def with_headings(rows):
 
 
 def ngsim(rows):
-    names = {"t_s": "Global_Time", "vehicle_id": "Vehicle_ID", "x_m": "Local_X", "y_m": "Local_Y", "speed_mps": "v_Vel"}
-    rows = rows.assign(t_s=(rows.t_s * 1000).round().astype(np.int64), vehicle_id=rows.vehicle_id.map({"a": 1, "b": 2}))
-    rows = rows.assign(**{name: rows[name] / FOOT for name in ("x_m", "y_m", "speed_mps")}).rename(columns=names)
-    return rows.assign(Global_X=6e6, Global_Y=1.8e6, v_Length=4.5 / FOOT, v_Width=1.8 / FOOT, v_Acc=0.0, Lane_ID=2)
+    names = {
+        "t_s": "Global_Time",
+        "vehicle_id": "Vehicle_ID",
+        "x_m": "Local_X",
+        "y_m": "Local_Y",
+        "speed_mps": "v_Vel",
+    }
+    rows = rows.assign(
+        t_s=(rows.t_s * 1000).round().astype(np.int64),
+        vehicle_id=rows.vehicle_id.map({"a": 1, "b": 2}),
+    )
+    rows = rows.assign(**{name: rows[name] / FOOT for name in ("x_m", "y_m", "speed_mps")}).rename(
+        columns=names
+    )
+    return rows.assign(
+        Global_X=6e6, Global_Y=1.8e6, v_Length=4.5 / FOOT, v_Width=1.8 / FOOT, v_Acc=0.0, Lane_ID=2
+    )
 
 
 READ = {  # name: what is changed, columns, what is said (None: nothing), how the file is written
@@ -100,24 +119,39 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
     "dogs": (with_kind, "", "1 × animal.dog.0007"),
     "dogs by a number": (numbered, "kind=type:1+2", "1 × unnamed 3"),
     "columns not read": (lambda rows: rows.assign(lane=3), "", "not read: lane"),
-    "brackets": (lambda rows: rows.rename(columns={"x_m": "Ost X [m]", "y_m": "Nord [y] "}), "x=Ost X [m],y=Nord [y]", ""),
+    "brackets": (
+        lambda rows: rows.rename(columns={"x_m": "Ost X [m]", "y_m": "Nord [y] "}),
+        "x=Ost X [m],y=Nord [y]",
+        "",
+    ),
     "spaces": (lambda rows: rows.rename(columns={"x_m": "Pos X [m]", "y_m": "Pos Y [m]"}), "", ""),
     "feet": (lambda rows: sized(rows, 15.0, 6.0), "", "in feet"),
     "zero": (lambda rows: sized(rows, 0.0, 0.0), "", "0 m long"),
     "length and width swapped": (lambda rows: sized(rows, 1.8, 4.5), "", "it looks swapped"),
     "lat and lon swapped": (swapped, "lat=lon_deg,lon=lat_deg", ""),
     "degrees and minutes": (nmea, "lat=lat_deg:ddmm,lon=lon_deg:ddmm", ""),
-    "a decimal comma": (plain, "", "its numbers have a decimal comma", {"sep": ";", "decimal": ","}),
+    "a decimal comma": (
+        plain,
+        "",
+        "its numbers have a decimal comma",
+        {"sep": ";", "decimal": ","},
+    ),
     "UTF-16": (plain, "", "the file is UTF-16", {"encoding": "utf-16"}),
     "bars": (plain, "", None, {"sep": "|"}),
     "spaces between fields": (plain, "", None, {"sep": " "}),
     "headings that fit": (with_headings, "", None),
     "units in brackets": (
-        lambda rows: plain(rows).rename(columns={"t": "Time [s]", "x": "x (m)", "y": "y (m)", "speed": "Speed [m/s]"}),
+        lambda rows: plain(rows).rename(
+            columns={"t": "Time [s]", "x": "x (m)", "y": "y (m)", "speed": "Speed [m/s]"}
+        ),
         "",
         None,
     ),
-    "no speed": (lambda rows: plain(rows).drop(columns="speed"), "", "speeds are derived from the positions"),
+    "no speed": (
+        lambda rows: plain(rows).drop(columns="speed"),
+        "",
+        "speeds are derived from the positions",
+    ),
     "NGSIM": (ngsim, "", "feet are converted to metres"),
     "headings in degrees": (
         lambda rows: with_headings(rows).assign(heading=lambda own: np.degrees(own.heading)),
@@ -137,10 +171,14 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
 }
 
 
-@pytest.mark.parametrize(("change", "columns", "said", "options"), [(*row, {})[:4] for row in READ.values()], ids=READ)
+@pytest.mark.parametrize(
+    ("change", "columns", "said", "options"), [(*row, {})[:4] for row in READ.values()], ids=READ
+)
 def test_it_is_read_as_it_was_driven(tmp_path, change, columns, said, options):
     (driven,) = read_log(save(crossing(), tmp_path)).encounters
-    result = read_log(save(change(crossing()), tmp_path, "other.csv", **options), LogConfig(columns=columns))
+    result = read_log(
+        save(change(crossing()), tmp_path, "other.csv", **options), LogConfig(columns=columns)
+    )
     (encounter,) = result.encounters
     size, names = ((4.5, 1.8), "12") if change is ngsim else ((4.8, 1.9), "ab")
     assert [(one.id, one.length, one.width) for one in encounter.vehicles] == [
@@ -150,21 +188,39 @@ def test_it_is_read_as_it_was_driven(tmp_path, change, columns, said, options):
     for name in ("position", "speed"):
         mine, right = getattr(encounter, name)[:, :count], getattr(driven, name)[:, :count]
         origin = mine[:, :1] - right[:, :1] if encounter.origin and name == "position" else 0.0
-        np.testing.assert_allclose(mine - origin, right, atol=0.7 if said and "repeated" in said else 0.25)
+        np.testing.assert_allclose(
+            mine - origin, right, atol=0.7 if said and "repeated" in said else 0.25
+        )
     assert said is not None or not result.quality.notes
-    assert (said or "") in " ".join(result.quality.notes) + " ".join(map(str, result.quality.dropped))
+    assert (said or "") in " ".join(result.quality.notes) + " ".join(
+        map(str, result.quality.dropped)
+    )
 
 
 SAID = {  # what is read, but looks otherwise
     "swapped": (swapped, "if lat and lon were swapped"),
-    "frames": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 24, speed_mps=rows.speed_mps), "24fps"),
-    "knots": (lambda rows: rows.assign(speed_mps=rows.speed_mps * 3600 / 1852), "knots (speed_kn)"),
+    "frames": (
+        lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 24, speed_mps=rows.speed_mps),
+        "24fps",
+    ),
+    "knots": (
+        lambda rows: rows.assign(speed_mps=rows.speed_mps * 3600 / 1852),
+        "knots (speed_kn)",
+    ),
     "overlaps": (
-        lambda rows: rows.assign(x_m=rows.x_m.where(rows.vehicle_id == "a", rows.x_m.shift(1) + 2.0), y_m=0.0),
+        lambda rows: rows.assign(
+            x_m=rows.x_m.where(rows.vehicle_id == "a", rows.x_m.shift(1) + 2.0), y_m=0.0
+        ),
         "overlap",
     ),
-    "kinds without a meaning": (lambda rows: rows.assign(type=1), "column type has numbers (1), whose meaning is not known"),
-    "y down": (lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)), "y=-…"),
+    "kinds without a meaning": (
+        lambda rows: rows.assign(type=1),
+        "column type has numbers (1), whose meaning is not known",
+    ),
+    "y down": (
+        lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)),
+        "y=-…",
+    ),
     "swapped axes": (
         lambda rows: with_headings(rows).rename(columns={"x": "y", "y": "x"}),
         "if x and y are swapped (log.columns=x=…,y=…)",
@@ -182,12 +238,17 @@ def test_what_looks_otherwise_is_said_once(tmp_path, change, said):
     assert sum(said in note for note in notes) == 1
 
 
-@pytest.mark.parametrize(("back", "rate"), [(0.5, 10.0), (1.0, 10.0), (1.0, 1.0), (1.5, 1.0), (0.7, 2.0)])
+@pytest.mark.parametrize(
+    ("back", "rate"), [(0.5, 10.0), (1.0, 10.0), (1.0, 1.0), (1.5, 1.0), (0.7, 2.0)]
+)
 def test_a_clock_set_back_cuts(tmp_path, back, rate):
     rows = crossing(seconds=14.0, rate=rate)
     rows["t_s"] -= np.where(rows["t_s"] > 1006.0, back, 0.0)
     result = read_log(save(rows, tmp_path))
-    assert len(result.encounters) == 2 and max(encounter.speed.max() for encounter in result.encounters) < 8.2
+    assert (
+        len(result.encounters) == 2
+        and max(encounter.speed.max() for encounter in result.encounters) < 8.2
+    )
     assert "the clock starts anew" in " ".join(result.quality.notes)
 
 
@@ -205,14 +266,29 @@ def test_a_jump_without_speeds_is_not_driven(tmp_path):
 
 
 def test_fixes_seconds_apart_do_not_refuse_the_log(tmp_path):
-    points = [(7.9, -3.4), (12.4, -4.2), (21.5, -6.4), (28.8, -0.8), (46.2, -9.2), (55.1, -13.5), (61.4, -23.0), (57.3, -47.5)]
-    rows = [(5.0 * k, name, x, y + off) for k, (x, y) in enumerate(points) for name, off in (("1", 0.0), ("2", 8.0))]
+    points = [
+        (7.9, -3.4),
+        (12.4, -4.2),
+        (21.5, -6.4),
+        (28.8, -0.8),
+        (46.2, -9.2),
+        (55.1, -13.5),
+        (61.4, -23.0),
+        (57.3, -47.5),
+    ]
+    rows = [
+        (5.0 * k, name, x, y + off)
+        for k, (x, y) in enumerate(points)
+        for name, off in (("1", 0.0), ("2", 8.0))
+    ]
     assert read_log(save(pd.DataFrame(rows, columns=["t", "id", "x", "y"]), tmp_path)).encounters
 
 
 @pytest.mark.parametrize("ids", [(LONG, LONG + 1), ("1e5", "100000"), ("12e3", "120e2")])
 def test_ids_stay_what_they_are(tmp_path, ids):
-    rows = crossing().assign(vehicle_id=lambda own: own.vehicle_id.map(dict(zip("ab", map(str, ids), strict=True))))
+    rows = crossing().assign(
+        vehicle_id=lambda own: own.vehicle_id.map(dict(zip("ab", map(str, ids), strict=True)))
+    )
     rows.loc[4, "vehicle_id"] = None
     (encounter,) = read_log(save(rows, tmp_path)).encounters
     assert {vehicle.id for vehicle in encounter.vehicles} == set(map(str, ids))
@@ -229,7 +305,11 @@ def test_lines_above_the_header(tmp_path, above):
 
 @pytest.mark.parametrize("ending", ["gz", "zip"])
 def test_packed_logs(tmp_path, ending):
-    crossing().to_csv(tmp_path / f"log.csv.{ending}", index=False, compression=None if ending == "zip" else "gzip")
+    crossing().to_csv(
+        tmp_path / f"log.csv.{ending}",
+        index=False,
+        compression=None if ending == "zip" else "gzip",
+    )
     if ending == "zip":
         with zipfile.ZipFile(tmp_path / "log.csv.zip", "w") as archive:
             archive.writestr("drive/log.csv", crossing().to_csv(index=False))
@@ -269,22 +349,41 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
         lambda rows: rows.rename(columns={"vehicle_id": "tracker"}).assign(id=range(len(rows))),
         "--set log.columns=vehicle=tracker",
     ),
-    "hours": (lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0), "the time may be in h: --set log.columns=time="),
+    "hours": (
+        lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0),
+        "the time may be in h: --set log.columns=time=",
+    ),
     "degrees and minutes": (nmea, "lat=…:ddmm"),
-    "1e-7 degrees": (lambda rows: geographic(rows).assign(lat_deg=4.8e8, lon_deg=1.1e8), "lat=…:e7"),
-    "a dog": (lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "dog"})), "1 × dog"),
+    "1e-7 degrees": (
+        lambda rows: geographic(rows).assign(lat_deg=4.8e8, lon_deg=1.1e8),
+        "lat=…:e7",
+    ),
+    "a dog": (
+        lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "dog"})),
+        "1 × dog",
+    ),
     "another unknown point": (lambda rows: rows, "point is one of centre, front"),
     "ids of one ROS name": (
         lambda rows: rows.assign(vehicle_id=rows.vehicle_id.map({"a": "car-1", "b": "car_1"})),
         "vehicle ids 'car-1' and 'car_1' are both 'car_1' as ROS names; rename one",
     ),
-    "no header": (plain, "line 1 has numbers instead of column names; put a line such as t,id,x,y,speed", {"header": False}),
+    "no header": (
+        plain,
+        "line 1 has numbers instead of column names; put a line such as t,id,x,y,speed",
+        {"header": False},
+    ),
     "another name for the vehicle": (
         lambda rows: plain(rows).rename(columns={"id": "who"}),
         "it could be who: --set log.columns=vehicle=who",
     ),
-    "no vehicle": (lambda rows: plain(rows).drop(columns="id"), "no column names the vehicle; add a column `id`"),
-    "one vehicle": (lambda rows: plain(rows[rows.vehicle_id == "a"]).drop(columns="id"), "Give the files of all vehicles"),
+    "no vehicle": (
+        lambda rows: plain(rows).drop(columns="id"),
+        "no column names the vehicle; add a column `id`",
+    ),
+    "one vehicle": (
+        lambda rows: plain(rows[rows.vehicle_id == "a"]).drop(columns="id"),
+        "Give the files of all vehicles",
+    ),
     "decimal commas between commas": (
         lambda rows: plain(rows).assign(t=[f"{t:.1f}".replace(".", ",") for t in rows.t_s]),
         "write 0.5, not 0,5",
@@ -295,13 +394,19 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
         "--set log.columns=time=…; is it timstamp?",
     ),
     "latitude and longitude swapped": (
-        lambda rows: plain(rows).assign(lon=48.0 + rows.x_m * 1e-5, lat=111.0 + rows.y_m * 1e-5).drop(columns=["x", "y"]),
+        lambda rows: (
+            plain(rows)
+            .assign(lon=48.0 + rows.x_m * 1e-5, lat=111.0 + rows.y_m * 1e-5)
+            .drop(columns=["x", "y"])
+        ),
         "lat and lon may be swapped",
     ),
 }
 
 
-@pytest.mark.parametrize(("change", "said", "options"), [(*row, {})[:3] for row in REFUSED.values()], ids=REFUSED)
+@pytest.mark.parametrize(
+    ("change", "said", "options"), [(*row, {})[:3] for row in REFUSED.values()], ids=REFUSED
+)
 def test_what_cannot_be_read_says_what_to_do(tmp_path, change, said, options):
     columns = "point=roof" if said.startswith("point") else ""
     with pytest.raises(InputError) as error:

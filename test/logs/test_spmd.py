@@ -50,7 +50,9 @@ def test_one_received_file(tmp_path):
 def test_a_folder_of_transmitted_files(tmp_path):
     lines = messages(crossing())
     for device, name in (("11", "TripStart_41090_p001.csv"), ("12", "TripStart_41090_p002.csv")):
-        (tmp_path / name).write_text("\n".join(line for line in lines if line.split(",")[2] == device) + "\n")
+        (tmp_path / name).write_text(
+            "\n".join(line for line in lines if line.split(",")[2] == device) + "\n"
+        )
     result = read_log(tmp_path)
     assert len(result.encounters[0].vehicles) == 2
     assert result.quality.rows == 242

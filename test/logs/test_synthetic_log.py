@@ -26,7 +26,11 @@ def test_the_bundled_files_are_what_the_module_writes(tmp_path, capsys):
     for name in CASES:
         made, kept = tmp_path / f"synthetic_{name}", bundled(name)
         files = sorted(file.name for file in made.iterdir())
-        assert files == sorted(file.name for file in kept.iterdir()) == ["metadata.yaml", f"synthetic_{name}.mcap"]
+        assert (
+            files
+            == sorted(file.name for file in kept.iterdir())
+            == ["metadata.yaml", f"synthetic_{name}.mcap"]
+        )
         for file in files:
             assert (made / file).read_bytes() == (kept / file).read_bytes()
             assert (kept / file).stat().st_size < 300_000
@@ -51,7 +55,11 @@ def test_the_paper_s_story():
 def test_all_readers_decode_every_message(case):
     bag = bundled(case.name[-1])
     with AnyReader([bag]) as reader:
-        counts = sum(1 for connection, _, data in reader.messages() if reader.deserialize(data, connection.msgtype))
+        counts = sum(
+            1
+            for connection, _, data in reader.messages()
+            if reader.deserialize(data, connection.msgtype)
+        )
     with (bag / f"{case.name}.mcap").open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == "ros2"

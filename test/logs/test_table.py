@@ -17,7 +17,9 @@ def test_a_plain_table(tmp_path):
     assert encounter.name == "log"
     assert [vehicle.id for vehicle in encounter.vehicles] == ["a", "b"]
     assert encounter.start_ns == 1000 * 10**9
-    np.testing.assert_allclose(encounter.position[0, :, 0], -40.0 + 8.0 * encounter.time, atol=0.05)
+    np.testing.assert_allclose(
+        encounter.position[0, :, 0], -40.0 + 8.0 * encounter.time, atol=0.05
+    )
     np.testing.assert_allclose(encounter.heading[0], 0.0, atol=0.01)
     np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.01)
     assert (encounter.speed[1, -50:] == 0.0).all()
@@ -25,19 +27,32 @@ def test_a_plain_table(tmp_path):
 
 def same(a, b, atol=0.02):
     """Two encounters agree up to a shift of the frame."""
-    for x, y in ((a.position - a.position[0, 0], b.position - b.position[0, 0]), (a.speed, b.speed)):
+    for x, y in (
+        (a.position - a.position[0, 0], b.position - b.position[0, 0]),
+        (a.speed, b.speed),
+    ):
         np.testing.assert_allclose(x, y, atol=atol)
 
 
 RENAMES = {
-    "kmh and ms": lambda rows: rows.assign(speed_kmh=rows.pop("speed_mps") * 3.6, time_ms=(rows.pop("t_s") * 1000).round()),
-    "nanoseconds": lambda rows: rows.assign(time_ns=(rows.pop("t_s") * 1e9).round().astype(np.int64)),
+    "kmh and ms": lambda rows: rows.assign(
+        speed_kmh=rows.pop("speed_mps") * 3.6, time_ms=(rows.pop("t_s") * 1000).round()
+    ),
+    "nanoseconds": lambda rows: rows.assign(
+        time_ns=(rows.pop("t_s") * 1e9).round().astype(np.int64)
+    ),
     "feet": lambda rows: rows.assign(
-        x_ft=rows.pop("x_m") / 0.3048, y_ft=rows.pop("y_m") / 0.3048, v_mph=rows.pop("speed_mps") / 0.44704
+        x_ft=rows.pop("x_m") / 0.3048,
+        y_ft=rows.pop("y_m") / 0.3048,
+        v_mph=rows.pop("speed_mps") / 0.44704,
     ),
     "utc wins over t": lambda rows: rows.assign(utc_s=rows["t_s"], t_s=0.0),
-    "dates": lambda rows: rows.assign(timestamp=pd.to_datetime(rows.pop("t_s"), unit="s", utc=True).astype(str)),
-    "tracks": lambda rows: rows.rename(columns={"vehicle_id": "Track_ID", "x_m": "E_m", "y_m": "N_m", "speed_mps": "Speed"}),
+    "dates": lambda rows: rows.assign(
+        timestamp=pd.to_datetime(rows.pop("t_s"), unit="s", utc=True).astype(str)
+    ),
+    "tracks": lambda rows: rows.rename(
+        columns={"vehicle_id": "Track_ID", "x_m": "E_m", "y_m": "N_m", "speed_mps": "Speed"}
+    ),
 }
 
 
@@ -75,7 +90,11 @@ def test_headings(tmp_path):
     unknown = read_log(save(rows, tmp_path))
     assert (unknown.encounters[0].heading[1] == 0.0).all()
     assert any("b never moves" in line for line in unknown.quality.lines())
-    for column, value in (("heading_rad", 0.5), ("heading_deg", np.degrees(0.5)), ("heading_north_deg", 90.0 - np.degrees(0.5))):
+    for column, value in (
+        ("heading_rad", 0.5),
+        ("heading_deg", np.degrees(0.5)),
+        ("heading_north_deg", 90.0 - np.degrees(0.5)),
+    ):
         known = read_log(save(rows.assign(**{column: value}), tmp_path)).encounters[0]
         np.testing.assert_allclose(known.heading[1], 0.5, atol=1e-6)
 
@@ -88,12 +107,24 @@ def test_sizes(tmp_path):
 
 def test_columns_by_option(tmp_path):
     (plain,) = read_log(save(crossing(), tmp_path)).encounters
-    rows = crossing().rename(columns={"t_s": "when", "vehicle_id": "who", "x_m": "ost", "y_m": "nord", "speed_mps": "schnell"})
+    rows = crossing().rename(
+        columns={
+            "t_s": "when",
+            "vehicle_id": "who",
+            "x_m": "ost",
+            "y_m": "nord",
+            "speed_mps": "schnell",
+        }
+    )
     rows["schnell"] *= 3.6
     path = save(rows, tmp_path, "odd.csv")
-    (other,) = read_log(path, LogConfig(columns="time=when, vehicle=who,x=ost,y=nord,speed=schnell:kmh")).encounters
+    (other,) = read_log(
+        path, LogConfig(columns="time=when, vehicle=who,x=ost,y=nord,speed=schnell:kmh")
+    ).encounters
     same(plain, other, atol=1e-6)
-    (derived,) = read_log(path, LogConfig(columns="time=when,vehicle=who,x=ost,y=nord,speed=none")).encounters
+    (derived,) = read_log(
+        path, LogConfig(columns="time=when,vehicle=who,x=ost,y=nord,speed=none")
+    ).encounters
     same(plain, derived, atol=0.6)
     for columns, words in (
         ("time=when", "no column for position"),

@@ -16,7 +16,12 @@ from scenario_gen.method.recombination import pair_of, recombinations
 from scenario_gen.template import conflict_of, time_gaps
 from scenario_gen.types import FOLLOW, YIELD
 
-WAITS, FOLLOWS, MERGES, TURNS = "crossing, stops", "follows", "merges", "left turn before oncoming, stops"
+WAITS, FOLLOWS, MERGES, TURNS = (
+    "crossing, stops",
+    "follows",
+    "merges",
+    "left turn before oncoming, stops",
+)
 
 
 def recorded(kind, *seeds):
@@ -33,9 +38,14 @@ def test_an_encounter_recombined_with_itself_is_itself(kind):
     made, second = recombined(one, one), pair_of(one).conflict.second
     begin = round((made.start_ns - one.start_ns) / one.dt_ns)
     same = slice(begin, begin + len(made.time))
-    assert len(made.time) > 0.7 * len(one.time) and len({vehicle.id for vehicle in made.vehicles}) == 2
+    assert (
+        len(made.time) > 0.7 * len(one.time)
+        and len({vehicle.id for vehicle in made.vehicles}) == 2
+    )
     assert np.abs(made.speed[1] - one.speed[second, same]).max() < 0.3
-    assert np.hypot(*(made.position[1] - one.position[second, same]).T).max() < 0.7, "a follower's path is the clean one"
+    assert np.hypot(*(made.position[1] - one.position[second, same]).T).max() < 0.7, (
+        "a follower's path is the clean one"
+    )
 
 
 @pytest.mark.parametrize("kind", [WAITS, TURNS])
@@ -49,10 +59,14 @@ def test_who_waits_stands_as_long_and_passes_as_long_behind_as_it_did_for_anothe
         tried += 1
         first, second = pair_of(one).conflict.first, pair_of(other).conflict.second
         begin = round((made.start_ns - one.start_ns) / one.dt_ns)
-        np.testing.assert_allclose(made.speed[0], one.speed[first, begin : begin + len(made.time)], atol=1e-9)
+        np.testing.assert_allclose(
+            made.speed[0], one.speed[first, begin : begin + len(made.time)], atol=1e-9
+        )
         assert stands(made, 1) == pytest.approx(stands(other, second), abs=0.2)
         behind = conflict_of(other, 0, 1).encroachment
-        assert conflict_of(made, 0, 1).encroachment == pytest.approx(behind, abs=0.6), "the shared area differs by its edges"
+        assert conflict_of(made, 0, 1).encroachment == pytest.approx(behind, abs=0.6), (
+            "the shared area differs by its edges"
+        )
         assert pair_of(made).graph == pair_of(other).graph
     assert tried >= 3
 
@@ -78,10 +92,16 @@ def test_what_is_not_alike_is_refused_and_says_why():
     (waits,), (follows,) = recorded(WAITS, 1), recorded(FOLLOWS, 1)
     with pytest.raises(RefusedError, match="different kinds"):
         recombined(waits, follows)
-    far = replace(waits, position=waits.position + np.array([1000.0, 0.0]) * np.arange(2)[:, None, None])
+    far = replace(
+        waits, position=waits.position + np.array([1000.0, 0.0]) * np.arange(2)[:, None, None]
+    )
     with pytest.raises(RefusedError, match="different kinds"):
         recombined(far, far)
-    late = replace(waits, speed=waits.speed * np.where(np.arange(2) == pair_of(waits).conflict.second, 9.0, 1.0)[:, None])
+    late = replace(
+        waits,
+        speed=waits.speed
+        * np.where(np.arange(2) == pair_of(waits).conflict.second, 9.0, 1.0)[:, None],
+    )
     with pytest.raises(RefusedError, match=r"too hard|unusual|kind"):
         recombined(waits, late)
 
@@ -92,20 +112,36 @@ def test_each_reacts_as_in_its_own_recording():
     made = [*recombinations([*waits, *free], 90)[0]]
     of_both = [[name.startswith(WAITS) for name in encounter.parents] for encounter in made]
     for second in (True, False):
-        found = [pair_of(own).graph for own, names in zip(made, of_both, strict=True) if names == [not second, second]]
-        assert len(found) >= 3 and all(graph == ({(True, YIELD)} if second else set()) for graph in found)
+        found = [
+            pair_of(own).graph
+            for own, names in zip(made, of_both, strict=True)
+            if names == [not second, second]
+        ]
+        assert len(found) >= 3 and all(
+            graph == ({(True, YIELD)} if second else set()) for graph in found
+        )
 
 
 def test_pairs_are_drawn_by_the_seed_and_those_that_give_none_are_counted():
     known = recorded(WAITS, *range(4)) + recorded(FOLLOWS, *range(4))
     made, refused = recombinations(known, 100)
-    assert 8 <= len(made) <= 24 and len(made) + sum(refused.values()) == 24, "ordered pairs of four, of two kinds"
+    assert 8 <= len(made) <= 24 and len(made) + sum(refused.values()) == 24, (
+        "ordered pairs of four, of two kinds"
+    )
     assert len({encounter.name for encounter in made}) == len(made)
-    assert all(len(encounter.parents) == 2 and encounter.parents[0][:8] == encounter.parents[1][:8] for encounter in made)
+    assert all(
+        len(encounter.parents) == 2 and encounter.parents[0][:8] == encounter.parents[1][:8]
+        for encounter in made
+    )
     few, again = (recombinations(known, 3, seed=5)[0] for _ in range(2))
-    assert [encounter.name for encounter in few] == [encounter.name for encounter in again] and len(few) == 3
+    assert [encounter.name for encounter in few] == [
+        encounter.name for encounter in again
+    ] and len(few) == 3
     np.testing.assert_array_equal(few[0].position, again[0].position)
-    assert recombinations(known[:1], 5) == recombinations([], 5) == ([], {}) and known[0].parents == ()
+    assert (
+        recombinations(known[:1], 5) == recombinations([], 5) == ([], {})
+        and known[0].parents == ()
+    )
     assert recombinations([known[0], replace(known[0], name="the same again")], 5) == ([], {})
 
 
@@ -117,10 +153,14 @@ def test_recombined_encounters_are_like_recorded_ones_and_new():
         features = np.array([member_of(encounter, "", 0).features for encounter in own])
         spread = np.maximum(features.std(axis=0), 0.05 * features.std(axis=0).max())
         names = [encounter.name for encounter in own]
-        between = np.sqrt(np.square((features[:, None] - features) / spread).mean(axis=-1)) + np.diag(np.full(len(own), math.inf))
+        between = np.sqrt(
+            np.square((features[:, None] - features) / spread).mean(axis=-1)
+        ) + np.diag(np.full(len(own), math.inf))
         nearest, to_parents = [], []
         for encounter in recombinations(own, 40, seed=1)[0]:
-            away = np.sqrt(np.square((member_of(encounter, "", 0).features - features) / spread).mean(axis=-1))
+            away = np.sqrt(
+                np.square((member_of(encounter, "", 0).features - features) / spread).mean(axis=-1)
+            )
             parents = [names.index(name) for name in encounter.parents]
             to_parents.append(away[parents].min())
             away[parents] = math.inf

@@ -35,12 +35,15 @@ def test_auto_takes_the_first_road_that_keeps_the_conflict_and_says_so(crossing)
     assert result.generated.adaptations[0].startswith("road auto: four_way")
     plain = generate(crossing, "four_way", count=2, seed=7)
     assert all(
-        (a.position == b.position).all() for a, b in zip(plain.generated.scenarios, result.generated.scenarios, strict=True)
+        (a.position == b.position).all()
+        for a, b in zip(plain.generated.scenarios, result.generated.scenarios, strict=True)
     )
 
 
 def test_where_roads_suit_but_the_target_cannot_be_had_that_is_said(crossing):
-    with pytest.raises(TargetError, match=r"on road corridor, the last that takes it: target gap=50\.\.60"):
+    with pytest.raises(
+        TargetError, match=r"on road corridor, the last that takes it: target gap=50\.\.60"
+    ):
         generate(crossing, "auto", count=1, seed=7, request=Request(target="gap=50..60"))
 
 
@@ -56,7 +59,8 @@ def test_auto_leaves_out_a_road_on_which_vehicles_share_no_area_any_more(crossin
     result = on_first_suitable_road(on, crossing, PipelineConfig(), 7)
     assert "road auto: four_way" not in result.generated.adaptations[0]
     with pytest.raises(
-        RefusedError, match=r"on road corridor, the last that takes it: vehicles .* and .* share no area there in scenario"
+        RefusedError,
+        match=r"on road corridor, the last that takes it: vehicles .* and .* share no area there in scenario",
     ):
         on_first_suitable_road(lambda _: on("four_way"), crossing, PipelineConfig(), 7)
 

@@ -12,7 +12,17 @@ from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import Scenario
 from scenario_gen.types.segmentation import Segmentation
 
-NASTY_HEADINGS = (0.0, np.pi, -np.pi, np.pi - 1e-10, -np.pi + 4e-10, 3.0 * np.pi, -5.0 * np.pi, 0.5 * np.pi, 1e-10)
+NASTY_HEADINGS = (
+    0.0,
+    np.pi,
+    -np.pi,
+    np.pi - 1e-10,
+    -np.pi + 4e-10,
+    3.0 * np.pi,
+    -5.0 * np.pi,
+    0.5 * np.pi,
+    1e-10,
+)
 
 
 def generator(seed: int) -> np.random.Generator:
@@ -62,7 +72,9 @@ def scenario(seed: int, n: int = 2, t: int = 57) -> Scenario:
 def route(seed: int) -> Route:
     """Five anchors: drives, dwells twice in a row, drives."""
     rng = generator(seed)
-    points = np.column_stack([np.cumsum(rng.uniform(0.1, 0.5, 30)), rng.normal(0.0, 0.1, 30), headings(rng, 1, 30)[0]])
+    points = np.column_stack(
+        [np.cumsum(rng.uniform(0.1, 0.5, 30)), rng.normal(0.0, 0.1, 30), headings(rng, 1, 30)[0]]
+    )
     return Route(points=points, anchor=np.array([0, 12, 12, 12, 29]), length=chord_length(points))
 
 

@@ -18,7 +18,10 @@ from scenario_gen.base.errors import InputError
 
 def test_a_road_of_the_same_geometry_differs_in_the_templates_hash_only():
     road = hand_made_run().road
-    first, second = ({"tracks": encode_tracks(e), "map": encode_map(road, e.start_ns)} for e in (encounter(1), encounter(2)))
+    first, second = (
+        {"tracks": encode_tracks(e), "map": encode_map(road, e.start_ns)}
+        for e in (encounter(1), encounter(2))
+    )
     assert first["map"] != second["map"]
     one, other = template_hashes(first), template_hashes(second)
     assert one["map_hash"] == other["map_hash"] and one["template_hash"] != other["template_hash"]
@@ -31,7 +34,9 @@ def test_a_road_of_the_same_geometry_differs_in_the_templates_hash_only():
 def test_what_belongs_together_is_read_again_and_anything_else_refused():
     messages = {"map": b"\x00\x01\x00\x00" + bytes(80), "fit": b"fit", "fit/info": b"never itself"}
     sent = encode_hashes("fit", messages, 5)
-    assert decode_hashes(sent, "fit/info") == {topic: hash_of(topic, messages[topic]) for topic in ("fit", "map")}
+    assert decode_hashes(sent, "fit/info") == {
+        topic: hash_of(topic, messages[topic]) for topic in ("fit", "map")
+    }
     for values in ({}, {"map": "no hash"}, {"map": "0" * 13}):
         with pytest.raises(InputError, match="fit/info: it must say"):
             decode_hashes(encode_diagnostics([Status("fit", Level.OK, "", values)], 5), "fit/info")

@@ -60,7 +60,10 @@ def test_who_takes_every_message_for_itself_sees_each_vehicle_where_it_is_and_no
     for message in messages_of(encode_scenario(made, 5)):
         heard = decode(message, "scenarios")
         for vehicle, xy in zip(heard.vehicles, heard.position, strict=True):
-            seen |= {(vehicle.id, t): tuple(place) for t, place in zip(heard.time_ns.tolist(), xy.tolist(), strict=True)}
+            seen |= {
+                (vehicle.id, t): tuple(place)
+                for t, place in zip(heard.time_ns.tolist(), xy.tolist(), strict=True)
+            }
     there = {
         (vehicle.id, round(t * 1e9)): tuple(place)
         for vehicle, xy, row in zip(made.vehicles, made.position.tolist(), made.there, strict=True)
@@ -73,7 +76,9 @@ def test_who_takes_every_message_for_itself_sees_each_vehicle_where_it_is_and_no
 def test_all_present_is_one_message_as_ever():
     data = encode_scenario(scenario([(0, 40), (0, 40)]), 5)
     assert messages_of(data) == (data,)
-    assert len(messages_of(encode_scenario(scenario([(0, 40), (0, 40), (5, 40), (0, 40)]), 5))) == 3
+    assert (
+        len(messages_of(encode_scenario(scenario([(0, 40), (0, 40), (5, 40), (0, 40)]), 5))) == 3
+    )
 
 
 def test_a_message_alone_that_begins_late_is_no_scenario():
@@ -108,7 +113,9 @@ def test_the_entry_says_who_is_there_when_and_which_messages_are_the_scenario():
     entry = entry_of(whole, encode_scenario(whole, 5))
     assert entry.messages == (entry.sha256,)
     assert not {"present", "messages"} & set(entry.status.values)
-    damaged = replace(entry, status=replace(entry.status, values={**entry.status.values, "messages": "[1]"}))
+    damaged = replace(
+        entry, status=replace(entry.status, values={**entry.status.values, "messages": "[1]"})
+    )
     with pytest.raises(InputError, match="no list of SHA-256"):
         decode_info(encode_info(damaged, 5))
 

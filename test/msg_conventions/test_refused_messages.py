@@ -25,7 +25,9 @@ def _tracks(vehicles: int, samples: int, frame: str = "local_enu") -> bytes:
     flat = np.zeros((vehicles, samples))
     named = tuple(Vehicle(str(k)) for k in range(vehicles))
     time = np.arange(samples) * 100_000_000
-    return trajectory.encode(Trajectory(7, frame, named, time, np.zeros((vehicles, samples, 2)), flat, flat, flat))
+    return trajectory.encode(
+        Trajectory(7, frame, named, time, np.zeros((vehicles, samples, 2)), flat, flat, flat)
+    )
 
 
 @pytest.mark.parametrize(
@@ -53,15 +55,29 @@ def test_tracks_of_nobody_or_of_an_instant(vehicles, samples, words):
 )
 def test_scenarios_say_which_rule_of_time_is_broken(time_ns, words):
     flat = np.zeros((1, len(time_ns)))
-    sent = Trajectory(7, "map", (Vehicle("1"),), np.array(time_ns), np.zeros((1, len(time_ns), 2)), flat, flat, flat)
+    sent = Trajectory(
+        7,
+        "map",
+        (Vehicle("1"),),
+        np.array(time_ns),
+        np.zeros((1, len(time_ns), 2)),
+        flat,
+        flat,
+        flat,
+    )
     with pytest.raises(InputError, match=f"scenarios: .*{words}"):
         decode_scenario(trajectory.encode(sent))
 
 
 def test_routes_of_no_poses_or_of_earlier_ones():
-    for count, words in ((0, "the path holds no poses"), (2, "pose 1 bears an earlier stamp than pose 0")):
+    for count, words in (
+        (0, "the path holds no poses"),
+        (2, "pose 1 bears an earlier stamp than pose 0"),
+    ):
         with pytest.raises(InputError, match=words):
-            decode_route(encode_path(np.zeros((count, 3)), np.array([9, 7])[:count], "map", 7), [7, 9])
+            decode_route(
+                encode_path(np.zeros((count, 3)), np.array([9, 7])[:count], "map", 7), [7, 9]
+            )
 
 
 def _messages(frame: str) -> dict[str, tuple[object, bytes]]:
@@ -83,7 +99,9 @@ def test_empty_frames_and_quaternions_of_zeros(kind):
     decode, data = _messages("map")[kind]
     decode(data)
     assert UNTURNED in data
-    with pytest.raises(InputError, match=rf"{kind}.*: quaternion 0 is \(0, 0, 0, 0\), which is no rotation"):
+    with pytest.raises(
+        InputError, match=rf"{kind}.*: quaternion 0 is \(0, 0, 0, 0\), which is no rotation"
+    ):
         decode(data.replace(UNTURNED, bytes(32)))
     with pytest.raises(InputError, match=rf"{kind}: header\.frame_id is empty; name the frame"):
         decode(_messages("")[kind][1])
@@ -103,6 +121,16 @@ def test_points_that_are_not_alike_are_read_one_by_one_to_the_same_values(frame,
 
 def _moving(frame: str) -> Trajectory:
     random = np.random.Generator(np.random.PCG64(3))
-    values = (canonical_heading(random.uniform(-3.0, 3.0, (3, 5))), *random.uniform(0.0, 20.0, (2, 3, 5)))
+    values = (
+        canonical_heading(random.uniform(-3.0, 3.0, (3, 5))),
+        *random.uniform(0.0, 20.0, (2, 3, 5)),
+    )
     named = tuple(Vehicle(name) for name in ("a", "bc", "def"))
-    return Trajectory(7, frame, named, np.arange(5) * 1_500_000_000, random.uniform(-9.0, 9.0, (3, 5, 2)), *values)
+    return Trajectory(
+        7,
+        frame,
+        named,
+        np.arange(5) * 1_500_000_000,
+        random.uniform(-9.0, 9.0, (3, 5, 2)),
+        *values,
+    )

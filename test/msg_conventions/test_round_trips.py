@@ -10,7 +10,16 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from message_examples import assert_same, encounter, generator, NASTY_HEADINGS, route, scenario, seeds, segmentation
+from message_examples import (
+    assert_same,
+    encounter,
+    generator,
+    NASTY_HEADINGS,
+    route,
+    scenario,
+    seeds,
+    segmentation,
+)
 import numpy as np
 import pytest
 
@@ -46,14 +55,20 @@ from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario
 @settings(max_examples=40)
 def test_tracks(seed, n, t):
     sent = encounter(seed, n, t)
-    assert_same(sent, tracks.decode_tracks(tracks.encode_tracks(sent)), *(f for f in sent.__dataclass_fields__))
+    assert_same(
+        sent,
+        tracks.decode_tracks(tracks.encode_tracks(sent)),
+        *(f for f in sent.__dataclass_fields__),
+    )
 
 
 @given(seeds, st.integers(1, 5), st.integers(2, 60))
 @settings(max_examples=40)
 def test_scenario(seed, n, t):
     sent = scenario(seed, n, t)
-    stamp, got = scenarios.decode_scenario(scenarios.encode_scenario(sent, 12_345_678_901), seed=sent.seed, index=sent.index)
+    stamp, got = scenarios.decode_scenario(
+        scenarios.encode_scenario(sent, 12_345_678_901), seed=sent.seed, index=sent.index
+    )
     assert stamp == 12_345_678_901
     assert_same(sent, got, *(f for f in sent.__dataclass_fields__))
 
@@ -74,10 +89,14 @@ def test_every_canonical_heading_survives(angle):
 @settings(max_examples=30)
 def test_changepoints_and_posterior(seed, k):
     template, sent = encounter(seed), segmentation(seed, k=k)
-    got = changepoints.decode_changepoints(changepoints.encode_changepoints(template, sent), template)
+    got = changepoints.decode_changepoints(
+        changepoints.encode_changepoints(template, sent), template
+    )
     assert_same(sent, got, "changepoints")
     assert (np.flatnonzero(np.diff(got.labels)) + 1 == sent.changepoints).all()
-    whole = changepoints.decode_posterior(changepoints.encode_posterior(template, sent), sent.descriptions)
+    whole = changepoints.decode_posterior(
+        changepoints.encode_posterior(template, sent), sent.descriptions
+    )
     assert_same(sent, whole, "labels", "changepoints", "changepoint_probability", "descriptions")
 
 
@@ -90,7 +109,9 @@ def test_road(seed, height, width, ways):
     ends = np.column_stack([rng.normal(0, 50, (ways, 2)), rng.choice(NASTY_HEADINGS, ways)])
     sent = Road("map", drivable, 0.2, rng.normal(0, 50, 2), ends, ends[::-1], "a" * (seed % 5 + 1))
     grid = roads.encode_map(sent, 99)
-    entries, exits = (roads.encode_poses(poses, sent.frame_id, 99) for poses in (sent.entries, sent.exits))
+    entries, exits = (
+        roads.encode_poses(poses, sent.frame_id, 99) for poses in (sent.entries, sent.exits)
+    )
     stamp, got = roads.decode_map(grid, entries, exits)
     assert stamp == 99
     assert_same(sent, got, *(f for f in sent.__dataclass_fields__))
@@ -105,16 +126,51 @@ def test_lanes(seed, count):
     for k in range(count):
         left, right = rng.normal(0, 50, (2, 2 + int(rng.integers(5)), 2))
         limit = math.nan if k % 2 else float(rng.random())
-        height = np.where(np.arange(len(left)) == k, np.nan, 4.0 * k)  # from two lanes on they lie above each other
-        own.append(Lane(f"é.{k}", left, right, (int(rng.integers(count)),), tuple(range(k)), limit, "j" * k, height))
+        height = np.where(
+            np.arange(len(left)) == k, np.nan, 4.0 * k
+        )  # from two lanes on they lie above each other
+        own.append(
+            Lane(
+                f"é.{k}",
+                left,
+                right,
+                (int(rng.integers(count)),),
+                tuple(range(k)),
+                limit,
+                "j" * k,
+                height,
+            )
+        )
     rules = tuple(
-        TrafficRule(f"é{k}", kind, (int(rng.integers(count)),), tuple(range(k % count)), rng.normal(0, 50, (2 * (k % 2), 2)))
+        TrafficRule(
+            f"é{k}",
+            kind,
+            (int(rng.integers(count)),),
+            tuple(range(k % count)),
+            rng.normal(0, 50, (2 * (k % 2), 2)),
+        )
         for k, kind in enumerate(RuleKind)
     )
-    aim, origin = DrawnFor(rng.normal(0, 50, 3), (("é.0", ""), ("", "2.1"))), (49.0, 8.4) if count % 2 else ()
-    sent = LaneNetwork("map", tuple(own), ("read so",), rules[: int(rng.integers(5))], bool(rng.integers(2)), True, aim, origin)
-    road = Road("map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
-    got = roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "map", 9))[1].lanes
+    aim, origin = (
+        DrawnFor(rng.normal(0, 50, 3), (("é.0", ""), ("", "2.1"))),
+        (49.0, 8.4) if count % 2 else (),
+    )
+    sent = LaneNetwork(
+        "map",
+        tuple(own),
+        ("read so",),
+        rules[: int(rng.integers(5))],
+        bool(rng.integers(2)),
+        True,
+        aim,
+        origin,
+    )
+    road = Road(
+        "map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3))
+    )
+    got = roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "map", 9))[
+        1
+    ].lanes
     assert (got.name, got.notes, got.drawn, got.origin) == (sent.name, sent.notes, True, origin)
     assert_same(got.drawn_for, aim, "frame", "lanes")
     assert got.rules_kept == (sent.rules_kept or not sent.rules)
@@ -123,7 +179,9 @@ def test_lanes(seed, count):
     for one, other in zip(sent.lanes, got.lanes, strict=True):
         assert_same(one, other, "id", "left", "right", "successors", "beside", "junction")
         assert np.array_equal(one.speed_limit, other.speed_limit, equal_nan=True)
-        assert np.array_equal(other.height, one.height if sent.has_levels else np.nan * one.height, equal_nan=True)
+        assert np.array_equal(
+            other.height, one.height if sent.has_levels else np.nan * one.height, equal_nan=True
+        )
     with pytest.raises(InputError, match="frame 'odom' is not the map's"):
         roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "odom", 9))
 
@@ -134,7 +192,11 @@ def test_lanes(seed, count):
         (b'"points": 3', b'"points": 9', "borders of 9 points"),
         (b'"points": 3', b'"points": 2', "belong to no lane"),
         (b'"points": 3', b'"points":[]', "TypeError"),
-        (b'"points": 3, "successors": [0], "beside": []', b'"points":3, "successors":[1e999],"beside":[]', "OverflowError"),
+        (
+            b'"points": 3, "successors": [0], "beside": []',
+            b'"points":3, "successors":[1e999],"beside":[]',
+            "OverflowError",
+        ),
         (b'"successors": [0]', b'"successors": [8]', "leads to a lane that is not there"),
         (b'{"name"', b'{"nome"', "KeyError"),
         (b'{"name"', b'["name"', "does not say what its lanes are"),
@@ -149,7 +211,9 @@ def test_lanes_that_say_what_cannot_be_are_refused(old, new, said):
 
 
 def test_unknown_cells_are_not_drivable():
-    road = Road("map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    road = Road(
+        "map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3))
+    )
     grid = bytearray(roads.encode_map(road, 0))
     grid[-4:] = np.array([-1, 64, 65, 100], dtype=np.int8).tobytes()
     assert roads.decode_map(bytes(grid))[1].drivable.tolist() == [[False, True], [False, False]]
@@ -167,7 +231,9 @@ def test_route(seed, frame):
 
 
 def test_a_route_that_stands_throughout():
-    sent = Route(points=np.array([[1.0, 2.0, math.pi]]), anchor=np.zeros(3, dtype=int), length=np.zeros(1))
+    sent = Route(
+        points=np.array([[1.0, 2.0, math.pi]]), anchor=np.zeros(3, dtype=int), length=np.zeros(1)
+    )
     anchors = [0, 1_000_000_000, 2_000_000_000]
     data = paths.encode_route(sent, anchors, "map")
     assert_same(sent, paths.decode_route(data, anchors)[1], "points", "anchor", "length")
@@ -186,8 +252,13 @@ def test_a_route_without_a_pose_at_a_changepoint_is_refused():
 def _fit(template, at) -> Fit:
     rng = generator(3)
     n, k = len(template.vehicles), len(at)
-    anchors = np.concatenate([rng.normal(0, 30, (n, k, 2)), rng.choice(NASTY_HEADINGS, (n, k, 1))], axis=-1)
-    fitted = tuple(FittedVehicle(a, np.full(k, 0.2), np.zeros(k - 1, dtype=bool), 0.9, "left") for a in anchors)
+    anchors = np.concatenate(
+        [rng.normal(0, 30, (n, k, 2)), rng.choice(NASTY_HEADINGS, (n, k, 1))], axis=-1
+    )
+    fitted = tuple(
+        FittedVehicle(a, np.full(k, 0.2), np.zeros(k - 1, dtype=bool), 0.9, "left")
+        for a in anchors
+    )
     start, end = (np.concatenate([anchors[:, j], rng.random((n, 1))], axis=1) for j in (0, -1))
     return Fit(template.vehicles, fitted, at, BoundaryStates(start, end), ("an entry was chosen",))
 
@@ -199,12 +270,22 @@ def test_fit():
     stamp, frame, asked, anchors = fits.decode_fit(fits.encode_fit(template, sent, "map"))
     assert (stamp, frame) == (template.start_ns, "map")
     assert_same(sent.requested, asked, "start", "end")
-    assert (canonical_angle(anchors[..., 2]) == np.stack([v.anchors for v in sent.fitted])[..., 2]).all()
-    assert fits.anchor_stamps(template, at[1:-1]) == [template.start_ns + int(k) * template.dt_ns for k in at]
+    assert (
+        canonical_angle(anchors[..., 2]) == np.stack([v.anchors for v in sent.fitted])[..., 2]
+    ).all()
+    assert fits.anchor_stamps(template, at[1:-1]) == [
+        template.start_ns + int(k) * template.dt_ns for k in at
+    ]
 
 
 def test_reports():
-    sent = ScenarioSet(50, (scenario(1),), 70, Counter({Cause.OVERLAP: 15, Cause.OFF_ROAD: 5}), ("clock stretched by 5 %",))
+    sent = ScenarioSet(
+        50,
+        (scenario(1),),
+        70,
+        Counter({Cause.OVERLAP: 15, Cause.OFF_ROAD: 5}),
+        ("clock stretched by 5 %",),
+    )
     template = encounter(3)
     fit = _fit(template, np.array([0, 7, 20, 39]))
     asked = BoundaryStates(np.ones((2, 4)), np.zeros((2, 4)))
@@ -213,8 +294,12 @@ def test_reports():
     cut = {"kind": "follow", "words": "a follows b (doubtful)", "lag": 1.0, "confidence": 0.4}
     reactions = {"edges": [edge], "cut": [cut], "sentences": ["b waits for a"]}
     summary = scenario_info.request_summary(sent, "r1", "/gp_sampler", 7, reactions=reactions)
-    assert summary.reactions == (edge, cut) and not any(key.startswith("reaction") for key in summary.provenance)
-    damaged = replace(summary, status=replace(summary.status, values={**summary.values, "reaction.0": "{"}))
+    assert summary.reactions == (edge, cut) and not any(
+        key.startswith("reaction") for key in summary.provenance
+    )
+    damaged = replace(
+        summary, status=replace(summary.status, values={**summary.values, "reaction.0": "{"})
+    )
     with pytest.raises(InputError, match=r"reaction\."):
         _ = damaged.reactions
     statuses = (entry.status, *fits.fit_statuses(fit, "/planner"), summary.status)
@@ -229,13 +314,20 @@ def test_reports():
     with pytest.raises(InputError, match=r"time_law.* version"):
         replace(summary, status=replace(summary.status, values=former)).result()
     by_subject = {status.name.partition(": ")[2]: status.values for status in statuses}
-    assert_same(fits.decode_fitted(fit.fitted[0].anchors, by_subject, fit.vehicles[0].id), fit.fitted[0], "moved", "stands")
+    assert_same(
+        fits.decode_fitted(fit.fitted[0].anchors, by_subject, fit.vehicles[0].id),
+        fit.fitted[0],
+        "moved",
+        "stands",
+    )
     with pytest.raises(InputError, match="fit of nobody"):
         fits.decode_fitted(fit.fitted[0].anchors, by_subject, "nobody")
 
 
 def _entry(sent, data, **values):
-    return scenario_info.scenario_entry(sent, data, "r1", "/gp_sampler", template=sent.vehicles, **values)
+    return scenario_info.scenario_entry(
+        sent, data, "r1", "/gp_sampler", template=sent.vehicles, **values
+    )
 
 
 @pytest.mark.parametrize("key", ["request", "index", "seed", "published", "candidates"])
@@ -244,7 +336,9 @@ def test_entries_and_summaries_that_lack_something_say_what(key):
     entry = _entry(sent, b"", asked=BoundaryStates(np.zeros((2, 4)), np.zeros((2, 4))))
     summary = scenario_info.request_summary(ScenarioSet(1, (sent,), 1), "r1", "/n", 7)
     status = (entry if key in ("index", "seed") else summary).status
-    values = {name: text for name, text in status.values.items() if name != key} | ({key: "?"} if key == "published" else {})
+    values = {name: text for name, text in status.values.items() if name != key} | (
+        {key: "?"} if key == "published" else {}
+    )
     data = diagnostics.encode_diagnostics([replace(status, values=values)], 5)
     with pytest.raises(InputError, match=f"scenarios/info.*{key} is"):
         for info in scenario_info.decode_info(data):
@@ -253,7 +347,9 @@ def test_entries_and_summaries_that_lack_something_say_what(key):
 
 @given(seeds)
 def test_states(seed):
-    sent = np.array([*generator(seed).normal(0, 100, 2), generator(seed).choice(NASTY_HEADINGS), 8.5])
+    sent = np.array(
+        [*generator(seed).normal(0, 100, 2), generator(seed).choice(NASTY_HEADINGS), 8.5]
+    )
     stamp, frame, child, got = ego.decode_state(ego.encode_state(sent, "vehicle_7", "map", 5))
     assert (stamp, frame, child) == (5, "map", "vehicle_7")
     assert got[[0, 1, 3]].tobytes() == sent[[0, 1, 3]].tobytes()
@@ -270,7 +366,9 @@ def test_ego_slot():
         stamp, frame, child, state = ego.decode_state(sent[topic])
         assert (stamp, frame, child) == (17, "map", "vehicle_v0")
         assert state.tolist() == pytest.approx(asked.tolist(), abs=1e-12)
-    said = scenario_info.request_summary(ScenarioSet(1, (), 1, ego=slot), "r", "/n", 7, {"count": "1", "ego": "v0"}).values
+    said = scenario_info.request_summary(
+        ScenarioSet(1, (), 1, ego=slot), "r", "/n", 7, {"count": "1", "ego": "v0"}
+    ).values
     assert said["ego"] == "v0" and said["count"] == "1"
     assert json.loads(said["ego_goal"])[3] == 6.0
     assert ego.ego_values(None) == {}
@@ -282,22 +380,33 @@ def test_a_scenario_with_a_witness_names_its_message():
     slot = EgoSlot(one.reference_drive.vehicles[0], np.full(4, 0.25), np.full(4, 0.5))
     data = scenarios.encode_scenario(one, 17)
     template = (*one.vehicles, *one.reference_drive.vehicles)
-    made = scenario_info.scenario_entry(one, data, "r", "/n", template=template, asked=asked, ego=slot)
+    made = scenario_info.scenario_entry(
+        one, data, "r", "/n", template=template, asked=asked, ego=slot
+    )
     (entry,) = scenario_info.decode_info(scenario_info.encode_info(made, 17))
     assert entry.witness == scenarios.digest(scenarios.encode_scenario(one.reference_drive, 17))
-    assert entry.asked().start.tolist() == [[0.0] * 4] and entry.asked(witness=True).end.tolist() == [[1.0] * 4, [0.5] * 4]
+    assert entry.asked().start.tolist() == [[0.0] * 4] and entry.asked(
+        witness=True
+    ).end.tolist() == [[1.0] * 4, [0.5] * 4]
 
 
 def test_asked_states_are_in_the_order_of_the_scenario():
     vehicles = tuple(Vehicle(f"v{k}") for k in range(3))
     asked = BoundaryStates(np.arange(12.0).reshape(3, 4) / 10.0, np.zeros((3, 4)))
-    entry = scenario_info.scenario_entry(scenario(1, n=2), b"", "r", "/n", template=vehicles, asked=asked)
+    entry = scenario_info.scenario_entry(
+        scenario(1, n=2), b"", "r", "/n", template=vehicles, asked=asked
+    )
     assert entry.asked().start.tolist() == asked.start[:2].tolist()
 
 
 def test_footprint():
     data = pictures.encode_footprint(Vehicle("a", 5.0, 2.0), 0, "vehicle_a")
-    assert decode(POLYGON, data, "footprint").points[:, :2].tolist() == [[2.5, 1.0], [-2.5, 1.0], [-2.5, -1.0], [2.5, -1.0]]
+    assert decode(POLYGON, data, "footprint").points[:, :2].tolist() == [
+        [2.5, 1.0],
+        [-2.5, 1.0],
+        [-2.5, -1.0],
+        [2.5, -1.0],
+    ]
 
 
 def test_ids_become_ros_tokens_and_collisions_are_refused():

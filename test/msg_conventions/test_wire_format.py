@@ -58,12 +58,16 @@ def _messages():
         road = Road("r", np.eye(seed, dtype=bool), 0.1, np.ones(2), ends, ends, frame)
         yield roads.MAP_TYPE, roads.encode_map(road, 5)
         border = np.column_stack((np.arange(seed + 1.0), np.zeros(seed + 1)))
-        network = LaneNetwork("m", (Lane("7", border + 1.0, border, (0,), (), 8.5 * seed, "j" * seed),), ("née",))
+        network = LaneNetwork(
+            "m", (Lane("7", border + 1.0, border, (0,), (), 8.5 * seed, "j" * seed),), ("née",)
+        )
         yield markers.TYPE, lanes.encode_lanes(network if seed > 1 else None, frame, 5)
         yield roads.POSES_TYPE, roads.encode_poses(road.entries, frame, 5)
         sent = scenario(seed)
         asked = BoundaryStates(np.zeros((2, 4)), np.ones((2, 4)))
-        entry = scenario_info.scenario_entry(sent, b"", frame, "/n" * seed, template=sent.vehicles, asked=asked)
+        entry = scenario_info.scenario_entry(
+            sent, b"", frame, "/n" * seed, template=sent.vehicles, asked=asked
+        )
         yield diagnostics.TYPE, diagnostics.encode_diagnostics([entry.status] * (seed - 1), 1)
         yield pictures.FOOTPRINT_TYPE, pictures.encode_footprint(Vehicle("a"), 3, frame)
         yield markers.ARRAY_TYPE, pictures.scenario_markers(scenario(seed), 3)
@@ -72,7 +76,9 @@ def _messages():
 MESSAGES = list(_messages())
 
 
-@pytest.mark.parametrize(("kind", "data"), MESSAGES, ids=[f"{k}-{kind}" for k, (kind, _) in enumerate(MESSAGES)])
+@pytest.mark.parametrize(
+    ("kind", "data"), MESSAGES, ids=[f"{k}-{kind}" for k, (kind, _) in enumerate(MESSAGES)]
+)
 def test_bytes_equal_those_of_rosbags_and_of_rclpy(kind, data):
     from rclpy.serialization import deserialize_message, serialize_message
 
@@ -90,15 +96,22 @@ def test_a_consumer_reads_what_the_convention_says():
     from trajectory_msgs.msg import MultiDOFJointTrajectory
 
     sent = scenario(1)
-    message = deserialize_message(scenarios.encode_scenario(sent, 1_500_000_000), MultiDOFJointTrajectory)
+    message = deserialize_message(
+        scenarios.encode_scenario(sent, 1_500_000_000), MultiDOFJointTrajectory
+    )
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (1, 500_000_000)
     assert message.header.frame_id == sent.frame_id
     assert message.joint_names[1] == f"v1:4.8x{sent.vehicles[1].width!r}"
     point = message.points[23]
     assert (point.time_from_start.sec, point.time_from_start.nanosec) == (2, 300_000_000)
     pose = point.transforms[1]
-    assert (pose.translation.x, pose.translation.y, pose.translation.z) == (*sent.position[1, 23], 0.0)
-    assert 2.0 * np.arctan2(pose.rotation.z, pose.rotation.w) % (2 * np.pi) == pytest.approx(sent.heading[1, 23] % (2 * np.pi))
+    assert (pose.translation.x, pose.translation.y, pose.translation.z) == (
+        *sent.position[1, 23],
+        0.0,
+    )
+    assert 2.0 * np.arctan2(pose.rotation.z, pose.rotation.w) % (2 * np.pi) == pytest.approx(
+        sent.heading[1, 23] % (2 * np.pi)
+    )
     assert point.velocities[1].linear.x == sent.speed[1, 23]
     assert point.accelerations[1].linear.x == sent.acceleration[1, 23]
 
@@ -139,10 +152,16 @@ def test_messages_without_velocities_are_read():
 
 def test_road_users_look_like_what_they_are():
     """A cylinder for who walks, boxes for the others, as wide and high as they are; narrow ones are yellow."""
-    users = [Vehicle("c"), Vehicle("b", 1.8, 0.65, "bicycle"), Vehicle("p", 0.5, 0.5, "pedestrian")]
+    users = [
+        Vehicle("c"),
+        Vehicle("b", 1.8, 0.65, "bicycle"),
+        Vehicle("p", 0.5, 0.5, "pedestrian"),
+    ]
     users += [Vehicle("u", 12.0, 2.55, "bus")]
     data = pictures.vehicle_markers(users, np.zeros((4, 4)), np.ones(4, np.bool_), 3, "map", 1)
     car, bicycle, walker, bus = STORE.deserialize_cdr(data, markers.ARRAY_TYPE).markers[1:]
     assert [one.type for one in (car, bicycle, walker, bus)] == [1, 1, 3, 1]
     assert (bicycle.scale.x, bicycle.scale.y, walker.scale.y, bus.scale.z) == (1.8, 0.65, 0.5, 3.2)
-    assert bicycle.color.r == walker.color.r == 1.0 != car.color.r and bus.color.r < 0.1  # the ego's is black
+    assert (
+        bicycle.color.r == walker.color.r == 1.0 != car.color.r and bus.color.r < 0.1
+    )  # the ego's is black

@@ -41,7 +41,9 @@ def of_runs(count: int, seed: int, *pairs: str) -> dict[str, Any]:
         for encounter in read_log([Path(log)], PipelineConfig().log).encounters:
             name = f"{encounter.name} on {Path(road).stem}"
             try:
-                found[name] = results(generate(encounter, road, PipelineConfig(), count=count, seed=seed))
+                found[name] = results(
+                    generate(encounter, road, PipelineConfig(), count=count, seed=seed)
+                )
             except RefusedError as error:
                 found[name] = {"decided": str(error), "places": []}
     return found

@@ -18,7 +18,9 @@ NEAR = st.floats(-6.0, 6.0)
 
 
 @given(NUMBER, NUMBER, NUMBER, st.floats(1.0, 20.0), st.floats(1.0, 5.0))
-def test_corners_are_those_of_a_rectangle_about_its_pose_counter_clockwise(x, y, yaw, length, width):
+def test_corners_are_those_of_a_rectangle_about_its_pose_counter_clockwise(
+    x, y, yaw, length, width
+):
     ring = shapely.LinearRing(corners(np.array([[x, y, yaw]]), length, width)[0])
     box = shapely.Polygon(ring)
     assert ring.is_ccw and box.area == pytest.approx(length * width)
@@ -27,8 +29,14 @@ def test_corners_are_those_of_a_rectangle_about_its_pose_counter_clockwise(x, y,
 
 @given(NEAR, NEAR, NUMBER, NUMBER)
 def test_gaps_and_distances_are_those_of_polygons(x, y, yaw, other_yaw):
-    cars, poses = (Vehicle("a"), Vehicle("b", 7.0, 2.4)), np.array([[x, y, yaw], [0.0, 0.0, other_yaw]])
-    boxes = [shapely.Polygon(corners(pose[None], car.length, car.width)[0]) for car, pose in zip(cars, poses, strict=True)]
+    cars, poses = (
+        (Vehicle("a"), Vehicle("b", 7.0, 2.4)),
+        np.array([[x, y, yaw], [0.0, 0.0, other_yaw]]),
+    )
+    boxes = [
+        shapely.Polygon(corners(pose[None], car.length, car.width)[0])
+        for car, pose in zip(cars, poses, strict=True)
+    ]
     true = boxes[0].distance(boxes[1])
     gap, axis = footprint_gaps(cars[0].half, poses[:1], cars[1].half, poses[1:])
     assert (gap[0] < 0.0) == (true == 0.0) or abs(gap[0]) < 1e-9

@@ -33,7 +33,10 @@ def test_the_same_as_over_all_edges(seed, scale, whole):
     points = rng.normal(size=(rng.integers(2, 80), 2)).cumsum(axis=0) * 5.0
     xy = rng.normal(size=(rng.integers(1, 300), 2)).cumsum(axis=0) * 10.0**scale
     if whole:  # ties: the first of several nearest edges counts
-        points, xy = np.column_stack((np.arange(len(points)), np.round(points[:, 1]))), np.round(xy)
+        points, xy = (
+            np.column_stack((np.arange(len(points)), np.round(points[:, 1]))),
+            np.round(xy),
+        )
     curve = Curve(np.column_stack((points, np.zeros(len(points)))))
     for one, other in zip(curve.project(xy), over_all_edges(curve, xy), strict=True):
         assert one.tobytes() == other.tobytes()

@@ -31,4 +31,10 @@ def test_decisions_are_the_same_and_places_within_a_centimetre(name, as_it_is):
 def test_what_was_decided_otherwise_is_seen(as_it_is):
     one = as_it_is
     assert apart(one, one | {"decided": one["decided"] | {"candidates": 9}}) == float("inf")
-    assert apart(one, one | {"places": [[[1e3] * len(each) for each in group] for group in one["places"]]}) > MOST_APART_M
+    assert (
+        apart(
+            one,
+            one | {"places": [[[1e3] * len(each) for each in group] for group in one["places"]]},
+        )
+        > MOST_APART_M
+    )

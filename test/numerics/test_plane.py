@@ -39,8 +39,12 @@ def test_an_angle_between_two_is_wrapped_and_turns_one_into_the_other(angle, oth
 def test_a_polyline_is_had_again_from_its_directions_and_lengths():
     yaw = np.linspace(0.0, 1.0, 201)
     points = polyline_of(yaw, 0.05)
-    assert np.allclose(points[-1], (10.0 * np.sin(1.0), 10.0 * (1.0 - np.cos(1.0))), atol=1e-4)  # a circle of 10 m
-    assert np.allclose(edge_lengths(points), 0.05) and np.allclose(edge_yaws(points), (yaw[1:] + yaw[:-1]) / 2.0)
+    assert np.allclose(
+        points[-1], (10.0 * np.sin(1.0), 10.0 * (1.0 - np.cos(1.0))), atol=1e-4
+    )  # a circle of 10 m
+    assert np.allclose(edge_lengths(points), 0.05) and np.allclose(
+        edge_yaws(points), (yaw[1:] + yaw[:-1]) / 2.0
+    )
     assert np.allclose(polyline_of(yaw, edge_lengths(points)), points)
 
 

@@ -42,7 +42,11 @@ def test_the_places_that_are_named_take_the_template(tmp_path):
     path.write_text(lanelet2())
     picture, said = map_picture(str(path), encounter)
     places = [line for line in said if line.startswith("place ")]
-    boxes = [shape for shape in ET.fromstring(picture).iter(f"{SVG}polygon") if shape.get("class") == "box"]
+    boxes = [
+        shape
+        for shape in ET.fromstring(picture).iter(f"{SVG}polygon")
+        if shape.get("class") == "box"
+    ]
     assert len(places) == len(boxes) or [line for line in said if line.startswith("no place for ")]
     if places:
         part = places[0].rpartition("--road '")[2].strip("'")
@@ -51,7 +55,10 @@ def test_the_places_that_are_named_take_the_template(tmp_path):
 
 def test_built_in_roads_are_listed_and_those_that_suit(tmp_path):
     log = ROOT / "examples" / "my_log.csv"
-    assert run("roads") == "roads: straight, curve, t_intersection, four_way, merge, roundabout, corridor\n"
+    assert (
+        run("roads")
+        == "roads: straight, curve, t_intersection, four_way, merge, roundabout, corridor\n"
+    )
     assert run("roads", "--log", log) == "roads that take my_log: four_way, corridor\n"
     assert run("roads", "four_way", "--out", tmp_path / "four.svg").startswith("four_way: ")
     assert ET.parse(tmp_path / "four.svg").getroot().tag == f"{SVG}svg"
@@ -62,4 +69,6 @@ def test_nothing_of_the_user_is_overwritten(tmp_path):
     for name in ("mine.svg", "mine.txt"):
         with pytest.raises(InputError, match="--out "):
             run("roads", "four_way", "--out", tmp_path / name)
-    assert (tmp_path / "mine.svg").read_text() == "<!-- mine -->" and not (tmp_path / "mine.txt").exists()
+    assert (tmp_path / "mine.svg").read_text() == "<!-- mine -->" and not (
+        tmp_path / "mine.txt"
+    ).exists()

@@ -25,7 +25,10 @@ def test_each_vehicle_of_each_scenario_is_a_line_in_its_colour_on_the_road():
     assert np.array_equal(np.transpose(drawn[0].get_data()), made[0].position[0])
     assert list(axes.get_images()[0].get_extent()) == pytest.approx([-10.0, 50.0, -5.0, 5.0])
     assert axes.get_title() == "5 scenarios, made by hand on straight"
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["vehicle 1", "vehicle bus 2"]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        "vehicle 1",
+        "vehicle bus 2",
+    ]
 
 
 def test_one_scenario_or_the_record_is_drawn_on_axes_that_are_given():

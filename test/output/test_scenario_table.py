@@ -24,9 +24,15 @@ def run_with_distances():
 
 def test_each_scenario_has_a_row_with_its_figures():
     table = measures(run_with_distances())
-    assert list(table.scenario) == [0, 1, 2, 3, 4] and (table.seconds == 6.0).all() and (table.speed == 6.0).all()
+    assert (
+        list(table.scenario) == [0, 1, 2, 3, 4]
+        and (table.seconds == 6.0).all()
+        and (table.speed == 6.0).all()
+    )
     lateral = 4.0 - (1.9 + 2.5) / 2.0
-    assert list(table.distance.round(2)) == pytest.approx([lateral - 0.3 * i for i in range(5)], abs=0.02)
+    assert list(table.distance.round(2)) == pytest.approx(
+        [lateral - 0.3 * i for i in range(5)], abs=0.02
+    )
     assert table.pet.isna().all()  # nobody crosses
 
 
@@ -42,9 +48,14 @@ def test_a_condition_keeps_the_scenarios_it_holds_for_and_says_so():
 def test_an_encounter_becomes_a_table_and_a_table_a_log_whose_errors_name_it():
     (encounter,) = read_log(bundled("follower")).encounters
     table = encounter.to_dataframe()
-    assert list(table.columns) == ["vehicle", "time", "x", "y", "heading", "speed"] and len(table) == encounter.speed.size
+    assert (
+        list(table.columns) == ["vehicle", "time", "x", "y", "heading", "speed"]
+        and len(table) == encounter.speed.size
+    )
     (again,) = read_log(table).encounters
-    assert again.position == pytest.approx(encounter.position, abs=0.1) and again.speed == pytest.approx(encounter.speed, abs=0.2)
+    assert again.position == pytest.approx(
+        encounter.position, abs=0.1
+    ) and again.speed == pytest.approx(encounter.speed, abs=0.2)
     with pytest.raises(InputError, match=r"^the DataFrame has no column for position"):
         read_log(table.drop(columns="x"))
 
@@ -59,7 +70,12 @@ def test_results_become_a_folder_with_page_bag_and_figures(tmp_path):
         report(tmp_path / "own", made)
 
 
-@pytest.mark.parametrize("condition", ["", "nearness < 1", "ttc <", "1 + 1", "scenario.sum()", "__import__('os')", "ttc = 2"])
+@pytest.mark.parametrize(
+    "condition",
+    ["", "nearness < 1", "ttc <", "1 + 1", "scenario.sum()", "__import__('os')", "ttc = 2"],
+)
 def test_what_is_no_condition_is_refused_with_the_columns(condition):
-    with pytest.raises(InputError, match=r"condition .*; the columns are scenario, seconds, ttc, pet"):
+    with pytest.raises(
+        InputError, match=r"condition .*; the columns are scenario, seconds, ttc, pet"
+    ):
         run_with_distances().filter(condition)

@@ -26,8 +26,12 @@ SEGMENTATION = ("numpy", "scipy", "numba")  # the extra's
 def lock_of(wanted: Sequence[Requirement]) -> str:
     """Return the part of core.lock that is needed, hashes included."""
     needed = needed_at_run_time(installed(), wanted)
-    blocks = re.split(r"^(?=\w)", (REQUIREMENTS / "core.lock").read_text(encoding="utf-8"), flags=re.MULTILINE)
-    return "".join(block for block in blocks if canonicalize_name(re.split(r"[=\s]", block)[0]) in needed)
+    blocks = re.split(
+        r"^(?=\w)", (REQUIREMENTS / "core.lock").read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
+    return "".join(
+        block for block in blocks if canonicalize_name(re.split(r"[=\s]", block)[0]) in needed
+    )
 
 
 def environment(folder: Path, wheel: Path, wanted: Sequence[Requirement]) -> Path:
@@ -45,26 +49,49 @@ def main() -> None:
     """Build, install, run, and say what was seen."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        run(sys.executable, *PIP, "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, ROOT)
+        run(
+            sys.executable,
+            *PIP,
+            "wheel",
+            "--no-deps",
+            "--no-build-isolation",
+            "--wheel-dir",
+            folder,
+            ROOT,
+        )
         (wheel,) = folder.glob("*.whl")
         core = extras()["core"]
-        alone = environment(folder / "segmentation", wheel, [one for one in core if one.name in SEGMENTATION])
+        alone = environment(
+            folder / "segmentation", wheel, [one for one in core if one.name in SEGMENTATION]
+        )
         fitted = json.loads(run(alone, ROOT / "test" / "packaging" / "segmentation_use.py"))
         few = run(alone, "-m", "pip", "freeze").split()
         python = environment(folder / "core", wheel, core)
         run(python, *PIP, "check")
-        told = json.loads(run(python, ROOT / "test" / "packaging" / "core_use.py", write_csv(folder / "log.csv")))
+        told = json.loads(
+            run(python, ROOT / "test" / "packaging" / "core_use.py", write_csv(folder / "log.csv"))
+        )
         packages = run(python, "-m", "pip", "freeze").split()
-    assert fitted["states"] == 2 and not set(fitted["loaded"]) - {*SEGMENTATION, "llvmlite", "scenario_gen"}, fitted
-    print(f"{len(few)} packages: {', '.join(few)}: two states found; imported in {fitted['seconds']:.2f} s")
-    assert told["scenarios"] == 4 and told["same"] and not set(told["loaded"]) & set(EXTRA_MODULES), told
+    assert fitted["states"] == 2 and not set(fitted["loaded"]) - {
+        *SEGMENTATION,
+        "llvmlite",
+        "scenario_gen",
+    }, fitted
+    print(
+        f"{len(few)} packages: {', '.join(few)}: two states found; imported in {fitted['seconds']:.2f} s"
+    )
+    assert (
+        told["scenarios"] == 4 and told["same"] and not set(told["loaded"]) & set(EXTRA_MODULES)
+    ), told
     print(f"{len(packages)} packages: {', '.join(packages)}")
     print(f"{told['scenarios']} scenarios from {len(told['changepoints'])} changepoints")
 
 
 def run(*command: str | Path) -> str:
     """Run a command, away from the sources; return what it printed."""
-    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, cwd=tempfile.gettempdir()).stdout
+    return subprocess.run(
+        command, check=True, stdout=subprocess.PIPE, text=True, cwd=tempfile.gettempdir()
+    ).stdout
 
 
 if __name__ == "__main__":

@@ -21,6 +21,8 @@ answer = {
     "scenarios": len(made.generated.scenarios),
     "same": evaluate(made).to_json() == made.evaluation.to_json(),
     "refusals": refusals,
-    "loaded": sorted({name.partition(".")[0] for name, module in sys.modules.items() if module is not None}),
+    "loaded": sorted(
+        {name.partition(".")[0] for name, module in sys.modules.items() if module is not None}
+    ),
 }
 json.dump(answer, sys.stdout)

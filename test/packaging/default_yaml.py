@@ -27,7 +27,9 @@ def default_yaml() -> str:
             lines.append(f"    {head}:")
             stage = head
         text = json.dumps(value)
-        text = re.sub(r"^(-?\d+)(e[+-]?\d+)$", r"\1.0\2", text) if isinstance(value, float) else text
+        text = (
+            re.sub(r"^(-?\d+)(e[+-]?\d+)$", r"\1.0\2", text) if isinstance(value, float) else text
+        )
         unit = f" [{entry.metadata['unit']}]" if entry.metadata["unit"] else ""
         lines += [f"      # {entry.metadata['meaning']}{unit}", f"      {rest}: {text}"]
     return DEFAULTS + "\n".join(lines) + "\n"

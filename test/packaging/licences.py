@@ -16,7 +16,9 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
 REQUIREMENTS = ROOT / "requirements"
-LOCKS = tuple(REQUIREMENTS / f"{name}.lock" for name in ("core", "run", "extras", "test", "ros", "ros-test"))
+LOCKS = tuple(
+    REQUIREMENTS / f"{name}.lock" for name in ("core", "run", "extras", "test", "ros", "ros-test")
+)
 TABLE = ROOT / "docs" / "licences.csv"
 TOLD = {  # what metadata does not say, or says only on Windows; looked up in the projects themselves
     "colorama": "BSD-3-Clause",
@@ -68,17 +70,29 @@ def licence(name: str, found: Distribution | None) -> str:
         return TOLD.get(name, "")
     stated = found.metadata.get("License-Expression")
     classified = [
-        text.rpartition(" :: ")[2] for text in found.metadata.get_all("Classifier") or () if text.startswith("License ::")
+        text.rpartition(" :: ")[2]
+        for text in found.metadata.get_all("Classifier") or ()
+        if text.startswith("License ::")
     ]
-    text = stated or " and ".join(SHORT.get(one, one) for one in classified if one != "OSI Approved")
-    text = text or (found.metadata.get("License") or "").strip().partition("\n")[0] or " and ".join(_of_manifests(found))
+    text = stated or " and ".join(
+        SHORT.get(one, one) for one in classified if one != "OSI Approved"
+    )
+    text = (
+        text
+        or (found.metadata.get("License") or "").strip().partition("\n")[0]
+        or " and ".join(_of_manifests(found))
+    )
     return SHORT.get(text, text)
 
 
 def _of_manifests(found: Distribution) -> Iterator[str]:
     """Licences in the package.xml files that a ROS package installs; a package of packages has none, and says ROS's own."""
     manifests = [file for file in found.files or () if file.name == "package.xml"]
-    said = {entry.text or "" for file in manifests for entry in ET.parse(Path(str(file.locate()))).getroot().findall("license")}
+    said = {
+        entry.text or ""
+        for file in manifests
+        for entry in ET.parse(Path(str(file.locate()))).getroot().findall("license")
+    }
     yield from sorted(SHORT.get(text.strip(), text.strip()) for text in said)
     if not manifests and found.metadata["Name"].startswith("ros-"):
         yield "Apache-2.0"
@@ -87,7 +101,10 @@ def _of_manifests(found: Distribution) -> Iterator[str]:
 def extras() -> dict[str, list[Requirement]]:
     """Return what core.in, run.in and extras.in ask for at run time, by the extra that it is for, or "core"."""
     found: dict[str, list[Requirement]] = {}
-    texts = [(REQUIREMENTS / f"{name}.in").read_text(encoding="utf-8") for name in ("core", "run", "extras")]
+    texts = [
+        (REQUIREMENTS / f"{name}.in").read_text(encoding="utf-8")
+        for name in ("core", "run", "extras")
+    ]
     for line in "".join(text.partition("# to build")[0] for text in texts).splitlines():
         if line.startswith("#"):
             heading = line.removeprefix("# ").removeprefix("extra ")
@@ -99,10 +116,15 @@ def extras() -> dict[str, list[Requirement]]:
 def run_time() -> list[Requirement]:
     """Return what setup.py asks for, all extras included."""
     ros = (REQUIREMENTS / "ros.in").read_text(encoding="utf-8").splitlines()
-    return [*chain.from_iterable(extras().values()), *(Requirement(line) for line in ros if not line.startswith("#"))]
+    return [
+        *chain.from_iterable(extras().values()),
+        *(Requirement(line) for line in ros if not line.startswith("#")),
+    ]
 
 
-def needed_at_run_time(known: Mapping[str, Distribution], wanted: Sequence[Requirement] | None = None) -> set[str]:
+def needed_at_run_time(
+    known: Mapping[str, Distribution], wanted: Sequence[Requirement] | None = None
+) -> set[str]:
     """Return the names of all that requirements (all of setup.py's) lead to on this platform."""
     open_ = run_time() if wanted is None else list(wanted)
     found: set[str] = set()
@@ -128,7 +150,10 @@ def write() -> None:
     needed = needed_at_run_time(known)
     rows = [("package", "version", "licence", "needed")]
     for name, version in locked().items():
-        stated, need = licence(name, known.get(name)) or "unknown", "run time" if name in needed else "to test"
+        stated, need = (
+            licence(name, known.get(name)) or "unknown",
+            "run time" if name in needed else "to test",
+        )
         rows.append((name, version, stated, need))
     with TABLE.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)

@@ -39,7 +39,11 @@ OPTIONS = [
 
 def pins(text: str) -> dict[str, str]:
     """Return the pins of a lock with their hashes, by their first lines."""
-    return {block.partition("\n")[0]: block for block in re.split(r"^(?=\w)", text, flags=re.MULTILINE) if "==" in block}
+    return {
+        block.partition("\n")[0]: block
+        for block in re.split(r"^(?=\w)", text, flags=re.MULTILINE)
+        if "==" in block
+    }
 
 
 def main() -> None:
@@ -47,17 +51,35 @@ def main() -> None:
     whole: dict[str, dict[str, str]] = {}
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "whole.lock"
-        for name in dict.fromkeys([*BEFORE, *sorted(path.stem for path in REQUIREMENTS.glob("*.in"))]):
+        for name in dict.fromkeys(
+            [*BEFORE, *sorted(path.stem for path in REQUIREMENTS.glob("*.in"))]
+        ):
             before, lock = BEFORE.get(name, ()), REQUIREMENTS / f"{name}.lock"
             known = dict.fromkeys(
-                chain(*(whole[each].values() for each in before), pins(lock.read_text(encoding="utf-8")).values())
+                chain(
+                    *(whole[each].values() for each in before),
+                    pins(lock.read_text(encoding="utf-8")).values(),
+                )
             )
             out.write_text("".join(known), encoding="utf-8")
             lists = [str(REQUIREMENTS / f"{each}.in") for each in (*before, name)]
-            command = ["uv", "pip", "compile", "--quiet", *OPTIONS, *lists, "--output-file", str(out)]
+            command = [
+                "uv",
+                "pip",
+                "compile",
+                "--quiet",
+                *OPTIONS,
+                *lists,
+                "--output-file",
+                str(out),
+            ]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
             whole[name] = pins(out.read_text(encoding="utf-8"))
-            new = [block for first, block in whole[name].items() if not any(first in whole[each] for each in before)]
+            new = [
+                block
+                for first, block in whole[name].items()
+                if not any(first in whole[each] for each in before)
+            ]
             lock.write_text("".join(new), encoding="utf-8")
 
 

@@ -18,7 +18,11 @@ import numpy as np  # noqa: E402
 labels = np.repeat([0, 1, 0], 80)
 x = np.random.default_rng(0).normal(size=(240, 2)) + 5.0 * labels[:, None]
 model = StickyHDPHMM(random_state=1).fit(x)
-files = (name for name in set(sys.modules) - before if getattr(sys.modules[name], "__file__", None))
+files = (
+    name for name in set(sys.modules) - before if getattr(sys.modules[name], "__file__", None)
+)
 own = {name.partition(".")[0] for name in files}
-loaded = sorted(name for name in own - set(sys.stdlib_module_names) if not name.startswith(("_", "cython")))
+loaded = sorted(
+    name for name in own - set(sys.stdlib_module_names) if not name.startswith(("_", "cython"))
+)
 json.dump({"states": model.n_states_, "seconds": seconds, "loaded": loaded}, sys.stdout)

@@ -7,10 +7,23 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = [
-    str(ROOT / name) for name in ("scenario_gen", "msg_conventions", "benchmarks", "examples", "launch", "test", "setup.py")
+    str(ROOT / name)
+    for name in (
+        "scenario_gen",
+        "msg_conventions",
+        "benchmarks",
+        "examples",
+        "launch",
+        "test",
+        "setup.py",
+    )
 ]
 
 
 def python_files() -> list[Path]:
     """Return every Python file of the project."""
-    return sorted(path for source in map(Path, SOURCES) for path in (source.rglob("*.py") if source.is_dir() else [source]))
+    return sorted(
+        path
+        for source in map(Path, SOURCES)
+        for path in (source.rglob("*.py") if source.is_dir() else [source])
+    )

@@ -17,5 +17,9 @@ HEADER = re.compile(
 @pytest.mark.linter
 def test_every_source_file_names_its_holder_and_licence():
     texts = {path: path.read_text(encoding="utf-8") for path in python_files()}
-    bare = [str(path.relative_to(ROOT)) for path, text in texts.items() if text and not HEADER.match(text)]
+    bare = [
+        str(path.relative_to(ROOT))
+        for path, text in texts.items()
+        if text and not HEADER.match(text)
+    ]
     assert not bare, f"without the header of this file: {', '.join(bare)}"

@@ -10,7 +10,12 @@ from source_files import ROOT
 
 import scenario_gen
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "examples" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "examples" / "README.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
 
 
 def anchors(page):
@@ -22,35 +27,60 @@ def anchors(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_files_links_and_targets_of_a_page_are_there(page):
     text = page.read_text()
-    named = {name for name in re.findall(r"`((?:scenario_gen|test|docs|examples|config)/[\w./]+)`", text) if "*" not in name}
+    named = {
+        name
+        for name in re.findall(r"`((?:scenario_gen|test|docs|examples|config)/[\w./]+)`", text)
+        if "*" not in name
+    }
     assert not [name for name in named if not (ROOT / name).exists()]
-    links = {link.partition("#")[0] for link in re.findall(r"\]\((?!https?:)([^)]+)\)", text)} - {""}
+    links = {link.partition("#")[0] for link in re.findall(r"\]\((?!https?:)([^)]+)\)", text)} - {
+        ""
+    }
     assert not [link for link in links if not (page.parent / link).exists()]
     places = re.findall(r"\]\((?!https?:)([^)#]*)#([^)]+)\)", text)
-    assert not [(link, anchor) for link, anchor in places if anchor not in anchors(page.parent / link if link else page)]
+    assert not [
+        (link, anchor)
+        for link, anchor in places
+        if anchor not in anchors(page.parent / link if link else page)
+    ]
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     assert set(re.findall(r"`make ([a-z]+)", text)) <= targets
 
 
 def test_every_function_that_contributing_names_is_in_its_file():
-    rows = re.findall(r"^\|.*\| `(scenario_gen/[\w/]+\.py)` \| (`.*?`) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE)
+    rows = re.findall(
+        r"^\|.*\| `(scenario_gen/[\w/]+\.py)` \| (`.*?`) \|$",
+        (ROOT / "CONTRIBUTING.md").read_text(),
+        re.MULTILINE,
+    )
     names = [(file, name) for file, cell in rows for name in re.findall(r"(\w+)`", cell)]
     assert len(names) > 30
-    assert not [(file, name) for file, name in names if not re.search(rf"(?:def|class) {name}\b", (ROOT / file).read_text())]
+    assert not [
+        (file, name)
+        for file, name in names
+        if not re.search(rf"(?:def|class) {name}\b", (ROOT / file).read_text())
+    ]
 
 
 def test_every_public_name_is_on_the_page_of_the_library_and_every_page_on_the_site():
     page = (ROOT / "docs" / "library.md").read_text()
     shown = dict(re.findall(r"\{py:(?:class|func)\}`(\w+) <([\w.]+)>`", page))
-    assert shown == {name: f"{getattr(scenario_gen, name).__module__}.{name}" for name in scenario_gen.__all__}
+    assert shown == {
+        name: f"{getattr(scenario_gen, name).__module__}.{name}" for name in scenario_gen.__all__
+    }
     site = (ROOT / "docs" / "index.md").read_text().split()
     pages = {path.stem for path in (ROOT / "docs").glob("*.md")}
-    assert pages - {"index"} <= set(site) and not pages & {"search", "genindex"}, "Sphinx writes pages of these names itself"
+    assert pages - {"index"} <= set(site) and not pages & {"search", "genindex"}, (
+        "Sphinx writes pages of these names itself"
+    )
 
 
 def test_the_version_is_the_same_everywhere():
     assert f'version="{scenario_gen.__version__}"' in (ROOT / "setup.py").read_text()
     assert f"<version>{scenario_gen.__version__}</version>" in (ROOT / "package.xml").read_text()
     assert (
-        re.search(r"^(\d+\.\d+\.\d+)\n-----$", (ROOT / "CHANGELOG.rst").read_text(), re.MULTILINE)[1] == scenario_gen.__version__
+        re.search(r"^(\d+\.\d+\.\d+)\n-----$", (ROOT / "CHANGELOG.rst").read_text(), re.MULTILINE)[
+            1
+        ]
+        == scenario_gen.__version__
     )

@@ -15,11 +15,24 @@ import scenario_gen
 from scenario_gen import bundled, read_log
 
 MODULES = {"pillow": "PIL", "pyyaml": "yaml"}  # by distribution, where they differ
-EXTRA_MODULES = sorted({MODULES.get(one.name, one.name) for name, listed in extras().items() if name != "core" for one in listed})
+EXTRA_MODULES = sorted(
+    {
+        MODULES.get(one.name, one.name)
+        for name, listed in extras().items()
+        if name != "core"
+        for one in listed
+    }
+)
 
 
 def python(*arguments):
-    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=False, cwd=Path(__file__).parent)
+    return subprocess.run(
+        [sys.executable, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=Path(__file__).parent,
+    )
 
 
 def test_every_public_name_is_there():
@@ -31,8 +44,14 @@ def test_every_public_name_is_there():
 
 
 def test_importing_the_package_loads_nothing():
-    ran = python("-c", "import sys; before = set(sys.modules); import scenario_gen; print(*(set(sys.modules) - before))")
-    assert {name.partition(".")[0] for name in ran.stdout.split()} <= {"scenario_gen", *sys.stdlib_module_names}
+    ran = python(
+        "-c",
+        "import sys; before = set(sys.modules); import scenario_gen; print(*(set(sys.modules) - before))",
+    )
+    assert {name.partition(".")[0] for name in ran.stdout.split()} <= {
+        "scenario_gen",
+        *sys.stdlib_module_names,
+    }
 
 
 def test_the_core_works_without_any_extra(tmp_path):
@@ -43,22 +62,41 @@ def test_the_core_works_without_any_extra(tmp_path):
     assert ran.returncode == 0, ran.stderr
     told = json.loads(ran.stdout)
     assert told["scenarios"] == 4 and told["changepoints"] and told["same"]
-    assert [sentence.rpartition("[")[2].partition("]")[0] for sentence in told["refusals"]] == ["bags", "report"]
+    assert [sentence.rpartition("[")[2].partition("]")[0] for sentence in told["refusals"]] == [
+        "bags",
+        "report",
+    ]
     assert not set(told["loaded"]) & set(EXTRA_MODULES)
 
 
 def test_the_command_names_the_extra_that_it_lacks():
-    ran = python("-c", "import sys; sys.modules['typer'] = None; from scenario_gen.__main__ import main; main()")
+    ran = python(
+        "-c",
+        "import sys; sys.modules['typer'] = None; from scenario_gen.__main__ import main; main()",
+    )
     assert (ran.returncode, ran.stdout) == (1, "")
-    assert ran.stderr == "error: typer not installed; `pip install 'scenario_gen[cli]'` brings it\n"
+    assert (
+        ran.stderr == "error: typer not installed; `pip install 'scenario_gen[cli]'` brings it\n"
+    )
 
 
 def write_csv(path):
     """Write the bundled case a as a table, which the core alone reads."""
     (encounter,) = read_log(bundled("a")).encounters
-    rows = ["vehicle,time_s,x_m,y_m,speed_mps,heading_rad"]  # a vehicle that only waits tells no heading by its places
+    rows = [
+        "vehicle,time_s,x_m,y_m,speed_mps,heading_rad"
+    ]  # a vehicle that only waits tells no heading by its places
     for n, vehicle in enumerate(encounter.vehicles):
-        states = zip(encounter.time, encounter.position[n], encounter.speed[n], encounter.heading[n], strict=True)
-        rows += [f"{vehicle.id},{t:.1f},{x:.6f},{y:.6f},{speed:.6f},{heading:.6f}" for t, (x, y), speed, heading in states]
+        states = zip(
+            encounter.time,
+            encounter.position[n],
+            encounter.speed[n],
+            encounter.heading[n],
+            strict=True,
+        )
+        rows += [
+            f"{vehicle.id},{t:.1f},{x:.6f},{y:.6f},{speed:.6f},{heading:.6f}"
+            for t, (x, y), speed, heading in states
+        ]
     path.write_text("\n".join(rows) + "\n")
     return path

@@ -20,15 +20,26 @@ from source_files import ROOT
 def test_package_xml_is_that_of_an_ament_python_package():
     warnings = []
     package = parse_package(ROOT, warnings=warnings)
-    assert (package.name, package.package_format, package.get_build_type()) == ("scenario_gen", 3, "ament_python")
+    assert (package.name, package.package_format, package.get_build_type()) == (
+        "scenario_gen",
+        3,
+        "ament_python",
+    )
     assert not warnings
 
 
 def test_every_ros_package_that_is_imported_is_declared():
-    declared = {entry.text for entry in ET.parse(ROOT / "package.xml").getroot().findall("exec_depend")}
+    declared = {
+        entry.text for entry in ET.parse(ROOT / "package.xml").getroot().findall("exec_depend")
+    }
     imported = set()
-    for path in [*(ROOT / "scenario_gen").rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")]:
-        imported |= set(re.findall(r"^\s*from (\w+)\.(?:msg|srv) import", path.read_text(), re.MULTILINE))
+    for path in [
+        *(ROOT / "scenario_gen").rglob("*.py"),
+        *(ROOT / "msg_conventions").rglob("*.py"),
+    ]:
+        imported |= set(
+            re.findall(r"^\s*from (\w+)\.(?:msg|srv) import", path.read_text(), re.MULTILINE)
+        )
     assert imported <= declared, imported - declared
 
 
@@ -37,13 +48,22 @@ def test_make_leaves_a_sourced_jazzy_its_rclpy(tmp_path, sourced):
     package = tmp_path / "lib" / "rclpy"
     package.mkdir(parents=True)
     (package / "__init__.py").touch()
-    environment = {name: value for name, value in os.environ.items() if name not in ("AMENT_PREFIX_PATH", "MAKEFLAGS")}
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("AMENT_PREFIX_PATH", "MAKEFLAGS")
+    }
     if sourced:
-        environment |= {"AMENT_PREFIX_PATH": f"/none:{tmp_path}", "PYTHONPATH": str(package.parent)}
+        environment |= {
+            "AMENT_PREFIX_PATH": f"/none:{tmp_path}",
+            "PYTHONPATH": str(package.parent),
+        }
     else:  # wheels in an active virtual environment are no Jazzy
         environment |= {"AMENT_PREFIX_PATH": sys.prefix}
     command = ["make", "--dry-run", "--always-make", "install", f"PYTHON={sys.executable}"]
-    said = subprocess.run(command, cwd=ROOT, env=environment, check=True, capture_output=True, text=True).stdout
+    said = subprocess.run(
+        command, cwd=ROOT, env=environment, check=True, capture_output=True, text=True
+    ).stdout
     assert "-r requirements/core.lock" in said
     assert ("-r requirements/ros.lock" in said) is not sourced
     assert ("--system-site-packages" in said) is sourced
@@ -54,7 +74,15 @@ def test_every_executable_exists(tmp_path):
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
     lines = (tmp_path / "scenario_gen.egg-info" / "entry_points.txt").read_text().splitlines()
     scripts = dict(line.split(" = ") for line in lines if " = " in line)
-    assert {"scenario-gen", "segmenter", "planner", "gp_sampler", "road_server", "log_player", "recorder"} <= set(scripts)
+    assert {
+        "scenario-gen",
+        "segmenter",
+        "planner",
+        "gp_sampler",
+        "road_server",
+        "log_player",
+        "recorder",
+    } <= set(scripts)
     for name, target in scripts.items():
         module, _, function = target.partition(":")
         assert callable(getattr(importlib.import_module(module), function)), name
@@ -66,10 +94,23 @@ def colcon(tmp_path_factory):
     base = tmp_path_factory.mktemp("workspace")
 
     def run(verb, *options):
-        command = [Path(sys.executable).with_name("colcon"), "--log-base", base / "log", verb, *options]
+        command = [
+            Path(sys.executable).with_name("colcon"),
+            "--log-base",
+            base / "log",
+            verb,
+            *options,
+        ]
         return subprocess.run(command, cwd=base, capture_output=True, text=True, check=False)
 
-    places = ("--base-paths", ROOT, "--build-base", base / "build", "--install-base", base / "install")
+    places = (
+        "--base-paths",
+        ROOT,
+        "--build-base",
+        base / "build",
+        "--install-base",
+        base / "install",
+    )
     built = run("build", *places)
     assert built.returncode == 0, built.stderr
     return base, places, run
@@ -84,18 +125,33 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
     executables = list((prefix / "lib" / "scenario_gen").iterdir())
     assert nodes <= {path.name for path in executables}
     for path in executables:  # `ros2 run` takes what can be executed; the packages are those of the Python that ran colcon
-        assert os.access(path, os.X_OK) and path.read_text().startswith(f"#!{sys.executable}\n"), path
-    assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "scenario_gen").is_file()
+        assert os.access(path, os.X_OK) and path.read_text().startswith(f"#!{sys.executable}\n"), (
+            path
+        )
+    assert (
+        prefix / "share" / "ament_index" / "resource_index" / "packages" / "scenario_gen"
+    ).is_file()
     share = prefix / "share" / "scenario_gen"
-    shared = [*ROOT.glob("config/*.*"), *ROOT.glob("launch/*.py"), *ROOT.glob("examples/*.*"), ROOT / "package.xml"]
-    assert {str(path.relative_to(ROOT)) for path in shared} <= {str(p.relative_to(share)) for p in share.rglob("*")}
+    shared = [
+        *ROOT.glob("config/*.*"),
+        *ROOT.glob("launch/*.py"),
+        *ROOT.glob("examples/*.*"),
+        ROOT / "package.xml",
+    ]
+    assert {str(path.relative_to(ROOT)) for path in shared} <= {
+        str(p.relative_to(share)) for p in share.rglob("*")
+    }
     (packages,) = prefix.glob("lib/python3*/site-packages")
     assert (packages / "scenario_gen" / "resources" / "synthetic_a").is_dir()
     assert (packages / "scenario_gen" / "resources" / "loopback.xml").is_file()
-    assert all((packages / name / "py.typed").is_file() for name in ("scenario_gen", "msg_conventions"))
+    assert all(
+        (packages / name / "py.typed").is_file() for name in ("scenario_gen", "msg_conventions")
+    )
     command = [sys.executable, prefix / "lib" / "scenario_gen" / "scenario-gen", "--help"]
     variables = os.environ | {"PYTHONPATH": str(packages)}
-    ran = subprocess.run(command, cwd=base, env=variables, capture_output=True, text=True, check=False)
+    ran = subprocess.run(
+        command, cwd=base, env=variables, capture_output=True, text=True, check=False
+    )
     assert ran.returncode == 0 and "regenerate" in ran.stdout, ran.stderr
 
 

@@ -18,7 +18,9 @@ FAILS = "my_planner:MyPlanner"  # the tutorial's bad planner: the command's exit
 
 def blocks(page):
     """Return (language, text) of each block of code."""
-    return re.findall(r"^```(sh|python)\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+    return re.findall(
+        r"^```(sh|python)\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL
+    )
 
 
 @pytest.fixture
@@ -30,7 +32,9 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("page", [pytest.param("docs/tutorial.md", marks=pytest.mark.long), "docs/howto_data.md"])
+@pytest.mark.parametrize(
+    "page", [pytest.param("docs/tutorial.md", marks=pytest.mark.long), "docs/howto_data.md"]
+)
 def test_commands_of_a_page_run(page, place, monkeypatch):
     for language, text in blocks(page):
         if language == "python":
@@ -50,16 +54,29 @@ def test_python_of_the_readme_runs(place, capsys):
 
 
 def test_the_table_of_columns_is_the_code_s():
-    rows = re.findall(r"^\| (\w+) \| (`.*?) \| (.*?) \|$", (ROOT / "docs" / "columns.md").read_text(), re.MULTILINE)
-    shown = {quantity: tuple(tuple(re.findall(r"`(\w+)`", cell)) for cell in cells) for quantity, *cells in rows}
-    assert shown == {quantity: (names, tuple(UNITS[quantity])) for quantity, names in NAMES.items()}
+    rows = re.findall(
+        r"^\| (\w+) \| (`.*?) \| (.*?) \|$",
+        (ROOT / "docs" / "columns.md").read_text(),
+        re.MULTILINE,
+    )
+    shown = {
+        quantity: tuple(tuple(re.findall(r"`(\w+)`", cell)) for cell in cells)
+        for quantity, *cells in rows
+    }
+    assert shown == {
+        quantity: (names, tuple(UNITS[quantity])) for quantity, names in NAMES.items()
+    }
 
 
 @pytest.mark.long
 @pytest.mark.usefixtures("place")
 def test_the_tasks_of_the_library_run_and_are_short():
     pytest.importorskip("matplotlib").use("Agg")
-    found = [text for language, text in blocks("docs/library.md") if language == "python" and text.startswith(">>> ")]
+    found = [
+        text
+        for language, text in blocks("docs/library.md")
+        if language == "python" and text.startswith(">>> ")
+    ]
     assert len(found) > 12 and max(text.count(">>> ") for text in found) <= 6
     page = doctest.DocTestParser().get_doctest("\n".join(found), {}, "library.md", None, 0)
     told = []

@@ -31,7 +31,9 @@ def test_rviz_shows_topics_of_the_suite_with_their_types_and_quality():
         kind, quality = topic_entry(name)
         assert kind == TYPES[display["Class"].rpartition("/")[2]], name
         assert quality.reliable == (display["Topic"]["Reliability Policy"] == "Reliable"), name
-        assert quality.transient_local == (display["Topic"]["Durability Policy"] == "Transient Local"), name
+        assert quality.transient_local == (
+            display["Topic"]["Durability Policy"] == "Transient Local"
+        ), name
     assert shown["posterior"]["Channel Name"] in POINT.names
     assert manager["Global Options"]["Fixed Frame"] == "map"
 

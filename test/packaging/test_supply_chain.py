@@ -25,7 +25,11 @@ def test_setup_py_asks_for_the_same(tmp_path):
     setup = (ROOT / "setup.py").read_text()
     assert 'python_requires=">=3.11,<3.14"' in setup
     assert all(f'needed("{name}.in")' in setup for name in ("core", "run", "extras", "ros"))
-    out = subprocess.run([sys.executable, "setup.py", "--quiet", "egg_info", "--egg-base", tmp_path], cwd=ROOT, check=False)
+    out = subprocess.run(
+        [sys.executable, "setup.py", "--quiet", "egg_info", "--egg-base", tmp_path],
+        cwd=ROOT,
+        check=False,
+    )
     assert out.returncode == 0
     asked = {"core": set()}
     for line in (tmp_path / "scenario_gen.egg-info" / "requires.txt").read_text().split():
@@ -36,7 +40,9 @@ def test_setup_py_asks_for_the_same(tmp_path):
     listed = {name: {one.name for one in wanted} for name, wanted in extras().items()}
     everything = set().union(*listed.values()) - listed["core"]
     apart = {"ompl", "gymnasium", "matplotlib", "betterosi", "fsspec", "s3fs", "aiohttp"}
-    assert asked["core"] == listed["core"] and asked["all"] == everything == asked["corpus"] | apart
+    assert (
+        asked["core"] == listed["core"] and asked["all"] == everything == asked["corpus"] | apart
+    )
     assert asked["cli"] == everything - listed["corpus"] - apart
     assert asked["ros"] - everything == {"ros-jazzy-rclpy", "ros-jazzy-common-interfaces"}
 
@@ -51,7 +57,9 @@ def test_what_locks_pin_has_one_version_in_all_of_them_and_for_every_python():
 def test_locks_have_hashes_and_name_no_place():
     for path in REQUIREMENTS.glob("*.lock"):
         pinned = re.findall(r"^\S+==.*$", text := path.read_text(), re.MULTILINE)
-        assert pinned and all(line.endswith("\\") for line in pinned), f"{path.name}: each pin is followed by its hashes"
+        assert pinned and all(line.endswith("\\") for line in pinned), (
+            f"{path.name}: each pin is followed by its hashes"
+        )
         assert "://" not in text, path.name
 
 
@@ -60,4 +68,6 @@ def test_every_locked_package_is_listed_with_its_licence():
         rows = list(csv.reader(file))[1:]
     assert {name: version for name, version, *_ in rows} == locked(), "make licences"
     assert not [name for name, _, stated, _ in rows if stated.strip() in ("", "unknown")]
-    assert not [name for name, _, stated, need in rows if need == "run time" and COPYLEFT.search(stated)]
+    assert not [
+        name for name, _, stated, need in rows if need == "run time" and COPYLEFT.search(stated)
+    ]

@@ -25,7 +25,9 @@ def chain():
 def following():
     """Two cars that follow each other, 20 m apart, on a straight road."""
     time = np.arange(201) * 0.1
-    position = np.stack([np.stack([start + 8.0 * time, 0.0 * time], axis=-1) for start in (20.0, 0.0)])
+    position = np.stack(
+        [np.stack([start + 8.0 * time, 0.0 * time], axis=-1) for start in (20.0, 0.0)]
+    )
     vehicles = (Vehicle("1"), Vehicle("2"))
     flat = np.zeros((2, 201))
     encounter = Encounter("following", vehicles, 0, 100_000_000, position, flat, flat + 8.0)
@@ -43,7 +45,14 @@ def crossing():
     """Two cars of 4 x 2 m at 10 m/s on crossing axes, the second 20 m behind the first."""
     time = np.arange(101) * 0.1
     along = 10.0 * time
-    position = np.stack([np.stack([along - 40.0, 0.0 * time], axis=-1), np.stack([0.0 * time, along - 60.0], axis=-1)])
+    position = np.stack(
+        [
+            np.stack([along - 40.0, 0.0 * time], axis=-1),
+            np.stack([0.0 * time, along - 60.0], axis=-1),
+        ]
+    )
     heading = np.stack([0.0 * time, 0.0 * time + 0.5 * np.pi])
     vehicles = (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0))
-    return Encounter("crossing", vehicles, 0, 100_000_000, position, heading, np.full((2, 101), 10.0))
+    return Encounter(
+        "crossing", vehicles, 0, 100_000_000, position, heading, np.full((2, 101), 10.0)
+    )

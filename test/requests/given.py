@@ -26,17 +26,26 @@ class Given:
     seed: int
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
-    sampling: SamplingConfig = field(default_factory=lambda: SamplingConfig(variety="narrow"))  # all states are as given
+    sampling: SamplingConfig = field(
+        default_factory=lambda: SamplingConfig(variety="narrow")
+    )  # all states are as given
     limits: Limits = field(default_factory=Limits)
 
     @property
     def config(self):
-        return PipelineConfig(fitting=self.fitting, planning=self.planning, sampling=self.sampling, limits=self.limits)
+        return PipelineConfig(
+            fitting=self.fitting,
+            planning=self.planning,
+            sampling=self.sampling,
+            limits=self.limits,
+        )
 
 
 def answer(given, request, *, count, cancelled=lambda: False):
     """Return what comes of a request; the nearest possible one is looked for where it cannot be had."""
-    asked = Chain(given.encounter, given.segmentation, given.road, given.config, request, count, given.seed)
+    asked = Chain(
+        given.encounter, given.segmentation, given.road, given.config, request, count, given.seed
+    )
     try:
         return asked.run(Callbacks(cancelled=cancelled))
     except RefusedError as error:

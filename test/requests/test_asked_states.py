@@ -26,7 +26,10 @@ def achieved(outcome):
     """Largest distances [m] and [m/s] from the states asked of the scenarios."""
     asked = outcome.fit.requested
     far = [
-        (np.hypot(*(s.position[:, k] - states[:, :2]).T).max(), np.abs(s.speed[:, k] - states[:, 3]).max())
+        (
+            np.hypot(*(s.position[:, k] - states[:, :2]).T).max(),
+            np.abs(s.speed[:, k] - states[:, 3]).max(),
+        )
         for s in outcome.generated.scenarios
         for k, states in ((0, asked.start), (-1, asked.end))
     ]
@@ -36,11 +39,17 @@ def achieved(outcome):
 def state(plain, end, vehicle, ahead=0.0, left=0.0, speed=None):
     """A state of the plain fit, moved: as text."""
     x, y, yaw, v = getattr(plain.fit.requested, end)[vehicle]
-    x, y = x + ahead * np.cos(yaw) - left * np.sin(yaw), y + ahead * np.sin(yaw) + left * np.cos(yaw)
+    x, y = (
+        x + ahead * np.cos(yaw) - left * np.sin(yaw),
+        y + ahead * np.sin(yaw) + left * np.cos(yaw),
+    )
     return f"{vehicle + 1}: {x:.3f} {y:.3f} {yaw:.6f} {v if speed is None else speed:.3f}"
 
 
-CHANGES = [{"goals": (1, 2.0, 0.2, 3.0)}, {"starts": (1, -3.0, 0.0, 12.0), "goals": (0, 3.0, 0.0, 0.0)}]
+CHANGES = [
+    {"goals": (1, 2.0, 0.2, 3.0)},
+    {"starts": (1, -3.0, 0.0, 12.0), "goals": (0, 3.0, 0.0, 0.0)},
+]
 CHANGES += [{"starts": (0, 5.0, 0.0, 9.0)}, {"starts": (0, 0.0, 0.0, 0.2)}]
 
 
@@ -58,9 +67,13 @@ def test_what_is_asked_is_met(chain, plain, change):
         off = np.where(asked, met - rows, 0.0)
         off[:, 2] = wrap_angle(off[:, 2])
         assert np.abs(off).max() < 1e-6, "asked states are those of the checker"
-        untouched = ~asked.any(axis=1) & ~np.isfinite(request.rows("starts", chain.encounter)).any(axis=1)
+        untouched = ~asked.any(axis=1) & ~np.isfinite(request.rows("starts", chain.encounter)).any(
+            axis=1
+        )
         untouched &= ~np.isfinite(request.rows("goals", chain.encounter)).any(axis=1)
-        assert np.array_equal(met[untouched], getattr(plain.fit.requested, own)[untouched]), "others are as they were"
+        assert np.array_equal(met[untouched], getattr(plain.fit.requested, own)[untouched]), (
+            "others are as they were"
+        )
 
 
 def refused(chain, **texts):
@@ -74,7 +87,11 @@ def refused(chain, **texts):
     for offer in offers if LONG else offers[:1]:
         taken = dict(re.findall(r"(starts|goals):='([^']*)'", offer))
         longer = re.search(r"max_stretch:=([0-9.]+)", offer)
-        own = chain if longer is None else replace(chain, sampling=replace(chain.sampling, max_stretch=float(longer[1])))
+        own = (
+            chain
+            if longer is None
+            else replace(chain, sampling=replace(chain.sampling, max_stretch=float(longer[1])))
+        )
         outcome = answer(own, Request(**(texts | taken)), count=COUNT)
         assert len(outcome.generated.scenarios) == COUNT
         assert (achieved(outcome) <= (0.1, 0.1)).all()
@@ -83,11 +100,16 @@ def refused(chain, **texts):
 
 def moved(error, chain, texts, end):
     """How far [m] the first suggestion is from what was asked."""
-    before, after = (request.rows(end, chain.encounter)[:, :2] for request in (Request(**texts), error.suggestions[0].request))
+    before, after = (
+        request.rows(end, chain.encounter)[:, :2]
+        for request in (Request(**texts), error.suggestions[0].request)
+    )
     return float(np.nanmax(np.hypot(*(after - before).T)))
 
 
-@pytest.mark.parametrize("vehicle", [0, pytest.param(1, marks=pytest.mark.long)])  # the second needs a search along its way
+@pytest.mark.parametrize(
+    "vehicle", [0, pytest.param(1, marks=pytest.mark.long)]
+)  # the second needs a search along its way
 def test_a_goal_off_the_road(chain, plain, vehicle):
     texts = {"goals": state(plain, "end", vehicle, left=-4.0)}
     error = refused(chain, **texts)
@@ -118,21 +140,32 @@ def test_a_goal_too_far_for_the_time(chain, plain):
         sampling=replace(chain.sampling, max_stretch=0.0),
         limits=Limits(car=Dynamics(max_acceleration=0.7 if LONG else 0.9)),
     )
-    texts = {"starts": state(plain, "start", 0, speed=0.0), "goals": state(plain, "end", 0, ahead=10.0)}
+    texts = {
+        "starts": state(plain, "start", 0, speed=0.0),
+        "goals": state(plain, "end", 0, ahead=10.0),
+    }
     error = refused(slow, **texts)
     assert "cannot drive" in str(error)
-    assert any(one.max_stretch is not None for one in error.suggestions), "a longer clock is offered"
+    assert any(one.max_stretch is not None for one in error.suggestions), (
+        "a longer clock is offered"
+    )
     assert any(one.max_stretch is None for one in error.suggestions), "and another state"
 
 
 @pytest.mark.long
 def test_a_start_too_fast_to_stop(chain, plain):
     weak = replace(chain, limits=Limits(car=Dynamics(max_deceleration=4.5)))
-    texts = {"starts": state(plain, "start", 0, speed=38.0), "goals": state(plain, "end", 0, speed=0.0)}
+    texts = {
+        "starts": state(plain, "start", 0, speed=38.0),
+        "goals": state(plain, "end", 0, speed=0.0),
+    }
     error = refused(weak, **texts)
     assert "cannot drive" in str(error)
     slower = error.suggestions[0].request.states("starts")["1"]
-    assert 25.0 < slower[3] < 38.0 and slower[:2] == error.suggestions[0].request.states("starts")["1"][:2]
+    assert (
+        25.0 < slower[3] < 38.0
+        and slower[:2] == error.suggestions[0].request.states("starts")["1"][:2]
+    )
 
 
 @pytest.mark.long
@@ -144,6 +177,11 @@ def test_a_speed_above_the_limit(chain, plain):
 
 def test_a_cancelled_search_suggests_nothing(chain, plain):
     with pytest.raises(ImpossibleError) as caught:
-        answer(chain, Request(goals=state(plain, "end", 1, left=-4.0)), count=COUNT, cancelled=lambda: True)
+        answer(
+            chain,
+            Request(goals=state(plain, "end", 1, left=-4.0)),
+            count=COUNT,
+            cancelled=lambda: True,
+        )
     assert issubclass(ImpossibleError, RefusedError)
     assert caught.value.suggestions == ()

@@ -33,7 +33,10 @@ def late(encounter, who, sample):
 
 
 def made(encounter, request=Request(), count=30):
-    road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
+    road, segmentation = (
+        build_road("corridor", encounter, CONFIG.road),
+        segment(encounter, CONFIG.segmentation, 1),
+    )
     return Chain(encounter, segmentation, road, CONFIG, request, count=count, seed=1).run()
 
 
@@ -43,8 +46,13 @@ def wholes(result):
     found = []
     for scenario in map(join_ego, result.generated.scenarios):
         rows = [[vehicle.id for vehicle in scenario.vehicles].index(known) for known in ids]
-        arrays = {name: getattr(scenario, name)[rows] for name in ("position", "heading", "speed", "acceleration", "present")}
-        found.append(replace(scenario, vehicles=tuple(scenario.vehicles[row] for row in rows), **arrays))
+        arrays = {
+            name: getattr(scenario, name)[rows]
+            for name in ("position", "heading", "speed", "acceleration", "present")
+        }
+        found.append(
+            replace(scenario, vehicles=tuple(scenario.vehicles[row] for row in rows), **arrays)
+        )
     return found
 
 
@@ -57,7 +65,9 @@ def assert_kept(result, names):
     for edge in edges:
         if edge.kind == FOLLOW:
             seen = following(edge, result.encounter, scenarios)
-            assert seen.slope > 0.75 and 0.65 < seen.gaps[0] < seen.gaps[1] < 1.35 and seen.own > 0.05
+            assert (
+                seen.slope > 0.75 and 0.65 < seen.gaps[0] < seen.gaps[1] < 1.35 and seen.own > 0.05
+            )
         else:
             seen = yielding(edge, scenarios)
             assert seen.early == 0.0 and seen.spread > 0.0
@@ -67,17 +77,23 @@ def assert_kept(result, names):
 def test_an_ego_slot_before_a_follower_or_behind_a_leader(ego, tmp_path):
     """The follower answers the witness in the slot before it; a witness in the slot behind answers the leader."""
     result = made(LANE, Request(ego=ego))
-    assert all(scenario.reference_drive.vehicles[0].id == ego for scenario in result.generated.scenarios)
+    assert all(
+        scenario.reference_drive.vehicles[0].id == ego for scenario in result.generated.scenarios
+    )
     assert_kept(result, ["2 follows 1"])
     bag = write_recording(tmp_path / "bag", result)
     (found,) = validate_bag(bag)
-    assert found.found == {} and list(found.proven.values()) == [30]  # proven with the witness, from the bag alone
+    assert found.found == {} and list(found.proven.values()) == [
+        30
+    ]  # proven with the witness, from the bag alone
     (strict,) = validate_bag(bag, Limits(headway_share=0.01))
     assert set(strict.found) == {"reaction"}
 
 
 def test_an_ego_slot_inside_a_platoon():
-    assert_kept(made(platoon(4), Request(ego="2"), count=40), ["2 follows 1", "3 follows 2", "4 follows 3"])
+    assert_kept(
+        made(platoon(4), Request(ego="2"), count=40), ["2 follows 1", "3 follows 2", "4 follows 3"]
+    )
 
 
 @pytest.mark.parametrize("who", [0, 1])
@@ -94,20 +110,28 @@ def test_a_group_of_three_and_what_the_first_does_differently_comes_back_in_the_
     assert np.corrcoef(speeds[:, 0], speeds[:, 2])[0, 1] > 0.8
 
 
-@pytest.mark.parametrize("request_", [Request(target="pet=0.5..1.5"), Request(choose="diverse")], ids=["target", "diverse"])
+@pytest.mark.parametrize(
+    "request_",
+    [Request(target="pet=0.5..1.5"), Request(choose="diverse")],
+    ids=["target", "diverse"],
+)
 def test_a_target_and_a_choice(request_):
     result = made(crossing(8.0), request_, count=12)
     assert_kept(result, ["2 yields to 1"])
     if request_.target:
         (edge,) = result.generated.reactions
-        assert yielding(edge, wholes(result)).mean < edge.lag - 0.5, "the range asks for less than the template's"
+        assert yielding(edge, wholes(result)).mean < edge.lag - 0.5, (
+            "the range asks for less than the template's"
+        )
 
 
 def test_an_ego_slot_of_who_goes_first_or_waits():
     for ego in ("1", "2"):
         result = made(crossing(8.0), Request(ego=ego))
         assert_kept(result, ["2 yields to 1"])
-        assert result.generated.candidates < 40, "who waits longer makes up for it, so asked ends are met"
+        assert result.generated.candidates < 40, (
+            "who waits longer makes up for it, so asked ends are met"
+        )
         assert yielding(result.generated.reactions[0], wholes(result)).spread > 0.4
 
 

@@ -33,7 +33,15 @@ def platoons(count):
         position.append(np.column_stack([x, np.full(time.size, -1.75 if east else 1.75)]))
         heading.append(np.full(time.size, 0.0 if east else np.pi))
     vehicles = tuple(Vehicle(f"car_{k}", 4.5 + 0.1 * k, 1.8) for k in range(count))
-    return Encounter("platoons", vehicles, 0, 100_000_000, np.array(position), np.array(heading), np.tile(speed, (count, 1)))
+    return Encounter(
+        "platoons",
+        vehicles,
+        0,
+        100_000_000,
+        np.array(position),
+        np.array(heading),
+        np.tile(speed, (count, 1)),
+    )
 
 
 @pytest.mark.parametrize("count", range(2, 9) if LONG else (2, 8))
@@ -53,10 +61,22 @@ def tight(made_data):
     (log,) = (made_data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
     encounter = read_log(log).encounters[0]
     config = SamplingConfig(
-        variety="narrow", lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=2.0, bend_acceleration=2.0
+        variety="narrow",
+        lateral_sigma=0.3,
+        observation_sigma=0.3,
+        longitudinal_sigma=0.5,
+        time_sigma=2.0,
+        bend_acceleration=2.0,
     )
     limits = Limits(acceleration_tolerance=0.0)
-    return Given(encounter, segment(encounter), build_road("t_intersection", encounter), 0, sampling=config, limits=limits)
+    return Given(
+        encounter,
+        segment(encounter),
+        build_road("t_intersection", encounter),
+        0,
+        sampling=config,
+        limits=limits,
+    )
 
 
 def test_variance_adapts_where_validity_is_hard(tight):
@@ -65,12 +85,16 @@ def test_variance_adapts_where_validity_is_hard(tight):
     assert len(made.scenarios) == 30
     (said,) = (line for line in made.adaptations if "few candidates were valid" in line)
     assert "standard deviations multiplied by 0" in said
-    assert max(s.index for s in made.scenarios) >= LEVEL_SIZE, "candidates of another level are among them"
+    assert max(s.index for s in made.scenarios) >= LEVEL_SIZE, (
+        "candidates of another level are among them"
+    )
     assert made.candidates == len(made.scenarios) + made.refused.total()
 
 
 def test_a_short_set_says_how_many_and_why(tight):
-    made = answer(replace(tight, sampling=replace(tight.sampling, attempts=3)), Request(), count=80).generated
+    made = answer(
+        replace(tight, sampling=replace(tight.sampling, attempts=3)), Request(), count=80
+    ).generated
     assert 0 < len(made.scenarios) < made.requested == 80
     assert made.candidates == 240 == len(made.scenarios) + made.refused.total()
     assert set(made.refused) == {Cause.LONGITUDINAL_ACCELERATION}
@@ -78,4 +102,7 @@ def test_a_short_set_says_how_many_and_why(tight):
     impossible = answer(replace(tight, limits=limits), Request(), count=10).generated
     assert impossible.scenarios == ()
     assert impossible.refused.total() == impossible.candidates == 200
-    assert "few candidates were valid, and smaller standard deviations did not help" in impossible.adaptations
+    assert (
+        "few candidates were valid, and smaller standard deviations did not help"
+        in impossible.adaptations
+    )

@@ -19,8 +19,27 @@ def test_states_are_read_by_vehicle_and_written_back():
     assert again.states("starts") == request.states("starts")
 
 
-STATES = ["1", "1: 2 3", "1: 1 2 3 4 5", "1: a b c", ": 1 2 3", "1: nan 0 0", "1: 0 0 0 -1", "1: 0 0 0; 1: 1 1 1"]
-TARGETS = ["pet", "pet=1", "pet=2..1", "pet=..", "speed=1..2", "pet[1,]=1..2", "pet[1,2=1..2", "pet=a..2", "pet=1..2; pet=2..3"]
+STATES = [
+    "1",
+    "1: 2 3",
+    "1: 1 2 3 4 5",
+    "1: a b c",
+    ": 1 2 3",
+    "1: nan 0 0",
+    "1: 0 0 0 -1",
+    "1: 0 0 0; 1: 1 1 1",
+]
+TARGETS = [
+    "pet",
+    "pet=1",
+    "pet=2..1",
+    "pet=..",
+    "speed=1..2",
+    "pet[1,]=1..2",
+    "pet[1,2=1..2",
+    "pet=a..2",
+    "pet=1..2; pet=2..3",
+]
 
 
 @pytest.mark.parametrize(("name", "texts"), [("goals", STATES), ("target", TARGETS)])
@@ -32,7 +51,11 @@ def test_other_text_is_refused_and_named(name, texts):
 
 def test_vehicles_are_found_by_id_and_by_ros_name_and_unknown_ones_listed(chain):
     rows = Request(goals="2: 1 2 3").rows("goals", chain.encounter)
-    assert np.isnan(rows[0]).all() and rows[1, :3].tolist() == [1.0, 2.0, 3.0] and np.isnan(rows[1, 3])
+    assert (
+        np.isnan(rows[0]).all()
+        and rows[1, :3].tolist() == [1.0, 2.0, 3.0]
+        and np.isnan(rows[1, 3])
+    )
     assert Request(ego="2").ego_of(chain.encounter) == 1
     assert Request().ego_of(chain.encounter) is None
     with pytest.raises(InputError, match=r"ego: no vehicle 'x'.*there are: 1, 2"):

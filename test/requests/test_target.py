@@ -13,7 +13,13 @@ import pytest
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.measures import features, figures_of, measure, MEASURES, most_critical
+from scenario_gen.method.evaluation.measures import (
+    features,
+    figures_of,
+    measure,
+    MEASURES,
+    most_critical,
+)
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.directed import TargetError
 from scenario_gen.output.results import provenance_of
@@ -35,7 +41,12 @@ def directed(chain):
 def test_texts_are_read_and_written():
     one, two = read_targets("pet=0.5..1.5; ttc[a b,2]=..2")
     assert (one.name, one.low, one.high, one.vehicles) == ("pet", 0.5, 1.5, ())
-    assert two.vehicles == ("a b", "2") and two.low == -np.inf and not two.holds(np.nan) and two.holds(2.0)
+    assert (
+        two.vehicles == ("a b", "2")
+        and two.low == -np.inf
+        and not two.holds(np.nan)
+        and two.holds(2.0)
+    )
     assert read_targets(f"{one}; {two}") == (one, two)
 
 
@@ -48,9 +59,14 @@ def test_all_are_in_the_range_and_have_weights_and_figures(directed):
     assert len(directed.scenarios) == 20
     for scenario in directed.scenarios:
         assert LOW <= measure(scenario, "pet") <= HIGH
-        assert float(scenario.facts["target.pet"]) == pytest.approx(measure(scenario, "pet"), rel=1e-5)
+        assert float(scenario.facts["target.pet"]) == pytest.approx(
+            measure(scenario, "pet"), rel=1e-5
+        )
         assert 0.0 < float(scenario.facts["weight"]) <= 10.0
-    assert directed.reached.directed and directed.reached.low <= directed.reached.share <= directed.reached.high
+    assert (
+        directed.reached.directed
+        and directed.reached.low <= directed.reached.share <= directed.reached.high
+    )
 
 
 def test_the_weighted_share_agrees_with_natural_sampling(chain, directed):
@@ -68,7 +84,13 @@ def test_a_range_that_cannot_be_had_is_refused_with_what_can(chain):
 
 
 @pytest.mark.parametrize(
-    "request_", [Request(target=f"pet={LOW}..{HIGH}", ego="1"), Request(order="free"), Request(choose="diverse")], ids=str
+    "request_",
+    [
+        Request(target=f"pet={LOW}..{HIGH}", ego="1"),
+        Request(order="free"),
+        Request(choose="diverse"),
+    ],
+    ids=str,
 )
 def test_each_comes_again_bit_for_bit_and_is_valid(chain, request_, tmp_path):
     config = PipelineConfig()
@@ -82,21 +104,32 @@ def test_each_comes_again_bit_for_bit_and_is_valid(chain, request_, tmp_path):
     (found,) = validate_bag(bag)
     assert found.scenarios == 3 and not found.invalid
     if request_.target:
-        assert all(LOW <= measure(join_ego(one), "pet") <= HIGH for one in made.generated.scenarios)
+        assert all(
+            LOW <= measure(join_ego(one), "pet") <= HIGH for one in made.generated.scenarios
+        )
 
 
 def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
-    chain = replace(chain, sampling=SamplingConfig(variety="wide"))  # with one clock for all nobody passes anybody
+    chain = replace(
+        chain, sampling=SamplingConfig(variety="wide")
+    )  # with one clock for all nobody passes anybody
     made = answer(chain, Request(order="swap"), count=3)
     for scenario in made.generated.scenarios:
         assert "swapped" in scenario.facts["passing_order"]
-        assert most_critical(figures_of(scenario)).first != most_critical(figures_of(chain.encounter)).first
+        assert (
+            most_critical(figures_of(scenario)).first
+            != most_critical(figures_of(chain.encounter)).first
+        )
     bag = write_recording(tmp_path / "bag", replace(made, provenance={}))
     (found,) = validate_bag(bag)
     assert not found.invalid
-    kept = replace(made.generated, scenarios=tuple(replace(one, facts={}) for one in made.generated.scenarios))
+    kept = replace(
+        made.generated, scenarios=tuple(replace(one, facts={}) for one in made.generated.scenarios)
+    )
     (found,) = validate_bag(write_recording(tmp_path / "kept", replace(made, generated=kept)))
-    assert "passing_order" in found.found and found.invalid == 3, "and signs, which a swapped order does not keep"
+    assert "passing_order" in found.found and found.invalid == 3, (
+        "and signs, which a swapped order does not keep"
+    )
 
 
 def test_a_diverse_set_covers_more_bins_and_carries_no_weights(chain):

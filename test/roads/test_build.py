@@ -28,9 +28,14 @@ def test_one_entry_and_one_exit_per_lane_on_the_right_side(name, lanes, side):
             assert min(x, y, abs(width - x), abs(height - y)) < 0.3
             inside = np.array([x, y]) + inward * 3.0
             assert footprint_fits(road, np.array([[*inside, yaw]]), 4.8, 1.9)[0]
-            assert not footprint_fits(road, np.array([[*(inside - inward * 6.0), yaw]]), 4.8, 1.9)[0]
+            assert not footprint_fits(road, np.array([[*(inside - inward * 6.0), yaw]]), 4.8, 1.9)[
+                0
+            ]
     # two vehicles that meet on the same road pass on the agreed side of each other
-    entry, leave = road.entries[0], next(x for x in road.exits if abs(np.cos(x[2] - road.entries[0][2]) + 1.0) < 1e-6)
+    entry, leave = (
+        road.entries[0],
+        next(x for x in road.exits if abs(np.cos(x[2] - road.entries[0][2]) + 1.0) < 1e-6),
+    )
     left = -np.sin(entry[2]) * (leave[0] - entry[0]) + np.cos(entry[2]) * (leave[1] - entry[1])
     assert (left > 0.0) == (side == "right")
 
@@ -77,5 +82,7 @@ def test_every_recorded_encounter_has_a_corridor_in_which_its_separated_paths_fi
             assert smallest_gaps(separation.tracks).min() > 0.49
             assert separation.moved.max() <= 3.0
             for track in separation.tracks:
-                roomy = footprint_fits(road, track.poses, track.vehicle.length, track.vehicle.width + 1.0)
+                roomy = footprint_fits(
+                    road, track.poses, track.vehicle.length, track.vehicle.width + 1.0
+                )
                 assert roomy.all(), (path.name, track.vehicle.id)

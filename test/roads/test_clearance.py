@@ -22,7 +22,14 @@ from scenario_gen.types.road import Road
 
 
 def road_of(drivable, resolution=1.0, origin=(0.0, 0.0)):
-    return Road("grid", np.asarray(drivable, dtype=bool), resolution, np.array(origin), np.empty((0, 3)), np.empty((0, 3)))
+    return Road(
+        "grid",
+        np.asarray(drivable, dtype=bool),
+        resolution,
+        np.array(origin),
+        np.empty((0, 3)),
+        np.empty((0, 3)),
+    )
 
 
 def random_road(rng, shape=(12, 15), density=0.25, resolution=0.5, origin=(-3.0, 2.0)):
@@ -38,7 +45,8 @@ def blocked_space(road):
     r = road.resolution
     whole = box(x, y, x + width * r, y + height * r)
     cells = [
-        box(x + j * r, y + i * r, x + (j + 1) * r, y + (i + 1) * r) for i, j in zip(*np.nonzero(~road.drivable), strict=True)
+        box(x + j * r, y + i * r, x + (j + 1) * r, y + (i + 1) * r)
+        for i, j in zip(*np.nonzero(~road.drivable), strict=True)
     ]
     return unary_union([*cells, whole.buffer(100.0).difference(whole)])
 
@@ -91,10 +99,15 @@ def test_footprints_against_shapely():
     for _ in range(8):
         road = random_road(rng, density=0.05)
         blocked = blocked_space(road)
-        poses = np.column_stack([rng.uniform((-3.0, 2.0), (4.5, 8.0), (300, 2)), rng.uniform(-4.0, 4.0, 300)])
+        poses = np.column_stack(
+            [rng.uniform((-3.0, 2.0), (4.5, 8.0), (300, 2)), rng.uniform(-4.0, 4.0, 300)]
+        )
         for pose, fits in zip(poses, footprint_fits(road, poses, 1.7, 0.8), strict=True):
             shape = affinity.translate(
-                affinity.rotate(box(-0.85, -0.4, 0.85, 0.4), pose[2], origin=(0, 0), use_radians=True), *pose[:2]
+                affinity.rotate(
+                    box(-0.85, -0.4, 0.85, 0.4), pose[2], origin=(0, 0), use_radians=True
+                ),
+                *pose[:2],
             )
             overlap = shape.intersection(blocked).area
             if overlap == 0.0 or overlap > 1e-7:
@@ -145,7 +158,9 @@ def test_repair_finds_the_nearest_pose(seed, yaw):
     offsets = rng.uniform(-1.5, 1.5, (4000, 2))
     offsets = offsets[np.hypot(*offsets.T) < 1.5]
     play = 0.1 * np.sqrt(2.0)  # the lattice comes so near to every pose
-    fitting = footprint_fits(road, pose + np.pad(offsets, ((0, 0), (0, 1))), 1.2 + 2.0 * play, 0.6 + 2.0 * play)
+    fitting = footprint_fits(
+        road, pose + np.pad(offsets, ((0, 0), (0, 1))), 1.2 + 2.0 * play, 0.6 + 2.0 * play
+    )
     nearest = np.hypot(*offsets[fitting].T).min(initial=np.inf)
     if found is None:
         assert nearest > 1.5 - play

@@ -14,7 +14,9 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.roads import Arm, build_road, BUILT_IN, draw_plan, ground_for, Plan, RoadConfig
 from scenario_gen.types import Vehicle
 
-FORMER = np.load(Path(__file__).with_name("cells_without_lanes.npz"))  # as roads were drawn before they were drawn from lanes
+FORMER = np.load(
+    Path(__file__).with_name("cells_without_lanes.npz")
+)  # as roads were drawn before they were drawn from lanes
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
@@ -35,22 +37,35 @@ def test_a_road_is_its_lanes_and_they_travel_in_messages(name, side):
 
 @pytest.mark.parametrize("lanes, side", [(1, "right"), (2, "left")])
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_cells_are_those_of_the_road_that_was_drawn_without_lanes_but_for_its_kerbs(name, lanes, side):
-    road, key = build_road(name, None, RoadConfig(lanes=lanes, traffic_side=side)), f"{name}_{lanes}_{side}"
+def test_cells_are_those_of_the_road_that_was_drawn_without_lanes_but_for_its_kerbs(
+    name, lanes, side
+):
+    road, key = (
+        build_road(name, None, RoadConfig(lanes=lanes, traffic_side=side)),
+        f"{name}_{lanes}_{side}",
+    )
     former = np.unpackbits(FORMER[key], axis=1, count=int(FORMER[f"{key}_width"])).astype(bool)
     row, column = np.indices(former.shape)
     middle = (np.stack((column, row), axis=-1) + 0.5) * road.resolution
     differ = road.drivable_at(middle + road.entries[0, :2] - FORMER[f"{key}_entry"]) != former
     around = np.ones((3, 3), dtype=bool)
-    kerb = ndimage.binary_dilation(former, around) ^ ndimage.binary_erosion(former, around, border_value=1)
-    assert (differ & ~kerb).sum() < 0.01 * former.sum()  # 0.7 % of a roundabout, 0.3 % of the others at most
+    kerb = ndimage.binary_dilation(former, around) ^ ndimage.binary_erosion(
+        former, around, border_value=1
+    )
+    assert (
+        differ & ~kerb
+    ).sum() < 0.01 * former.sum()  # 0.7 % of a roundabout, 0.3 % of the others at most
     assert differ.sum() < 0.07 * former.sum()
 
 
 def test_a_road_of_ones_own_has_all_ways_also_where_its_arms_meet_at_a_sharp_angle():
     arms = [Arm.towards(np.pi, 80.0, 2), *(Arm.towards(yaw, 80.0, 1) for yaw in (0.87, -0.87))]
     network = draw_plan(Plan(arms, yielding=(1, 2)), "y", RoadConfig()).lanes
-    ways = {tuple(end.partition(".")[0] for end in lane.id.split(">")) for lane in network.lanes if lane.junction}
+    ways = {
+        tuple(end.partition(".")[0] for end in lane.id.split(">"))
+        for lane in network.lanes
+        if lane.junction
+    }
     assert ways == {(a, b) for a in "123" for b in "123" if a != b}
     assert (len(network.entries), len(network.exits), len(network.rules)) == (4, 4, 2)
 
@@ -59,25 +74,47 @@ BICYCLE = Vehicle("b", 1.8, 0.65, "bicycle")
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
-@pytest.mark.parametrize("name, arms, ways", [("straight", 1, 0), ("curve", 1, 0), ("t_intersection", 3, 6), ("four_way", 4, 12)])
-def test_cycle_lanes_lie_beside_the_outermost_lanes_and_lead_through_junctions(name, arms, ways, side):
+@pytest.mark.parametrize(
+    "name, arms, ways",
+    [("straight", 1, 0), ("curve", 1, 0), ("t_intersection", 3, 6), ("four_way", 4, 12)],
+)
+def test_cycle_lanes_lie_beside_the_outermost_lanes_and_lead_through_junctions(
+    name, arms, ways, side
+):
     config = RoadConfig(lanes=2, cycle_lane=1.8, traffic_side=side)
-    road, plain = build_road(name, None, config), build_road(name, None, RoadConfig(lanes=2, traffic_side=side))
+    road, plain = (
+        build_road(name, None, config),
+        build_road(name, None, RoadConfig(lanes=2, traffic_side=side)),
+    )
     assert [lane.id for lane in road.lanes.lanes] == [lane.id for lane in plain.lanes.lanes]
-    assert road.drivable.sum() == pytest.approx(plain.drivable.sum(), rel=0.01)  # cars have no more room than without
+    assert road.drivable.sum() == pytest.approx(
+        plain.drivable.sum(), rel=0.01
+    )  # cars have no more room than without
     of_all, beside = road.lanes.of_all, [lane for lane in road.lanes.others if not lane.junction]
     assert len(beside) == 2 * arms and len(road.lanes.others) == 2 * arms + ways
     ground = ground_for(road, BICYCLE)
     for lane in beside:
         arm, number = lane.id.split(".")
-        (inner,) = (other for other in road.lanes.lanes if other.id == f"{arm}.{int(number) + (1 if number[0] == '-' else -1)}")
-        assert np.allclose(lane.left if side == "right" else lane.right, inner.right if side == "right" else inner.left)
+        (inner,) = (
+            other
+            for other in road.lanes.lanes
+            if other.id == f"{arm}.{int(number) + (1 if number[0] == '-' else -1)}"
+        )
+        assert np.allclose(
+            lane.left if side == "right" else lane.right,
+            inner.right if side == "right" else inner.left,
+        )
         assert np.hypot(*(lane.left - lane.right).T) == pytest.approx(1.8)
-        assert ground.drivable_at(lane.centre[1:-1]).all() and not road.drivable_at(lane.centre[2:-2]).any()
+        assert (
+            ground.drivable_at(lane.centre[1:-1]).all()
+            and not road.drivable_at(lane.centre[2:-2]).any()
+        )
     for lane in road.lanes.others:
         assert lane.users == {"bicycle"} and ground.drivable_at(lane.centre[1:-1]).all()
         for k in lane.successors:
-            assert np.allclose((of_all[k].left[0], of_all[k].right[0]), (lane.left[-1], lane.right[-1]))
+            assert np.allclose(
+                (of_all[k].left[0], of_all[k].right[0]), (lane.left[-1], lane.right[-1])
+            )
             assert of_all[k].users == {"bicycle"}
 
 
@@ -88,11 +125,17 @@ def test_zebra_crossings_reach_from_kerb_to_kerb_before_the_stop_lines(name, sid
     road = build_road(name, None, config)
     walks = road.lanes.others
     arms = len(road.lanes.arms) if road.lanes.arms else 1
-    assert len(walks) == (1 if name in ("straight", "curve") else arms) and all(lane.crossing for lane in walks)
+    assert len(walks) == (1 if name in ("straight", "curve") else arms) and all(
+        lane.crossing for lane in walks
+    )
     for lane in walks:
         assert road.drivable_at(lane.centre[:1] + 0.05 * (lane.centre[-1] - lane.centre[0])).all()
-        beyond = lane.centre[[0, -1]] + np.array([[-0.05], [0.05]]) * (lane.centre[-1] - lane.centre[0])
-        assert not road.drivable_at(beyond).any() and np.hypot(*(lane.left - lane.right)[0]) == pytest.approx(4.0, rel=0.02)
+        beyond = lane.centre[[0, -1]] + np.array([[-0.05], [0.05]]) * (
+            lane.centre[-1] - lane.centre[0]
+        )
+        assert not road.drivable_at(beyond).any() and np.hypot(
+            *(lane.left - lane.right)[0]
+        ) == pytest.approx(4.0, rel=0.02)
     for rule in road.lanes.rules:
         lane, line = road.lanes.lanes[rule.lanes[0]], rule.line.mean(axis=0)
         walk = min(walks, key=lambda one: np.hypot(*(one.centre.mean(axis=0) - line)))
@@ -102,7 +145,9 @@ def test_zebra_crossings_reach_from_kerb_to_kerb_before_the_stop_lines(name, sid
 
 def test_roads_that_have_no_cycle_lanes_refuse_them():
     for name in ("merge", "roundabout"):
-        with pytest.raises(RefusedError, match=f"road {name} is drawn without cycle lanes; unset road.cycle_lane"):
+        with pytest.raises(
+            RefusedError, match=f"road {name} is drawn without cycle lanes; unset road.cycle_lane"
+        ):
             build_road(name, None, RoadConfig(cycle_lane=1.5))
     with pytest.raises(InputError, match=r"road\.cycle_lane 0\.5 m; 0 or 1 m and more"):
         RoadConfig(cycle_lane=0.5)

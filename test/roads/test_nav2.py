@@ -27,7 +27,9 @@ def write(folder, pixels=None, **changes):
     if pixels is not None:
         Image.fromarray(np.asarray(pixels, dtype=np.uint8)).save(folder / "map.pgm")
     path = folder / "map.yaml"
-    path.write_text("".join(f"{key}: {value}\n" for key, value in keys.items() if value is not None))
+    path.write_text(
+        "".join(f"{key}: {value}\n" for key, value in keys.items() if value is not None)
+    )
     return str(path)
 
 
@@ -50,7 +52,10 @@ def test_rows_are_turned_over_and_unknown_is_not_drivable(tmp_path):
     ],
 )
 def test_modes_and_negate(tmp_path, mode, negate, pixels, drivable):
-    assert build_road(write(tmp_path, pixels, mode=mode, negate=negate), None).drivable[0].tolist() == drivable
+    assert (
+        build_road(write(tmp_path, pixels, mode=mode, negate=negate), None).drivable[0].tolist()
+        == drivable
+    )
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,24 @@ from scenario_gen.roads.obstacles import Obstacle, read_obstacles, with_obstacle
 
 
 def test_text():
-    assert read_obstacles(" 1 2 0.5 4 2 ; 3,4,0,1,1;") == (Obstacle(1, 2, 0.5, 4, 2), Obstacle(3, 4, 0, 1, 1))
+    assert read_obstacles(" 1 2 0.5 4 2 ; 3,4,0,1,1;") == (
+        Obstacle(1, 2, 0.5, 4, 2),
+        Obstacle(3, 4, 0, 1, 1),
+    )
     assert read_obstacles("") == ()
 
 
 @pytest.mark.parametrize(
-    "text", ["1 2 3 4", "1 2 3 4 x", "1 2 3 4 inf", "1 2 3 0 1", "1 2 3 4 -1", "1 2 0 1 2; nonsense", "1 2 0 1e9 2"]
+    "text",
+    [
+        "1 2 3 4",
+        "1 2 3 4 x",
+        "1 2 3 4 inf",
+        "1 2 3 0 1",
+        "1 2 3 4 -1",
+        "1 2 0 1 2; nonsense",
+        "1 2 0 1e9 2",
+    ],
 )
 def test_bad_text_is_refused_by_name(text):
     with pytest.raises(InputError, match="obstacles: '"):
@@ -34,7 +46,9 @@ def test_bad_text_is_refused_by_name(text):
     x=st.floats(0, 20), y=st.floats(0, 10), yaw=st.floats(-7, 7), length=st.floats(0.3, 8), width=st.floats(0.3, 3)
 )  # fmt: skip
 def test_cells_that_overlap_are_closed(x, y, yaw, length, width):
-    road = build_road("straight", config=RoadConfig(resolution=0.5, arm_length=10.0, lane_width=5.0))
+    road = build_road(
+        "straight", config=RoadConfig(resolution=0.5, arm_length=10.0, lane_width=5.0)
+    )
     there = Obstacle(x + road.origin[0], y + road.origin[1] + 1.0, yaw, length, width)
     made = with_obstacles(road, (there,)) if _area(road, there).max() > 0.0 else road
     area = _area(road, there)
@@ -46,7 +60,9 @@ def test_cells_that_overlap_are_closed(x, y, yaw, length, width):
 def _area(road, obstacle):
     """The overlap of each drivable cell with the rectangle [m²]."""
     half = (obstacle.length / 2, obstacle.width / 2)
-    shape = affinity.rotate(box(-half[0], -half[1], *half), obstacle.yaw, origin=(0, 0), use_radians=True)
+    shape = affinity.rotate(
+        box(-half[0], -half[1], *half), obstacle.yaw, origin=(0, 0), use_radians=True
+    )
     shape = affinity.translate(shape, obstacle.x, obstacle.y)
     area = np.zeros(road.drivable.shape)
     for i, j in np.argwhere(road.drivable):

@@ -17,7 +17,11 @@ def test_a_polygon_is_drivable_inside_and_traffic_comes_and_goes_at_its_ends():
     road = build_road(CROSS)
     assert road.origin.tolist() == [-30.0, -20.0] and road.drivable.shape == (200, 300)
     assert road.drivable.sum() * 0.04 == pytest.approx(CROSS.area)
-    assert road.drivable_at(np.array([[29.0, 3.0], [3.0, -19.0], [29.0, 10.0]])).tolist() == [True, True, False]
+    assert road.drivable_at(np.array([[29.0, 3.0], [3.0, -19.0], [29.0, 10.0]])).tolist() == [
+        True,
+        True,
+        False,
+    ]
     assert len(road.entries) == len(road.exits) == 4
 
 
@@ -25,7 +29,9 @@ def test_an_array_is_taken_as_it_is():
     cells = np.zeros((40, 300), dtype=bool)
     cells[5:40] = True
     road = build_road(cells, None, RoadConfig(resolution=0.1, obstacles="10 2 0 2 1"))
-    assert np.array_equal(road.drivable | road.obstructed, cells) and road.resolution == pytest.approx(0.1)
+    assert np.array_equal(
+        road.drivable | road.obstructed, cells
+    ) and road.resolution == pytest.approx(0.1)
     assert road.origin.tolist() == [0.0, 0.0]
 
 

@@ -54,7 +54,9 @@ def ring_of(road):
     (way,) = (lane.centre for lane in road.lanes.lanes if lane.id == "1.-1>1.1")
     points = way[len(way) // 4 : -len(way) // 4]
     x, y, rest = np.linalg.lstsq(
-        np.column_stack((2.0 * points, np.ones(len(points)))), np.square(points).sum(axis=1), rcond=None
+        np.column_stack((2.0 * points, np.ones(len(points)))),
+        np.square(points).sum(axis=1),
+        rcond=None,
     )[0]
     return np.array([x, y]), np.sqrt(rest + x * x + y * y)
 
@@ -69,10 +71,14 @@ def fitted(encounter, road_name):
 @pytest.mark.parametrize("angle", [-75.0, -50.0, 48.0, 68.0, 95.0])
 @pytest.mark.parametrize("road_name", ["t_intersection", "four_way"])
 def test_a_turn_of_any_angle_is_kept_and_its_conflict_too(angle, road_name):
-    encounter = made(motion(bend(np.radians(angle), 14.0, 40.0), 8.0), motion(line(np.pi, 95.0, 3.5), 7.0))
+    encounter = made(
+        motion(bend(np.radians(angle), 14.0, 40.0), 8.0), motion(line(np.pi, 95.0, 3.5), 7.0)
+    )
     _, fit = fitted(encounter, road_name)
     for vehicle in fit.fitted:
-        assert np.degrees(vehicle.turned[1]) == pytest.approx(np.degrees(vehicle.turned[0]), abs=15.0)
+        assert np.degrees(vehicle.turned[1]) == pytest.approx(
+            np.degrees(vehicle.turned[0]), abs=15.0
+        )
         assert np.ptp(np.diff(vehicle.path[:, 2])) < 0.1
     assert not [loss for loss in fit.losses if loss.kind in ("turn", "conflict", "order")]
 
@@ -81,7 +87,10 @@ def test_who_crosses_needs_four_arms_and_a_road_of_three_is_refused():
     encounter = made(motion(line(0.0), 8.0), motion(line(np.radians(70.0), 25.0, -40.0), 8.0))
     road, fit = fitted(encounter, "four_way")
     assert len(road.lanes.arms) == 4 and fit.losses == ()
-    with pytest.raises(RefusedError, match="t_intersection has 3 arms, and the recorded vehicles enter and leave by 4"):
+    with pytest.raises(
+        RefusedError,
+        match="t_intersection has 3 arms, and the recorded vehicles enter and leave by 4",
+    ):
         build_road("t_intersection", encounter)
 
 
@@ -94,7 +103,10 @@ def test_an_arm_that_nobody_uses_is_said():
 
 def test_lanes_are_as_wide_as_the_widest_vehicle_needs():
     for name in ("straight", "four_way", "curve"):
-        _, fit = fitted(made(motion(line(0.0), 8.0, 20.0), motion(line(np.pi, 100.0, 4.0), 8.0), width=3.3), name)
+        _, fit = fitted(
+            made(motion(line(0.0), 8.0, 20.0), motion(line(np.pi, 100.0, 4.0), 8.0), width=3.3),
+            name,
+        )
         assert fit.fitted[0].moved.max() == 0.0
 
 
@@ -104,7 +116,9 @@ def test_a_merge_is_used_by_who_changes_lanes_and_refused_where_nobody_does():
     joining = np.column_stack((x, -3.5 + 3.5 * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)))
     road, fit = fitted(made(motion(line(0.0), 10.0, 18.0), motion(joining, 10.0)), "merge")
     away = [abs(np.degrees(f.path[0, 2]) % 360.0) for f in fit.fitted]
-    assert away[0] == pytest.approx(0.0, abs=0.5) and 8.0 < away[1] < 20.0  # the second comes up the ramp
+    assert (
+        away[0] == pytest.approx(0.0, abs=0.5) and 8.0 < away[1] < 20.0
+    )  # the second comes up the ramp
     assert len(road.entries) == len(road.exits) + 1
     _, fit = fitted(made(motion(line(0.0), 10.0, 28.0), motion(joining, 10.0)), "curve")
     assert fit.losses == ()  # who ends beyond another one's path in a bend is in its lane
@@ -114,7 +128,9 @@ def test_a_merge_is_used_by_who_changes_lanes_and_refused_where_nobody_does():
 
 def test_a_roundabout_is_sized_to_the_speed_and_gone_about():
     for speed in (8.0, 9.5):
-        road, fit = fitted(made(motion(line(0.0), speed, 18.0), motion(line(0.0), speed)), "roundabout")
+        road, fit = fitted(
+            made(motion(line(0.0), speed, 18.0), motion(line(0.0), speed)), "roundabout"
+        )
         centre, radius = ring_of(road)
         assert radius == pytest.approx(max(speed**2 / 3.0, 13.0), abs=0.5)
         for vehicle in fit.fitted:
@@ -125,26 +141,37 @@ def test_a_roundabout_is_sized_to_the_speed_and_gone_about():
 
 
 @pytest.mark.parametrize(("radius", "circles"), [(16.0, False), (10.0, False), (16.0, True)])
-def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_driven_fast(radius, circles):
+def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_driven_fast(
+    radius, circles
+):
     poses, speeds = [], []
     for come, leave in ((np.pi, 0.0), (-np.pi / 2.0, np.pi / 2.0)):
         out = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in (come, leave)]
         beside = [1.75 * np.array([-y, x]) for x, y in out]
-        start, goal = np.array([*(90.0 * out[0] + beside[0]), come + np.pi]), np.array([*(90.0 * out[1] - beside[1]), leave])
+        start, goal = (
+            np.array([*(90.0 * out[0] + beside[0]), come + np.pi]),
+            np.array([*(90.0 * out[1] - beside[1]), leave]),
+        )
         way = draw_ring_route(start, goal, np.zeros(2), radius)
         away = np.maximum(np.hypot(*way.points[:, :2].T) - radius - 3.0, 0.0)
         speed = np.minimum(np.sqrt(36.0 + 4.0 * away), 14.0)
-        time = np.concatenate(([0.0], np.cumsum(2.0 * np.diff(way.station) / (speed[1:] + speed[:-1]))))
+        time = np.concatenate(
+            ([0.0], np.cumsum(2.0 * np.diff(way.station) / (speed[1:] + speed[:-1])))
+        )
         station = np.interp(0.1 * np.arange(T), time, way.station)
         poses.append(way.at(station))
         speeds.append(np.interp(station, way.station, speed))
     if circles:  # by 287°, neither coming nor going
         angle = np.linspace(1.0, 6.0, T)
-        poses[1] = np.column_stack((radius * np.cos(angle), radius * np.sin(angle), angle + np.pi / 2.0))
+        poses[1] = np.column_stack(
+            (radius * np.cos(angle), radius * np.sin(angle), angle + np.pi / 2.0)
+        )
         speeds[1] = np.full(T, 50.0 * radius / T)
     road, fit = fitted(made(*zip(poses, speeds, strict=True)), "roundabout")
     assert ring_of(road)[1] == pytest.approx(radius, abs=0.3)
-    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and {loss.kind for loss in fit.losses} <= {"arm"}
+    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and {
+        loss.kind for loss in fit.losses
+    } <= {"arm"}
 
 
 def test_roads_without_a_template_are_of_their_kind():
@@ -155,7 +182,10 @@ def test_roads_without_a_template_are_of_their_kind():
     assert len(merge.entries) == 3 and len(merge.exits) == 2
 
 
-@pytest.mark.parametrize("priority, kind", [("auto", RuleKind.GIVE_WAY), ("all_way_stop", RuleKind.STOP), ("none", None)])
+@pytest.mark.parametrize(
+    "priority, kind",
+    [("auto", RuleKind.GIVE_WAY), ("all_way_stop", RuleKind.STOP), ("none", None)],
+)
 def test_arms_of_those_who_yield_give_way_and_the_line_lies_across_their_lanes(priority, kind):
     encounter = labelled("crossing, stops", 1).encounter
     (edge,) = reactions_of(encounter).edges
@@ -178,6 +208,8 @@ def test_arms_of_those_who_yield_give_way_and_the_line_lies_across_their_lanes(p
 def test_arms_into_a_roundabout_and_ramps_give_way():
     ring, merge = (build_road(name).lanes for name in ("roundabout", "merge"))
     assert [rule.kind for rule in ring.rules] == [RuleKind.GIVE_WAY] * 4
-    assert {ring.lanes[k].id for k in ring.rules[0].over} == {f"{a}.-1>{b}.1" for a in (2, 3, 4) for b in (1, 2, 3, 4)}
+    assert {ring.lanes[k].id for k in ring.rules[0].over} == {
+        f"{a}.-1>{b}.1" for a in (2, 3, 4) for b in (1, 2, 3, 4)
+    }
     ((ramp,),) = ([merge.lanes[k].id for k in rule.lanes] for rule in merge.rules)
     assert ramp == "3.-1"

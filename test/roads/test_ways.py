@@ -19,9 +19,13 @@ from scenario_gen.roads.ways import draw_ring_route, draw_route
     yaw=st.floats(-3.0, 3.0),
     sharpness=st.floats(0.03, 0.17),
 )
-def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(turn, before, after, yaw, sharpness):
+def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(
+    turn, before, after, yaw, sharpness
+):
     corner = before * np.array([np.cos(yaw), np.sin(yaw)])
-    leave = np.array([*(corner + after * np.array([np.cos(yaw + turn), np.sin(yaw + turn)])), yaw + turn])
+    leave = np.array(
+        [*(corner + after * np.array([np.cos(yaw + turn), np.sin(yaw + turn)])), yaw + turn]
+    )
     way = draw_route(np.array([0.0, 0.0, yaw]), leave, sharpness=sharpness)
     assert way is not None
     assert way.points[0] == pytest.approx([0.0, 0.0, yaw], abs=1e-6)
@@ -29,10 +33,14 @@ def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(turn, 
     bend = np.diff(way.points[:, 2]) / np.diff(way.station)
     if 1.5 * abs(turn) / sharpness < 50.0:  # there is room for it
         assert np.abs(bend).max() == pytest.approx(sharpness, rel=0.05)
-    assert np.abs(np.diff(bend)).max() < 0.5 * np.abs(bend).max()  # the shortest transition has three samples
+    assert (
+        np.abs(np.diff(bend)).max() < 0.5 * np.abs(bend).max()
+    )  # the shortest transition has three samples
 
 
-@pytest.mark.parametrize(("leave", "turn"), [(0.0, 0.0), (np.pi / 2.0, np.pi / 2.0), (-np.pi / 2.0, -np.pi / 2.0)])
+@pytest.mark.parametrize(
+    ("leave", "turn"), [(0.0, 0.0), (np.pi / 2.0, np.pi / 2.0), (-np.pi / 2.0, -np.pi / 2.0)]
+)
 def test_a_roundabout_is_gone_about_in_the_direction_of_traffic(leave, turn):
     out = np.array([np.cos(leave), np.sin(leave)])
     goal = np.array([*(70.0 * out + 1.75 * np.array([out[1], -out[0]])), leave])

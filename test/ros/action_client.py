@@ -30,7 +30,9 @@ def main(goals: list[dict]) -> list[dict]:
     rclpy.init()
     node = rclpy.create_node("action_client")
     scenarios = []
-    quality = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.VOLATILE)
+    quality = QoSProfile(
+        depth=1000, history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.VOLATILE
+    )
     digests = []
 
     def hear(data: bytes) -> None:
@@ -40,7 +42,11 @@ def main(goals: list[dict]) -> list[dict]:
     node.create_subscription(MultiDOFJointTrajectory, "scenarios", hear, quality, raw=True)
     client = ActionClient(node, Generate, "gp_sampler/generate_scenarios")
     assert client.wait_for_server(180.0)
-    until_known_at(node, "gp_sampler", lambda answer: rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0))
+    until_known_at(
+        node,
+        "gp_sampler",
+        lambda answer: rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0),
+    )
     ended, begun, waits, then = [], time.monotonic(), [], []
 
     def look() -> None:
@@ -61,10 +67,22 @@ def main(goals: list[dict]) -> list[dict]:
 
         def heard(message) -> None:
             one = message.feedback
-            row = [time.monotonic() - begun, list(one.waiting_for), one.position, one.wanted, one.found, one.candidates]
+            row = [
+                time.monotonic() - begun,
+                list(one.waiting_for),
+                one.position,
+                one.wanted,
+                one.found,
+                one.candidates,
+            ]
             told["feedback"].append(row)
             found, position, after = goal.get("cancel", [0, 0, [k]])
-            if "handle" in told and one.found >= found and one.position >= position and ended_ones().issuperset(after):
+            if (
+                "handle" in told
+                and one.found >= found
+                and one.position >= position
+                and ended_ones().issuperset(after)
+            ):
                 goal["cancel"] = [0, 0, [k]]
                 told["handle"].cancel_goal_async()
             if "tracks" in row[1] and k == 0:
@@ -80,7 +98,10 @@ def main(goals: list[dict]) -> list[dict]:
         def done(future) -> None:
             answer = future.result()
             result = answer.result
-            words = {name: getattr(result, name) for name in ("code", "reason", "request", "requested", "published")}
+            words = {
+                name: getattr(result, name)
+                for name in ("code", "reason", "request", "requested", "published")
+            }
             more = {
                 "status": answer.status,
                 "first": result.first_index,
@@ -92,7 +113,10 @@ def main(goals: list[dict]) -> list[dict]:
             then.extend([goal["then"]] if "then" in goal else [])
             look()
 
-        given = [Parameter(name, value=value).to_parameter_msg() for name, value in goal.get("parameters", {}).items()]
+        given = [
+            Parameter(name, value=value).to_parameter_msg()
+            for name, value in goal.get("parameters", {}).items()
+        ]
         message = Generate.Goal(parameters=given, wait=float(goal.get("wait", 300.0)))
         client.send_goal_async(message, feedback_callback=heard).add_done_callback(accepted)
 

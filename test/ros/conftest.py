@@ -31,9 +31,14 @@ def start(domain):
     started = []
 
     def run(node: str, *more: str, without_tf2: bool = False, **parameters: object) -> Forked:
-        words = [*more, *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}"))]
+        words = [
+            *more,
+            *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")),
+        ]
         more_environment = {"WITHOUT_TF2": "1"} if without_tf2 else {}
-        process = start_nodes(node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain), **more_environment)
+        process = start_nodes(
+            node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain), **more_environment
+        )
         started.append(process)
         return process
 

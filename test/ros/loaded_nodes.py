@@ -6,4 +6,8 @@
 from scenario_gen.ros.plumbing.process import kernels_ready
 from scenario_gen.ros.plumbing.start import node_class, NODES
 
-kernels_ready(dict.fromkeys(stage for node in (*NODES, "traffic") for stage in getattr(node_class(node), "STAGES", ())))
+kernels_ready(
+    dict.fromkeys(
+        stage for node in (*NODES, "traffic") for stage in getattr(node_class(node), "STAGES", ())
+    )
+)

@@ -28,7 +28,9 @@ class Forked:
     def __init__(self, arguments: list[str], environment: dict[str, str], log: Path | None):
         self.args = arguments
         self.log = log or Path(tempfile.mkstemp(suffix=".log", dir=SCRATCH.name)[1])
-        self._process = CONTEXT.Process(target=_become, args=(arguments, str(Path.cwd()), environment, str(self.log)))
+        self._process = CONTEXT.Process(
+            target=_become, args=(arguments, str(Path.cwd()), environment, str(self.log))
+        )
         self._process.start()
         self.pid = self._process.pid
 

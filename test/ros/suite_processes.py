@@ -42,13 +42,25 @@ class Processes:
         apart: Iterable[str] = (),
     ):
         self.folder, self.processes = folder, {}
-        self.environment = {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)}
+        self.environment = {
+            "ROS_DOMAIN_ID": str(domain),
+            "RCUTILS_COLORIZED_OUTPUT": "0",
+            "ROS_LOG_DIR": str(folder),
+        }
         together = [node for node in nodes if node not in (*apart, *APART)]
         if together:
-            own = [word if word == "-p" else f"{node}:{word}" for node in together for word in nodes[node]]
-            self.processes = dict.fromkeys(together, self._start("suite", "--nodes", ",".join(together), "--ros-args", *own))
+            own = [
+                word if word == "-p" else f"{node}:{word}"
+                for node in together
+                for word in nodes[node]
+            ]
+            self.processes = dict.fromkeys(
+                together, self._start("suite", "--nodes", ",".join(together), "--ros-args", *own)
+            )
         for node in nodes.keys() - set(together):
-            spaces = [word for name in (namespaces or {}).get(node, ()) for word in ("--namespace", name)]
+            spaces = [
+                word for name in (namespaces or {}).get(node, ()) for word in ("--namespace", name)
+            ]
             self.processes[node] = self._start(node, *spaces, "--ros-args", *nodes[node])
         self.pids = {node: process.pid for node, process in self.processes.items()}
 
@@ -119,7 +131,9 @@ class Client:
         return message_class(kind), qos(quality)
 
     def wait(self, topic: str, count: int = 1, timeout: float = 180.0) -> list[bytes]:
-        self.until(lambda: len(self.heard[topic]) >= count, f"{count} messages on {topic}", timeout)
+        self.until(
+            lambda: len(self.heard[topic]) >= count, f"{count} messages on {topic}", timeout
+        )
         return self.heard[topic]
 
     def until(self, condition, what: str, timeout: float = 180.0) -> None:
@@ -129,7 +143,9 @@ class Client:
             time.sleep(0.02)
 
     def call_later(self, kind, name: str, request):
-        if name not in self._callers:  # one for all calls of a service, so that they arrive in order
+        if (
+            name not in self._callers
+        ):  # one for all calls of a service, so that they arrive in order
             self._callers[name] = self.node.create_client(kind, name)
             assert self._callers[name].wait_for_service(180.0), name
             until_known_at(self.node, name.rpartition("/")[0], self._wait)
@@ -151,21 +167,32 @@ class Client:
         """All statuses that were heard so far."""
         from msg_conventions.diagnostics import decode_diagnostics
 
-        return [status for data in list(self.heard[topic]) for status in decode_diagnostics(data)[1]]
+        return [
+            status for data in list(self.heard[topic]) for status in decode_diagnostics(data)[1]
+        ]
 
     def counted(self, topic: str, node: str = "/recorder") -> int:
         """How many messages of a topic a recorder says are in its bag."""
         if not self.heard["/diagnostics"]:
             self.hear("/diagnostics")
             self.wait("/diagnostics")
-        return max((int(s.values.get(topic, 0)) for s in self.statuses() if s.name == f"{node}: recorded"), default=0)
+        return max(
+            (
+                int(s.values.get(topic, 0))
+                for s in self.statuses()
+                if s.name == f"{node}: recorded"
+            ),
+            default=0,
+        )
 
     def generate_later(self, **values):
         """Ask the sampler for scenarios; return the future."""
         from rcl_interfaces.srv import SetParametersAtomically
         from rclpy.parameter import Parameter
 
-        parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+        parameters = [
+            Parameter(key, value=value).to_parameter_msg() for key, value in values.items()
+        ]
         request = SetParametersAtomically.Request(parameters=parameters)
         return self.call_later(SetParametersAtomically, "/gp_sampler/generate", request)
 
@@ -189,7 +216,9 @@ def memory(pid: int, key: str) -> int:
     return next((int(line.split()[1]) for line in lines if line.startswith(key)), 0)
 
 
-def whole_chain(folder: Path, domain: int, nodes: Iterable[str], *, count: int, apart: Iterable[str] = ()) -> Iterator[Processes]:
+def whole_chain(
+    folder: Path, domain: int, nodes: Iterable[str], *, count: int, apart: Iterable[str] = ()
+) -> Iterator[Processes]:
     """Run nodes on one log, with sets of `count` scenarios and a bag in `folder`; a test that has not ended them has failed."""
     arguments: dict[str, list[str]] = {node: [] for node in nodes}
     arguments["log_player"] = ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"]

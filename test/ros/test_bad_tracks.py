@@ -47,7 +47,9 @@ def _repeated(encounter: Encounter, samples: int) -> bytes:
     )
 
 
-def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tmp_path, domain, client):
+def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(
+    tmp_path, domain, client
+):
     (good,) = read_log(RESOURCES / "synthetic_c").encounters
     client.hear("/diagnostics", "/fit", "/report")
     made = Processes(tmp_path, domain, NODES)
@@ -63,13 +65,23 @@ def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tm
             client.heard["/diagnostics"].clear()
             client.say("/tracks", data)
             for node in NODES:
-                client.until(lambda node=node, words=words: _named(client, node, words), f"{words!r} of {node}")
+                client.until(
+                    lambda node=node, words=words: _named(client, node, words),
+                    f"{words!r} of {node}",
+                )
         later = replace(good, start_ns=good.start_ns + 10**9)
         client.say("/tracks", encode_tracks(later))
         client.wait("/report", 2)
         assert decode_fit(client.heard["/fit"][-1])[0] == later.start_ns
-        assert {node: peak for node, pid in made.pids.items() if (peak := memory(pid, "VmHWM")) >= GIBIBYTE} == {}
-        client.until(lambda: _levels(client) == dict.fromkeys(NODES, Level.OK), "the end of what was wrong with the tracks")
+        assert {
+            node: peak
+            for node, pid in made.pids.items()
+            if (peak := memory(pid, "VmHWM")) >= GIBIBYTE
+        } == {}
+        client.until(
+            lambda: _levels(client) == dict.fromkeys(NODES, Level.OK),
+            "the end of what was wrong with the tracks",
+        )
     finally:
         codes = made.end()
     assert codes == dict.fromkeys(NODES, 0)
@@ -77,8 +89,15 @@ def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tm
 
 def _levels(client) -> dict[str, Level]:
     """What each node said last of its tracks."""
-    return {s.name[1:].removesuffix(": tracks"): s.level for s in client.statuses() if s.name.endswith(": tracks")}
+    return {
+        s.name[1:].removesuffix(": tracks"): s.level
+        for s in client.statuses()
+        if s.name.endswith(": tracks")
+    }
 
 
 def _named(client, node: str, words: str) -> bool:
-    return any(s.level is Level.ERROR and s.name == f"/{node}: tracks" and words in s.message for s in client.statuses())
+    return any(
+        s.level is Level.ERROR and s.name == f"/{node}: tracks" and words in s.message
+        for s in client.statuses()
+    )

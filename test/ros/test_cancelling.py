@@ -36,7 +36,8 @@ def test_every_stage_of_a_node_can_be_cancelled(request):
         lambda fresh=read(): fit_template(fresh, segmentation, road),
         lambda: plan_routes(road, fit),
         lambda: suggest_nearest(
-            RefusedError("no"), Chain(encounter, segmentation, road, PipelineConfig(), Request(starts="1: 0 0 0"))
+            RefusedError("no"),
+            Chain(encounter, segmentation, road, PipelineConfig(), Request(starts="1: 0 0 0")),
         ),
     ):
         with cancellable(lambda: True), pytest.raises(CancelledError):

@@ -39,7 +39,10 @@ def forked():
     """Processes that have loaded the libraries, as the other tests have them."""
     with pytest.MonkeyPatch.context() as patch:
         context = SimpleNamespace(Process=process)
-        patch.setattr("scenario_gen.ros.plumbing.suite.multiprocessing", SimpleNamespace(get_context=lambda _: context))
+        patch.setattr(
+            "scenario_gen.ros.plumbing.suite.multiprocessing",
+            SimpleNamespace(get_context=lambda _: context),
+        )
         yield
 
 
@@ -48,14 +51,25 @@ def test_the_suite_records_several_jobs_in_their_namespaces(demo):
         encounter = read_log(job.log).encounters[0]
         case = generate(encounter, job.road, PipelineConfig(), count=3, seed=7)
         expected = [encode_scenario(s, encounter.start_ns) for s in case.generated.scenarios]
-        assert [m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios"] == expected
+        assert [
+            m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios"
+        ] == expected
         written = list(result_messages(case))
         for topic in INFOS:
             own = [decode_hashes(data, topic) for name, data, _ in written if name == topic]
-            assert [decode_hashes(m.data, topic) for m in read_messages(demo) if m.topic == f"{job.namespace}/{topic}"] == own
+            assert [
+                decode_hashes(m.data, topic)
+                for m in read_messages(demo)
+                if m.topic == f"{job.namespace}/{topic}"
+            ] == own
         messages = {topic: data for topic, data, _ in written}
-        infos = [m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios/info"]
-        assert all(template_hashes(messages).items() <= decode_diagnostics(data)[1][0].values.items() for data in infos)
+        infos = [
+            m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios/info"
+        ]
+        assert all(
+            template_hashes(messages).items() <= decode_diagnostics(data)[1][0].values.items()
+            for data in infos
+        )
     assert [path.name for path in demo.parent.iterdir()] == ["bag"]
 
 
@@ -74,9 +88,15 @@ def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
         "gp_sampler": [*sim_time, "-p", "count:=3", "-p", "seed:=7"],
     }
     spaces = tuple(job.namespace for job in JOBS)
-    made = Processes(tmp_path, domain, nodes, {node: spaces for node in nodes if node != "player"}, apart=nodes)
+    made = Processes(
+        tmp_path, domain, nodes, {node: spaces for node in nodes if node != "player"}, apart=nodes
+    )
     try:
-        derived = [f"{space}/{topic}" for space in spaces for topic in ("changepoints", "posterior", "fit", "scenarios")]
+        derived = [
+            f"{space}/{topic}"
+            for space in spaces
+            for topic in ("changepoints", "posterior", "fit", "scenarios")
+        ]
         client.hear(*derived)
         for topic in derived:
             assert client.wait(topic, len(recorded[topic])) == recorded[topic], topic
@@ -87,12 +107,23 @@ def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
 @pytest.mark.parametrize(
     ("log", "error", "said"),
     [
-        pytest.param(RESOURCES / "synthetic_b", RefusedError, "/x/planner: plan: the recording", marks=pytest.mark.long),
+        pytest.param(
+            RESOURCES / "synthetic_b",
+            RefusedError,
+            "/x/planner: plan: the recording",
+            marks=pytest.mark.long,
+        ),
         ("none.csv", InputError, "/x/log_player"),
     ],
 )
 def test_a_job_that_cannot_be_done_names_the_stage_and_leaves_nothing(tmp_path, log, error, said):
     with pytest.raises(error, match=said):
-        run_suite([Job("/x", tmp_path / log, "straight")], PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag")
+        run_suite(
+            [Job("/x", tmp_path / log, "straight")],
+            PipelineConfig(),
+            count=3,
+            seed=7,
+            bag=tmp_path / "bag",
+        )
     assert list(tmp_path.iterdir()) == []
     assert threading.active_count() < 20

@@ -38,7 +38,10 @@ class Reporter:
     def heard(self) -> list[tuple[int, dict[str, Status]]]:
         """Stamps and statuses by subject, of every message."""
         decoded = [decode_diagnostics(data) for data in list(self.client.heard["/diagnostics"])]
-        return [(stamp, {status.name.partition(": ")[2]: status for status in every}) for stamp, every in decoded]
+        return [
+            (stamp, {status.name.partition(": ")[2]: status for status in every})
+            for stamp, every in decoded
+        ]
 
     def newest(self) -> dict[str, Status]:
         return self.heard()[-1][1]
@@ -65,8 +68,12 @@ def test_all_is_said_every_second_stamped_now(reporter: Reporter):
 
     before, aggregated = time.time_ns(), []
     quality = QoSPresetProfiles.SYSTEM_DEFAULT.value  # diagnostic_aggregator's
-    reporter.client.node.create_subscription(DiagnosticArray, "/diagnostics", aggregated.append, quality)
-    reporter.diagnostics.status(Level.OK, "a road", "road", {"cells": "7"}, 5_000_000_006, log=False)
+    reporter.client.node.create_subscription(
+        DiagnosticArray, "/diagnostics", aggregated.append, quality
+    )
+    reporter.diagnostics.status(
+        Level.OK, "a road", "road", {"cells": "7"}, 5_000_000_006, log=False
+    )
     reporter.diagnostics.status(Level.WARN, "moved", "fit of 1", {}, log=False)
     reporter.until(lambda: {"road", "fit of 1"} <= set(reporter.newest()), "both at once")
     count = len(reporter.heard())
@@ -78,7 +85,9 @@ def test_all_is_said_every_second_stamped_now(reporter: Reporter):
         assert template_of(statuses["fit of 1"], stamp) == stamp
         assert {status.name.partition(":")[0] for status in statuses.values()} == {NODE}
     reporter.until(lambda: aggregated, "what an aggregator hears")
-    assert all(message.header.stamp.sec > 0 for message in aggregated), "it warns of messages without a stamp"
+    assert all(message.header.stamp.sec > 0 for message in aggregated), (
+        "it warns of messages without a stamp"
+    )
 
 
 def test_what_is_over_goes_back_to_ok_when_it_was_seen(reporter: Reporter):
@@ -87,22 +96,36 @@ def test_what_is_over_goes_back_to_ok_when_it_was_seen(reporter: Reporter):
     reporter.diagnostics.resolve("tracks")
     reporter.until(lambda: "tracks" in reporter.newest(), "the error")
     reporter.until(lambda: reporter.newest()["tracks"].level is Level.OK, "its end")
-    over = next(stamp for stamp, statuses in reporter.heard() if "tracks" in statuses and statuses["tracks"].level is Level.OK)
+    over = next(
+        stamp
+        for stamp, statuses in reporter.heard()
+        if "tracks" in statuses and statuses["tracks"].level is Level.OK
+    )
     assert over - reported >= 0.99e9 * HOLD_S, "whoever looks once a second sees it"
     assert reporter.newest()["tracks"].message == "over: ValueError: no quaternion"
     reporter.diagnostics.failed("plan 7", ValueError("once"))
     reporter.diagnostics.failed("plan 8", ValueError("again"))
-    reporter.until(lambda: reporter.newest().get("plan", Status("", Level.OK, "")).values.get("times") == "2", "the second one")
+    reporter.until(
+        lambda: reporter.newest().get("plan", Status("", Level.OK, "")).values.get("times") == "2",
+        "the second one",
+    )
     assert reporter.newest()["plan"].values == {"error": "ValueError", "job": "8", "times": "2"}
     reporter.diagnostics.status(Level.OK, "planned", "plan", {}, log=False)
     reporter.until(lambda: reporter.newest()["plan"].message == "planned", "good news, at once")
 
 
 def test_a_report_takes_the_place_of_the_one_before(reporter: Reporter):
-    reporter.diagnostics.report(*(Status(f"{NODE}: fit{of}", Level.OK, "") for of in ("", " of 1", " of 2")), stamp_ns=1)
+    reporter.diagnostics.report(
+        *(Status(f"{NODE}: fit{of}", Level.OK, "") for of in ("", " of 1", " of 2")), stamp_ns=1
+    )
     reporter.diagnostics.report(Status(f"{NODE}: segmentation", Level.OK, ""))
-    reporter.diagnostics.report(*(Status(f"{NODE}: fit{of}", Level.OK, "") for of in ("", " of 3")), stamp_ns=2)
-    reporter.until(lambda: set(reporter.newest()) == {"fit", "fit of 3", "segmentation"}, "the newer report alone")
+    reporter.diagnostics.report(
+        *(Status(f"{NODE}: fit{of}", Level.OK, "") for of in ("", " of 3")), stamp_ns=2
+    )
+    reporter.until(
+        lambda: set(reporter.newest()) == {"fit", "fit of 3", "segmentation"},
+        "the newer report alone",
+    )
     reporter.diagnostics.enable(False)
     reporter.diagnostics.state("inactive")
     reporter.diagnostics.status(Level.OK, "too late", "fit", {}, log=False)
@@ -117,14 +140,16 @@ def test_of_a_storm_few_messages_are_published_and_what_is_wrong_is_kept(reporte
     reporter.until(lambda: "tracks" in reporter.newest(), "the finding")
     assert len(reporter.heard()) - count < MAX_STATUSES // 4
     found = reporter.newest()
-    assert found["tracks"].message.startswith(f"finding {k}; finding {k - 1}; ") and found["tracks"].values["times"] == str(
-        2 * MAX_STATUSES
-    )
+    assert found["tracks"].message.startswith(f"finding {k}; finding {k - 1}; ") and found[
+        "tracks"
+    ].values["times"] == str(2 * MAX_STATUSES)
     assert len(found) <= MAX_STATUSES
 
 
 def test_a_status_is_bounded():
-    large = bounded(Status("n: x", Level.WARN, "\x1b" * 10_000, {str(k): "v" * 1000 for k in range(1000)}))
+    large = bounded(
+        Status("n: x", Level.WARN, "\x1b" * 10_000, {str(k): "v" * 1000 for k in range(1000)})
+    )
     assert len(large.message) < 9_000 and "\x1b" not in large.message
     assert sum(map(len, large.values.values())) < LARGEST + 100
     assert large.values["left_out"].startswith("935 values")

@@ -17,7 +17,10 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def test_versions_and_packages_are_judged():
     assert [python(version).level for version in ((3, 10), (3, 12), (3, 14))] == [ERROR, OK, ERROR]
-    assert packages("packages", ("json", "no_such_module"), "install it").message == "missing: no_such_module; install it"
+    assert (
+        packages("packages", ("json", "no_such_module"), "install it").message
+        == "missing: no_such_module; install it"
+    )
 
 
 @pytest.mark.dds
@@ -31,6 +34,8 @@ def test_a_sound_environment_is_sound_and_an_rmw_that_is_not_there_is_an_error(d
 def test_without_ros_and_without_packages_it_still_answers():
     """-S hides all that is installed."""
     command = [sys.executable, "-S", "-m", "scenario_gen.ros.plumbing.doctor"]
-    answer = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+    answer = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
     assert answer.returncode == 1 and answer.stderr == ""
     assert "missing: numpy" in answer.stdout and "ROS 2        not here" in answer.stdout

@@ -15,7 +15,9 @@ from scenario_gen.base.ros_domain import DOMAINS, free_domain, this_host_only
 
 
 def test_two_runs_get_two_domains(monkeypatch, tmp_path):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))  # where no other run of the tests holds one
+    monkeypatch.setattr(
+        tempfile, "tempdir", str(tmp_path)
+    )  # where no other run of the tests holds one
     with free_domain() as one, free_domain() as two:
         assert one != two
     with free_domain() as again:
@@ -24,7 +26,10 @@ def test_two_runs_get_two_domains(monkeypatch, tmp_path):
 
 def test_domains_that_are_held_or_another_users_are_passed_over(monkeypatch):
     own = os.geteuid()
-    with tempfile.TemporaryDirectory() as name, (Path(name) / f"scenario_gen_domain_{DOMAINS[-1]}.lock").open("w") as held:
+    with (
+        tempfile.TemporaryDirectory() as name,
+        (Path(name) / f"scenario_gen_domain_{DOMAINS[-1]}.lock").open("w") as held,
+    ):
         fcntl.flock(held, fcntl.LOCK_EX)
         Path(name).chmod(0o1777)
         for domain in range(81, DOMAINS[-1]):
@@ -42,7 +47,9 @@ def test_domains_that_are_held_or_another_users_are_passed_over(monkeypatch):
 
 
 def test_other_middleware_is_kept_on_this_host_by_ros_itself():
-    assert this_host_only({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}) == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    assert this_host_only({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}) == {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"
+    }
     for own in ({}, {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}):
         assert Path(this_host_only(own)["FASTRTPS_DEFAULT_PROFILES_FILE"]).is_file()
 

@@ -22,7 +22,9 @@ def test_a_node_says_that_kernels_are_compiled_and_ends_when_asked(tmp_path):
         said = (line for line in iter(node.stderr.readline, "") if line.startswith("kernels: "))
         assert next(said, "").endswith("once for this installation\n")
         node.send_signal(signal.SIGINT)
-        assert node.wait(timeout=300.0) == 0  # a kernel that is being compiled is compiled to its end
+        assert (
+            node.wait(timeout=300.0) == 0
+        )  # a kernel that is being compiled is compiled to its end
     finally:
         node.kill()
         node.stderr.close()
@@ -38,16 +40,26 @@ def test_several_processes_compile_once_and_without_a_folder_each_does(tmp_path)
         "compiling.make_ready(kernels.registered(), lambda *words: said.append(compiling.words(*words)))\n"
         "print(module.twice(2.0), said[-1:])"
     )
-    environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    environment = os.environ | {
+        "PYTHONPATH": str(tmp_path),
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+    }
     several = [
-        subprocess.Popen([sys.executable, "-c", run], stdout=subprocess.PIPE, text=True, env=environment) for _ in range(2)
+        subprocess.Popen(
+            [sys.executable, "-c", run], stdout=subprocess.PIPE, text=True, env=environment
+        )
+        for _ in range(2)
     ]
     said = [process.communicate(timeout=300.0)[0] for process in several]
     assert all(text.startswith("4.0 [") for text in said), said
     assert any("once for this installation" in text for text in said)
     assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 1
-    warm = subprocess.run([sys.executable, "-c", run], capture_output=True, text=True, env=environment, check=True)
+    warm = subprocess.run(
+        [sys.executable, "-c", run], capture_output=True, text=True, env=environment, check=True
+    )
     assert warm.stdout == "4.0 []\n"
     nowhere = environment | {"NUMBA_CACHE_DIR": "/proc/nowhere"}
-    alone = subprocess.run([sys.executable, "-c", run], capture_output=True, text=True, env=nowhere, check=True)
+    alone = subprocess.run(
+        [sys.executable, "-c", run], capture_output=True, text=True, env=nowhere, check=True
+    )
     assert "at every start" in alone.stdout, alone.stdout

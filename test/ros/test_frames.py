@@ -27,8 +27,12 @@ def test_bytes_are_those_of_rosbags_and_are_read_back():
 def test_without_tf2_msgs_the_nodes_work_and_say_so(start, client):
     for node in ("preview", "traffic"):
         process = start(node, without_tf2=True)
-        client.until(lambda node=node: (node, "/") in client.node.get_node_names_and_namespaces(), node)
+        client.until(
+            lambda node=node: (node, "/") in client.node.get_node_names_and_namespaces(), node
+        )
         process.send_signal(signal.SIGINT)
         output, _ = process.communicate(timeout=180.0)
-        assert process.returncode == 0 and output.count("no frames are published on /tf:") == 1, output
+        assert process.returncode == 0 and output.count("no frames are published on /tf:") == 1, (
+            output
+        )
         assert "tf2_msgs" in output and "Traceback" not in output

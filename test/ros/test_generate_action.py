@@ -34,17 +34,44 @@ def built(tmp_path_factory):
     missing = [name for name in ("cmake", "c++") if not shutil.which(name, path=programs)]
     missing += [] if Path(sysconfig.get_path("include"), "Python.h").exists() else ["Python.h"]
     if missing:
-        pytest.skip(f"{', '.join(missing)} not here, with which colcon builds interfaces (apt-get install g++ python3-dev)")
+        pytest.skip(
+            f"{', '.join(missing)} not here, with which colcon builds interfaces (apt-get install g++ python3-dev)"
+        )
     environment = os.environ | {"CMAKE_PREFIX_PATH": prefix.replace(":", ";"), "PATH": programs}
-    settings = [f"-DCMAKE_PROJECT_INCLUDE={ROOT / 'test' / 'ros' / 'wheels.cmake'}", f"-DPython3_EXECUTABLE={sys.executable}"]
-    places = ["--base-paths", ROOT / PACKAGE, "--build-base", base / "build", "--install-base", base / "install"]
-    command = [Path(sys.executable).with_name("colcon"), "--log-base", base / "log", "build", *places, "--cmake-args", *settings]
+    settings = [
+        f"-DCMAKE_PROJECT_INCLUDE={ROOT / 'test' / 'ros' / 'wheels.cmake'}",
+        f"-DPython3_EXECUTABLE={sys.executable}",
+    ]
+    places = [
+        "--base-paths",
+        ROOT / PACKAGE,
+        "--build-base",
+        base / "build",
+        "--install-base",
+        base / "install",
+    ]
+    command = [
+        Path(sys.executable).with_name("colcon"),
+        "--log-base",
+        base / "log",
+        "build",
+        *places,
+        "--cmake-args",
+        *settings,
+    ]
     run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
     installed = base / "install" / PACKAGE
     (modules,) = installed.glob("lib/python3*/site-packages")
-    paths = {"LD_LIBRARY_PATH": installed / "lib", "PYTHONPATH": modules, "AMENT_PREFIX_PATH": installed}
-    return {name: os.pathsep.join(filter(None, [str(path), os.environ.get(name, "")])) for name, path in paths.items()}
+    paths = {
+        "LD_LIBRARY_PATH": installed / "lib",
+        "PYTHONPATH": modules,
+        "AMENT_PREFIX_PATH": installed,
+    }
+    return {
+        name: os.pathsep.join(filter(None, [str(path), os.environ.get(name, "")]))
+        for name, path in paths.items()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +91,16 @@ def suite(environment, tmp_path_factory):
         "generate_on_input": "false",
     }
     words = [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
-    command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "suite", "--nodes", NODES, "--ros-args", *words]
+    command = [
+        sys.executable,
+        "-m",
+        "scenario_gen.ros.plumbing.start",
+        "suite",
+        "--nodes",
+        NODES,
+        "--ros-args",
+        *words,
+    ]
     with log.open("w") as file:
         process = subprocess.Popen(command, env=environment, stdout=file, stderr=file)
         yield log
@@ -75,52 +111,100 @@ def suite(environment, tmp_path_factory):
 def ask(environment, *goals):
     """Send goals at once; return how each went, by its place, and what was heard of scenarios."""
     command = [sys.executable, ROOT / "test" / "ros" / "action_client.py", json.dumps(goals)]
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=550.0)
+    run = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=False, timeout=550.0
+    )
     assert run.returncode == 0, run.stderr[-3000:]
     *ended, heard = json.loads(run.stdout.splitlines()[-1])
-    return [one for _, one in sorted((one["goal"], one) for one in ended)], heard, [one["goal"] for one in ended]
+    return (
+        [one for _, one in sorted((one["goal"], one) for one in ended)],
+        heard,
+        [one["goal"] for one in ended],
+    )
 
 
 def test_the_codes_are_those_of_the_action():
     text = (ROOT / PACKAGE / "action" / "Generate.action").read_text()
-    assert {name: int(code) for name, code in re.findall(r"^uint8 ([A-Z_]+)=(\d)", text, re.MULTILINE)} == dict(Code.__members__)
+    assert {
+        name: int(code) for name, code in re.findall(r"^uint8 ([A-Z_]+)=(\d)", text, re.MULTILINE)
+    } == dict(Code.__members__)
 
 
 def test_goals_wait_for_the_inputs_and_one_that_does_not_wait_is_told(environment, suite):
     wanted = [{"parameters": {"count": 100 - k, "seed": k, "request": f"r{k}"}} for k in range(3)]
-    (first, *others, hasty), heard, _ = ask(environment, *wanted, {"wait": 0.0, "then": "log_player"})
+    (first, *others, hasty), heard, _ = ask(
+        environment, *wanted, {"wait": 0.0, "then": "log_player"}
+    )
     assert (first["status"], first["code"], first["request"]) == (SUCCEEDED, Code.OK, "r0")
     assert first["requested"] == first["published"] == 100 and 0 <= first["first"] < first["last"]
-    refused = sum(int(count) for cause, count in first["account"].items() if cause.startswith("refused."))
+    refused = sum(
+        int(count) for cause, count in first["account"].items() if cause.startswith("refused.")
+    )
     assert int(first["account"]["candidates"]) == first["last"] + 1 == 100 + refused
     assert any("tracks" in row[1] for row in first["feedback"])
     assert [one["published"] for one in others] == [99, 98]
-    assert (hasty["status"], hasty["code"]) == (ABORTED, Code.NOT_READY) and re.search("not active|waiting for", hasty["reason"])
+    assert (hasty["status"], hasty["code"]) == (ABORTED, Code.NOT_READY) and re.search(
+        "not active|waiting for", hasty["reason"]
+    )
     assert heard["heard"] == 297
     assert "ERROR" not in suite.read_text()
 
 
-def test_what_is_wrong_is_said_with_its_code_and_what_is_at_work_or_waits_is_cancelled(environment, suite):
-    wrong = [{"parameters": values} for values in ({"cout": 3}, {"count": 0}, {"request": "1 2"}, {"goals": "1: 9999 0 0 5"})]
+def test_what_is_wrong_is_said_with_its_code_and_what_is_at_work_or_waits_is_cancelled(
+    environment, suite
+):
+    wrong = [
+        {"parameters": values}
+        for values in ({"cout": 3}, {"count": 0}, {"request": "1 2"}, {"goals": "1: 9999 0 0 5"})
+    ]
     many = {"parameters": {"count": 100_000}}
-    hasty, *_ = ask(environment, *[many | {"cancel": [0, 0, []]}] * 6)  # before, while and after their work begins
+    hasty, *_ = ask(
+        environment, *[many | {"cancel": [0, 0, []]}] * 6
+    )  # before, while and after their work begins
     assert [(one["status"], one["code"]) for one in hasty] == [(CANCELED, Code.CANCELLED)] * 6
-    goals = [*[many | {"cancel": [1, 0, [GpSampler.THREADS]]}] * GpSampler.THREADS, many | {"cancel": [0, 1, []]}, *wrong]
+    goals = [
+        *[many | {"cancel": [1, 0, [GpSampler.THREADS]]}] * GpSampler.THREADS,
+        many | {"cancel": [0, 1, []]},
+        *wrong,
+    ]
     answers, heard, _ = ask(environment, *goals, {"parameters": {"count": 3, "seed": 9}})
-    (*running, waiting), refused, last = answers[: GpSampler.THREADS + 1], answers[GpSampler.THREADS + 1 : -1], answers[-1]
+    (*running, waiting), refused, last = (
+        answers[: GpSampler.THREADS + 1],
+        answers[GpSampler.THREADS + 1 : -1],
+        answers[-1],
+    )
     for one in (*running, waiting):
-        assert (one["status"], one["code"]) == (CANCELED, Code.CANCELLED) and "cancelled" in one["reason"]
+        assert (one["status"], one["code"]) == (CANCELED, Code.CANCELLED) and "cancelled" in one[
+            "reason"
+        ]
     assert all(one["published"] > 0 for one in running) and waiting["published"] == 0
     assert [one["status"] for one in refused] == [ABORTED] * 4
-    assert [one["code"] for one in refused] == [Code.INVALID, Code.INVALID, Code.INVALID, Code.IMPOSSIBLE]
-    assert all(word in one["reason"] for word, one in zip(("cout", "count", "'1 2'", "vehicle"), refused, strict=True))
-    assert last["code"] == Code.OK and heard["heard"] == sum(one["published"] for one in running) + 3
+    assert [one["code"] for one in refused] == [
+        Code.INVALID,
+        Code.INVALID,
+        Code.INVALID,
+        Code.IMPOSSIBLE,
+    ]
+    assert all(
+        word in one["reason"]
+        for word, one in zip(("cout", "count", "'1 2'", "vehicle"), refused, strict=True)
+    )
+    assert (
+        last["code"] == Code.OK and heard["heard"] == sum(one["published"] for one in running) + 3
+    )
 
 
 def test_requests_at_the_same_time_give_what_each_gives_alone_by_service_too(environment, suite):
     """And a small one does not wait for a large one."""
-    goals = [{"parameters": {"count": 8, "seed": k, "ego": ego, "request": f"same{k}"}} for k, ego in ((0, ""), (1, "2"))]
-    large = [{"parameters": {"count": 100_000}, "cancel": [1, 0, [1, 2]]}] if GpSampler.THREADS > 1 else []
+    goals = [
+        {"parameters": {"count": 8, "seed": k, "ego": ego, "request": f"same{k}"}}
+        for k, ego in ((0, ""), (1, "2"))
+    ]
+    large = (
+        [{"parameters": {"count": 100_000}, "cancel": [1, 0, [1, 2]]}]
+        if GpSampler.THREADS > 1
+        else []
+    )
     answers, together, order = ask(environment, *large, *goals)
     assert not large or order[-1] == 0
     client = Client(int(environment["ROS_DOMAIN_ID"]))
@@ -131,10 +215,18 @@ def test_requests_at_the_same_time_give_what_each_gives_alone_by_service_too(env
         for goal in goals:
 
             def published(name=goal["parameters"]["request"]):
-                every = [s.values for s in client.statuses("/scenarios/info") if s.values["request"] == name]
+                every = [
+                    s.values
+                    for s in client.statuses("/scenarios/info")
+                    if s.values["request"] == name
+                ]
                 return [values["sha256"] for values in every if "sha256" in values]
 
-            client.until(lambda published=published: len(published()) == 16, "the scenarios of both")
-            assert published()[:8] == published()[8:] and set(published()) <= set(together["digests"])
+            client.until(
+                lambda published=published: len(published()) == 16, "the scenarios of both"
+            )
+            assert published()[:8] == published()[8:] and set(published()) <= set(
+                together["digests"]
+            )
     finally:
         client.close()

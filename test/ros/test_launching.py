@@ -29,7 +29,9 @@ def launched(file: str = "suite.launch.py", **arguments: str) -> list[SimpleName
     """What a launch file would start; the launch package is not among the wheels, so stand-ins take its place."""
 
     def node(**keywords):
-        return SimpleNamespace(**{"name": None, "respawn": False, "arguments": [], "parameters": [], **keywords})
+        return SimpleNamespace(
+            **{"name": None, "respawn": False, "arguments": [], "parameters": [], **keywords}
+        )
 
     def declare(name, *, default_value, description):
         assert description and default_value == ""
@@ -37,45 +39,78 @@ def launched(file: str = "suite.launch.py", **arguments: str) -> list[SimpleName
 
     stand_ins = {
         "launch": mock.MagicMock(LaunchDescription=list),
-        "launch.actions": mock.MagicMock(DeclareLaunchArgument=declare, OpaqueFunction=lambda *, function: function),
+        "launch.actions": mock.MagicMock(
+            DeclareLaunchArgument=declare, OpaqueFunction=lambda *, function: function
+        ),
         "launch_ros": mock.MagicMock(),
         "launch_ros.actions": mock.MagicMock(Node=node),
-        "ament_index_python.packages": mock.MagicMock(get_package_share_directory=lambda _: str(ROOT)),
+        "ament_index_python.packages": mock.MagicMock(
+            get_package_share_directory=lambda _: str(ROOT)
+        ),
     }
     with mock.patch.dict(sys.modules, stand_ins):
         scope: dict[str, object] = {}
         exec(compile((ROOT / "launch" / file).read_text(), file, "exec"), scope)
         *declared, begin = scope["generate_launch_description"]()
-        return begin(SimpleNamespace(launch_configurations=dict.fromkeys(declared, "") | arguments))
+        return begin(
+            SimpleNamespace(launch_configurations=dict.fromkeys(declared, "") | arguments)
+        )
 
 
 def words(node: SimpleNamespace) -> list[str]:
     """The command line with which launch_ros starts a node, behind its executable."""
     names = ["-r", f"__node:={node.name}"] if node.name else []
     files = [word for path in node.parameters for word in ("--params-file", path)]
-    return ["--ros-args", *node.ros_arguments, *names, "-r", f"__ns:={node.namespace or '/'}", *files]
+    return [
+        "--ros-args",
+        *node.ros_arguments,
+        *names,
+        "-r",
+        f"__ns:={node.namespace or '/'}",
+        *files,
+    ]
 
 
 def test_the_nodes_that_are_started(tmp_path):
-    assert [(node.executable, node.name, node.respawn) for node in launched(log=LOG)] == [(name, name, False) for name in NODES]
-    recording = launched(log=LOG, bag=str(tmp_path / "bag"), respawn="true", log_level="debug", namespace="/a")
+    assert [(node.executable, node.name, node.respawn) for node in launched(log=LOG)] == [
+        (name, name, False) for name in NODES
+    ]
+    recording = launched(
+        log=LOG, bag=str(tmp_path / "bag"), respawn="true", log_level="debug", namespace="/a"
+    )
     assert [node.respawn for node in recording] == [name != "recorder" for name in NODES]
-    assert all(node.ros_arguments == ["--log-level", "debug"] and node.namespace == "/a" for node in recording)
+    assert all(
+        node.ros_arguments == ["--log-level", "debug"] and node.namespace == "/a"
+        for node in recording
+    )
     some = [name for name in NODES if name not in ("planner", "recorder")]
     assert [node.executable for node in launched(log=LOG, without="planner, recorder")] == some
-    (together, *pictures) = launched(log=LIVE, composed="true", rviz="true", without="planner,recorder")
-    assert (together.executable, together.name, together.arguments) == ("suite", None, ["--nodes", ",".join(some)])
+    (together, *pictures) = launched(
+        log=LIVE, composed="true", rviz="true", without="planner,recorder"
+    )
+    assert (together.executable, together.name, together.arguments) == (
+        "suite",
+        None,
+        ["--nodes", ",".join(some)],
+    )
     assert [node.executable for node in pictures] == ["static_transform_publisher", "rviz2"]
 
 
 def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given():
     known = {name for node in NODES for name in flatten(config_of(node_class(node)))}
     assert {name for name, _ in SUITE.values()} - known == {"autostart", "use_sim_time"}
-    assert {name for name, _ in DRIVE.values()} == set(flatten(config_of(node_class("traffic")))) - {"drive.patience"}
+    assert {name for name, _ in DRIVE.values()} == set(
+        flatten(config_of(node_class("traffic")))
+    ) - {"drive.patience"}
     assert "(default: 50)" in meanings(SUITE)["count"]
     (node, *_) = launched(log=LOG, count="50")
-    assert yaml.safe_load(Path(node.parameters[-1]).read_text())["/**/**"]["ros__parameters"] == {"count": 50, "log_path": LOG}
-    defaults = yaml.safe_load((ROOT / "config" / "suite.yaml").read_text())["/**"]["ros__parameters"]
+    assert yaml.safe_load(Path(node.parameters[-1]).read_text())["/**/**"]["ros__parameters"] == {
+        "count": 50,
+        "log_path": LOG,
+    }
+    defaults = yaml.safe_load((ROOT / "config" / "suite.yaml").read_text())["/**"][
+        "ros__parameters"
+    ]
     assert set(defaults) <= known
 
 
@@ -96,7 +131,10 @@ def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given()
         ({"bag": "/proc/x"}, "bag:=/proc/x: .*; name another folder"),
         ({"bag": str(ROOT)}, "File exists; name another folder"),
         ({"file": "drive.launch.py", "bag": "no_such_bag"}, "bag:=no_such_bag: it does not exist"),
-        ({"file": "drive.launch.py", "results": f"{ROOT / 'setup.py'}/x"}, "results:=.*; name another folder"),
+        (
+            {"file": "drive.launch.py", "results": f"{ROOT / 'setup.py'}/x"},
+            "results:=.*; name another folder",
+        ),
         ({"params": str(ROOT / "pyproject.toml")}, "no ros__parameters"),
         ({"file": "drive.launch.py", "policy": "brave"}, "policy:=brave: .*reactive"),
     ],
@@ -109,7 +147,9 @@ def test_what_cannot_be_is_refused_before_a_process_starts(given, said):
 
 @pytest.mark.dds
 @pytest.mark.parametrize("composed", ["false", "true"])
-def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domain, client, tmp_path, composed):
+def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(
+    domain, client, tmp_path, composed
+):
     """Processes with the arguments that launch_ros gives them; the file has both kinds of sections: ROS takes the last."""
     from lifecycle_msgs.srv import GetState
     from rcl_interfaces.srv import GetParameters
@@ -117,10 +157,19 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
 
     file = tmp_path / "my.yaml"
     everywhere = {"count": 3, "seed": 5, "road_name": "straight", "ego": "7", "log_path": LOG}
-    sections = {"/**": everywhere, "/**/gp_sampler": {"count": 4, "ego": "8", "limits": {"car": {"max_speed": 30}}}}
-    file.write_text(yaml.safe_dump({key: {"ros__parameters": body} for key, body in sections.items()}, sort_keys=False))
+    sections = {
+        "/**": everywhere,
+        "/**/gp_sampler": {"count": 4, "ego": "8", "limits": {"car": {"max_speed": 30}}},
+    }
+    file.write_text(
+        yaml.safe_dump(
+            {key: {"ros__parameters": body} for key, body in sections.items()}, sort_keys=False
+        )
+    )
     space = f"/launched_{composed}"
-    nodes = launched(params=str(file), ego="21202", namespace=space, autostart="false", composed=composed)
+    nodes = launched(
+        params=str(file), ego="21202", namespace=space, autostart="false", composed=composed
+    )
     wanted = [node for node in nodes if node.executable in ("suite", "gp_sampler", "road_server")]
     some = ["--nodes", "gp_sampler,road_server"] if composed == "true" else []
     where = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)}
@@ -128,11 +177,21 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
     try:
 
         def values(node: str, *names: str) -> list[object]:
-            answer = client.call(GetParameters, f"{space}/{node}/get_parameters", GetParameters.Request(names=list(names)))
+            answer = client.call(
+                GetParameters,
+                f"{space}/{node}/get_parameters",
+                GetParameters.Request(names=list(names)),
+            )
             return [parameter_value_to_python(value) for value in answer.values]
 
-        assert values("gp_sampler", "count", "seed", "ego", "pair_map", "limits.car.max_speed") == [4, 5, "21202", True, 30.0]
-        assert values("road_server", "road_name", "wait_for_tracks", "autostart") == ["straight", True, False]
+        assert values(
+            "gp_sampler", "count", "seed", "ego", "pair_map", "limits.car.max_speed"
+        ) == [4, 5, "21202", True, 30.0]
+        assert values("road_server", "road_name", "wait_for_tracks", "autostart") == [
+            "straight",
+            True,
+            False,
+        ]
         state = client.call(GetState, f"{space}/gp_sampler/get_state", GetState.Request())
         assert state.current_state.label == "unconfigured"
     finally:
@@ -162,9 +221,17 @@ assert others <= {*sys.stdlib_module_names, "scenario_gen", "yaml", "_yaml"}, ot
 def test_a_launch_imports_nothing_that_ros_python_lacks_and_removes_what_it_has_written(tmp_path):
     """Whatever is given: `ros2 launch` runs in ROS's own Python."""
     command = [sys.executable, "-c", IN_ROS_PYTHON, LOG, str(tmp_path / "bag")]
-    answer = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"TMPDIR": str(tmp_path)}, check=True)
+    answer = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        check=True,
+    )
     file, written = answer.stdout.splitlines()
-    assert Path(file).parent == tmp_path and json.loads(written)["starts"] == "1: 31.8 68.45 0.0 10.7"
+    assert (
+        Path(file).parent == tmp_path and json.loads(written)["starts"] == "1: 31.8 68.45 0.0 10.7"
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -173,12 +240,29 @@ def test_a_drive_is_launched_with_its_parameters(domain, client):
     """Each is one of the parameters of `traffic`, and takes effect."""
     from rcl_interfaces.srv import GetParameters
 
-    (only, *pictures) = launched("drive.launch.py", ego="002", policy="replay", lock_step="true", namespace="/a", rviz="true")
-    assert (only.executable, only.namespace, [one.executable for one in pictures]) == ("traffic", "/a", ["rviz2"])
+    (only, *pictures) = launched(
+        "drive.launch.py",
+        ego="002",
+        policy="replay",
+        lock_step="true",
+        namespace="/a",
+        rviz="true",
+    )
+    assert (only.executable, only.namespace, [one.executable for one in pictures]) == (
+        "traffic",
+        "/a",
+        ["rviz2"],
+    )
     process = start_nodes("traffic", *words(only), ROS_DOMAIN_ID=str(domain))
     try:
         request = GetParameters.Request(names=["ego", "drive.policy", "lock_step"])
-        ego, policy, lock_step = client.call(GetParameters, "/a/traffic/get_parameters", request).values
-        assert (ego.string_value, policy.string_value, lock_step.bool_value) == ("002", "replay", True)
+        ego, policy, lock_step = client.call(
+            GetParameters, "/a/traffic/get_parameters", request
+        ).values
+        assert (ego.string_value, policy.string_value, lock_step.bool_value) == (
+            "002",
+            "replay",
+            True,
+        )
     finally:
         process.kill()

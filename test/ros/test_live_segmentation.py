@@ -43,7 +43,14 @@ def test_changepoints_come_while_the_vehicles_drive_and_scenarios_afterwards(sui
     client.also("/changepoints/live", lambda _: order.append("live"))
     client.also("/tracks", lambda _: order.append("tracks"))
     # the log player waits for two listeners of every stream
-    client.hear("/vehicle_1/fix", "/vehicle_1/speed", "/vehicle_2/fix", "/vehicle_2/speed", "/changepoints", "/scenarios")
+    client.hear(
+        "/vehicle_1/fix",
+        "/vehicle_1/speed",
+        "/vehicle_2/fix",
+        "/vehicle_2/speed",
+        "/changepoints",
+        "/scenarios",
+    )
     found = [trajectory.decode(data, "live") for data in client.wait("/changepoints/live", 2)]
     template = decode_tracks(client.wait("/tracks")[0])
     assert order[:2] == ["live", "live"] and "tracks" in order
@@ -51,13 +58,18 @@ def test_changepoints_come_while_the_vehicles_drive_and_scenarios_afterwards(sui
         assert message.stamp_ns == encounter.start_ns
         assert [vehicle.id for vehicle in message.vehicles] == ["1", "2"]
     assert abs(found[0].time_ns[0] * 1e-9 - 4.0) < 0.6  # the case's first changepoint
-    assert (template.start_ns, template.duration) == (encounter.start_ns, pytest.approx(encounter.duration, abs=0.2))
+    assert (template.start_ns, template.duration) == (
+        encounter.start_ns,
+        pytest.approx(encounter.duration, abs=0.2),
+    )
     moved = template.position - encounter.position[:, : len(template.time)]
     assert np.ptp(moved, axis=(0, 1)).max() < 0.2  # smoothed once more, about another origin
     points = decode_changepoints(client.wait("/changepoints")[0], template).changepoints * 0.1
     assert np.abs(points[:, None] - np.array([4.0, 8.0, 12.0])).min(axis=1).max() < 0.6
     client.wait("/scenarios", 2)
-    assert client.call(Trigger, "/segmenter/segment", Trigger.Request()).message == "started"  # the streams have ended: tracks
+    assert (
+        client.call(Trigger, "/segmenter/segment", Trigger.Request()).message == "started"
+    )  # the streams have ended: tracks
     assert len(set(client.wait("/changepoints", 2))) == 1
 
 
@@ -69,8 +81,15 @@ def test_what_is_no_stream_is_said(suite, client):
     client.wait("/tracks")
     misfit = client.node.create_publisher(String, "/vehicle_8/fix", 10)
     client.announce("/vehicle_4/fix")
-    client.until(lambda: client.node.count_subscribers("/vehicle_4/fix"), "the segmenter's subscription")
+    client.until(
+        lambda: client.node.count_subscribers("/vehicle_4/fix"), "the segmenter's subscription"
+    )
     misfit.publish(String(data="no fix"))
     client.say("/vehicle_4/fix", b"\x00\x01\x00\x00" + bytes(8))
     for words in ("/vehicle_4/fix: the message ends at byte 8", "/vehicle_8/fix is a std_msgs"):
-        client.until(lambda words=words: any(s.level is Level.ERROR and words in s.message for s in client.statuses()), words)
+        client.until(
+            lambda words=words: any(
+                s.level is Level.ERROR and words in s.message for s in client.statuses()
+            ),
+            words,
+        )

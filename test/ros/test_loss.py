@@ -56,13 +56,23 @@ def test_a_large_request_arrives_whole(tmp_path, domain, client):
         answer = client.generate(count=MANY, seed=3)
         assert answer.successful and f"{MANY} of {MANY} scenarios" in answer.reason, answer.reason
         assert not [s.message for s in client.statuses() if "pace of" in s.name], "nobody hangs"
-        client.until(lambda: client.counted("/scenarios/info") >= MANY + 2, "the recorder to have all", 600.0)
-        assert not [s.message for s in client.statuses() if s.name == "/recorder: losses" and "lost" in s.message]
+        client.until(
+            lambda: client.counted("/scenarios/info") >= MANY + 2,
+            "the recorder to have all",
+            600.0,
+        )
+        assert not [
+            s.message
+            for s in client.statuses()
+            if s.name == "/recorder: losses" and "lost" in s.message
+        ]
     finally:
         assert suite.end() == dict.fromkeys(nodes, 0)
     (scenarios,) = [topic for topic in bag_topics(bag) if topic.name == "/scenarios"]
     assert scenarios.count == MANY + 1
-    messages = read_messages(bag, lambda topic: topic in ("/scenarios", "/scenarios/info"), BagConfig(most_bytes=2**40))
+    messages = read_messages(
+        bag, lambda topic: topic in ("/scenarios", "/scenarios/info"), BagConfig(most_bytes=2**40)
+    )
     came, told = set(), []
     for message in messages:
         if message.topic == "/scenarios":
@@ -83,9 +93,13 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
 
     publisher, told = client.node.create_publisher(String, "/hang", 5), []
     pace = Pace(publisher, 5, 0.2, told.append)
-    hanging = subprocess.Popen([sys.executable, "-c", HANGING], env=os.environ | {"ROS_DOMAIN_ID": str(domain)})
+    hanging = subprocess.Popen(
+        [sys.executable, "-c", HANGING], env=os.environ | {"ROS_DOMAIN_ID": str(domain)}
+    )
     try:
-        client.until(lambda: publisher.get_subscription_count() == 1, "the subscriber that will hang")
+        client.until(
+            lambda: publisher.get_subscription_count() == 1, "the subscriber that will hang"
+        )
 
         def publish() -> None:
             pace.wait(lambda: False)
@@ -93,7 +107,9 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
 
         for _ in range(20):
             publish()
-        client.until(lambda: publisher.wait_for_all_acked(Duration()), "what it acknowledges while it runs")
+        client.until(
+            lambda: publisher.wait_for_all_acked(Duration()), "what it acknowledges while it runs"
+        )
         pace.end()
         told.clear()
         hanging.send_signal(signal.SIGSTOP)
@@ -101,7 +117,10 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
             publish()
         assert told == [0]
         hanging.send_signal(signal.SIGCONT)
-        client.until(lambda: publisher.wait_for_all_acked(Duration()), "what it acknowledges when it goes on")
+        client.until(
+            lambda: publisher.wait_for_all_acked(Duration()),
+            "what it acknowledges when it goes on",
+        )
         publish()
         first, second = told
         assert first == 0 and 10 <= second <= 20
@@ -119,7 +138,9 @@ def _scenario(k: int) -> Scenario:
     clock = np.arange(1400) * 0.1
     place = np.stack([clock * 10.0 + k, 0.0 * clock], axis=-1)[None]
     speed = np.full((1, len(clock)), 10.0)
-    return Scenario((Vehicle("car"),), clock, place, 0.0 * speed, speed, 0.0 * speed, seed=1, index=k)
+    return Scenario(
+        (Vehicle("car"),), clock, place, 0.0 * speed, speed, 0.0 * speed, seed=1, index=k
+    )
 
 
 def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
@@ -131,18 +152,27 @@ def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
     from rclpy.qos import QoSProfile
     from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-    hasty = client.node.create_publisher(MultiDOFJointTrajectory, "/scenarios", QoSProfile(depth=2))
+    hasty = client.node.create_publisher(
+        MultiDOFJointTrajectory, "/scenarios", QoSProfile(depth=2)
+    )
     recorder = _recorder(domain, bag)
     try:
         client.until(lambda: hasty.get_subscription_count() == 1, "a subscriber of /scenarios")
-        client.until(lambda: client.node.count_subscribers("/scenarios/info") == 1, "a subscriber of /scenarios/info")
+        client.until(
+            lambda: client.node.count_subscribers("/scenarios/info") == 1,
+            "a subscriber of /scenarios/info",
+        )
 
         def publish(k: int) -> None:
             scenario = _scenario(k)
             data = encode_scenario(scenario, 0)
             hasty.publish(data)
-            asked = BoundaryStates(np.zeros((len(scenario.vehicles), 4)), np.zeros((len(scenario.vehicles), 4)))
-            entry = scenario_entry(scenario, data, "1", "/x", template=scenario.vehicles, asked=asked)
+            asked = BoundaryStates(
+                np.zeros((len(scenario.vehicles), 4)), np.zeros((len(scenario.vehicles), 4))
+            )
+            entry = scenario_entry(
+                scenario, data, "1", "/x", template=scenario.vehicles, asked=asked
+            )
             client.say("/scenarios/info", encode_info(entry, 0))
 
         publish(0)
@@ -154,10 +184,17 @@ def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
         publish(count)
         numbers = dict.fromkeys(("published", "requested", "candidates"), str(count + 1))
         closing = {"request": "1", "seed": "1", **numbers}
-        client.say("/scenarios/info", encode_diagnostics([Status("/x: request", Level.OK, "", closing)], 0))
+        client.say(
+            "/scenarios/info",
+            encode_diagnostics([Status("/x: request", Level.OK, "", closing)], 0),
+        )
 
         def told() -> str:
-            losses = [s.values for s in client.statuses() if s.name == "/recorder: losses" and s.level is Level.WARN]
+            losses = [
+                s.values
+                for s in client.statuses()
+                if s.name == "/recorder: losses" and s.level is Level.WARN
+            ]
             words = [values.get("/scenarios", "") for values in losses]
             return next((said for said in words if "lost" in said and "are missing" in said), "")
 
@@ -170,14 +207,18 @@ def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
         recorder.communicate()
         client.close()
     there = len([message for message in read_messages(bag) if message.topic == "/scenarios"])
-    sentence = f"request 1: {there} of {count + 1} scenarios are there, {count + 1 - there} are missing"
+    sentence = (
+        f"request 1: {there} of {count + 1} scenarios are there, {count + 1 - there} are missing"
+    )
     assert 0 < there < count
     assert f"{count + 1 - there} lost" in told() and sentence in told()
     assert sentence in output
     info = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert info["custom_data"]["scenario_gen.lost:/scenarios"] == told()
     answer = CliRunner().invoke(app, ["validate", str(bag)])
-    assert sentence in answer.output.replace("\n", " ") and "by its recorder" in answer.output, answer.output
+    assert sentence in answer.output.replace("\n", " ") and "by its recorder" in answer.output, (
+        answer.output
+    )
 
 
 def test_a_killed_recorder_keeps_what_came_before_its_last_seconds(domain, tmp_path):
@@ -186,7 +227,9 @@ def test_a_killed_recorder_keeps_what_came_before_its_last_seconds(domain, tmp_p
     client.hear("/diagnostics")
     recorder = _recorder(domain, bag)
     try:
-        client.until(lambda: any(s.name == "/recorder: recorded" for s in client.statuses()), "the recorder")
+        client.until(
+            lambda: any(s.name == "/recorder: recorded" for s in client.statuses()), "the recorder"
+        )
         client.announce("/report")
         client.until(lambda: client.node.count_subscribers("/report") == 1, "a subscriber")
         data = encode_diagnostics([Status("/evaluator: row", Level.OK, "")], 0)

@@ -31,7 +31,9 @@ def suite(tmp_path_factory, domain):
 
 
 def _infos(client: Client) -> list[dict[str, str]]:
-    return [decode_diagnostics(data)[1][0].values for data in list(client.heard["/scenarios/info"])]
+    return [
+        decode_diagnostics(data)[1][0].values for data in list(client.heard["/scenarios/info"])
+    ]
 
 
 def _closed(client: Client, hashed: str) -> bool:
@@ -67,11 +69,19 @@ def test_nothing_of_an_old_map_is_said_beside_the_new_one(suite, client):
     client.hear("/scenarios/info", "/map", "/fit/info")
     heard_by = client.node.get_subscriptions_info_by_topic
     for topic in ("/map", "/road/lanes", "/tracks", "/fit/info", "/scenarios", "/scenarios/info"):
-        client.until(lambda topic=topic: any(one.node_name == "recorder" for one in heard_by(topic)), f"the recorder on {topic}")
+        client.until(
+            lambda topic=topic: any(one.node_name == "recorder" for one in heard_by(topic)),
+            f"the recorder on {topic}",
+        )
     hashes = [hash_of("map", client.wait("/map")[0])]
     for k in range(LOADS):
-        if k % 3 == 0:  # amid its publication; else while the planner or the sampler is at work, or before
-            client.until(lambda: any(v.get("map_hash") == hashes[-1] for v in _infos(client)), "a scenario on this map")
+        if (
+            k % 3 == 0
+        ):  # amid its publication; else while the planner or the sampler is at work, or before
+            client.until(
+                lambda: any(v.get("map_hash") == hashes[-1] for v in _infos(client)),
+                "a scenario on this map",
+            )
         hashes.append(_another_road(client, 3.5 + 0.05 * (k + 1)))
     client.until(lambda: _closed(client, hashes[-1]), "the set on the last map")
     assert len(set(hashes)) == LOADS + 1
@@ -81,7 +91,9 @@ def test_nothing_of_an_old_map_is_said_beside_the_new_one(suite, client):
     _fitted(client, hashes[-1])
 
 
-def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(suite, client, tmp_path):
+def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(
+    suite, client, tmp_path
+):
     client.hear("/scenarios/info", "/map", "/diagnostics")
     client.until(lambda: _infos(client) and "published" in _infos(client)[-1], "the last set")
     (tmp_path / "tiny.pgm").write_bytes(b"P5 20 20 255\n" + b"\xff" * 400)
@@ -89,7 +101,9 @@ def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(sui
     tiny = _loaded(client, str(tmp_path / "tiny.yaml"))
 
     def refused() -> bool:
-        return any(s.name == "/planner: plan" and s.level is Level.ERROR for s in client.statuses())
+        return any(
+            s.name == "/planner: plan" and s.level is Level.ERROR for s in client.statuses()
+        )
 
     client.until(refused, "the planner's refusal")
     reasons = []
@@ -107,7 +121,11 @@ def _straight_lanes() -> str:
     """A CommonRoad map of two lanes in each direction, 1 km long."""
 
     def bound(tag: str, y: float, ends: tuple[float, float]) -> str:
-        return f"<{tag}>" + "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x in ends) + f"</{tag}>"
+        return (
+            f"<{tag}>"
+            + "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x in ends)
+            + f"</{tag}>"
+        )
 
     lanes = ""
     for k, y in enumerate((-7.0, -3.5, 0.0, 3.5)):
@@ -124,7 +142,10 @@ def test_lanes_of_a_vector_map_travel_from_the_road_server_to_the_sampler(suite,
     own = _loaded(client, str(tmp_path / "lanes.xml"))
     client.until(lambda: _closed(client, own), "a set on the lanes")
     together = _fitted(client, own)["road/lanes"]
-    client.until(lambda: hash_of("road/lanes", client.wait("/road/lanes")[-1]) == together, "the lanes that were fitted to")
+    client.until(
+        lambda: hash_of("road/lanes", client.wait("/road/lanes")[-1]) == together,
+        "the lanes that were fitted to",
+    )
     assert len(decode_lanes(client.heard["/road/lanes"][-1])[1].lanes) == 4
 
 
@@ -132,6 +153,10 @@ def test_the_bag_is_valid_with_each_scenario_on_its_own_map(suite):
     assert suite.end() == dict.fromkeys(NODES, 0)
     bag = suite.folder / "bag"
     (found,) = validate_bag(bag)
-    assert (found.invalid, found.unaccounted, found.found) == (0, 0, {}), json.dumps(found.left_out)
+    assert (found.invalid, found.unaccounted, found.found) == (0, 0, {}), json.dumps(
+        found.left_out
+    )
     assert not any("off_road" in sentence for sentence in found.left_out)
-    assert len({hash_of("map", m.data) for m in read_messages(bag) if m.topic == "/map"}) == LOADS + 3
+    assert (
+        len({hash_of("map", m.data) for m in read_messages(bag) if m.topic == "/map"}) == LOADS + 3
+    )

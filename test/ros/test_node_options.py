@@ -15,7 +15,10 @@ LOG = ROOT / "examples" / "my_log.csv"
 
 
 def nodes_of(client):
-    return {f"{space.rstrip('/')}/{name}" for name, space in client.node.get_node_names_and_namespaces()}
+    return {
+        f"{space.rstrip('/')}/{name}"
+        for name, space in client.node.get_node_names_and_namespaces()
+    }
 
 
 def test_topics_services_and_the_node_are_remapped(start, client):
@@ -26,15 +29,30 @@ def test_topics_services_and_the_node_are_remapped(start, client):
     assert "/b/logs" in nodes_of(client)
     services = {name for name, _ in client.node.get_service_names_and_types()}
     assert {"/lab/again", "/b/logs/get_parameters"} <= services and "/b/logs/play" not in services
-    assert client.node.count_publishers("/tracks") == client.node.count_publishers("/b/tracks") == 0
+    assert (
+        client.node.count_publishers("/tracks") == client.node.count_publishers("/b/tracks") == 0
+    )
 
 
 def test_a_rule_for_one_node_leaves_the_others_of_its_process(start, client):
     client.hear("/b/tracks")
-    start("suite", "--nodes", "log_player,segmenter", "-r", "log_player:tracks:=/b/tracks", log_path=LOG, road_name="straight")
+    start(
+        "suite",
+        "--nodes",
+        "log_player,segmenter",
+        "-r",
+        "log_player:tracks:=/b/tracks",
+        log_path=LOG,
+        road_name="straight",
+    )
     client.wait("/b/tracks")
-    assert "segmenter" in {one.node_name for one in client.node.get_subscriptions_info_by_topic("/tracks")}
-    assert client.node.count_publishers("/tracks") == 0 and client.node.count_subscribers("/b/tracks") == 1
+    assert "segmenter" in {
+        one.node_name for one in client.node.get_subscriptions_info_by_topic("/tracks")
+    }
+    assert (
+        client.node.count_publishers("/tracks") == 0
+        and client.node.count_subscribers("/b/tracks") == 1
+    )
 
 
 def test_a_parameter_file_of_wildcards_names_and_namespaces(start, client, tmp_path):
@@ -48,7 +66,10 @@ def test_a_parameter_file_of_wildcards_names_and_namespaces(start, client, tmp_p
     from rcl_interfaces.srv import GetParameters
 
     request = GetParameters.Request(names=["road_name"])
-    names = [client.call(GetParameters, f"/{space}/road_server/get_parameters", request).values[0] for space in "ac"]
+    names = [
+        client.call(GetParameters, f"/{space}/road_server/get_parameters", request).values[0]
+        for space in "ac"
+    ]
     assert [name.string_value for name in names] == ["curve", "straight"]
 
 
@@ -62,7 +83,11 @@ def test_simulated_time_stamps_what_a_node_says(start, client):
 
     def told():
         clock.publish(now)
-        return [stamp for data in client.heard["/diagnostics"] if (stamp := stamp_of(data, "diagnostics")) == 7_000_000_000]
+        return [
+            stamp
+            for data in client.heard["/diagnostics"]
+            if (stamp := stamp_of(data, "diagnostics")) == 7_000_000_000
+        ]
 
     deadline = time.monotonic() + 180.0
     while not told():

@@ -18,7 +18,15 @@ from scenario_gen.pipeline import generate, PipelineConfig
 
 pytestmark = pytest.mark.dds
 LOG = RESOURCES / "synthetic_c"
-CHAIN = ("log_player", "segmenter", "planner", "gp_sampler", "road_server", "evaluator", "recorder")
+CHAIN = (
+    "log_player",
+    "segmenter",
+    "planner",
+    "gp_sampler",
+    "road_server",
+    "evaluator",
+    "recorder",
+)
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +40,25 @@ def test_a_late_joiner_gets_everything(suite, client):
     client.wait("/scenarios/info", 5)
     late = Client(client.context.get_domain_id())
     try:
-        late.hear("/map", "/tracks", "/changepoints", "/posterior", "/fit", "/vehicle_1/route", "/scenarios", "/report")
-        for topic in ("/map", "/tracks", "/changepoints", "/posterior", "/fit", "/vehicle_1/route", "/report"):
+        late.hear(
+            "/map",
+            "/tracks",
+            "/changepoints",
+            "/posterior",
+            "/fit",
+            "/vehicle_1/route",
+            "/scenarios",
+            "/report",
+        )
+        for topic in (
+            "/map",
+            "/tracks",
+            "/changepoints",
+            "/posterior",
+            "/fit",
+            "/vehicle_1/route",
+            "/report",
+        ):
             late.wait(topic)
         assert late.wait("/scenarios", 4) == client.wait("/scenarios", 4)
         rows = {s.name: s.values for s in decode_diagnostics(late.heard["/report"][0])[1]}
@@ -56,9 +81,15 @@ def test_parameters_are_checked_on_set_with_a_reason(suite, client):
     from rcl_interfaces.srv import SetParameters
     from rclpy.parameter import Parameter
 
-    request = SetParameters.Request(parameters=[Parameter("sampling.no_such", value=1).to_parameter_msg()])
-    assert not client.call(SetParameters, "/gp_sampler/set_parameters", request).results[0].successful
-    request = SetParameters.Request(parameters=[Parameter("road.traffic_side", value="up").to_parameter_msg()])
+    request = SetParameters.Request(
+        parameters=[Parameter("sampling.no_such", value=1).to_parameter_msg()]
+    )
+    assert (
+        not client.call(SetParameters, "/gp_sampler/set_parameters", request).results[0].successful
+    )
+    request = SetParameters.Request(
+        parameters=[Parameter("road.traffic_side", value="up").to_parameter_msg()]
+    )
     (result,) = client.call(SetParameters, "/road_server/set_parameters", request).results
     assert not result.successful
     assert "left" in result.reason
@@ -70,11 +101,19 @@ def test_maps_are_served_and_bad_ones_refused(suite, client):
     client.hear("/map", "/diagnostics")
     (grid, *_) = client.wait("/map")
     answer = client.call(GetMap, "/road_server/get_map", GetMap.Request())
-    assert (answer.map.info.width, answer.map.info.height) == decode_map(grid)[1].drivable.shape[::-1]
+    assert (answer.map.info.width, answer.map.info.height) == decode_map(grid)[1].drivable.shape[
+        ::-1
+    ]
     for url in ("file:///no/such/map.yaml", "package://no_such_package/map.yaml", "nonsense"):
         answer = client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=url))
-        assert answer.result in (LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST, LoadMap.Response.RESULT_INVALID_MAP_METADATA)
-    client.until(lambda: any("nonsense" in s.message for s in client.statuses()), "the reason on /diagnostics")
+        assert answer.result in (
+            LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST,
+            LoadMap.Response.RESULT_INVALID_MAP_METADATA,
+        )
+    client.until(
+        lambda: any("nonsense" in s.message for s in client.statuses()),
+        "the reason on /diagnostics",
+    )
 
 
 def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
@@ -109,7 +148,9 @@ def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
             bad.start.pose.position.x = value
         assert not client.call(GetPlan, "/planner/get_plan", bad).plan.poses
         client.until(
-            lambda reason=reason: any(s.name.startswith("/planner") and reason in s.message for s in client.statuses()),
+            lambda reason=reason: any(
+                s.name.startswith("/planner") and reason in s.message for s in client.statuses()
+            ),
             f"{reason} on /diagnostics",
         )
 
@@ -122,4 +163,12 @@ def test_ctrl_c_ends_everything_cleanly_and_the_bag_is_whole(suite):
         if node != "recorder":
             assert "effective parameters" in suite.log(node)
     recorded = {message.topic for message in read_messages(suite.folder / "bag")}
-    assert {"/map", "/tracks", "/changepoints", "/fit", "/vehicle_1/route", "/scenarios", "/scenarios/info"} <= recorded
+    assert {
+        "/map",
+        "/tracks",
+        "/changepoints",
+        "/fit",
+        "/vehicle_1/route",
+        "/scenarios",
+        "/scenarios/info",
+    } <= recorded

@@ -77,7 +77,9 @@ def test_lanes_count_only_where_an_info_names_them_and_are_waited_for_there():
     lanes = encode_lanes(None, "map", 1)
     inputs.put("road/lanes", lanes)
     assert inputs.missing() == ["road/info of this road/lanes"]
-    inputs.put("road/info", encode_hashes("road", messages | {"road/lanes": lanes + bytes(3)}, 1))  # as DDS fills it up
+    inputs.put(
+        "road/info", encode_hashes("road", messages | {"road/lanes": lanes + bytes(3)}, 1)
+    )  # as DDS fills it up
     assert set(inputs.complete()) == {"tracks", "map", "road/info", "road/lanes"}
     inputs.put("road/info", encode_hashes("road", messages, 1))
     assert "road/lanes" not in inputs.complete()
@@ -138,7 +140,9 @@ def test_urls_of_load_map():
 
 
 def test_the_suite_hands_every_stage_parameter_to_a_node(tmp_path):
-    body = parameters([Job("/x", tmp_path / "log", "straight", 3)], PipelineConfig(), 5, 7, tmp_path / "bag")
+    body = parameters(
+        [Job("/x", tmp_path / "log", "straight", 3)], PipelineConfig(), 5, 7, tmp_path / "bag"
+    )
     given = {name for node in body.values() for name in node["ros__parameters"]}
     stages = {"log", "road", "segmentation", "fitting", "planning", "sampling", "limits"}
     assert {name for name in flatten(PipelineConfig()) if name.split(".")[0] in stages} <= given
@@ -149,6 +153,10 @@ def test_the_suite_hands_every_stage_parameter_to_a_node(tmp_path):
 def test_default_yaml_holds_the_defaults():
     text = (ROOT / "config" / "default.yaml").read_text()
     nested = yaml.safe_load(text)["/**"]["ros__parameters"]
-    flat = {f"{head}.{name}": value for head, body in nested.items() for name, value in body.items()}
+    flat = {
+        f"{head}.{name}": value for head, body in nested.items() for name, value in body.items()
+    }
     assert flat == {name: value for name, (_, value) in flatten(PipelineConfig()).items()}
-    assert text == default_yaml(), "run: python test/packaging/default_yaml.py > config/default.yaml"
+    assert text == default_yaml(), (
+        "run: python test/packaging/default_yaml.py > config/default.yaml"
+    )

@@ -25,7 +25,11 @@ def states(scenario, at):
 def test_states_are_those_of_the_scenario_and_who_is_gone_has_none():
     scenario = replace(hand_made_run().generated[0], present=np.array([[0, 60], [20, 40]]))
     here, poses, speeds = states(scenario, 3.0)
-    assert here == [0, 1] and poses[0].tolist() == pytest.approx([15.0, -2.0, 0.0]) and speeds.tolist() == [5.0, 6.0]
+    assert (
+        here == [0, 1]
+        and poses[0].tolist() == pytest.approx([15.0, -2.0, 0.0])
+        and speeds.tolist() == [5.0, 6.0]
+    )
     assert states(scenario, 1.0)[0] == states(scenario, 5.0)[0] == [0]
 
 
@@ -35,12 +39,16 @@ def test_conflicts_are_where_paths_meet_with_who_goes_first():
     run = hand_made_run().generated[0]
     late = np.stack([np.full(61, 15.0), np.linspace(-70.0, 10.0, 61)], axis=-1)
     crossing = replace(
-        run, position=np.stack([run.position[0], late]), heading=np.stack([run.heading[0], np.full(61, np.pi / 2)])
+        run,
+        position=np.stack([run.position[0], late]),
+        heading=np.stack([run.heading[0], np.full(61, np.pi / 2)]),
     )
     (((x, y, _), words),) = conflicts_of(crossing)
     first, second = run.vehicles
     assert x == pytest.approx(15.0)
-    assert y + 0.5 * second.length == pytest.approx(run.position[0, 0, 1] - 0.5 * first.width, abs=0.1), "its front at the path"
+    assert y + 0.5 * second.length == pytest.approx(
+        run.position[0, 0, 1] - 0.5 * first.width, abs=0.1
+    ), "its front at the path"
     assert re.fullmatch(r"1 first, bus_2 \d\.\d s later", words)
 
 
@@ -51,12 +59,17 @@ def test_every_vehicle_moves_on_tf_and_in_the_markers(start, client):
     run = hand_made_run()
     for topic in TOPICS:
         client.announce(topic)
-    for topic, data, _ in result_messages(replace(run, generated=replace(run.generated, scenarios=run.generated.scenarios[:1]))):
+    for topic, data, _ in result_messages(
+        replace(run, generated=replace(run.generated, scenarios=run.generated.scenarios[:1]))
+    ):
         if topic in TOPICS:
             client.say(topic, data)
 
     def moved() -> list[dict[str, np.ndarray]]:
-        return [{child: pose for _, _, child, pose in decode_frames(data)} for data in list(client.heard["/tf"])]
+        return [
+            {child: pose for _, _, child, pose in decode_frames(data)}
+            for data in list(client.heard["/tf"])
+        ]
 
     def x() -> np.ndarray:
         return np.array([frames["preview/vehicle_1"][0] for frames in moved()])
@@ -65,4 +78,7 @@ def test_every_vehicle_moves_on_tf_and_in_the_markers(start, client):
     client.until(lambda: np.ptp(x()) == pytest.approx(30.0, abs=1.0), "all of its way")
     assert all(set(frames) == {"preview/vehicle_1", "preview/vehicle_bus_2"} for frames in moved())
     client.wait("preview")
-    assert all(word in client.heard["preview"][-1] for word in (b"box_1", b"text_bus_2", b"changepoint_0_0", b"m/s"))
+    assert all(
+        word in client.heard["preview"][-1]
+        for word in (b"box_1", b"text_bus_2", b"changepoint_0_0", b"m/s")
+    )

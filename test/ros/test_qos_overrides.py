@@ -18,7 +18,10 @@ def test_the_quality_of_a_topic_is_overridden_and_that_of_others_is_not(start, c
     start("road_server", road_name="straight", **overrides)
     for topic in ("/map", "/road/info"):
         client.until(lambda topic=topic: client.node.count_publishers(topic), topic)
-    offered = {topic: client.node.get_publishers_info_by_topic(topic)[0].qos_profile for topic in ("/map", "/road/info")}
+    offered = {
+        topic: client.node.get_publishers_info_by_topic(topic)[0].qos_profile
+        for topic in ("/map", "/road/info")
+    }
     assert offered["/map"].reliability is ReliabilityPolicy.BEST_EFFORT
     assert offered["/map"].durability is DurabilityPolicy.VOLATILE
     assert offered["/road/info"].reliability is ReliabilityPolicy.RELIABLE

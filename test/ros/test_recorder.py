@@ -51,23 +51,33 @@ def test_any_type_is_recorded_as_it_was_sent(start, client, tmp_path):
         outline.polygon.points = [Point32(x=float(n)) for n in range(k)]
         for topic, out, message in (("/imu", imu, reading), ("/area", area, outline)):
             sent[topic].append(serialize_message(message))
-            out.publish(sent[topic][-1])  # these bytes: what fills CDR's gaps may differ from one serialisation to the next
+            out.publish(
+                sent[topic][-1]
+            )  # these bytes: what fills CDR's gaps may differ from one serialisation to the next
     whole = sum(len(data) for messages in sent.values() for data in messages)
-    client.until(lambda: client.counted("/area") == 50 and client.counted("/imu") == 50, f"{whole} bytes in the bag")
+    client.until(
+        lambda: client.counted("/area") == 50 and client.counted("/imu") == 50,
+        f"{whole} bytes in the bag",
+    )
     ended(recorder)
     assert {topic.name: topic.type for topic in bag_topics(bag)} == {
         "/imu": "sensor_msgs/msg/Imu",
         "/area": "geometry_msgs/msg/PolygonStamped",
     }
     for topic, messages in sent.items():
-        assert [m.data for m in read_messages(bag, lambda name, topic=topic: name == topic)] == messages
+        assert [
+            m.data for m in read_messages(bag, lambda name, topic=topic: name == topic)
+        ] == messages
     with (bag / "bag_0.mcap").open("rb") as stream:
         summary = make_reader(stream).get_summary()
     texts = {schema.name: schema.data.decode() for schema in summary.schemas.values()}
     assert (
-        "orientation_covariance" in texts["sensor_msgs/msg/Imu"] and "MSG: geometry_msgs/Vector3" in texts["sensor_msgs/msg/Imu"]
+        "orientation_covariance" in texts["sensor_msgs/msg/Imu"]
+        and "MSG: geometry_msgs/Vector3" in texts["sensor_msgs/msg/Imu"]
     )
-    assert all(c.metadata["topic_type_hash"].startswith("RIHS01_") for c in summary.channels.values())
+    assert all(
+        c.metadata["topic_type_hash"].startswith("RIHS01_") for c in summary.channels.values()
+    )
 
 
 def test_a_full_disk_ends_the_recording_and_says_so(start, client, tmp_path):
@@ -89,19 +99,30 @@ def test_a_full_disk_ends_the_recording_and_says_so(start, client, tmp_path):
         client.hear("/diagnostics")
 
         def errors():
-            statuses = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+            statuses = [
+                status
+                for data in client.heard["/diagnostics"]
+                for status in decode_diagnostics(data)[1]
+            ]
             return [
-                status.message for status in statuses if status.name == "/recorder: recording" and status.level is Level.ERROR
+                status.message
+                for status in statuses
+                if status.name == "/recorder: recording" and status.level is Level.ERROR
             ]
 
         for k in range(120):  # 6 MB
             picture.publish(CompressedImage(format=str(k), data=bytes(50_000)))
-            client.until(lambda due=k - 40: errors() or client.counted("/picture") >= due, "the recorder to keep up")
+            client.until(
+                lambda due=k - 40: errors() or client.counted("/picture") >= due,
+                "the recorder to keep up",
+            )
         client.until(errors, "an error of the recorder")
         assert "No space left on device" in errors()[0] and "bag_0.mcap" in errors()[0]
         assert recorder.poll() is None
         ended(recorder)
-        saved = CliRunner().invoke(app, ["reindex", str(disk / "bag"), "--out", str(tmp_path / "saved")])
+        saved = CliRunner().invoke(
+            app, ["reindex", str(disk / "bag"), "--out", str(tmp_path / "saved")]
+        )
         assert saved.exit_code == 0, saved.output
         assert 40 <= len(list(read_messages(tmp_path / "saved"))) <= 80
     finally:
@@ -112,13 +133,21 @@ def test_a_full_disk_ends_the_recording_and_says_so(start, client, tmp_path):
 
 @pytest.mark.data
 @pytest.mark.parametrize("storage", [pytest.param("mcap", marks=pytest.mark.long), "sqlite3"])
-def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(start, client, data, tmp_path, storage):
+def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(
+    start, client, data, tmp_path, storage
+):
     """What `ros2 bag record` wrote goes through the player and the recorder unchanged, and is split by size."""
     from std_srvs.srv import Trigger
 
     source, copy = data / "bags" / storage / "talker", tmp_path / "copy"
-    kept = [word for p in ("durability:=transient_local", "depth:=10") for word in ("-p", f"qos_overrides./topic.publisher.{p}")]
-    player = start("player", *kept, bag=source, topics="/topic", paused=True, rate=100.0)  # a late match loses nothing
+    kept = [
+        word
+        for p in ("durability:=transient_local", "depth:=10")
+        for word in ("-p", f"qos_overrides./topic.publisher.{p}")
+    ]
+    player = start(
+        "player", *kept, bag=source, topics="/topic", paused=True, rate=100.0
+    )  # a late match loses nothing
     recorder = start("recorder", bag=copy, topics="/topic", split_bytes=100)
     client.until(lambda: client.node.count_subscribers("/topic") > 0, "a subscriber of /topic")
     client.until(lambda: client.node.count_publishers("/topic") > 0, "a publisher of /topic")
@@ -138,14 +167,30 @@ def test_the_player_takes_other_names_and_other_qualities_of_service(start, clie
 
     bag = data / "bags" / "mcap" / "talker"
     overrides = ("reliability:=best_effort", "durability:=transient_local", "depth:=3")
-    words = [word for policy in overrides for word in ("-p", f"qos_overrides./topic.publisher.{policy}")]
+    words = [
+        word for policy in overrides for word in ("-p", f"qos_overrides./topic.publisher.{policy}")
+    ]
     start("player", "-r", "/topic:=/here/other", *words, bag=bag, topics="/topic", paused=True)
-    client.until(lambda: client.node.count_publishers("/here/other") > 0, "the topic under its other name")
+    client.until(
+        lambda: client.node.count_publishers("/here/other") > 0, "the topic under its other name"
+    )
     (offer,) = client.node.get_publishers_info_by_topic("/here/other")
-    assert offer.qos_profile.reliability == ReliabilityPolicy.RELIABLE  # the override names the topic as it is published
+    assert (
+        offer.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+    )  # the override names the topic as it is published
     assert client.node.count_publishers("/topic") == 0
     words = [word.replace("/topic.", "/here/other.") for word in words]
-    start("player", "-r", "/topic:=/here/other", "-r", "__node:=second", *words, bag=bag, topics="/topic", paused=True)
+    start(
+        "player",
+        "-r",
+        "/topic:=/here/other",
+        "-r",
+        "__node:=second",
+        *words,
+        bag=bag,
+        topics="/topic",
+        paused=True,
+    )
     client.until(lambda: client.node.count_publishers("/here/other") == 2, "the second player")
     offers = [info.qos_profile for info in client.node.get_publishers_info_by_topic("/here/other")]
     changed = (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL)
@@ -154,32 +199,59 @@ def test_the_player_takes_other_names_and_other_qualities_of_service(start, clie
 
 def test_a_recorder_keeps_to_its_namespace(start, client, tmp_path):
     """By default it records the suite's topics there, ego/* too, and what is of the whole domain; at the root those of all."""
-    from geometry_msgs.msg import TransformStamped  # in place of tf2_msgs, which is not among the wheels; the name decides
+    from geometry_msgs.msg import (
+        TransformStamped,
+    )  # in place of tf2_msgs, which is not among the wheels; the name decides
     from nav_msgs.msg import Odometry
     from rosgraph_msgs.msg import Clock
     from std_msgs.msg import String
 
-    kinds = {"/a/ego/start": Odometry, "/a/deep/ego/goal": Odometry, "/b/ego/start": Odometry, "/ab/ego/start": Odometry}
-    kinds |= {"/clock": Clock, "/tf": TransformStamped, "/tf_static": TransformStamped, "/a/other": String, "/other": String}
+    kinds = {
+        "/a/ego/start": Odometry,
+        "/a/deep/ego/goal": Odometry,
+        "/b/ego/start": Odometry,
+        "/ab/ego/start": Odometry,
+    }
+    kinds |= {
+        "/clock": Clock,
+        "/tf": TransformStamped,
+        "/tf_static": TransformStamped,
+        "/a/other": String,
+        "/other": String,
+    }
     recorders = {
         "/": start("recorder", bag=tmp_path / "root", compress=False),
         "/a": start("recorder", "-r", "__ns:=/a", bag=tmp_path / "own", compress=False),
     }
-    heard = {topic: len(recorders) for topic in ("/a/ego/start", "/a/deep/ego/goal", "/clock", "/tf", "/tf_static")}
+    heard = {
+        topic: len(recorders)
+        for topic in ("/a/ego/start", "/a/deep/ego/goal", "/clock", "/tf", "/tf_static")
+    }
     heard |= {"/b/ego/start": 1, "/ab/ego/start": 1}
-    made = {topic: client.node.create_publisher(kind, topic, QUEUE) for topic, kind in kinds.items()}
+    made = {
+        topic: client.node.create_publisher(kind, topic, QUEUE) for topic, kind in kinds.items()
+    }
     for topic, count in heard.items():
-        client.until(lambda out=made[topic], n=count: out.get_subscription_count() == n, f"{count} subscribers of {topic}")
+        client.until(
+            lambda out=made[topic], n=count: out.get_subscription_count() == n,
+            f"{count} subscribers of {topic}",
+        )
     for topic, out in made.items():
         out.publish(kinds[topic]())
     wanted = {"/": set(heard), "/a": set(heard) - {"/b/ego/start", "/ab/ego/start"}}
     for space, topics in wanted.items():
         node = f"{space.rstrip('/')}/recorder"
-        client.until(lambda n=node, t=topics: all(client.counted(one, n) == 1 for one in t), f"{len(topics)} messages of {node}")
+        client.until(
+            lambda n=node, t=topics: all(client.counted(one, n) == 1 for one in t),
+            f"{len(topics)} messages of {node}",
+        )
     for process in recorders.values():
         ended(process)
     bags = {"/": tmp_path / "root", "/a": tmp_path / "own"}
-    assert {space: {m.topic for m in read_messages(bag)} - {"/diagnostics"} for space, bag in bags.items()} == wanted
+    assert {
+        space: {m.topic for m in read_messages(bag)} - {"/diagnostics"}
+        for space, bag in bags.items()
+    } == wanted
 
 
 def test_the_player_ends_when_all_is_played_and_heard(start, client):
@@ -188,24 +260,33 @@ def test_the_player_ends_when_all_is_played_and_heard(start, client):
     from msg_conventions.topics import topic_entry
 
     bag = RESOURCES / "synthetic_c"
-    played = [m for m in read_messages(bag) if topic_entry(m.topic)[0] == "sensor_msgs/msg/NavSatFix"]
+    played = [
+        m for m in read_messages(bag) if topic_entry(m.topic)[0] == "sensor_msgs/msg/NavSatFix"
+    ]
     topics = sorted({f"/{m.topic.lstrip('/')}" for m in played})
     process = start("player", bag=bag, paused=True, rate=1000.0, clock=True)
     client.hear(*topics)
     for topic in topics:
-        client.until(lambda name=topic: client.node.count_publishers(name) == 1, f"a publisher of {topic}")
+        client.until(
+            lambda name=topic: client.node.count_publishers(name) == 1, f"a publisher of {topic}"
+        )
     client.until(lambda: client.node.count_publishers("/clock") == 1, "one publisher of /clock")
     assert client.call(Trigger, "/player/resume", Trigger.Request()).success
     output, _ = process.communicate(timeout=180.0)
     assert process.returncode == 0 and "played" in output and "Traceback" not in output, output
-    assert {topic: len(client.heard[topic]) for topic in topics} == Counter(f"/{m.topic.lstrip('/')}" for m in played)
+    assert {topic: len(client.heard[topic]) for topic in topics} == Counter(
+        f"/{m.topic.lstrip('/')}" for m in played
+    )
 
 
 def test_the_player_stays_if_it_is_told_to(start, client):
     bag = RESOURCES / "synthetic_c"
     process = start("player", bag=bag, rate=1000.0, stay=True)
     client.until(lambda: "played" in process.output(), "its end")
-    client.until(lambda: ("player", "/") in client.node.get_node_names_and_namespaces(), "the player in the graph")
+    client.until(
+        lambda: ("player", "/") in client.node.get_node_names_and_namespaces(),
+        "the player in the graph",
+    )
     assert process.poll() is None
     ended(process)
 

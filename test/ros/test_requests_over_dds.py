@@ -28,7 +28,10 @@ MOVED = {"starts": "2: 53 4.57 0 9.5", "goals": "1: 19 8.07 3.1413 11"}
 def suite(tmp_path_factory, domain):
     """All nodes but the evaluator, at work on one log."""
     folder = tmp_path_factory.mktemp("requests")
-    arguments = {node: ["-p", f"seed:={SEED}"] if node in ("segmenter", "planner", "gp_sampler") else [] for node in CHAIN}
+    arguments = {
+        node: ["-p", f"seed:={SEED}"] if node in ("segmenter", "planner", "gp_sampler") else []
+        for node in CHAIN
+    }
     arguments["log_player"] = ["-p", f"log_path:={LOG}"]
     arguments["road_server"] = ["-p", f"road_name:={ROAD}", "-p", "wait_for_tracks:=true"]
     arguments["gp_sampler"] += ["-p", "count:=2"]
@@ -50,11 +53,18 @@ def published(client, result):
     request = re.match(r"request (\d+)", result.reason)[1]
 
     def accounts():
-        return [s.values for s in client.statuses("/scenarios/info") if s.values["request"] == request]
+        return [
+            s.values for s in client.statuses("/scenarios/info") if s.values["request"] == request
+        ]
 
     client.until(lambda: any("published" in values for values in accounts()), "the account")
     own = [values for values in accounts() if "sha256" in values]
-    client.until(lambda: {v["sha256"] for v in own} <= {digest(data) for data in client.heard["/scenarios"]}, "the scenarios")
+    client.until(
+        lambda: (
+            {v["sha256"] for v in own} <= {digest(data) for data in client.heard["/scenarios"]}
+        ),
+        "the scenarios",
+    )
     return [values["sha256"] for values in own], own
 
 
@@ -66,14 +76,20 @@ def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
     encounter, made = in_process(3, ego="1")
     digests, accounts = published(client, result)
     assert digests == [digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios]
-    witnesses = [digest(encode_scenario(s.reference_drive, encounter.start_ns)) for s in made.scenarios]
+    witnesses = [
+        digest(encode_scenario(s.reference_drive, encounter.start_ns)) for s in made.scenarios
+    ]
     assert [values["ego_witness"] for values in accounts] == witnesses
-    client.until(lambda: set(witnesses) <= set(map(digest, client.heard["/ego/witness"])), "the witnesses")
+    client.until(
+        lambda: set(witnesses) <= set(map(digest, client.heard["/ego/witness"])), "the witnesses"
+    )
     for topic, data in ego_messages(made.ego, "map", encounter.start_ns):
         assert client.wait(f"/{topic}")[-1] == data, topic
     stamp, frame, child, state = decode_state(client.heard["/ego/start"][-1])
     assert (stamp, frame, child) == (encounter.start_ns, "map", "vehicle_1")
-    assert all(values["ego"] == "1" and values["ego_start"] == str(state.tolist()) for values in accounts)
+    assert all(
+        values["ego"] == "1" and values["ego_start"] == str(state.tolist()) for values in accounts
+    )
 
 
 def test_the_same_bytes_as_in_process_with_states(suite, client):
@@ -82,11 +98,13 @@ def test_the_same_bytes_as_in_process_with_states(suite, client):
     result = client.generate(count=3, **MOVED)
     assert result.successful, result.reason
     encounter, made = in_process(3, **MOVED)
-    assert published(client, result)[0] == [digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios]
+    assert published(client, result)[0] == [
+        digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios
+    ]
     plain = client.generate(count=2)
-    assert published(client, plain)[0] == [digest(encode_scenario(s, encounter.start_ns)) for s in in_process(2)[1].scenarios], (
-        "states are valid for their call only"
-    )
+    assert published(client, plain)[0] == [
+        digest(encode_scenario(s, encounter.start_ns)) for s in in_process(2)[1].scenarios
+    ], "states are valid for their call only"
 
 
 def test_what_is_impossible_is_refused_and_the_nearest_is_possible(suite, client):
@@ -98,7 +116,11 @@ def test_what_is_impossible_is_refused_and_the_nearest_is_possible(suite, client
     nearest = re.search(r"goals:='([^']*)'", result.reason.partition("Nearest possible: ")[2])[1]
     taken = client.generate(count=2, goals=nearest)
     assert taken.successful and "2 of 2" in taken.reason
-    for values, said in (({"ego": "9"}, "there are: 1, 2"), ({"starts": "1: a"}, "starts"), ({"goals": "7: 0 0 0"}, "'7'")):
+    for values, said in (
+        ({"ego": "9"}, "there are: 1, 2"),
+        ({"starts": "1: a"}, "starts"),
+        ({"goals": "7: 0 0 0"}, "'7'"),
+    ):
         refused = client.generate(**values)
         assert not refused.successful and said in refused.reason
 
@@ -109,7 +131,10 @@ def test_all_of_it_is_in_the_bag(suite, client):
     results = [client.generate(ego="2", count=2), client.generate(count=2, **MOVED)]
     digests = [published(client, result)[0] for result in results]
     for topic in ("/scenarios", "/scenarios/info"):
-        client.until(lambda topic=topic: client.counted(topic) >= len(client.heard[topic]), f"{topic} in the bag")
+        client.until(
+            lambda topic=topic: client.counted(topic) >= len(client.heard[topic]),
+            f"{topic} in the bag",
+        )
     suite.end()
     bag = suite.folder / "bag"
     (found,) = validate_bag(bag)

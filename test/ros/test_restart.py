@@ -26,10 +26,15 @@ def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, clie
     def processes(name, nodes):
         (tmp_path / name).mkdir()
         return Processes(
-            tmp_path / name, domain, {node: NODES[node] for node in nodes}, apart=("segmenter", "planner", "gp_sampler")
+            tmp_path / name,
+            domain,
+            {node: NODES[node] for node in nodes},
+            apart=("segmenter", "planner", "gp_sampler"),
         )
 
-    client.hear("/scenarios", "/scenarios/info", "/changepoints", "/fit", "/vehicle_1/route", "/report")
+    client.hear(
+        "/scenarios", "/scenarios/info", "/changepoints", "/fit", "/vehicle_1/route", "/report"
+    )
     suites = [processes("first", NODES)]
     try:
         first = list(client.wait("/scenarios", 3))
@@ -38,7 +43,11 @@ def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, clie
         for node in ("segmenter", "planner"):
             os.kill(suites[0].pids[node], signal.SIGKILL)
         suites.append(processes("second", ("segmenter", "planner")))
-        for topic in ("/changepoints", "/fit", "/vehicle_1/route"):  # the latched inputs came again
+        for topic in (
+            "/changepoints",
+            "/fit",
+            "/vehicle_1/route",
+        ):  # the latched inputs came again
             assert len(set(client.wait(topic, 2))) == 1, topic
         # the sampler, which lives, heard the same inputs again and made nothing of them: this is its second request
         result = client.generate(count=1, seed=9)
@@ -47,7 +56,9 @@ def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, clie
 
         os.kill(suites[0].pids["gp_sampler"], signal.SIGKILL)
         suites.append(processes("third", ("gp_sampler",)))
-        assert client.wait("/scenarios", 7) == [*first, other, *first], "the same set again, for late joiners"
+        assert client.wait("/scenarios", 7) == [*first, other, *first], (
+            "the same set again, for late joiners"
+        )
         client.wait("/scenarios/info", 4 + 2 + 4)
         infos = [decode_diagnostics(data)[1][0].values for data in client.heard["/scenarios/info"]]
         assert [values["request"] for values in infos if "published" in values] == ["1", "2", "1"]
@@ -57,4 +68,8 @@ def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, clie
     finally:
         codes = [suite.end() for suite in suites]
     killed = dict.fromkeys(("segmenter", "planner", "gp_sampler"), -signal.SIGKILL)
-    assert codes == [dict.fromkeys(NODES, 0) | killed, {"segmenter": 0, "planner": 0}, {"gp_sampler": 0}]
+    assert codes == [
+        dict.fromkeys(NODES, 0) | killed,
+        {"segmenter": 0, "planner": 0},
+        {"gp_sampler": 0},
+    ]

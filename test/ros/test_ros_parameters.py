@@ -34,7 +34,13 @@ def test_a_real_number_is_taken_as_any_tool_writes_it(number):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("ego", True), ("limits.car.max_speed", "fast"), ("limits.car.max_speed", True), ("count", "5"), ("count", 5.0)],
+    [
+        ("ego", True),
+        ("limits.car.max_speed", "fast"),
+        ("limits.car.max_speed", True),
+        ("count", "5"),
+        ("count", 5.0),
+    ],
 )
 def test_what_can_only_be_a_mistake_is_refused(name, value):
     with pytest.raises(InputError, match=name.rpartition(".")[2]):
@@ -45,8 +51,12 @@ def dumped(client: Client, node: str) -> dict[str, object]:
     """What `ros2 param dump` asks for: every parameter of a node and its value."""
     from rcl_interfaces.srv import GetParameters, ListParameters
 
-    names = client.call(ListParameters, f"{node}/list_parameters", ListParameters.Request()).result.names
-    values = client.call(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names)).values
+    names = client.call(
+        ListParameters, f"{node}/list_parameters", ListParameters.Request()
+    ).result.names
+    values = client.call(
+        GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names)
+    ).values
     return dict(zip(names, map(parameter_value_to_python, values), strict=True))
 
 
@@ -55,8 +65,14 @@ def loaded(client: Client, node: str, path) -> dict[str, str]:
     from rcl_interfaces.srv import SetParameters
 
     messages = list(parameter_dict_from_yaml_file(str(path)).values())
-    results = client.call(SetParameters, f"{node}/set_parameters", SetParameters.Request(parameters=messages)).results
-    return {message.name: result.reason for message, result in zip(messages, results, strict=True) if not result.successful}
+    results = client.call(
+        SetParameters, f"{node}/set_parameters", SetParameters.Request(parameters=messages)
+    ).results
+    return {
+        message.name: result.reason
+        for message, result in zip(messages, results, strict=True)
+        if not result.successful
+    }
 
 
 @pytest.mark.dds
@@ -77,7 +93,16 @@ def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
     bag = ("-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "paused:=true")
     player = start_nodes("player", "--ros-args", "-r", "__ns:=/a", *bag, **where)
     try:
-        for name in ("gp_sampler", "log_player", "road_server", "segmenter", "planner", "evaluator", "recorder", "player"):
+        for name in (
+            "gp_sampler",
+            "log_player",
+            "road_server",
+            "segmenter",
+            "planner",
+            "evaluator",
+            "recorder",
+            "player",
+        ):
             node = f"/a/{name}"
             before = dumped(client, node)
             assert RESERVED in before
@@ -89,14 +114,36 @@ def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
                 key: (type(value), value) for key, value in before.items()
             }
             if name == "gp_sampler":
-                assert before["ego"] == "21202" and before["starts"] == "21202:10.5 -1.75 0.0 8.0; 2:3 4 1.5"
-                assert type(before["limits.car.max_speed"]) is float and before["limits.time_resolution"] == 1e-6
-                file.write_text(
-                    yaml.dump({node: {"ros__parameters": {RESERVED: False, "ego": 7, "limits": {"car": {"max_speed": 30}}}}})
+                assert (
+                    before["ego"] == "21202"
+                    and before["starts"] == "21202:10.5 -1.75 0.0 8.0; 2:3 4 1.5"
                 )
-                assert set(loaded(client, node, file)) == {RESERVED}, "what is read-only is not changed"
+                assert (
+                    type(before["limits.car.max_speed"]) is float
+                    and before["limits.time_resolution"] == 1e-6
+                )
+                file.write_text(
+                    yaml.dump(
+                        {
+                            node: {
+                                "ros__parameters": {
+                                    RESERVED: False,
+                                    "ego": 7,
+                                    "limits": {"car": {"max_speed": 30}},
+                                }
+                            }
+                        }
+                    )
+                )
+                assert set(loaded(client, node, file)) == {RESERVED}, (
+                    "what is read-only is not changed"
+                )
                 changed = dumped(client, node)
-                assert (changed["ego"], changed["limits.car.max_speed"], changed[RESERVED]) == ("7", 30.0, True)
+                assert (changed["ego"], changed["limits.car.max_speed"], changed[RESERVED]) == (
+                    "7",
+                    30.0,
+                    True,
+                )
                 assert type(changed["limits.car.max_speed"]) is float
             if name == "log_player":
                 assert before["log.vehicles"] == "21202"

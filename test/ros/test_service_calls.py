@@ -60,7 +60,9 @@ def calls() -> Iterator[Call]:
             if line.startswith("ros2 service call"):
                 _, _, _, name, kind, *more = shlex.split(line)
                 assert below.startswith("# {"), f"no answer below {line}"
-                yield Call(name, kind, yaml.safe_load(more[0]) if more else {}, yaml.safe_load(below[2:]))
+                yield Call(
+                    name, kind, yaml.safe_load(more[0]) if more else {}, yaml.safe_load(below[2:])
+                )
 
 
 def fill(message: Any, values: dict[str, Any]) -> None:
@@ -80,7 +82,9 @@ def _fill(message: Any, values: dict[str, Any]) -> None:
         field = getattr(message, name)
         if hasattr(field, "get_fields_and_field_types"):
             _fill(field, value)
-        elif isinstance(field, list) and (element := re.fullmatch(r"sequence<(\w+)/(\w+)>", kinds[name])):
+        elif isinstance(field, list) and (
+            element := re.fullmatch(r"sequence<(\w+)/(\w+)>", kinds[name])
+        ):
             kind = getattr(importlib.import_module(f"{element[1]}.msg"), element[2])
             made = [kind() for _ in value]
             for one, entry in zip(made, value, strict=True):
@@ -95,16 +99,28 @@ def _fill(message: Any, values: dict[str, Any]) -> None:
 def differences(answer: Any, wanted: Any, where: str = "") -> list[str]:
     """Where a message is not as a page says; `…` in a text stands for any other."""
     if isinstance(wanted, dict):
-        return [text for key, value in wanted.items() for text in differences(getattr(answer, key), value, f"{where}.{key}")]
+        return [
+            text
+            for key, value in wanted.items()
+            for text in differences(getattr(answer, key), value, f"{where}.{key}")
+        ]
     if isinstance(wanted, str):
         pattern = ".*".join(map(re.escape, wanted.split("…")))
-        return [] if re.fullmatch(pattern, answer, re.DOTALL) else [f"{where}: {answer!r} is not {wanted!r}"]
+        return (
+            []
+            if re.fullmatch(pattern, answer, re.DOTALL)
+            else [f"{where}: {answer!r} is not {wanted!r}"]
+        )
     return [] if answer == wanted else [f"{where}: {answer!r} is not {wanted!r}"]
 
 
 def test_every_service_of_the_list_is_called():
     services = TEXT.partition("## Services\n\n")[2].partition("\n\n")[0]
-    listed = {name for row in re.findall(r"^- (`.*?) \(", services, re.MULTILINE) for name in re.findall(r"`([\w/]+)`", row)}
+    listed = {
+        name
+        for row in re.findall(r"^- (`.*?) \(", services, re.MULTILINE)
+        for name in re.findall(r"`([\w/]+)`", row)
+    }
     assert len(listed) > 10
     assert {call.name.lstrip("/") for call in calls()} == listed
     for call in calls():
@@ -132,10 +148,20 @@ def test_the_calls_are_answered_as_the_page_says(suite, client):
     echo = re.search(r"topic echo /diagnostics --filter \"(.*)\"", TEXT)[1]
 
     def large_is_at_work() -> bool:
-        messages = [deserialize_message(data, DiagnosticArray) for data in list(client.heard["/diagnostics"])]
+        messages = [
+            deserialize_message(data, DiagnosticArray)
+            for data in list(client.heard["/diagnostics"])
+        ]
         shown = [m for m in messages if eval(echo, {"m": m})]
-        pairs = [{pair.key: pair.value for pair in s.values} for m in shown for s in m.status if s.name.endswith("progress")]
-        return any(values.get("request") == "large" and int(values["accepted"]) > 0 for values in pairs)
+        pairs = [
+            {pair.key: pair.value for pair in s.values}
+            for m in shown
+            for s in m.status
+            if s.name.endswith("progress")
+        ]
+        return any(
+            values.get("request") == "large" and int(values["accepted"]) > 0 for values in pairs
+        )
 
     later, wrong, begun = [], [], time.monotonic()
     for call in calls():
@@ -143,13 +169,20 @@ def test_the_calls_are_answered_as_the_page_says(suite, client):
             later.append((call, client.call_later(call.kind, call.name, call.made())))
             client.until(large_is_at_work, "progress of the large request")
             continue
-        wrong += [f"{call.name}{text}" for text in differences(client.call(call.kind, call.name, call.made()), call.answer)]
+        wrong += [
+            f"{call.name}{text}"
+            for text in differences(client.call(call.kind, call.name, call.made()), call.answer)
+        ]
         if call.name == "/gp_sampler/cancel_request":
             for asked, future in later:
                 client.until(future.done, "the answer of what was cancelled")
-                wrong += [f"{asked.name}{text}" for text in differences(future.result(), asked.answer)]
+                wrong += [
+                    f"{asked.name}{text}" for text in differences(future.result(), asked.answer)
+                ]
     assert wrong == []
     assert len(later) == 1
     assert [path.is_dir() for path in suite.folder.glob("bag_*")] == [True]
     lines = [line for line in suite.log("gp_sampler").splitlines() if "request large:" in line]
-    assert len(lines) < 10 + time.monotonic() - begun, "about a line for a second, not one for each scenario"
+    assert len(lines) < 10 + time.monotonic() - begun, (
+        "about a line for a second, not one for each scenario"
+    )

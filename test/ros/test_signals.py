@@ -32,15 +32,37 @@ def _forked(node: str, domain: int, *arguments: str) -> Forked:
     return start_nodes(node, "--ros-args", *arguments, ROS_DOMAIN_ID=str(domain))
 
 
-ENDS = {"once": (signal.SIGINT,), "twice": (signal.SIGINT, signal.SIGINT), "terminated": (signal.SIGTERM,)}
+ENDS = {
+    "once": (signal.SIGINT,),
+    "twice": (signal.SIGINT, signal.SIGINT),
+    "terminated": (signal.SIGTERM,),
+}
 
 
 def test_a_recorder_closes_its_bag(domain, tmp_path):
     """Three recorders of one player, each ended in its own way."""
-    player = _forked("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=50.0", "-p", "loop:=true")
+    player = _forked(
+        "player",
+        domain,
+        "-p",
+        f"bag:={RESOURCES / 'synthetic_c'}",
+        "-p",
+        "rate:=50.0",
+        "-p",
+        "loop:=true",
+    )
     recording = ("-p", "topics:=/?vehicle_.*", "-p", "compress:=false")
     recorders = {
-        name: _forked("recorder", domain, "-r", f"__node:={name}", "-p", f"bag:={tmp_path / name}", *recording) for name in ENDS
+        name: _forked(
+            "recorder",
+            domain,
+            "-r",
+            f"__node:={name}",
+            "-p",
+            f"bag:={tmp_path / name}",
+            *recording,
+        )
+        for name in ENDS
     }
     try:
         deadline = time.monotonic() + 180.0
@@ -105,7 +127,11 @@ def test_a_node_ends_when_something_waits_for_ever_holding_the_lock_of_python(do
     """Where it was stuck is said."""
     environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
     process = subprocess.Popen(
-        [sys.executable, "-c", STUCK, place], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
+        [sys.executable, "-c", STUCK, place],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=environment,
     )
     try:
         assert process.stdout is not None and process.stdout.readline() == "ready\n"

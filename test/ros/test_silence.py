@@ -53,7 +53,9 @@ def spun(node, condition) -> None:
         rclpy.spin_once(node, timeout_sec=0.02)
 
 
-@pytest.mark.parametrize(("cleaned", "fails"), [(False, False), (True, True)], ids=["deactivate", "cleanup"])
+@pytest.mark.parametrize(
+    ("cleaned", "fails"), [(False, False), (True, True)], ids=["deactivate", "cleanup"]
+)
 def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch, cleaned, fails):
     """And a node that is active again publishes what is done then."""
     from scenario_gen.ros.nodes import segmenter
@@ -76,13 +78,18 @@ def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch
         node.trigger_deactivate()
         if cleaned:
             node.trigger_cleanup()
-        client.until(lambda: client.node.count_publishers("/changepoints") == (0 if cleaned else 1), "what is offered")
+        client.until(
+            lambda: client.node.count_publishers("/changepoints") == (0 if cleaned else 1),
+            "what is offered",
+        )
         gate.opened.set()
         worker.join(180.0)
         assert not worker.is_alive()
         spun(node, lambda: _said(client).endswith("unconfigured" if cleaned else "inactive"))
         names = {s.name for s in client.statuses()}
-        assert names == {"/segmenter: state"}, "of its work a node says nothing when it is not active"
+        assert names == {"/segmenter: state"}, (
+            "of its work a node says nothing when it is not active"
+        )
         assert not any(client.heard[topic] for topic in OUTPUTS)
         if cleaned:
             node.trigger_configure()
@@ -95,7 +102,9 @@ def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch
         node.destroy_node()
 
 
-def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(ros, client: Client):
+def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
+    ros, client: Client
+):
     from scenario_gen.ros.nodes.evaluator import Evaluator
 
     node = Evaluator()
@@ -106,10 +115,20 @@ def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
         spun(node, lambda: _said(client).endswith("active"))
         for k in range(node.config.wait + 1):
             entry = {"request": str(k), "index": "0", "seed": "0", "sha256": f"{k:064x}"}
-            node.received("scenarios/info", encode_diagnostics([Status("scenario", Level.OK, "", entry)], 0))
+            node.received(
+                "scenarios/info", encode_diagnostics([Status("scenario", Level.OK, "", entry)], 0)
+            )
             closing = {"request": str(k), "published": "1", "requested": "1"}
-            node.received("scenarios/info", encode_diagnostics([Status("request", Level.OK, "", closing)], 0))
-        spun(node, lambda: "request 0: 0 of 1 scenarios are there, 1 are missing; it is not evaluated" in _said(client))
+            node.received(
+                "scenarios/info", encode_diagnostics([Status("request", Level.OK, "", closing)], 0)
+            )
+        spun(
+            node,
+            lambda: (
+                "request 0: 0 of 1 scenarios are there, 1 are missing; it is not evaluated"
+                in _said(client)
+            ),
+        )
     finally:
         node.destroy_node()
 

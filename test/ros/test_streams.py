@@ -24,10 +24,19 @@ def test_bytes_are_read_by_rclpy():
     for frame in ("a", "ab", "abcdef"):
         data = encode_fix(42.25, -83.5, 1_500_000_000, frame)
         fix = deserialize_message(data, NavSatFix)
-        assert (fix.latitude, fix.longitude, fix.status.status, fix.status.service) == (42.25, -83.5, 0, 1)
+        assert (fix.latitude, fix.longitude, fix.status.status, fix.status.service) == (
+            42.25,
+            -83.5,
+            0,
+            1,
+        )
         assert len(serialize_message(fix)) == len(data)
         twist = deserialize_message(encode_speed(3.25, 7, frame), TwistStamped)
-        assert (twist.twist.linear.x, twist.header.stamp.nanosec, twist.header.frame_id) == (3.25, 7, frame)
+        assert (twist.twist.linear.x, twist.header.stamp.nanosec, twist.header.frame_id) == (
+            3.25,
+            7,
+            frame,
+        )
 
 
 def test_every_sample_is_streamed_at_twenty_times_its_speed(tmp_path, domain, client):
@@ -39,9 +48,22 @@ def test_every_sample_is_streamed_at_twenty_times_its_speed(tmp_path, domain, cl
     (encounter,) = read_log([LOG]).encounters
     samples = encounter.speed.shape[1]
     clock = []
-    client.node.create_subscription(Clock, "/clock", lambda m: clock.append(m.clock.sec * 10**9 + m.clock.nanosec), 1000)
+    client.node.create_subscription(
+        Clock, "/clock", lambda m: clock.append(m.clock.sec * 10**9 + m.clock.nanosec), 1000
+    )
     client.hear("/vehicle_1/fix", "/vehicle_2/fix", "/vehicle_1/speed", "/vehicle_2/speed")
-    nodes = {"log_player": ["-p", f"log_path:={LOG}", "-p", "stream:=true", "-p", f"rate:={RATE}", "-p", "autostart:=false"]}
+    nodes = {
+        "log_player": [
+            "-p",
+            f"log_path:={LOG}",
+            "-p",
+            "stream:=true",
+            "-p",
+            f"rate:={RATE}",
+            "-p",
+            "autostart:=false",
+        ]
+    }
     made = Processes(tmp_path, domain, nodes)
     try:
         from lifecycle_msgs.msg import Transition
@@ -54,11 +76,20 @@ def test_every_sample_is_streamed_at_twenty_times_its_speed(tmp_path, domain, cl
         client.wait("/vehicle_1/fix", samples - 2)
     finally:
         assert made.end() == {"log_player": 0}
-    assert last.header.stamp.sec * 10**9 + last.header.stamp.nanosec <= encounter.start_ns + (samples - 1) * encounter.dt_ns
-    frame = pyproj.Proj(proj="aeqd", lat_0=encounter.origin[0], lon_0=encounter.origin[1], ellps="WGS84")
+    assert (
+        last.header.stamp.sec * 10**9 + last.header.stamp.nanosec
+        <= encounter.start_ns + (samples - 1) * encounter.dt_ns
+    )
+    frame = pyproj.Proj(
+        proj="aeqd", lat_0=encounter.origin[0], lon_0=encounter.origin[1], ellps="WGS84"
+    )
     for i, token in enumerate(("1", "2")):
-        fixes = [deserialize_message(data, NavSatFix) for data in client.heard[f"/vehicle_{token}/fix"]]
-        stamps = np.array([fix.header.stamp.sec * 10**9 + fix.header.stamp.nanosec for fix in fixes])
+        fixes = [
+            deserialize_message(data, NavSatFix) for data in client.heard[f"/vehicle_{token}/fix"]
+        ]
+        stamps = np.array(
+            [fix.header.stamp.sec * 10**9 + fix.header.stamp.nanosec for fix in fixes]
+        )
         index, rest = np.divmod(stamps - encounter.start_ns, encounter.dt_ns)
         assert not rest.any() and (np.diff(index) == 1).all()
         x, y = frame([fix.longitude for fix in fixes], [fix.latitude for fix in fixes])

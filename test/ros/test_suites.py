@@ -42,7 +42,9 @@ def suites(tmp_path_factory, domains):
         }
         words = [word for key, value in values.items() for word in ("-p", f"{key}:={value}")]
         where = {"ROS_DOMAIN_ID": str(domains[domain]), "ROS_LOG_DIR": str(folder)}
-        running.append(start_nodes("suite", "--namespace", namespace, "--ros-args", *words, **where))
+        running.append(
+            start_nodes("suite", "--namespace", namespace, "--ros-args", *words, **where)
+        )
     yield
     for process in running:
         process.kill()
@@ -61,13 +63,26 @@ def test_each_suite_makes_its_own_scenarios_and_none_meets_another(suites, domai
             heard = clients[domain].wait(f"{namespace}/scenarios", COUNT)
             (encounter,) = read_log(RESOURCES / log).encounters
             case = generate(encounter, road, PipelineConfig(), count=COUNT, seed=seed)
-            expected = [digest(encode_scenario(s, encounter.start_ns)) for s in case.generated.scenarios]
-            assert [digest(data) for data in heard] == expected, "one process must give the bytes that the stages give"
-        assert len(clients[0].heard["/a/scenarios"]) == len(clients[0].heard["/b/scenarios"]) == COUNT
+            expected = [
+                digest(encode_scenario(s, encounter.start_ns)) for s in case.generated.scenarios
+            ]
+            assert [digest(data) for data in heard] == expected, (
+                "one process must give the bytes that the stages give"
+            )
+        assert (
+            len(clients[0].heard["/a/scenarios"]) == len(clients[0].heard["/b/scenarios"]) == COUNT
+        )
         assert not clients[1].heard["/b/scenarios"]
-        spaces = [{space for _, space in client.node.get_node_names_and_namespaces()} for client in clients]
+        spaces = [
+            {space for _, space in client.node.get_node_names_and_namespaces()}
+            for client in clients
+        ]
         assert spaces == [{"/", "/a", "/b"}, {"/", "/a"}]
-        names = [name for name, space in clients[0].node.get_node_names_and_namespaces() if space == "/a"]
+        names = [
+            name
+            for name, space in clients[0].node.get_node_names_and_namespaces()
+            if space == "/a"
+        ]
         assert sorted(names) == sorted(set(NODES) - {"player"})
     finally:
         for client in clients:

@@ -50,11 +50,23 @@ def traffic(start, client, bag):
 
     def run(**parameters):
         process = start("traffic", bag=bag, lock_step=True, **{"follow_on": False, **parameters})
-        client.hear("verdicts", "vehicle_1/odom", "vehicle_bus_2/odom", "/tf", "/clock", "traffic/local_map", "/diagnostics")
+        client.hear(
+            "verdicts",
+            "vehicle_1/odom",
+            "vehicle_bus_2/odom",
+            "/tf",
+            "/clock",
+            "traffic/local_map",
+            "/diagnostics",
+        )
         for topic in ("ego/cmd_vel", "ego/odom", "ego/path"):
             client.announce(topic)
         for topic in ("ego/cmd_vel", "ego/odom", "ego/path", "verdicts"):
-            count = client.node.count_publishers if topic == "verdicts" else client.node.count_subscribers
+            count = (
+                client.node.count_publishers
+                if topic == "verdicts"
+                else client.node.count_subscribers
+            )
             client.until(lambda count=count, topic=topic: count(topic) >= 1, topic)
         return process
 
@@ -79,7 +91,9 @@ class Slow:
         return of_twist(seen.ego, 3.0, 0.0, self.step)
 
 
-def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic, client, tmp_path):
+def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(
+    traffic, client, tmp_path
+):
     from std_srvs.srv import Trigger
 
     traffic(results=tmp_path / "results")
@@ -97,15 +111,26 @@ def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic
     run = hand_made_run()
     loop = ClosedLoop(run.generated.scenarios[0], 0, run.road, ClosedLoopConfig())
     expected = judge(loop, loop.drive(Slow())).document()
-    values = {key: json.loads(value) for key, value in first.values.items() if key != "first_faults"}
+    values = {
+        key: json.loads(value) for key, value in first.values.items() if key != "first_faults"
+    }
     assert values == json.loads(json.dumps(expected))
-    assert (tmp_path / "results" / "drives.json").is_file() and (tmp_path / "results" / "junit.xml").is_file()
+    assert (tmp_path / "results" / "drives.json").is_file() and (
+        tmp_path / "results" / "junit.xml"
+    ).is_file()
 
     told = [decode_odometry(data) for data in client.heard["vehicle_1/odom"][:10]]
-    stamps = sorted({stamp for stamp, *_ in told})  # where everyone is at the start may have been told twice
+    stamps = sorted(
+        {stamp for stamp, *_ in told}
+    )  # where everyone is at the start may have been told twice
     assert np.diff(stamps).tolist() == [100_000_000] * (len(stamps) - 1) and len(stamps) > 5
-    assert all(frame == run.road.frame_id and np.isfinite(state).all() for _, frame, _, state in told)
-    assert {child for _, _, child, _ in decode_frames(client.heard["/tf"][0])} == {"vehicle_1", "vehicle_bus_2"}
+    assert all(
+        frame == run.road.frame_id and np.isfinite(state).all() for _, frame, _, state in told
+    )
+    assert {child for _, _, child, _ in decode_frames(client.heard["/tf"][0])} == {
+        "vehicle_1",
+        "vehicle_bus_2",
+    }
     grid = decode_map(client.heard["traffic/local_map"][0])[1]
     assert not grid.drivable.all() and grid.drivable.any()
 
@@ -120,16 +145,25 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     wrong = {
         "not finite": ("ego/cmd_vel", encode_twist(float("nan"), 0.0)),
         "jumped": ("ego/odom", encode_odometry(far, 0.0, "base_link", frame, 0)),
-        "is not that of the scenario": ("ego/odom", encode_odometry(far, 0.0, "base_link", "odom", 0)),
+        "is not that of the scenario": (
+            "ego/odom",
+            encode_odometry(far, 0.0, "base_link", "odom", 0),
+        ),
         "damaged": ("ego/cmd_vel", encode_twist(1.0, 0.0)[:20]),
-        "must ascend": ("ego/path", encode_path(np.zeros((2, 3)), np.zeros(2, dtype=np.int64), frame, 0)),
+        "must ascend": (
+            "ego/path",
+            encode_path(np.zeros((2, 3)), np.zeros(2, dtype=np.int64), frame, 0),
+        ),
     }
     for topic, data in wrong.values():
         client.say(topic, data)
         step(client)
     for data in (encode_twist(1.0, 0.0), encode_twist(2.0, 0.0)):
         client.say("ego/cmd_vel", data)
-    client.until(lambda: any("2 replies to one state" in status.message for status in client.statuses()), "a second reply")
+    client.until(
+        lambda: any("2 replies to one state" in status.message for status in client.statuses()),
+        "a second reply",
+    )
     short = SetParameters.Request(parameters=[Parameter("patience", value=0.1).to_parameter_msg()])
     assert client.call(SetParameters, "/traffic/set_parameters", short).results[0].successful
     for _ in range(9):
@@ -152,14 +186,20 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     values = decode_diagnostics(client.heard["verdicts"][-1])[1][0].values
     assert int(values["faults"]) >= 5
     faults = str(values["first_faults"])
-    assert "not finite" in faults and "jumped" in faults and "is not that of the scenario" in faults
+    assert (
+        "not finite" in faults and "jumped" in faults and "is not that of the scenario" in faults
+    )
 
 
-@pytest.mark.parametrize(("stamp", "step"), [(0, 7), (FIRST_STAMP, 0), (FIRST_STAMP + 300_000_000, 3), (10**18, 7)])
+@pytest.mark.parametrize(
+    ("stamp", "step"), [(0, 7), (FIRST_STAMP, 0), (FIRST_STAMP + 300_000_000, 3), (10**18, 7)]
+)
 def test_a_stamp_of_the_drive_names_the_state_that_a_command_answers(stamp, step):
     run = hand_made_run()
     loop = ClosedLoop(run.generated.scenarios[0], 0, run.road, ClosedLoopConfig())
-    data = encode(VELOCITY_STAMPED, stamp=stamp, frame_id="base_link", twist=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    data = encode(
+        VELOCITY_STAMPED, stamp=stamp, frame_id="base_link", twist=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    )
     assert decode_command("ego/cmd_vel_stamped", data, loop, "vehicle_1", 7).step == step
 
 
@@ -171,18 +211,28 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
 
     process = traffic(patience=0.2)
     client.announce("ego/cmd_vel_stamped")
-    client.until(lambda: client.node.count_subscribers("ego/cmd_vel_stamped") >= 1, "ego/cmd_vel_stamped")
+    client.until(
+        lambda: client.node.count_subscribers("ego/cmd_vel_stamped") >= 1, "ego/cmd_vel_stamped"
+    )
     other = rclpy.create_node("second_planner", context=client.node.context)
     try:
         publisher = create_publisher(other, "ego/cmd_vel")
-        client.until(lambda: client.node.count_publishers("ego/cmd_vel") >= 2 and publisher.get_subscription_count() >= 1, "both")
+        client.until(
+            lambda: (
+                client.node.count_publishers("ego/cmd_vel") >= 2
+                and publisher.get_subscription_count() >= 1
+            ),
+            "both",
+        )
         for _ in range(12):
             client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
             step(client)
     finally:
         other.destroy_node()
     ahead = (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    stale = encode(VELOCITY_STAMPED, stamp=FIRST_STAMP, frame_id="base_link", twist=ahead)  # of the drive's begin
+    stale = encode(
+        VELOCITY_STAMPED, stamp=FIRST_STAMP, frame_id="base_link", twist=ahead
+    )  # of the drive's begin
     for _ in range(12):
         client.say("ego/cmd_vel_stamped", stale)
         said = step(client)
@@ -192,7 +242,10 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
     values = decode_diagnostics(client.wait("verdicts")[-1])[1][0].values
     faults = str(values["first_faults"])
     assert "several egos" in faults and "second_planner" in faults and int(values["faults"]) > 20
-    client.until(lambda: any(b"s old" in data for data in client.heard["/diagnostics"]), "the late command on /diagnostics")
+    client.until(
+        lambda: any(b"s old" in data for data in client.heard["/diagnostics"]),
+        "the late command on /diagnostics",
+    )
     assert process.poll() is None
 
 
@@ -270,7 +323,9 @@ rclpy.spin(node)
 """
 
 
-def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag, tmp_path, monkeypatch):
+def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
+    bag, tmp_path, monkeypatch
+):
     """`scenario-gen drive --ros`: any node that answers its odometry with a command; what it is not is said."""
     from typer.testing import CliRunner
 
@@ -279,7 +334,11 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag,
     program = tmp_path / "by_place.py"
     program.write_text(PLANNER)
     words = ["drive", str(bag), "--count", "2", "--set", "bars.goals=0.0"]
-    words += [word for bar in ("collisions", "at_fault", "off_road") for word in ("--set", f"bars.{bar}=1.0")]
+    words += [
+        word
+        for bar in ("collisions", "at_fault", "off_road")
+        for word in ("--set", f"bars.{bar}=1.0")
+    ]
     words += ["--set", "bars.progress=0.0"]
     command = f"{sys.executable} {program} vehicle_1/odom"
     for out, more in (
@@ -288,16 +347,25 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag,
     ):
         told = CliRunner().invoke(app, [*words, "--out", str(tmp_path / out), *more])
         assert told.exit_code == 0, told.output
-    over_dds, in_process = (json.loads((tmp_path / out / "drives.json").read_text()) for out in ("over_dds", "in_process"))
+    over_dds, in_process = (
+        json.loads((tmp_path / out / "drives.json").read_text())
+        for out in ("over_dds", "in_process")
+    )
     assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
     monkeypatch.setattr(traffic_of_trials, "SILENT_S", 1.0)
     for planner, more, said in (
         (f"{sys.executable} -c 'print(7)'", (), "ended with code 0; its last output: 7"),
         ("no_such_program", (), "No such"),
         (f"{command} 9", (), "has sent no command for 1 s: it hangs"),
-        (f"{command} 1000000 0.05", ("--set", "drive_time=0.1"), "did not come to an end in 0.1 s (drive_time)"),
+        (
+            f"{command} 1000000 0.05",
+            ("--set", "drive_time=0.1"),
+            "did not come to an end in 0.1 s (drive_time)",
+        ),
     ):
-        refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", planner, *more])
+        refused = CliRunner().invoke(
+            app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", planner, *more]
+        )
         assert said in str(refused.exception), refused.output
 
 

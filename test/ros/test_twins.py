@@ -28,10 +28,18 @@ def test_two_road_servers_in_one_namespace_name_each_other(start, client):
     second = start("road_server", "-r", "__node:=two", road_name="straight")
     client.until(lambda: {"/one", "/two"} <= set(twins_of(client)), "both to warn")
     found = twins_of(client)
-    assert "/map is published by /two, too" in found["/one"].message and found["/one"].level is Level.WARN
-    assert "/map is published by /one, too" in found["/two"].message and "another namespace" in found["/two"].message
+    assert (
+        "/map is published by /two, too" in found["/one"].message
+        and found["/one"].level is Level.WARN
+    )
+    assert (
+        "/map is published by /one, too" in found["/two"].message
+        and "another namespace" in found["/two"].message
+    )
     second.terminate()
-    client.until(lambda: twins_of(client)["/one"].level is Level.OK, "the one that is left to be content")
+    client.until(
+        lambda: twins_of(client)["/one"].level is Level.OK, "the one that is left to be content"
+    )
 
 
 def test_the_recorder_blames_two_publishers_and_not_the_disk(start, client, tmp_path):
@@ -45,7 +53,11 @@ def test_the_recorder_blames_two_publishers_and_not_the_disk(start, client, tmp_
     run = hand_made_run()
     for topic in ("scenarios", "scenarios/info"):
         client.announce(topic)
-    messages = [(topic, data) for topic, data, _ in result_messages(run) if topic in ("scenarios", "scenarios/info")]
+    messages = [
+        (topic, data)
+        for topic, data, _ in result_messages(run)
+        if topic in ("scenarios", "scenarios/info")
+    ]
     for topic, data in messages[1:]:  # the first is missing
         client.say(topic, data)
 
@@ -53,7 +65,8 @@ def test_the_recorder_blames_two_publishers_and_not_the_disk(start, client, tmp_
         return [
             status.message
             for status in client.statuses()
-            if status.name == "/recorder: losses" and "/one and /test_client and /two publish" in status.message
+            if status.name == "/recorder: losses"
+            and "/one and /test_client and /two publish" in status.message
         ]
 
     client.until(blamed, "the recorder to blame the publishers")

@@ -60,10 +60,16 @@ def test_callers_from_many_processes_get_their_own_answers(suite, domain, client
     client.wait("/scenarios/info", 2)
     client.heard.clear()
     counts = {seed: 1 + seed % 3 for seed in range(500, 520 if LONG else 504)}
-    environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment = os.environ | {
+        "ROS_DOMAIN_ID": str(domain),
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }
     callers = {
         seed: subprocess.Popen(
-            [sys.executable, "-c", CALLER, str(seed), str(count)], stdout=subprocess.PIPE, text=True, env=environment
+            [sys.executable, "-c", CALLER, str(seed), str(count)],
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment,
         )
         for seed, count in counts.items()
     }
@@ -75,7 +81,9 @@ def test_callers_from_many_processes_get_their_own_answers(suite, domain, client
     for seed, (successful, reason) in answers.items():
         assert successful, reason
         assert f"{counts[seed]} of {counts[seed]} scenarios" in reason
-    requests = {seed: reason.partition(":")[0].split()[-1] for seed, (_, reason) in answers.items()}
+    requests = {
+        seed: reason.partition(":")[0].split()[-1] for seed, (_, reason) in answers.items()
+    }
     assert len(set(requests.values())) == len(counts)
     client.wait("/scenarios/info", sum(counts.values()) + len(counts))
     client.wait("/scenarios", sum(counts.values()))
@@ -95,7 +103,8 @@ def test_a_map_is_served_while_another_is_loaded(suite, domain, client):
     client.hear("/map")
     client.wait("/map")
     loads = {
-        url: client.call_later(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=url)) for url in ("four_way", "straight")
+        url: client.call_later(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=url))
+        for url in ("four_way", "straight")
     }
     between = client.call(GetMap, "/road_server/get_map", GetMap.Request())
     assert between.map.info.width > 0
@@ -118,14 +127,30 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
     running, *others = [client.generate_later(count=20_000) for _ in range(GpSampler.THREADS)]
     waiting = client.generate_later(count=2, seed=3)
     name = "/gp_sampler: progress"
-    client.until(lambda: any(s.name == name and s.values.get("requested") == "20000" for s in client.statuses()), "progress")
-    assert client.call(ListParameters, "/gp_sampler/list_parameters", ListParameters.Request()).result.names
+    client.until(
+        lambda: any(
+            s.name == name and s.values.get("requested") == "20000" for s in client.statuses()
+        ),
+        "progress",
+    )
+    assert client.call(
+        ListParameters, "/gp_sampler/list_parameters", ListParameters.Request()
+    ).result.names
     assert client.call(GetMap, "/road_server/get_map", GetMap.Request()).map.data
     client.call(GetPlan, "/planner/get_plan", GetPlan.Request())
     assert not running.done(), "the others were to be served while it ran"
     third = client.generate_later(count=20_000, request="third")
-    one = SetParametersAtomically.Request(parameters=[Parameter("request", value="third").to_parameter_msg()])
-    client.until(lambda: client.call(SetParametersAtomically, "/gp_sampler/cancel_request", one).result.successful, "its end")
+    one = SetParametersAtomically.Request(
+        parameters=[Parameter("request", value="third").to_parameter_msg()]
+    )
+    client.until(
+        lambda: (
+            client.call(
+                SetParametersAtomically, "/gp_sampler/cancel_request", one
+            ).result.successful
+        ),
+        "its end",
+    )
     client.until(third.done, "the answer of one that waited, though others did not end")
     assert third.result().result.reason == "request third: cancelled" and not running.done()
     refused = client.call(SetParametersAtomically, "/gp_sampler/cancel_request", one).result
@@ -133,7 +158,12 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
     cancelled = set()
 
     def ended() -> bool:  # the second request may come after the first call
-        cancelled.update(re.findall(r"request \d+", client.call(Trigger, "/gp_sampler/cancel", Trigger.Request()).message))
+        cancelled.update(
+            re.findall(
+                r"request \d+",
+                client.call(Trigger, "/gp_sampler/cancel", Trigger.Request()).message,
+            )
+        )
         return all(future.done() for future in (running, *others, waiting))
 
     client.until(ended, "the answers of what was cancelled")

@@ -30,7 +30,10 @@ def test_the_player_lists_its_parameters():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("-p", "frames:="), "'-p frames:='; write -r FROM:=TO and -p NAME:=VALUE, an empty text as -p \"NAME:=''\""),
+        (
+            ("-p", "frames:="),
+            "'-p frames:='; write -r FROM:=TO and -p NAME:=VALUE, an empty text as -p \"NAME:=''\"",
+        ),
         (("-p", "starts:=1: 31 68 0 10"), "Unknown YAML event; write"),
         (("-r", "foo"), "'-r foo'"),
         (("--params-file", "no_such.yaml"), "no_such.yaml"),
@@ -42,7 +45,12 @@ def test_what_ros_cannot_read_is_one_line(words, said):
     process = start_nodes("suite" if "-r" in words else "player", "--ros-args", *words)
     output, _ = process.communicate(180.0)
     (line,) = output.splitlines()
-    assert process.returncode == 2 and line.startswith("error: ") and said in line and "/src/" not in line
+    assert (
+        process.returncode == 2
+        and line.startswith("error: ")
+        and said in line
+        and "/src/" not in line
+    )
 
 
 @pytest.mark.parametrize("name", NODES)

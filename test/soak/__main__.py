@@ -31,7 +31,10 @@ def run_part(part: str) -> list[Figure]:
     state.mkdir(parents=True, exist_ok=True)
     started = time.monotonic()
     figures = list(importlib.import_module(part).run(state))
-    record = {"seconds": round(time.monotonic() - started, 1), "figures": [asdict(figure) for figure in figures]}
+    record = {
+        "seconds": round(time.monotonic() - started, 1),
+        "figures": [asdict(figure) for figure in figures],
+    }
     (OUT / f"{part}.json").write_text(json.dumps(record, indent=2) + "\n")
     return figures
 
@@ -43,7 +46,9 @@ def show() -> bool:
     for part in PARTS:
         path = OUT / f"{part}.json"
         for row in json.loads(path.read_text())["figures"] if path.exists() else ():
-            table.add_row(part, row["promise"], row["asked"], row["seen"], "yes" if row["met"] else "NO")
+            table.add_row(
+                part, row["promise"], row["asked"], row["seen"], "yes" if row["met"] else "NO"
+            )
             met = met and row["met"]
     Console(width=160 if not sys.stdout.isatty() else None).print(table)
     return met
@@ -53,9 +58,15 @@ def main() -> int:
     """Run the parts that are named, or all, and print one table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*", choices=[[], *PARTS])
-    parser.add_argument("--fresh", action="store_true", help="begin again instead of going on where a part was stopped")
+    parser.add_argument(
+        "--fresh",
+        action="store_true",
+        help="begin again instead of going on where a part was stopped",
+    )
     arguments = parser.parse_args()
-    words = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]["pythonpath"]
+    words = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"][
+        "pythonpath"
+    ]
     sys.path += [str(ROOT / folder) for folder in ("test", *words)]  # as pytest's
     for part in arguments.parts or PARTS:
         if arguments.fresh:

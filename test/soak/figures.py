@@ -41,5 +41,14 @@ def of_benchmark(name: str, path: Path) -> Iterator[Figure]:
 
     for row in kept(path, run)["rows"]:
         target = row["target"]
-        asked = "-" if target is None else f"{'≥' if row['better'] == 'higher' else '≤'} {target:g} {row['unit']}"
-        yield Figure(f"{name}: {row['id']}", asked, f"{row['value']:g} {row['unit']}", row["met"] is not False)
+        asked = (
+            "-"
+            if target is None
+            else f"{'≥' if row['better'] == 'higher' else '≤'} {target:g} {row['unit']}"
+        )
+        yield Figure(
+            f"{name}: {row['id']}",
+            asked,
+            f"{row['value']:g} {row['unit']}",
+            row["met"] is not False,
+        )

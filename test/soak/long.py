@@ -43,7 +43,10 @@ def platoon(path: Path, vehicles: int, seconds: float) -> Path:
         table = csv.writer(file)
         table.writerow(("time", "id", "x", "y", "speed", "heading"))
         for n in range(vehicles):
-            table.writerows((t, n + 1, x - 12.0 * n, -1.75, v, 0.0) for t, x, v in zip(time, driven, speed, strict=True))
+            table.writerows(
+                (t, n + 1, x - 12.0 * n, -1.75, v, 0.0)
+                for t, x, v in zip(time, driven, speed, strict=True)
+            )
     return path
 
 
@@ -56,7 +59,10 @@ def peak(state: Path, name: str, *arguments: str) -> float | None:
         run = subprocess.run(command, capture_output=True, text=True, check=False)
         shutil.rmtree(out, ignore_errors=True)
         taken = [line.split()[1] for line in run.stderr.splitlines() if line.startswith("peak ")]
-        return {"peak": float(taken[-1]) / 1e6 if run.returncode == 0 else None, "said": run.stderr[-500:]}
+        return {
+            "peak": float(taken[-1]) / 1e6 if run.returncode == 0 else None,
+            "said": run.stderr[-500:],
+        }
 
     found: float | None = kept(state / f"{name}.json", measure)["peak"]
     return found
@@ -74,15 +80,25 @@ def run(state: Path) -> Iterable[Figure]:
     ):
         found = peak(state, name, *arguments, "--road", "straight", "--count", "10")
         seen = "failed" if found is None else f"finished, {found:.2f} GB"
-        yield Figure(asked, f"finishes in at most {PEAK:g} GB", seen, found is not None and found <= PEAK)
+        yield Figure(
+            asked, f"finishes in at most {PEAK:g} GB", seen, found is not None and found <= PEAK
+        )
 
 
 def _scenarios(state: Path) -> Iterator[Figure]:
     log = str(bundled("c"))
-    few, many = (peak(state, f"count_{count}", log, "--road", "straight", "--count", str(count)) for count in (FEW, COUNT))
+    few, many = (
+        peak(state, f"count_{count}", log, "--road", "straight", "--count", str(count))
+        for count in (FEW, COUNT)
+    )
     if few is None or many is None:
         yield Figure(f"{COUNT:,} scenarios", "finishes", "failed", met=False)
         return
     slope = (many - few) * 1e6 / (COUNT - FEW)
     seen = f"{few:.3f} GB for {FEW:,}, {many:.3f} GB for {COUNT:,}: {slope:.3f} kB each"
-    yield Figure(f"memory for {COUNT:,} scenarios", f"at most {GROWTH:g} kB for one more", seen, slope <= GROWTH)
+    yield Figure(
+        f"memory for {COUNT:,} scenarios",
+        f"at most {GROWTH:g} kB for one more",
+        seen,
+        slope <= GROWTH,
+    )

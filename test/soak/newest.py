@@ -22,8 +22,24 @@ def install(python: Path) -> None:
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
     pip = [python, "-m", "pip", "install", "--quiet", "--upgrade", "--upgrade-strategy", "eager"]
-    subprocess.run([*pip, *(word for name in LISTS for word in ("-r", ROOT / "requirements" / f"{name}.in"))], check=True)
-    subprocess.run([python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "-e", ROOT], check=True)
+    subprocess.run(
+        [*pip, *(word for name in LISTS for word in ("-r", ROOT / "requirements" / f"{name}.in"))],
+        check=True,
+    )
+    subprocess.run(
+        [
+            python,
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--no-deps",
+            "--no-build-isolation",
+            "-e",
+            ROOT,
+        ],
+        check=True,
+    )
 
 
 def run(state: Path) -> Iterator[Figure]:
@@ -34,10 +50,22 @@ def run(state: Path) -> Iterator[Figure]:
     frozen = subprocess.run(listing, check=True, stdout=subprocess.PIPE, text=True).stdout
     versions = dict(line.split("==") for line in frozen.splitlines() if "==" in line)
     with (state / "tests.log").open("w") as log:
-        words = [python, "-m", "pytest", *PYTEST, "--deselect", "test/packaging/test_supply_chain.py"]
+        words = [
+            python,
+            "-m",
+            "pytest",
+            *PYTEST,
+            "--deselect",
+            "test/packaging/test_supply_chain.py",
+        ]
         environment = os.environ | {"PATH": f"{python.parent}{os.pathsep}{os.environ['PATH']}"}
-        code = subprocess.run(words, cwd=ROOT, env=environment, stdout=log, stderr=log, check=False).returncode
+        code = subprocess.run(
+            words, cwd=ROOT, env=environment, stdout=log, stderr=log, check=False
+        ).returncode
     said = (state / "tests.log").read_text()
     summary = re.findall(r"^.*\d+ passed.*$", said, re.MULTILINE)
-    seen = ", ".join(f"{name} {versions[name]}" for name in SHOWN) + f": {summary[-1] if summary else f'see {state}/tests.log'}"
+    seen = (
+        ", ".join(f"{name} {versions[name]}" for name in SHOWN)
+        + f": {summary[-1] if summary else f'see {state}/tests.log'}"
+    )
     yield Figure("all tests pass on the newest releases", "green", seen, code == 0)

@@ -22,5 +22,9 @@ def run(state: Path) -> Iterator[Figure]:
         return
     command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", "recorded"]
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    files = {line.partition("::")[0].partition(": ")[0] for line in said.splitlines() if line.startswith("test/")}
+    files = {
+        line.partition("::")[0].partition(": ")[0]
+        for line in said.splitlines()
+        if line.startswith("test/")
+    }
     yield run_files(state, PROMISE, sorted(files), "-m", "recorded")

@@ -39,7 +39,10 @@ MESSAGES = int(os.environ.get("SCENARIO_GEN_SOAK_MESSAGES", "10000"))
 MINUTES = float(os.environ.get("SCENARIO_GEN_SOAK_MINUTES", "30"))
 HEAD = 160  # bytes
 CLIENTS, WARM_UP, GROWTH = 8, 1 / 3, 0.05  # a share of the time; of the memory then
-GIBIBYTE, IDLE = 1 << 20, 1.0  # kB; s in which a machine with nothing else to do names what it refuses
+GIBIBYTE, IDLE = (
+    1 << 20,
+    1.0,
+)  # kB; s in which a machine with nothing else to do names what it refuses
 STORE = get_typestore(Stores.ROS2_JAZZY)
 NODES = {
     "road_server": ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
@@ -71,7 +74,9 @@ def hostile(rng: random.Random, kind: str, seeds: list[bytes]) -> bytes:
     """A damaged message that is still of its type: what any publisher of ROS could send."""
     while True:
         data = rng.choice(seeds)
-        size = rng.choice((HEAD, len(data)))  # what a message says of itself stands at its beginning
+        size = rng.choice(
+            (HEAD, len(data))
+        )  # what a message says of itself stands at its beginning
         head, rest = data[:size], data[size:]
         for _ in range(rng.choice((1, 1, 2, 4))):
             head = rng.choice(BYTES)(rng, head, seeds)
@@ -100,7 +105,11 @@ class Suite:
     def __init__(self, folder: Path, domain: int) -> None:
         (self.good,) = read_log(RESOURCES / "synthetic_c").encounters
         self.client = Client(domain)
-        self.client.hear("/diagnostics", "/report", *(f"/{topic}" for topic in LISTENERS if not topic.endswith(("fix", "speed"))))
+        self.client.hear(
+            "/diagnostics",
+            "/report",
+            *(f"/{topic}" for topic in LISTENERS if not topic.endswith(("fix", "speed"))),
+        )
         self.made = Processes(folder, domain, NODES)
         self._served = 0
         self.serve()
@@ -115,15 +124,26 @@ class Suite:
         self.client.say("/tracks", encode_tracks(replace(self.good, start_ns=stamp)))
 
         def is_reported() -> bool:
-            return any(CdrReader(data, "report").stamp() == stamp for data in list(self.client.heard["/report"]))
+            return any(
+                CdrReader(data, "report").stamp() == stamp
+                for data in list(self.client.heard["/report"])
+            )
 
         self.client.until(is_reported, f"the report of good tracks {self._served}", 300.0)
 
     def is_named(self, topic: str, after: int) -> set[str]:
         """The nodes that have said an error of the topic since so many messages of /diagnostics."""
-        statuses = [s for data in self.client.heard["/diagnostics"][after:] for s in decode_diagnostics(data)[1]]
+        statuses = [
+            s
+            for data in self.client.heard["/diagnostics"][after:]
+            for s in decode_diagnostics(data)[1]
+        ]
         named = {s.name for s in statuses if s.level is Level.ERROR}
-        return {node for node in LISTENERS[topic] if {f"/{node}: {topic}", f"/{node}: /{topic}"} & named}
+        return {
+            node
+            for node in LISTENERS[topic]
+            if {f"/{node}: {topic}", f"/{node}: /{topic}"} & named
+        }
 
     def end(self) -> dict[str, int]:
         """End the nodes; return their exit codes."""
@@ -137,7 +157,10 @@ def storm(suite: Suite, topic: str, rng: random.Random) -> dict[str, Any]:
     kind, _ = topic_entry(topic)
     client, refused, silent, slowest = suite.client, 0, 0, 0.0
     client.announce(f"/{topic}")
-    client.until(lambda: client.node.count_subscribers(f"/{topic}") >= len(LISTENERS[topic]), f"listeners of {topic}")
+    client.until(
+        lambda: client.node.count_subscribers(f"/{topic}") >= len(LISTENERS[topic]),
+        f"listeners of {topic}",
+    )
     last = b""
     for _ in range(MESSAGES):
         data = hostile(rng, kind, suite.seeds[topic])
@@ -149,7 +172,11 @@ def storm(suite: Suite, topic: str, rng: random.Random) -> dict[str, Any]:
             continue
         refused += 1
         try:
-            client.until(lambda after=after: suite.is_named(topic, after) == set(LISTENERS[topic]), f"a refusal on {topic}", 30.0)
+            client.until(
+                lambda after=after: suite.is_named(topic, after) == set(LISTENERS[topic]),
+                f"a refusal on {topic}",
+                30.0,
+            )
         except AssertionError:
             silent += 1
         slowest = max(slowest, time.monotonic() - began)
@@ -160,7 +187,13 @@ def storm(suite: Suite, topic: str, rng: random.Random) -> dict[str, Any]:
         suite.serve()
         served = True
     peaks = {node: memory(pid, "VmHWM") for node, pid in suite.made.pids.items()}
-    return {"refused": refused, "silent": silent, "slowest": slowest, "served": served, "peaks": peaks}
+    return {
+        "refused": refused,
+        "silent": silent,
+        "slowest": slowest,
+        "served": served,
+        "peaks": peaks,
+    }
 
 
 def _storms(state: Path) -> Iterator[Figure]:
@@ -178,9 +211,16 @@ def _storms(state: Path) -> Iterator[Figure]:
             codes = suite.end()
     asked = f"named on /diagnostics by every listener; idle within {IDLE:g} s; the next good tracks served"
     for topic, one in found.items():
-        seen = f"{one['refused']} refused, {one['silent']} not named, slowest {one['slowest']:.2f} s"
+        seen = (
+            f"{one['refused']} refused, {one['silent']} not named, slowest {one['slowest']:.2f} s"
+        )
         seen += "" if one["served"] else "; good tracks NOT served"
-        yield Figure(f"{MESSAGES:,} hostile messages on {topic}", asked, seen, one["silent"] == 0 and one["served"])
+        yield Figure(
+            f"{MESSAGES:,} hostile messages on {topic}",
+            asked,
+            seen,
+            one["silent"] == 0 and one["served"],
+        )
     peaks = {node: max(one["peaks"].get(node, 0) for one in found.values()) for node in NODES}
     seen = ", ".join(f"{node} {peak / 1024:.0f} MiB" for node, peak in peaks.items())
     is_small = all(0 < peak < GIBIBYTE for peak in peaks.values()) and not any(codes.values())
@@ -195,8 +235,18 @@ def _calls(rng: random.Random, suite: Suite) -> list[tuple[Any, str, Callable[[]
     from std_srvs.srv import Trigger
 
     def generate() -> Any:
-        values = rng.choice(({"count": 1}, {"count": 2, "seed": rng.randrange(99)}, {"count": -1}, {"ego": "1"}, {"no_such": 1}))
-        parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+        values = rng.choice(
+            (
+                {"count": 1},
+                {"count": 2, "seed": rng.randrange(99)},
+                {"count": -1},
+                {"ego": "1"},
+                {"no_such": 1},
+            )
+        )
+        parameters = [
+            Parameter(key, value=value).to_parameter_msg() for key, value in values.items()
+        ]
         return SetParametersAtomically.Request(parameters=parameters)
 
     def plan() -> Any:
@@ -213,7 +263,11 @@ def _calls(rng: random.Random, suite: Suite) -> list[tuple[Any, str, Callable[[]
         (Trigger, "/gp_sampler/cancel", Trigger.Request),
         (GetPlan, "/planner/get_plan", plan),
         (GetMap, "/road_server/get_map", GetMap.Request),
-        (LoadMap, "/road_server/load_map", lambda: LoadMap.Request(map_url=rng.choice(("straight", "corridor", "nonsense")))),
+        (
+            LoadMap,
+            "/road_server/load_map",
+            lambda: LoadMap.Request(map_url=rng.choice(("straight", "corridor", "nonsense"))),
+        ),
         (Trigger, "/segmenter/segment", Trigger.Request),
     ]
 
@@ -221,10 +275,23 @@ def _calls(rng: random.Random, suite: Suite) -> list[tuple[Any, str, Callable[[]
 def _clients(state: Path) -> Iterator[Figure]:
     found = kept(state / f"clients_{MINUTES:g}.json", partial(_call_all, state))
     seen = f"{found['answered']:,} answers, {found['unanswered']} without one"
-    yield Figure(f"{CLIENTS} clients for {MINUTES:g} min", "every call is answered", seen, found["unanswered"] == 0)
+    yield Figure(
+        f"{CLIENTS} clients for {MINUTES:g} min",
+        "every call is answered",
+        seen,
+        found["unanswered"] == 0,
+    )
     growth = {node: found["last"][node] / max(found["warm"][node], 1) - 1.0 for node in NODES}
-    seen = ", ".join(f"{node} {found['warm'][node] / 1024:.0f} MiB {100 * share:+.1f} %" for node, share in growth.items())
-    yield Figure("memory after the warm-up", f"at most {100 * GROWTH:g} % more", seen, max(growth.values()) <= GROWTH)
+    seen = ", ".join(
+        f"{node} {found['warm'][node] / 1024:.0f} MiB {100 * share:+.1f} %"
+        for node, share in growth.items()
+    )
+    yield Figure(
+        "memory after the warm-up",
+        f"at most {100 * GROWTH:g} % more",
+        seen,
+        max(growth.values()) <= GROWTH,
+    )
 
 
 def _fill_history(suite: Suite) -> None:
@@ -234,7 +301,9 @@ def _fill_history(suite: Suite) -> None:
 
     parameters = [Parameter("count", value=topic_entry("/scenarios")[1].depth).to_parameter_msg()]
     request = SetParametersAtomically.Request(parameters=parameters)
-    assert suite.client.call(SetParametersAtomically, "/gp_sampler/generate", request, 600.0).result.successful
+    assert suite.client.call(
+        SetParametersAtomically, "/gp_sampler/generate", request, 600.0
+    ).result.successful
 
 
 def _call_all(state: Path) -> dict[str, Any]:
@@ -269,10 +338,16 @@ def _call_suite(suite: Suite, domain: int) -> dict[str, Any]:
         time.sleep(1.0)
         for messages in list(suite.client.heard.values()):
             messages.clear()
-        if time.monotonic() - began < WARM_UP * seconds:  # the most in the warm-up: a set in the making is no growth
+        if (
+            time.monotonic() - began < WARM_UP * seconds
+        ):  # the most in the warm-up: a set in the making is no growth
             for node, pid in suite.made.pids.items():
                 warm[node] = max(warm.get(node, 0), memory(pid, "VmRSS"))
-    return {**count, "warm": warm, "last": {node: memory(pid, "VmRSS") for node, pid in suite.made.pids.items()}}
+    return {
+        **count,
+        "warm": warm,
+        "last": {node: memory(pid, "VmRSS") for node, pid in suite.made.pids.items()},
+    }
 
 
 def run(state: Path) -> Iterator[Figure]:

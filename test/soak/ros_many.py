@@ -24,8 +24,19 @@ from scenario_gen.base.ros_domain import free_domain
 COUNT = int(os.environ.get("SCENARIO_GEN_SOAK_COUNT", "100000"))
 MOST = 1024  # MiB of any process
 PATIENCE = 7200.0  # seconds for one request
-TOPICS = {"/scenarios": 0, "/scenarios/info": 1}  # and how many messages it has beside one for each scenario
-NODES = ("recorder", "evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")
+TOPICS = {
+    "/scenarios": 0,
+    "/scenarios/info": 1,
+}  # and how many messages it has beside one for each scenario
+NODES = (
+    "recorder",
+    "evaluator",
+    "gp_sampler",
+    "planner",
+    "segmenter",
+    "road_server",
+    "log_player",
+)
 
 
 def run(state: Path) -> Iterator[Figure]:
@@ -33,9 +44,18 @@ def run(state: Path) -> Iterator[Figure]:
     found = kept(state / f"many_{COUNT}.json", partial(_measured, state / "many"))
     name, told = f"{COUNT:,} scenarios", f"{found['lost']} messages; {found['said']}"
     yield Figure(f"{name}: lost on the way to the bag", "0", told, found["lost"] == 0)
-    yield Figure(f"{name}: the evaluator's report", "comes", found["report"], "samples" in found["report"])
-    sizes = ", ".join(f"{node} {size}" for node, size in sorted(found["peak"].items(), key=lambda one: -one[1]))
-    yield Figure(f"{name}: peak memory [MiB]", f"at most {MOST} each", sizes, max(found["peak"].values()) <= MOST)
+    yield Figure(
+        f"{name}: the evaluator's report", "comes", found["report"], "samples" in found["report"]
+    )
+    sizes = ", ".join(
+        f"{node} {size}" for node, size in sorted(found["peak"].items(), key=lambda one: -one[1])
+    )
+    yield Figure(
+        f"{name}: peak memory [MiB]",
+        f"at most {MOST} each",
+        sizes,
+        max(found["peak"].values()) <= MOST,
+    )
 
 
 def _measured(folder: Path) -> dict[str, Any]:
@@ -54,7 +74,9 @@ def _measured(folder: Path) -> dict[str, Any]:
         suite.end()
         client.close()
     rows = [status for data in client.heard["/report"] for status in decode_diagnostics(data)[1]]
-    said = {status.message for status in client.statuses() if status.level and "lost" in status.message}
+    said = {
+        status.message for status in client.statuses() if status.level and "lost" in status.message
+    }
     there = {topic.name: topic.count for topic in bag_topics(folder / "bag")}
     shutil.rmtree(folder)
     return {

@@ -31,14 +31,20 @@ def run_file(state: Path, name: str, *words: str, **variables: str) -> tuple[str
     return name, process.returncode in (0, 5), used.ru_utime + used.ru_stime
 
 
-def run_files(state: Path, promise: str, files: Sequence[str], *words: str, **variables: str) -> Figure:
+def run_files(
+    state: Path, promise: str, files: Sequence[str], *words: str, **variables: str
+) -> Figure:
     """Run test files, two at a time; those that have passed are not run again."""
     state.mkdir(parents=True, exist_ok=True)
     kept = state / "passed.json"
     passed: dict[str, float] = json.loads(kept.read_text()) if kept.exists() else {}
     pool = ThreadPoolExecutor(2)
     try:
-        left = [pool.submit(run_file, state, name, *words, **variables) for name in files if name not in passed]
+        left = [
+            pool.submit(run_file, state, name, *words, **variables)
+            for name in files
+            if name not in passed
+        ]
         for done in as_completed(left):
             name, good, seconds = done.result()
             if good:
@@ -49,7 +55,12 @@ def run_files(state: Path, promise: str, files: Sequence[str], *words: str, **va
     failed = [name for name in files if name not in passed]
     took = sum(passed.get(name, 0.0) for name in files) / 60
     seen = f"{len(files) - len(failed)} of {len(files)}, {took:.0f} min of CPU"
-    return Figure(promise, f"{len(files)} files", seen + (f"; not {', '.join(failed)}: {state}" if failed else ""), not failed)
+    return Figure(
+        promise,
+        f"{len(files)} files",
+        seen + (f"; not {', '.join(failed)}: {state}" if failed else ""),
+        not failed,
+    )
 
 
 def run(state: Path) -> Iterator[Figure]:

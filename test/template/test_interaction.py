@@ -32,7 +32,9 @@ def conflicts(*tracks, vehicles=CARS, time=TIME):
 
 def encounter(speed):
     n, t = speed.shape
-    return Encounter("test", CARS[:n], 0, 100_000_000, np.zeros((n, t, 2)), np.zeros((n, t)), speed)
+    return Encounter(
+        "test", CARS[:n], 0, 100_000_000, np.zeros((n, t, 2)), np.zeros((n, t)), speed
+    )
 
 
 def box(length, width, x, y, yaw):
@@ -57,23 +59,41 @@ def test_parallel_lanes_are_no_conflict_and_a_slight_touch_is_one():
     assert not found.following
     assert (found.first, found.second) == (0, 1)
     (found,) = conflicts(straight(0, 0, 0, 10), straight(110, 1.8, np.pi, 20))
-    assert (found.first, found.entry_first, found.entry_second) == (0, 0.0, pytest.approx((110 - 102.4 - 2.4) / 20, abs=1e-3))
+    assert (found.first, found.entry_first, found.entry_second) == (
+        0,
+        0.0,
+        pytest.approx((110 - 102.4 - 2.4) / 20, abs=1e-3),
+    )
 
 
 @pytest.mark.parametrize("leader", [0, 1])
-@pytest.mark.parametrize(("ahead", "speed", "beside", "entry"), [(20, 9, 0.3, 15.2), (3, 10, 0.0, None)], ids=["apart", "on top"])
+@pytest.mark.parametrize(
+    ("ahead", "speed", "beside", "entry"),
+    [(20, 9, 0.3, 15.2), (3, 10, 0.0, None)],
+    ids=["apart", "on top"],
+)
 def test_following_is_ordered_along_the_route(leader, ahead, speed, beside, entry):
     """Also of cars that were recorded on top of each other."""
     tracks = [straight(0, 0 if entry else 0.2, 0, 10)] * 2
     tracks[leader] = straight(ahead, beside, 0, speed)
     (found,) = conflicts(*tracks)
-    assert (found.first, found.second, found.following, found.entry_first) == (leader, 1 - leader, True, 0.0)
+    assert (found.first, found.second, found.following, found.entry_first) == (
+        leader,
+        1 - leader,
+        True,
+        0.0,
+    )
     assert entry is None or found.entry_second == pytest.approx(entry / 10, abs=1e-3)
 
 
 def test_a_vehicle_that_stands_in_the_way_is_first():
     (found,) = conflicts(straight(0, 0, 0, 10), straight(50, 1.0, 0, 0))
-    assert (found.first, found.following, found.entry_first, found.exit_first) == (1, False, 0.0, 10.0)
+    assert (found.first, found.following, found.entry_first, found.exit_first) == (
+        1,
+        False,
+        0.0,
+        10.0,
+    )
 
 
 def test_entering_at_the_same_instant_is_ordered_by_index():
@@ -91,7 +111,9 @@ def test_merging_is_ordered_by_who_merges_first():
 
 def test_a_fast_crossing_between_two_samples_is_seen():
     time = np.arange(11) * 1.0  # 40 m between samples
-    (found,) = conflicts(straight(-100, 0, 0, 40, time), straight(20, -210, np.pi / 2, 40, time), time=time)
+    (found,) = conflicts(
+        straight(-100, 0, 0, 40, time), straight(20, -210, np.pi / 2, 40, time), time=time
+    )
     assert found.first == 0
     assert found.entry_first == pytest.approx((120 - 2.4 - 0.95) / 40, abs=0.01)
 
@@ -105,13 +127,23 @@ def speeds(first, second, *changes):
 
 
 def test_waits_are_slow_for_at_least_a_second_and_not_ended_by_one_noisy_sample():
-    found = find_waits(speeds(5.0, 0.2, (0, 20, 40, 0.0), (0, 60, 66, 0.0)))  # the second time for half a second
-    assert found == (Wait(0, pytest.approx(2.2), pytest.approx(3.7)), Wait(1, 0.0, 10.0, moves_slowly=True))
-    assert find_waits(speeds(0.1, 0.1, (0, 50, 51, 1.4))) == (Wait(0, 0.0, 10.0), Wait(1, 0.0, 10.0))
+    found = find_waits(
+        speeds(5.0, 0.2, (0, 20, 40, 0.0), (0, 60, 66, 0.0))
+    )  # the second time for half a second
+    assert found == (
+        Wait(0, pytest.approx(2.2), pytest.approx(3.7)),
+        Wait(1, 0.0, 10.0, moves_slowly=True),
+    )
+    assert find_waits(speeds(0.1, 0.1, (0, 50, 51, 1.4))) == (
+        Wait(0, 0.0, 10.0),
+        Wait(1, 0.0, 10.0),
+    )
 
 
 def test_who_does_not_stand_for_a_second_moves_slowly():
-    made = speeds(5.0, 5.0, (0, 20, 60, 0.3), (0, 30, 39, 0.0), (1, 20, 60, 0.3), (1, 30, 41, 0.05))
+    made = speeds(
+        5.0, 5.0, (0, 20, 60, 0.3), (0, 30, 39, 0.0), (1, 20, 60, 0.3), (1, 30, 41, 0.05)
+    )
     assert [wait.moves_slowly for wait in find_waits(made)] == [True, False]
 
 
@@ -152,7 +184,11 @@ def test_existence_and_entry_agree_with_shapely(seed):
     samples = [boxes_of(vehicles[i], poses(i, time), -DEPTH) for i in range(2)]
     sweeps = [shapely.union_all(one) for one in samples]
     latest = [
-        next((t for t, one in zip(time, samples[i], strict=True) if one.intersects(sweeps[1 - i])), np.inf) for i in range(2)
+        next(
+            (t for t, one in zip(time, samples[i], strict=True) if one.intersects(sweeps[1 - i])),
+            np.inf,
+        )
+        for i in range(2)
     ]
     if not found:
         assert latest == [np.inf, np.inf]
@@ -162,7 +198,10 @@ def test_existence_and_entry_agree_with_shapely(seed):
     for i in range(2):
         assert times[i] <= latest[i]
         (here,) = boxes_of(vehicles[i], poses(i, np.array([times[i]])), TURN_ERROR)
-        assert any(here.intersects(other) for other in boxes_of(vehicles[1 - i], poses(1 - i, fine), TURN_ERROR))
+        assert any(
+            here.intersects(other)
+            for other in boxes_of(vehicles[1 - i], poses(1 - i, fine), TURN_ERROR)
+        )
     assert one.following or one.entry_first <= one.entry_second
 
 
@@ -195,7 +234,11 @@ def test_who_walks_slowly_does_not_wait():
     """A pedestrian at 0.35 m/s walks, one that stands for 2 s waits; a car at that speed waits."""
     speed = np.full((2, 101), 0.35)
     speed[1, 40:61] = 0.05
-    on_foot = replace(encounter(speed), vehicles=tuple(Vehicle(name, 0.5, 0.5, "pedestrian") for name in "ab"))
+    on_foot = replace(
+        encounter(speed), vehicles=tuple(Vehicle(name, 0.5, 0.5, "pedestrian") for name in "ab")
+    )
     (found,) = find_waits(on_foot)
     assert found.vehicle == 1 and found.end - found.start == pytest.approx(2.0, abs=0.4)
-    assert [wait.end - wait.start for wait in find_waits(encounter(speed))] == pytest.approx([10.0, 10.0])
+    assert [wait.end - wait.start for wait in find_waits(encounter(speed))] == pytest.approx(
+        [10.0, 10.0]
+    )

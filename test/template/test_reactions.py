@@ -54,7 +54,9 @@ def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
 def test_who_leaves_long_after_waits_for_something_else():
     graph = reactions_of(crossing(14.0))
     assert graph.edges == ()
-    assert graph.sentences(TWO)[0].startswith("no vehicle is seen to react to another: the nearest are vehicle 2 and vehicle 1")
+    assert graph.sentences(TWO)[0].startswith(
+        "no vehicle is seen to react to another: the nearest are vehicle 2 and vehicle 1"
+    )
 
 
 def seen(kinds, seeds):
@@ -63,13 +65,19 @@ def seen(kinds, seeds):
     for kind, seed in itertools.product(kinds, seeds):
         motion = labelled(kind, seed)
         there += motion.edge is not None
-        edges += [(one.confidence, (one.who, one.whom) == motion.edge) for one in pairs_of(motion.encounter)]
+        edges += [
+            (one.confidence, (one.who, one.whom) == motion.edge)
+            for one in pairs_of(motion.encounter)
+        ]
     return np.array(edges), there
 
 
 def pairs_of(encounter):
     """The surest edge of each pair: one may both come behind another and follow it."""
-    return {(one.who, one.whom): one for one in sorted(reactions_of(encounter).edges, key=lambda one: one.confidence)}.values()
+    return {
+        (one.who, one.whom): one
+        for one in sorted(reactions_of(encounter).edges, key=lambda one: one.confidence)
+    }.values()
 
 
 def test_textbook_motions_are_seen_and_those_that_only_look_alike_are_not():
@@ -123,4 +131,8 @@ def test_whatever_the_edges_everybody_comes_behind_those_it_reacts_to(count):
 def test_a_doubtful_edge_is_said_to_be():
     assert edge(0, 1, 0.4).words(AB).endswith("(doubtful)")
     assert "doubtful" not in edge(0, 1, 0.6).words(AB)
-    assert edge(0, 1, 0.6).document(AB)["words"].startswith("vehicle a follows vehicle b, 1.0 s bumper to bumper")
+    assert (
+        edge(0, 1, 0.6)
+        .document(AB)["words"]
+        .startswith("vehicle a follows vehicle b, 1.0 s bumper to bumper")
+    )

@@ -20,7 +20,9 @@ def queue(*places, present=ALWAYS):
     count = len(places)
     vehicles = tuple(Vehicle(str(n), 4.0, 2.0) for n in range(count))
     flat = np.zeros((count, 30))
-    return Encounter("queue", vehicles, 0, 100_000_000, position, flat, flat + 5.0, present=present)
+    return Encounter(
+        "queue", vehicles, 0, 100_000_000, position, flat, flat + 5.0, present=present
+    )
 
 
 def test_the_least_gap_of_each_is_to_its_nearest():

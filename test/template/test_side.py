@@ -20,7 +20,15 @@ def oncoming(side):
         np.column_stack([50.0 - 10.0 * time, np.full(101, 1.75 * side)]),
     )
     heading = np.stack([np.zeros(101), np.full(101, np.pi)])
-    return Encounter("o", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, np.stack([there, back]), heading, np.full((2, 101), 10.0))
+    return Encounter(
+        "o",
+        (Vehicle("1"), Vehicle("2")),
+        0,
+        100_000_000,
+        np.stack([there, back]),
+        heading,
+        np.full((2, 101), 10.0),
+    )
 
 
 @pytest.mark.parametrize(("side", "name"), [(1.0, "right"), (-1.0, "left")])
@@ -38,5 +46,7 @@ def test_who_passes_nobody_has_no_side():
 def test_a_mirror_image_of_a_mirror_image_is_the_template():
     one = oncoming(1.0)
     twice = mirrored(mirrored(one))
-    assert np.array_equal(twice.position, one.position) and np.allclose(np.cos(twice.heading), np.cos(one.heading))
+    assert np.array_equal(twice.position, one.position) and np.allclose(
+        np.cos(twice.heading), np.cos(one.heading)
+    )
     assert mirrored(one).name == "o mirrored" and np.array_equal(mirrored(one).speed, one.speed)

@@ -37,20 +37,30 @@ def driving(offset=0.0, jump=0.0, samples=100, period_ns=100_000_000):
     position[1, :, 1] = 4.0 + offset
     position[1, samples // 2, 1] += jump
     flat = np.zeros((2, samples))
-    return Encounter("tracks", (Vehicle("a"), Vehicle("b")), 0, period_ns, position, flat, flat + 10.0)
+    return Encounter(
+        "tracks", (Vehicle("a"), Vehicle("b")), 0, period_ns, position, flat, flat + 10.0
+    )
 
 
 @pytest.mark.parametrize("metres", [1e4, 1e7, -1e7])
 def test_vehicles_that_are_not_where_they_can_be_are_refused(metres):
-    with pytest.raises(RefusedError, match=r"vehicle \w is never nearer than .* m to another, 2000 m are possible"):
+    with pytest.raises(
+        RefusedError, match=r"vehicle \w is never nearer than .* m to another, 2000 m are possible"
+    ):
         refuse_too_large(driving(offset=metres))
-    with pytest.raises(RefusedError, match=r"positions of vehicle b are up to .* m apart while its speeds add up to 100 m"):
+    with pytest.raises(
+        RefusedError,
+        match=r"positions of vehicle b are up to .* m apart while its speeds add up to 100 m",
+    ):
         refuse_too_large(driving(jump=metres))
     refuse_too_large(driving(offset=1900.0))
     refuse_too_large(driving(jump=1900.0))
 
 
 def test_too_many_samples_are_refused_however_short_their_period():
-    with pytest.raises(RefusedError, match=r"a sample every 0.001 s have 200000 samples, 45000 are possible.*log\.period=0\.1"):
+    with pytest.raises(
+        RefusedError,
+        match=r"a sample every 0.001 s have 200000 samples, 45000 are possible.*log\.period=0\.1",
+    ):
         refuse_too_large(driving(samples=100_000, period_ns=1_000_000))
     refuse_too_large(driving(samples=20_000, period_ns=50_000_000))

@@ -35,17 +35,31 @@ def line(x0, y0, yaw, speed, t=100):
 def arc(x0, y0, yaw, radius, speed, t=100):
     """Poses on a circle that turns left (radius > 0) or right."""
     a = yaw + np.arange(t) * 0.1 * speed / radius
-    return np.column_stack((x0 + radius * (np.sin(a) - np.sin(yaw)), y0 - radius * (np.cos(a) - np.cos(yaw)), a))
+    return np.column_stack(
+        (x0 + radius * (np.sin(a) - np.sin(yaw)), y0 - radius * (np.cos(a) - np.cos(yaw)), a)
+    )
 
 
 @settings(max_examples=50)
-@given(st.floats(6.0, 200.0), st.sampled_from([-1.0, 1.0]), st.floats(-3.0, 3.0), st.floats(2.0, 60.0), st.floats(-4.0, 4.0))
+@given(
+    st.floats(6.0, 200.0),
+    st.sampled_from([-1.0, 1.0]),
+    st.floats(-3.0, 3.0),
+    st.floats(2.0, 60.0),
+    st.floats(-4.0, 4.0),
+)
 def test_projection_undoes_placing_beside_a_curve(radius, sign, yaw, length, offset):
     s = np.linspace(0.0, min(length, 4.0 * radius), 400)
     a = yaw + sign * s / radius
-    xy = np.column_stack((sign * radius * (np.sin(a) - np.sin(yaw)), -sign * radius * (np.cos(a) - np.cos(yaw))))
+    xy = np.column_stack(
+        (sign * radius * (np.sin(a) - np.sin(yaw)), -sign * radius * (np.cos(a) - np.cos(yaw)))
+    )
     curve = Curve.through(xy)
-    at = np.linspace(-5.0, curve.length + 5.0, 37) if radius > 40.0 else np.linspace(0.1, curve.length - 0.1, 37)
+    at = (
+        np.linspace(-5.0, curve.length + 5.0, 37)
+        if radius > 40.0
+        else np.linspace(0.1, curve.length - 0.1, 37)
+    )
     poses = curve.beside(at, np.full(37, offset))
     station, found = curve.project(poses[:, :2])
     assert np.abs(station - at).max() < 0.06
@@ -76,9 +90,18 @@ def test_noise_is_smoothed_and_a_standing_vehicle_is_a_point():
 
 
 def test_a_junction_turn_is_one_and_a_bend_is_not():
-    turner, bender = clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), arc(0.0, 50.0, 0.0, -80.0, 8.0)))
-    assert turner.turns and turner.turning(30.0) > 0.0 and not turner.makes_u_turn and not bender.turns
-    (round_, _) = clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 6.0, 2.0), line(0.0, 40.0, 0.0, 5.0)))
+    turner, bender = clean_tracks(
+        encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), arc(0.0, 50.0, 0.0, -80.0, 8.0))
+    )
+    assert (
+        turner.turns
+        and turner.turning(30.0) > 0.0
+        and not turner.makes_u_turn
+        and not bender.turns
+    )
+    (round_, _) = clean_tracks(
+        encounter_of(arc(0.0, 0.0, 0.0, 6.0, 2.0), line(0.0, 40.0, 0.0, 5.0))
+    )
     assert round_.makes_u_turn
 
 
@@ -95,7 +118,9 @@ def test_lanes_and_changes_of_lane_are_told_from_offsets():
     changing = line(0.0, 3.6, 0.0, 10.0, t)
     x = np.clip((np.arange(t) - 60) / 60.0, 0.0, 1.0)
     changing[:, 1] -= 3.6 * x**2 * (3.0 - 2.0 * x)
-    encounter = encounter_of(changing, line(-30.0, 0.0, 0.0, 10.0, t), line(200.0, 7.3, np.pi, 9.0, t))
+    encounter = encounter_of(
+        changing, line(-30.0, 0.0, 0.0, 10.0, t), line(200.0, 7.3, np.pi, 9.0, t)
+    )
     frenet = to_frenet(clean_tracks(encounter))
     assert frenet.direction.tolist() in ([1, 1, -1], [-1, -1, 1])
     assert frenet.lane.tolist() == [[0, 1], [1, 1], [0, 0]]
@@ -104,7 +129,8 @@ def test_lanes_and_changes_of_lane_are_told_from_offsets():
 
 
 @pytest.mark.parametrize(
-    ("apart", "between"), [(3.5, (0, 0)), (7.0, (1, 0)), (12.0, (1, 1)), (14.0, (2, 1)), (25.0, (2, 2)), (-4.0, (0, 0))]
+    ("apart", "between"),
+    [(3.5, (0, 0)), (7.0, (1, 0)), (12.0, (1, 1)), (14.0, (2, 1)), (25.0, (2, 2)), (-4.0, (0, 0))],
 )
 def test_oncoming_vehicles_that_are_far_apart_have_lanes_between_them(apart, between):
     encounter = encounter_of(line(0.0, 0.0, 0.0, 10.0), line(120.0, apart, np.pi, 9.0))
@@ -125,9 +151,15 @@ def test_a_line_continued_by_one_far_beside_it_does_not_jump():
 
 def test_turns_and_crossings_are_not_along_a_road():
     with pytest.raises(RefusedError, match="vehicle 0 turns left"):
-        to_frenet(clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), line(0.0, 30.0, 0.0, 5.0))))
+        to_frenet(
+            clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), line(0.0, 30.0, 0.0, 5.0)))
+        )
     with pytest.raises(RefusedError, match="across"):
-        to_frenet(clean_tracks(encounter_of(line(0.0, 0.0, 0.0, 8.0), line(30.0, -30.0, np.pi / 2.0, 5.0))))
+        to_frenet(
+            clean_tracks(
+                encounter_of(line(0.0, 0.0, 0.0, 8.0), line(30.0, -30.0, np.pi / 2.0, 5.0))
+            )
+        )
 
 
 def test_overlapping_vehicles_are_pulled_apart_by_the_least():

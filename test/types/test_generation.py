@@ -17,40 +17,68 @@ from scenario_gen.types.scenario import dataframe, ScenarioSet
 
 def result(**figures):
     """A result whose rows have these (E position, E speed); of references there are those that are given."""
-    names = {"own": WITH, "without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replay": REPLAY}
+    names = {
+        "own": WITH,
+        "without": WITHOUT,
+        "uniform": UNIFORM,
+        "narrow": NARROW,
+        "replay": REPLAY,
+    }
     rows = [
         Row(names[key], 1, {"e_position": Interval(position), "e_speed": Interval(speed)})
         for key, (position, speed) in figures.items()
     ]
-    references = {names[key]: ScenarioSet(1, (), 1) for key in figures if key in ("without", "uniform", "narrow")}
+    references = {
+        names[key]: ScenarioSet(1, (), 1)
+        for key in figures
+        if key in ("without", "uniform", "narrow")
+    }
     evaluation = replace(Evaluation.empty(), rows=tuple(rows))
-    return GenerationResult(None, None, None, None, (), evaluation=evaluation, references=references)
+    return GenerationResult(
+        None, None, None, None, (), evaluation=evaluation, references=references
+    )
 
 
-FIVE = {"own": (0.1, 0.2), "without": (0.3, 0.4), "uniform": (0.08, 0.2), "narrow": (0.01, 0.02), "replay": (0.001, 0.002)}
+FIVE = {
+    "own": (0.1, 0.2),
+    "without": (0.3, 0.4),
+    "uniform": (0.08, 0.2),
+    "narrow": (0.01, 0.02),
+    "replay": (0.001, 0.002),
+}
 
 
 def test_the_delivered_set_stands_first_and_only_what_is_drawn_likewise_is_compared():
     similar = result(**FIVE).similarity()
     assert list(similar["compared"]) == [WITH, WITHOUT, UNIFORM]
     assert similar["compared"][WITH] == {"e_position": 0.1, "e_speed": 0.2, "e_heading": None}
-    assert list(similar["beside"]) == [NARROW, REPLAY]  # nearer, and no match for it: they have less freedom, or none
+    assert list(similar["beside"]) == [
+        NARROW,
+        REPLAY,
+    ]  # nearer, and no match for it: they have less freedom, or none
 
 
 def test_a_reference_that_does_better_is_said_with_both_figures():
     made = result(**FIVE)
     assert made.best("e_position") == UNIFORM
-    assert made.better_references() == ("evenly spaced changepoints keep it better here: E position 0.080 against 0.100",)
+    assert made.better_references() == (
+        "evenly spaced changepoints keep it better here: E position 0.080 against 0.100",
+    )
     assert made.best("e_speed") == WITH, "equal is not better"
     worse = result(own=(0.1, 0.2), without=(0.05, 0.1)).better_references()
-    assert worse == ("no changepoints at all keep it better here: E position 0.050 against 0.100, E speed 0.100 against 0.200",)
+    assert worse == (
+        "no changepoints at all keep it better here: E position 0.050 against 0.100, E speed 0.100 against 0.200",
+    )
 
 
 def test_what_does_not_show_in_three_digits_is_not_said():
     assert result(own=(0.1001, 0.2), without=(0.1, 0.3)).better_references() == ()
 
 
-@pytest.mark.parametrize("missing", [{"own": (np.nan, np.nan)}, {"without": (np.nan, np.nan), "uniform": (np.nan, np.nan)}])
+@pytest.mark.parametrize(
+    "missing",
+    [{"own": (np.nan, np.nan)}, {"without": (np.nan, np.nan), "uniform": (np.nan, np.nan)}],
+)
 def test_where_there_is_no_figure_nothing_is_best(missing):
     made = result(**{**{key: FIVE[key] for key in ("own", "without")}, **missing})
     assert made.better_references() == () and made.best("e_heading") == ""
@@ -58,20 +86,41 @@ def test_where_there_is_no_figure_nothing_is_best(missing):
 
 
 def test_what_was_asked_of_the_delivered_set_alone_takes_it_out_of_the_comparison():
-    made = replace(result(**FIVE), not_compared="only the delivered set was drawn with target as requested")
+    made = replace(
+        result(**FIVE), not_compared="only the delivered set was drawn with target as requested"
+    )
     similar = made.similarity()
-    assert list(similar["compared"]) == [WITH] and list(similar["beside"]) == [WITHOUT, UNIFORM, NARROW, REPLAY]
+    assert list(similar["compared"]) == [WITH] and list(similar["beside"]) == [
+        WITHOUT,
+        UNIFORM,
+        NARROW,
+        REPLAY,
+    ]
     assert similar["best"] == {}
-    assert similar["said"] == ["nothing is compared: only the delivered set was drawn with target as requested"]
+    assert similar["said"] == [
+        "nothing is compared: only the delivered set was drawn with target as requested"
+    ]
 
 
 def test_results_are_counted_indexed_and_made_a_table():
     """A row for each scenario, vehicle and instant at which it is there; short representations."""
     result = hand_made_run()
-    assert len(result) == len(list(result)) == len(result.generated.scenarios) and result[1] is result.generated.scenarios[1]
+    assert (
+        len(result) == len(list(result)) == len(result.generated.scenarios)
+        and result[1] is result.generated.scenarios[1]
+    )
     table = result.to_dataframe()
     assert len(table) == sum(int(scenario.there.sum()) for scenario in result)
-    assert list(table.columns) == ["scenario", "vehicle", "time", "x", "y", "heading", "speed", "acceleration"]
+    assert list(table.columns) == [
+        "scenario",
+        "vehicle",
+        "time",
+        "x",
+        "y",
+        "heading",
+        "speed",
+        "acceleration",
+    ]
     first = result[0]
     own = table[(table.scenario == first.index) & (table.vehicle == first.vehicles[0].id)]
     assert (own[["x", "y"]].to_numpy() == first.position[0][first.there[0]]).all()
@@ -86,7 +135,9 @@ def test_names_of_the_version_before_still_work_with_a_warning():
     names = {"apart": "not_compared", "row": "row_name", "oracle": "replay", "lost": "losses"}
     for old, new in names.items():
         with pytest.warns(DeprecationWarning, match=f"GenerationResult.{old} is now {new}"):
-            assert getattr(made, old) is getattr(made, new) or getattr(made, old) == getattr(made, new)
+            assert getattr(made, old) is getattr(made, new) or getattr(made, old) == getattr(
+                made, new
+            )
     with pytest.warns(DeprecationWarning, match="road_and_fit"):
         assert made.placed() == made.road_and_fit()
     with pytest.warns(DeprecationWarning, match=r"Fit.lost is now losses"):
@@ -98,6 +149,12 @@ def test_names_of_the_version_before_still_work_with_a_warning():
 def test_the_replay_is_found_by_the_name_that_its_row_had():
     case = result(**FIVE)
     with pytest.warns(DeprecationWarning, match="row 'oracle' of an evaluation is now 'replay'"):
-        assert case.evaluation.value("oracle", "e_position") == case.evaluation.value(REPLAY, "e_position") == 0.001
+        assert (
+            case.evaluation.value("oracle", "e_position")
+            == case.evaluation.value(REPLAY, "e_position")
+            == 0.001
+        )
     former = replace(case.evaluation, level=0.95).to_json().replace('"replay"', '"oracle"')
-    assert [row.name for row in Evaluation.from_json(former).rows] == [row.name for row in case.evaluation.rows]
+    assert [row.name for row in Evaluation.from_json(former).rows] == [
+        row.name for row in case.evaluation.rows
+    ]

@@ -30,15 +30,22 @@ def street():
 
 
 def led(network):
-    return {lane.id: sorted(network.lanes[k].id for k in lane.successors) for lane in network.lanes}
+    return {
+        lane.id: sorted(network.lanes[k].id for k in lane.successors) for lane in network.lanes
+    }
 
 
 def test_lanes_of_cars_stand_first_and_lead_into_no_others():
     network = street()
     assert led(network) == {"in": ["motorway"], "motorway": []}
-    assert [lane.id for lane in network.others] == ["cycle", "bus", "walk"] and len(network.whole.lanes) == 5
+    assert [lane.id for lane in network.others] == ["cycle", "bus", "walk"] and len(
+        network.whole.lanes
+    ) == 5
     assert led(lanes_for(network, BUS)) == {"in": ["bus", "motorway"], "motorway": [], "bus": []}
-    assert lanes_for(network, BUS) is lanes_for(network, BUS) and network.open_to(frozenset(("car",))) is network
+    assert (
+        lanes_for(network, BUS) is lanes_for(network, BUS)
+        and network.open_to(frozenset(("car",))) is network
+    )
 
 
 def test_a_bicycle_has_other_lanes_than_a_car_and_the_rules_of_those_it_shares():
@@ -51,8 +58,16 @@ def test_users_travel_in_messages_and_who_is_nobody_is_refused():
     _, again = decode_lanes(encode_lanes(street(), "map", 0))
     before = street()
     for one, other in zip(again.of_all, before.of_all, strict=True):
-        assert (one.id, one.users, one.crossing, one.successors) == (other.id, other.users, other.crossing, other.successors)
-    assert led(again) == led(before) and again.moved(np.ones(2)).others[0].left[0].tolist() == [1.0, 1.0]
+        assert (one.id, one.users, one.crossing, one.successors) == (
+            other.id,
+            other.users,
+            other.crossing,
+            other.successors,
+        )
+    assert led(again) == led(before) and again.moved(np.ones(2)).others[0].left[0].tolist() == [
+        1.0,
+        1.0,
+    ]
     with pytest.raises(InputError, match="lane x: users tram; choose of bicycle, bus, car"):
         lane("x", 0.0, users=["tram"])
 
@@ -61,4 +76,6 @@ def test_users_travel_in_messages_and_who_is_nobody_is_refused():
 def test_every_type_uses_lanes_as_one_that_is_known(name):
     kind = VEHICLE_TYPES[name]
     (user,) = kind.lane_user
-    assert kind.walks == (user == "pedestrian") and (name not in ("bus", "bicycle", "truck") or user == name)
+    assert kind.walks == (user == "pedestrian") and (
+        name not in ("bus", "bicycle", "truck") or user == name
+    )

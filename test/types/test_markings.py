@@ -21,8 +21,15 @@ from scenario_gen.types.markings import Marking, markings
 def test_each_border_is_painted_once_as_what_it_is(side, drawn):
     network = build_road("t_intersection", None, RoadConfig(lanes=2, traffic_side=side)).lanes
     line = np.array([[20.0, 1.0], [20.0, 5.0]])
-    rules = (TrafficRule("s", RuleKind.STOP, (0,), (), line), TrafficRule("p", RuleKind.PRIORITY, (1,), (), line))
-    arms = replace(network, lanes=tuple(replace(n, successors=()) for n in network.lanes if not n.junction), drawn=drawn)
+    rules = (
+        TrafficRule("s", RuleKind.STOP, (0,), (), line),
+        TrafficRule("p", RuleKind.PRIORITY, (1,), (), line),
+    )
+    arms = replace(
+        network,
+        lanes=tuple(replace(n, successors=()) for n in network.lanes if not n.junction),
+        drawn=drawn,
+    )
     painted = markings(replace(arms, rules=rules))
     counts = {kind: len(lines) for kind, lines in painted.items()}
     assert counts == {
@@ -45,12 +52,26 @@ def test_markers_have_dashes_of_their_length_and_replace_those_before():
 
 def test_crossings_are_bars_and_a_cycle_lane_has_a_line_on_each_side():
     config = RoadConfig(crossing="zebra", cycle_lane=2.0)
-    painted, plain = markings(build_road("straight", None, config).lanes), markings(build_road("straight").lanes)
+    painted, plain = (
+        markings(build_road("straight", None, config).lanes),
+        markings(build_road("straight").lanes),
+    )
     bars = np.stack(painted[Marking.ZEBRA])
-    assert len(bars) == 11 and Marking.ZEBRA not in plain  # a bar a metre, on 7 m of lanes and 4 m of cycle lanes
-    assert np.hypot(*(bars[:, 1] - bars[:, 0]).T) == pytest.approx(4.0) and np.ptp(bars[:, :, 0], axis=0) == pytest.approx(0.0)
-    assert len(painted[Marking.EDGE]) == 4 and not painted[Marking.LANE] and len(painted[Marking.CENTRE]) == 1
+    assert (
+        len(bars) == 11 and Marking.ZEBRA not in plain
+    )  # a bar a metre, on 7 m of lanes and 4 m of cycle lanes
+    assert np.hypot(*(bars[:, 1] - bars[:, 0]).T) == pytest.approx(4.0) and np.ptp(
+        bars[:, :, 0], axis=0
+    ) == pytest.approx(0.0)
+    assert (
+        len(painted[Marking.EDGE]) == 4
+        and not painted[Marking.LANE]
+        and len(painted[Marking.CENTRE]) == 1
+    )
     names = [
-        marker.name for marker in decode(MARKERS, road_markers(build_road("straight", None, config).lanes, "map", 5), "m").markers
+        marker.name
+        for marker in decode(
+            MARKERS, road_markers(build_road("straight", None, config).lanes, "map", 5), "m"
+        ).markers
     ]
     assert names == ["", "edge", "centre", "arrow", "zebra"]

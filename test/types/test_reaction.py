@@ -29,13 +29,23 @@ def test_every_edge_has_a_sentence_and_what_is_doubtful_or_cut_says_so():
 def test_who_slows_passes_or_stops_is_said_to():
     early = Reaction(YIELD, 1, 0, -0.3, 1.0, 0.6, 0.9, 3.0, 9.0, gap=-0.2)
     assert early.words(VEHICLES) == "vehicle b slows for vehicle a and passes right behind it"
-    assert replace(early, since=9.0, gap=1.2).words(VEHICLES) == "vehicle b passes 1.2 s behind vehicle a"
+    assert (
+        replace(early, since=9.0, gap=1.2).words(VEHICLES)
+        == "vehicle b passes 1.2 s behind vehicle a"
+    )
     assert replace(early, gap=math.inf).words(VEHICLES) == "vehicle b slows for vehicle a"
-    assert replace(early, gap=math.inf, stands=True).words(VEHICLES) == "vehicle b stops for vehicle a"
+    assert (
+        replace(early, gap=math.inf, stands=True).words(VEHICLES)
+        == "vehicle b stops for vehicle a"
+    )
 
 
 def test_road_users_are_called_by_their_types():
-    users = (Vehicle("a", type="bicycle"), Vehicle("b", type="pedestrian"), Vehicle("c", type="car"))
+    users = (
+        Vehicle("a", type="bicycle"),
+        Vehicle("b", type="pedestrian"),
+        Vehicle("c", type="car"),
+    )
     assert GRAPH.sentences(users)[0].startswith("pedestrian b waits for bicycle a, then")
     assert GRAPH.sentences(users)[1].startswith("vehicle c follows pedestrian b,")
 

@@ -16,14 +16,25 @@ VEHICLES = (Vehicle("a"), Vehicle("b"))
 
 @st.composite
 def presences(draw, count=3, samples=9):
-    rows = st.tuples(st.integers(0, samples - 2), st.integers(1, samples - 1)).filter(lambda row: row[0] < row[1])
+    rows = st.tuples(st.integers(0, samples - 2), st.integers(1, samples - 1)).filter(
+        lambda row: row[0] < row[1]
+    )
     return np.array(draw(st.lists(rows, min_size=count, max_size=count)))
 
 
 def encounter(present=ALWAYS):
     clock = np.arange(9.0)
     position = np.stack((np.tile(clock, (2, 1)), np.zeros((2, 9))), axis=-1)
-    return Encounter("test", VEHICLES, 0, 100_000_000, position, np.zeros((2, 9)), np.ones((2, 9)), present=present)
+    return Encounter(
+        "test",
+        VEHICLES,
+        0,
+        100_000_000,
+        position,
+        np.zeros((2, 9)),
+        np.ones((2, 9)),
+        present=present,
+    )
 
 
 @given(presences())
@@ -41,7 +52,10 @@ def test_what_is_held_is_the_value_at_the_nearest_instant_of_presence(present):
 def test_two_are_together_where_both_are_there(present):
     there = mask(present, 9)
     for a, b in ((0, 1), (0, 2), (1, 2)):
-        assert np.arange(9)[together(present, a, b)].tolist() == np.flatnonzero(there[a] & there[b]).tolist()
+        assert (
+            np.arange(9)[together(present, a, b)].tolist()
+            == np.flatnonzero(there[a] & there[b]).tolist()
+        )
 
 
 @given(presences(), st.integers(0, 4), st.integers(5, 9))
@@ -66,7 +80,15 @@ def test_an_encounter_holds_the_edge_values_where_a_vehicle_is_not_there():
 
 def test_a_scenario_holds_them_too():
     one = encounter()
-    made = Scenario(VEHICLES, one.time, one.position, one.heading, one.speed, one.speed, present=np.array([[0, 6], [2, 8]]))
+    made = Scenario(
+        VEHICLES,
+        one.time,
+        one.position,
+        one.heading,
+        one.speed,
+        one.speed,
+        present=np.array([[0, 6], [2, 8]]),
+    )
     assert made.position[1, 0, 0] == 2.0
     assert made.there.sum() == 14
 

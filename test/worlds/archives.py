@@ -28,7 +28,12 @@ are recorded, how far one drives, how far beside each other they pass, how long 
 FIRST_DAY = 3000  # days after 2004-01-01: April 2012
 DAY0 = date(1899, 12, 30)  # from which the names of the files count
 PLACE = (42.28, -83.74)  # degrees, around which all lies
-TILE, STREET, BLOCK, COLUMN = 2000.0, 300.0, 60.0, 30_000.0  # m: an encounter's own ground; between lone drives, wide and narrow
+TILE, STREET, BLOCK, COLUMN = (
+    2000.0,
+    300.0,
+    60.0,
+    30_000.0,
+)  # m: an encounter's own ground; between lone drives, wide and narrow
 ROWS_PER_FILE = 1_000_000
 
 
@@ -98,16 +103,33 @@ class _Draft:
     def between(self, low: float, high: float) -> float:
         return low + (high - low) * float(self.random.random())
 
-    def add(self, place: tuple[float, float, float, float], drives: list[dict[str, float]]) -> list[int]:
+    def add(
+        self, place: tuple[float, float, float, float], drives: list[dict[str, float]]
+    ) -> list[int]:
         """Put drives, given about an encounter's own middle, to a place (east, north, turned by, time); return their devices."""
         east, north, turned, when = place
         cos, sin = np.cos(turned), np.sin(turned)
         devices = []
         for drive in drives:
-            row = {"radius": 1.0, "turn": 0.0, "dip": 0.0, "dip_at": 0.0, "dip_width": 4.0, "x": 0.0, "y": 0.0, "at": 0.0} | drive
+            row = {
+                "radius": 1.0,
+                "turn": 0.0,
+                "dip": 0.0,
+                "dip_at": 0.0,
+                "dip_width": 4.0,
+                "x": 0.0,
+                "y": 0.0,
+                "at": 0.0,
+            } | drive
             x, y = row["x"], row["y"]
-            row |= {"x": cos * x - sin * y, "y": sin * x + cos * y, "heading": row["heading"] + turned}
-            row |= {"east": east, "north": north} | {name: row[name] + when for name in ("at", "begin", "dip_at")}
+            row |= {
+                "x": cos * x - sin * y,
+                "y": sin * x + cos * y,
+                "heading": row["heading"] + turned,
+            }
+            row |= {"east": east, "north": north} | {
+                name: row[name] + when for name in ("at", "begin", "dip_at")
+            }
             self.device += 1
             devices.append(int(row.setdefault("device", self.device)))
             self.rows.append(row)
@@ -130,7 +152,12 @@ def write_archive(folder: Path, config: ArchiveConfig = ArchiveConfig(), seed: i
     if any(folder.iterdir()):
         raise ValueError(f"{folder} is not empty; name another folder")
     counts = _write(folder, drives, config, np.random.default_rng([seed, 1]))
-    document = {"synthetic": True, "seed": seed, **counts, "planted": [vars(encounter) for encounter in planted]}
+    document = {
+        "synthetic": True,
+        "seed": seed,
+        **counts,
+        "planted": [vars(encounter) for encounter in planted],
+    }
     (folder / TRUTH).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return folder
 
@@ -166,20 +193,28 @@ def plan(config: ArchiveConfig, seed: int) -> tuple[Drives, list[Planted]]:
         draft.planted.append(Planted(kind, tuple(devices), when, threshold, inside))
     used = sum(int(10.0 * row["lasts"]) for row in draft.rows)
     shared = [row for row in draft.rows if draft.random.random() < config.repeated_ids]
-    _lone(draft, config, config.rows / (1.0 - config.loss) / (1.0 + config.duplicates) - used, shared)
+    _lone(
+        draft, config, config.rows / (1.0 - config.loss) / (1.0 + config.duplicates) - used, shared
+    )
     names = Drives.__dataclass_fields__
-    columns = {name: np.array([row[name] for row in draft.rows], dtype=np.float64) for name in names}
+    columns = {
+        name: np.array([row[name] for row in draft.rows], dtype=np.float64) for name in names
+    }
     return Drives(columns.pop("device").astype(np.int64), **columns), draft.planted
 
 
-def _lone(draft: _Draft, config: ArchiveConfig, rows: float, shared: list[dict[str, float]]) -> None:
+def _lone(
+    draft: _Draft, config: ArchiveConfig, rows: float, shared: list[dict[str, float]]
+) -> None:
     """Add vehicles that meet nobody: for ten minutes each, a fifth of them side by side, and somebody for each shared id.
 
     Raises:
         ValueError: there is no room for any.
     """
     if rows < 0.0:
-        raise ValueError(f"rows: the encounters alone take {-rows:.0f} rows more than {config.rows}")
+        raise ValueError(
+            f"rows: the encounters alone take {-rows:.0f} rows more than {config.rows}"
+        )
     lasts = min(600.0, 3600.0 * config.hours)
     count = int(np.ceil(rows / (10.0 * lasts)))
     north = begin = 0.0
@@ -191,11 +226,22 @@ def _lone(draft: _Draft, config: ArchiveConfig, rows: float, shared: list[dict[s
         column = k // 2000
         if column and k % 2000 == 0:
             north = -STREET
-        drive = {"heading": np.pi if k % 3 == 0 else 0.0, "speed": draft.between(8.0, 15.0), "begin": begin, "lasts": lasts}
+        drive = {
+            "heading": np.pi if k % 3 == 0 else 0.0,
+            "speed": draft.between(8.0, 15.0),
+            "begin": begin,
+            "lasts": lasts,
+        }
         drive |= {"at": begin + 300.0, "dip_at": begin + 200.0, "dip_width": 20.0}
         if k < len(shared):
-            drive |= {"device": shared[k]["device"], "begin": max(shared[k]["begin"] - 300.0, 0.0), "at": shared[k]["begin"]}
-        draft.add((column * COLUMN, north, 0.0, 0.0), [drive | {"dip": 0.9 * draft.random.random()}])
+            drive |= {
+                "device": shared[k]["device"],
+                "begin": max(shared[k]["begin"] - 300.0, 0.0),
+                "at": shared[k]["begin"],
+            }
+        draft.add(
+            (column * COLUMN, north, 0.0, 0.0), [drive | {"dip": 0.9 * draft.random.random()}]
+        )
 
 
 def _recorded(draft: _Draft, low: float = 18.0, high: float = 25.0) -> dict[str, float]:
@@ -208,50 +254,99 @@ def _crossing(draft: _Draft, late: tuple[float, float] = (1.0, 2.4)) -> list[dic
     dip = {"dip": draft.between(0.0, 0.5), "dip_at": draft.between(-7.0, -4.0), "dip_width": 2.0}
     return [
         {"heading": 0.0, "speed": draft.between(7.0, 14.0), **_recorded(draft)},
-        {"heading": angle, "speed": draft.between(7.0, 14.0), "at": draft.between(*late), **_recorded(draft), **dip},
+        {
+            "heading": angle,
+            "speed": draft.between(7.0, 14.0),
+            "at": draft.between(*late),
+            **_recorded(draft),
+            **dip,
+        },
     ]
 
 
 def _opposing(draft: _Draft, beside: tuple[float, float] = (3.2, 4.5)) -> list[dict[str, float]]:
     return [
         {"heading": 0.0, "speed": draft.between(6.0, 14.0), **_recorded(draft)},
-        {"heading": np.pi, "speed": draft.between(6.0, 14.0), "y": draft.between(*beside), **_recorded(draft)},
+        {
+            "heading": np.pi,
+            "speed": draft.between(6.0, 14.0),
+            "y": draft.between(*beside),
+            **_recorded(draft),
+        },
     ]
 
 
 def _following(draft: _Draft) -> list[dict[str, float]]:
-    speed, headway, dip = draft.between(7.0, 15.0), draft.between(1.1, 2.4), draft.between(0.0, 0.8)
+    speed, headway, dip = (
+        draft.between(7.0, 15.0),
+        draft.between(1.1, 2.4),
+        draft.between(0.0, 0.8),
+    )
     same = {"heading": 0.0, "speed": speed, "dip": dip, **_recorded(draft)}
     count = 3 if draft.random.random() < 0.2 else 2
     return [same | {"at": k * headway, "dip_at": k * headway} for k in range(count)]
 
 
 def _merging(draft: _Draft) -> list[dict[str, float]]:
-    angle, radius, speed, times = draft.between(0.8, 1.55), draft.between(9.0, 14.0), draft.between(6.0, 8.0), _recorded(draft)
+    angle, radius, speed, times = (
+        draft.between(0.8, 1.55),
+        draft.between(9.0, 14.0),
+        draft.between(6.0, 8.0),
+        _recorded(draft),
+    )
     side = 1.0 if draft.random.random() < 0.5 else -1.0
-    x, y = -radius * np.sin(angle), side * radius * (1.0 - np.cos(angle))  # where the arc begins that ends at (0, 0)
+    x, y = (
+        -radius * np.sin(angle),
+        side * radius * (1.0 - np.cos(angle)),
+    )  # where the arc begins that ends at (0, 0)
     at = draft.between(1.2, 2.4) - radius * angle / speed
     return [
         {"heading": 0.0, "speed": speed, **times},
-        {"heading": -side * angle, "turn": side * angle, "radius": radius, "x": x, "y": y, "at": at, "speed": speed, **times},
+        {
+            "heading": -side * angle,
+            "turn": side * angle,
+            "radius": radius,
+            "x": x,
+            "y": y,
+            "at": at,
+            "speed": speed,
+            **times,
+        },
     ]
 
 
 def _turning(draft: _Draft) -> list[dict[str, float]]:
-    radius, lane, speed, other = draft.between(8.0, 11.0), 3.5, draft.between(5.0, 8.0), draft.between(8.0, 14.0)
-    beta = np.arctan2(float(np.sqrt(2.0 * radius * lane - lane * lane)), radius - lane)  # where it crosses the other's lane
+    radius, lane, speed, other = (
+        draft.between(8.0, 11.0),
+        3.5,
+        draft.between(5.0, 8.0),
+        draft.between(8.0, 14.0),
+    )
+    beta = np.arctan2(
+        float(np.sqrt(2.0 * radius * lane - lane * lane)), radius - lane
+    )  # where it crosses the other's lane
     passes = -radius * np.sin(beta) / other
     at = passes + draft.between(1.3, 2.4) - radius * beta / speed
     return [
         {"heading": 0.0, "speed": other, **_recorded(draft)},
-        {"heading": np.pi, "y": lane, "radius": radius, "turn": np.pi / 2.0, "speed": speed, "at": at, **_recorded(draft)},
+        {
+            "heading": np.pi,
+            "y": lane,
+            "radius": radius,
+            "turn": np.pi / 2.0,
+            "speed": speed,
+            "at": at,
+            **_recorded(draft),
+        },
     ]
 
 
 _OF_KIND = dict(zip(KINDS, (_crossing, _opposing, _following, _merging, _turning), strict=True))
 
 
-def _at_threshold(draft: _Draft, threshold: str, *, inside: bool) -> tuple[str, list[dict[str, float]]]:
+def _at_threshold(
+    draft: _Draft, threshold: str, *, inside: bool
+) -> tuple[str, list[dict[str, float]]]:
     """Return the kind and the drives of an encounter just inside or just outside of a threshold (the miner's defaults)."""
 
     def margin(limit: float, by: float) -> float:  # `by` on the side on which it is found
@@ -259,7 +354,9 @@ def _at_threshold(draft: _Draft, threshold: str, *, inside: bool) -> tuple[str, 
 
     if threshold == "proximity":  # behind each other, almost 100 m apart
         apart, times = margin(100.0, -4.0), {"begin": -6.0, "lasts": 12.0}
-        return "following", [{"heading": 0.0, "speed": 38.0, "at": k * apart / 38.0, **times} for k in range(2)]
+        return "following", [
+            {"heading": 0.0, "speed": 38.0, "at": k * apart / 38.0, **times} for k in range(2)
+        ]
     if threshold == "duration":  # nearer than 100 m for almost 5 s
         closing = 200.0 / margin(5.0, 0.6)
         same = {"speed": closing / 2.0, "begin": -9.0, "lasts": 18.0}
@@ -267,7 +364,10 @@ def _at_threshold(draft: _Draft, threshold: str, *, inside: bool) -> tuple[str, 
     if threshold == "presence":  # the second is recorded for almost 5 s
         lasts = margin(5.0, 0.6)
         first, second = _opposing(draft)
-        return "opposing", [first | {"speed": 7.0}, second | {"speed": 7.0, "begin": -lasts / 2.0, "lasts": lasts}]
+        return "opposing", [
+            first | {"speed": 7.0},
+            second | {"speed": 7.0, "begin": -lasts / 2.0, "lasts": lasts},
+        ]
     if threshold == "travel":  # one stands, the other moves slowly
         speed, times = margin(5.0, 1.2) / 30.0, {"begin": -15.0, "lasts": 30.0}
         places = {"speed": speed}, {"speed": 0.0, "x": 4.8 + 15.0 * speed}
@@ -279,7 +379,9 @@ def _at_threshold(draft: _Draft, threshold: str, *, inside: bool) -> tuple[str, 
     return "crossing", _crossing(draft, (late, late))
 
 
-def _write(folder: Path, drives: Drives, config: ArchiveConfig, random: np.random.Generator) -> dict[str, int]:
+def _write(
+    folder: Path, drives: Drives, config: ArchiveConfig, random: np.random.Generator
+) -> dict[str, int]:
     """Write the files; return how many rows of what there are."""
     import pyarrow as pa
     from pyarrow import csv
@@ -298,8 +400,13 @@ def _write(folder: Path, drives: Drives, config: ArchiveConfig, random: np.rando
             csv.write_csv(pa.table(columns), path, csv.WriteOptions(include_header=False))
             broken = round(config.damaged * len(columns["TxDevice"]))
             if broken:
-                with path.open("a", encoding="utf-8") as file:  # torn rows, a row of text, and an end that is cut off
-                    file.writelines("17,3,\n" if k % 2 else "x,".join(["17"] * 19) + "\n" for k in range(broken - 1))
+                with path.open(
+                    "a", encoding="utf-8"
+                ) as file:  # torn rows, a row of text, and an end that is cut off
+                    file.writelines(
+                        "17,3,\n" if k % 2 else "x,".join(["17"] * 19) + "\n"
+                        for k in range(broken - 1)
+                    )
                     file.write("17,3,55,261")
             counts["damaged"] += broken
             counts["rows"] += len(columns["TxDevice"]) + broken
@@ -322,10 +429,16 @@ def states(drives: Drives, who: Ints, time: Floats) -> tuple[Floats, Floats, Flo
         time: (R,) s.
     """
     base, width = drives.speed[who], drives.dip_width[who]
-    since, since_at = (time - drives.dip_at[who]) / width, ((drives.at - drives.dip_at) / drives.dip_width)[who]
+    since, since_at = (
+        (time - drives.dip_at[who]) / width,
+        ((drives.at - drives.dip_at) / drives.dip_width)[who],
+    )
     dip = drives.dip[who]
     speed = base * (1.0 - dip / (1.0 + np.square(since)))
-    driven = base * ((time - drives.at[who]) - dip * width * (np.arctan2(since, 1.0) - np.arctan2(since_at, 1.0)))
+    driven = base * (
+        (time - drives.at[who])
+        - dip * width * (np.arctan2(since, 1.0) - np.arctan2(since_at, 1.0))
+    )
     radius, turn, heading = drives.radius[who], drives.turn[who], drives.heading[who]
     bent = np.clip(driven / radius, 0.0, np.abs(turn))
     side = np.sign(turn)
@@ -338,7 +451,12 @@ def states(drives: Drives, who: Ints, time: Floats) -> tuple[Floats, Floats, Flo
 
 
 def _rows(
-    drives: Drives, part: Ints, number: int, config: ArchiveConfig, random: np.random.Generator, counts: dict[str, int]
+    drives: Drives,
+    part: Ints,
+    number: int,
+    config: ArchiveConfig,
+    random: np.random.Generator,
+    counts: dict[str, int],
 ) -> dict[str, Ints | Floats]:
     """Return the columns of one file."""
     amount = np.maximum((drives.lasts[part] * 10.0).astype(np.int64), 1)
@@ -349,9 +467,13 @@ def _rows(
     position, heading, speed = states(drives, who, time)
     off = config.noise * random.standard_normal((len(drives.x), 2))
     position = position + off[who] + 0.05 * (random.random((len(who), 2)) - 0.5)
-    away = position - np.column_stack([drives.east[who], drives.north[who]])  # from its encounter's own place on the globe
+    away = position - np.column_stack(
+        [drives.east[who], drives.north[who]]
+    )  # from its encounter's own place on the globe
     middle = PLACE[1] + drives.east[who] / 80_000.0, PLACE[0] + drives.north[who] / 111_000.0
-    longitude, latitude, _ = pyproj.Geod(ellps="WGS84").fwd(*middle, np.degrees(np.arctan2(*away.T)), np.hypot(*away.T))
+    longitude, latitude, _ = pyproj.Geod(ellps="WGS84").fwd(
+        *middle, np.degrees(np.arctan2(*away.T)), np.hypot(*away.T)
+    )
     stamp = (np.round(time * 1e6) + FIRST_DAY * 86400e6).astype(np.int64)
     second = stamp // 1000 % 60_000
     kept = random.random(len(who)) >= config.loss

@@ -50,7 +50,18 @@ def at(document: object, path: str, value: object) -> bytes:
 def library() -> dict[str, object]:
     """The document of a small library of primitives."""
     eyes, half = np.stack([np.eye(6)] * 2), np.full((2, 2), 0.5)
-    made = PrimitiveLibrary(2, np.zeros((2, 6)), eyes, half, [0.5, 0.5], [3, 4], [1.0, 2.0], 0.5, [1, 2, 0.2, 0.4], ("a", "b"))
+    made = PrimitiveLibrary(
+        2,
+        np.zeros((2, 6)),
+        eyes,
+        half,
+        [0.5, 0.5],
+        [3, 4],
+        [1.0, 2.0],
+        0.5,
+        [1, 2, 0.2, 0.4],
+        ("a", "b"),
+    )
     with tempfile.TemporaryDirectory() as folder:
         made.save(Path(folder) / "library.json")
         return json.loads((Path(folder) / "library.json").read_text())
@@ -70,14 +81,20 @@ LIBRARY = {
     "a_weight_in_a_list": ("weight", [0.5]),
     "vehicles_are_text": ("vehicles", "2"),
 }
-CASE = {"name": "n", "road": "r", "rows": [{"name": "with", "figures": {"e_speed": [0.1, 0.0, 0.2]}}]}
+CASE = {
+    "name": "n",
+    "road": "r",
+    "rows": [{"name": "with", "figures": {"e_speed": [0.1, 0.0, 0.2]}}],
+}
 RESULT = {
     "cases_is_no_number": b'{"cases": NaN}',
     "a_case_is_a_number": b'{"cases": [7]}',
     "rows_are_a_number": at({"cases": [CASE]}, "cases.0.rows", 3),
     "a_name_is_a_list": at({"cases": [CASE]}, "cases.0.name", []),
     "a_figure_is_an_object": at({"cases": [CASE]}, "cases.0.rows.0.figures.e_speed", {"x": 1}),
-    "a_figure_of_too_many_digits": at({"cases": [CASE]}, "cases.0.rows.0.figures.e_speed", 10**400),
+    "a_figure_of_too_many_digits": at(
+        {"cases": [CASE]}, "cases.0.rows.0.figures.e_speed", 10**400
+    ),
     "figures_are_a_number": at({"cases": [CASE]}, "cases.0.rows.0.figures", 1),
     "too_deep": b"[" * 100_000,
 }
@@ -105,24 +122,44 @@ def bomb(width: int, height: int) -> bytes:
     """A PNG of a few bytes that says it is so large, of one bit each."""
 
     def chunk(name: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        return (
+            struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        )
 
     head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0))
-    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", zlib.compress(b"\0" * 1000)) + chunk(b"IEND", b"")
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + head
+        + chunk(b"IDAT", zlib.compress(b"\0" * 1000))
+        + chunk(b"IEND", b"")
+    )
 
 
 def nav2(picture: str, **facts: str) -> bytes:
     """A map's facts."""
-    given = {"image": picture, "resolution": "0.2", "origin": "[0, 0, 0]", "negate": "0", "occupied_thresh": "0.65"}
-    return "".join(f"{key}: {value}\n" for key, value in (given | {"free_thresh": "0.25"} | facts).items()).encode()
+    given = {
+        "image": picture,
+        "resolution": "0.2",
+        "origin": "[0, 0, 0]",
+        "negate": "0",
+        "occupied_thresh": "0.65",
+    }
+    return "".join(
+        f"{key}: {value}\n" for key, value in (given | {"free_thresh": "0.25"} | facts).items()
+    ).encode()
 
 
-ALIASES = "a0: &a0 [1,1,1,1,1,1,1,1,1]\n" + "".join(f"a{k}: &a{k} [{','.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 8))
+ALIASES = "a0: &a0 [1,1,1,1,1,1,1,1,1]\n" + "".join(
+    f"a{k}: &a{k} [{','.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 8)
+)
 IMAGES = {
     "a_cut_png": ("m.png", lambda: image("png")[:-30]),
     "a_png_of_wrong_chunks": ("m.png", lambda: image("png").replace(b"IDAT", b"\0\0IE")),
     "a_huge_png": ("m.png", lambda: bomb(600_000, 500_000)),
-    "a_dds_of_no_format": ("m.dds", lambda: b"DDS " + struct.pack("<7I", 124, 0x1007, 4, 4, 0, 0, 0) + bytes(96)),
+    "a_dds_of_no_format": (
+        "m.dds",
+        lambda: b"DDS " + struct.pack("<7I", 124, 0x1007, 4, 4, 0, 0, 0) + bytes(96),
+    ),
     "a_qoi_of_nothing": ("m.qoi", lambda: b"qoif" + struct.pack(">IIBB", 500_000, 500_000, 3, 0)),
     "a_cut_pgm": ("m.pgm", lambda: b"P5 40 40 255\n" + bytes(100)),
     "a_pgm_of_letters": ("m.pgm", lambda: b"P2 4 x 255\n"),
@@ -136,9 +173,13 @@ def mcap(compression: CompressionType = CompressionType.NONE) -> bytes:
     out = BytesIO()
     writer = Writer(out, chunk_size=300, compression=compression)
     writer.start("ros2")
-    channel = writer.register_channel("/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data"))
+    channel = writer.register_channel(
+        "/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+    )
     for k in range(40):
-        writer.add_message(channel, 1000 + k, b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00" + bytes([k]), 1000 + k)
+        writer.add_message(
+            channel, 1000 + k, b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00" + bytes([k]), 1000 + k
+        )
     writer.finish()
     return out.getvalue()
 
@@ -160,7 +201,9 @@ MCAP: dict[str, Make] = {
     "records_of_a_terabyte": lambda: at_record(mcap(), CHUNK, 9 + 16, HUGE),
     "an_index_of_a_terabyte": lambda: at_record(mcap(), INDEX, 1, HUGE),
     "an_index_that_points_beyond": lambda: at_record(mcap(), INDEX, 9 + 16, BEYOND),
-    "an_index_that_points_elsewhere": lambda: at_record(mcap(), INDEX, 9 + 16, (77).to_bytes(8, "little")),
+    "an_index_that_points_elsewhere": lambda: at_record(
+        mcap(), INDEX, 9 + 16, (77).to_bytes(8, "little")
+    ),
     "a_schema_of_a_terabyte": lambda: at_record(mcap(), SCHEMA, 1, HUGE),
     "a_schema_of_another_number": lambda: at_record(mcap(), SCHEMA, 9, b"\xcb\x00"),
     "statistics_of_nothing": lambda: at_record(mcap(), STATISTICS, 1, bytes(8)),
@@ -197,7 +240,9 @@ def small(*, compress: bool) -> bytes:
 def metadata() -> str:
     """The metadata of a bag as the project writes it."""
     with tempfile.TemporaryDirectory() as folder:
-        return (write_recording(Path(folder) / "bag", hand_made_run()) / "metadata.yaml").read_text()
+        return (
+            write_recording(Path(folder) / "bag", hand_made_run()) / "metadata.yaml"
+        ).read_text()
 
 
 def versioned(value: str) -> bytes:
@@ -212,12 +257,19 @@ def sqlite(*changes: str, cut: int | None = None) -> bytes:
         with sqlite3.connect(path) as bag:
             columns = "name TEXT, type TEXT, serialization_format TEXT, offered_qos_profiles TEXT DEFAULT ''"
             bag.execute(f"CREATE TABLE topics(id INTEGER PRIMARY KEY, {columns})")
-            bag.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+            bag.execute(
+                "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)"
+            )
             for k in range(3):
                 row = (k + 1, f"/vehicle_{k}/fix", "sensor_msgs/msg/NavSatFix", "cdr")
-                bag.execute("INSERT INTO topics(id, name, type, serialization_format) VALUES(?, ?, ?, ?)", row)
+                bag.execute(
+                    "INSERT INTO topics(id, name, type, serialization_format) VALUES(?, ?, ?, ?)",
+                    row,
+                )
             rows = [(1 + k % 3, 10**8 * k, bytes(4) + bytes(120)) for k in range(90)]
-            bag.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", rows)
+            bag.executemany(
+                "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", rows
+            )
             for statement in changes:
                 bag.execute(statement)
         bag.close()
@@ -275,7 +327,9 @@ def stamps(values: pa.Array) -> Make:
 
 def described(said: object) -> Make:
     """The crossing in Parquet with other words of pandas about it."""
-    return lambda: arrow(lambda rows: rows.replace_schema_metadata({b"pandas": json.dumps(said).encode()}))
+    return lambda: arrow(
+        lambda rows: rows.replace_schema_metadata({b"pandas": json.dumps(said).encode()})
+    )
 
 
 ROWS = len(crossing())
@@ -290,26 +344,56 @@ TABLES: dict[str, Make] = {
     "table/a_place_far_away.csv": lambda: csv(table(50, "x_m", 1e300)),
     "table/letters_for_places.csv": lambda: csv(geographic(crossing()).assign(lat_deg="1;2")),
     "table_time_none.csv": lambda: csv(table(0, "vehicle_id", "%s%n").assign(t_s="none")),
-    "table_ms_as_s_slow.csv": lambda: csv(crossing(start=0.0).assign(t_s=(crossing(start=0.0)["t_s"] * 1000.0).round())),
+    "table_ms_as_s_slow.csv": lambda: csv(
+        crossing(start=0.0).assign(t_s=(crossing(start=0.0)["t_s"] * 1000.0).round())
+    ),
     "spmd/a_stamp_of_another_age.csv": lambda: spmd("599999769000000000"),
     "spmd/a_long_stamp.csv": lambda: spmd("9" * 4000),
     "spmd_grid_memoryerror_22GiB.csv": lambda: spmd("599999769000000"),
-    "table_grid_memoryerror_596GiB.parquet": stamps(pa.array([1000.0 + k * 0.1 for k in range(ROWS - 1)] + [3e8])),
-    "parquet/stamps_that_are_no_numbers.parquet": stamps(pa.array([float("nan")] * 3 + NO_NUMBER[3:], from_pandas=False)),
-    "parquet/an_index_that_is_not_there.parquet": described({"columns": [], "index_columns": ["t_s", "no"]}),
+    "table_grid_memoryerror_596GiB.parquet": stamps(
+        pa.array([1000.0 + k * 0.1 for k in range(ROWS - 1)] + [3e8])
+    ),
+    "parquet/stamps_that_are_no_numbers.parquet": stamps(
+        pa.array([float("nan")] * 3 + NO_NUMBER[3:], from_pandas=False)
+    ),
+    "parquet/an_index_that_is_not_there.parquet": described(
+        {"columns": [], "index_columns": ["t_s", "no"]}
+    ),
     "parquet/columns_that_are_not_told.parquet": described({"index_columns": []}),
     "parquet/words_that_are_a_list.parquet": described([1]),
     "parquet/a_type_that_is_none.parquet": described(
-        {"columns": [{"name": "x_m", "field_name": "x_m", "pandas_type": "int64", "numpy_type": "]nt64", "metadata": None}]}
+        {
+            "columns": [
+                {
+                    "name": "x_m",
+                    "field_name": "x_m",
+                    "pandas_type": "int64",
+                    "numpy_type": "]nt64",
+                    "metadata": None,
+                }
+            ]
+        }
     ),
-    "parquet/a_stamp_far_away.parquet": stamps(pa.array([k * 0.1 for k in range(ROWS - 1)] + [3e8])),
-    "parquet/a_date_of_the_year_9999.parquet": stamps(pa.array([253402214400] * ROWS).cast(pa.timestamp("s"))),
-    "parquet/microseconds_beyond.parquet": stamps(pa.array([2**62] * ROWS).cast(pa.timestamp("us"))),
-    "parquet/a_time_zone.parquet": stamps(pa.array([2**62] * ROWS).cast(pa.timestamp("us", "Europe/Berlin"))),
+    "parquet/a_stamp_far_away.parquet": stamps(
+        pa.array([k * 0.1 for k in range(ROWS - 1)] + [3e8])
+    ),
+    "parquet/a_date_of_the_year_9999.parquet": stamps(
+        pa.array([253402214400] * ROWS).cast(pa.timestamp("s"))
+    ),
+    "parquet/microseconds_beyond.parquet": stamps(
+        pa.array([2**62] * ROWS).cast(pa.timestamp("us"))
+    ),
+    "parquet/a_time_zone.parquet": stamps(
+        pa.array([2**62] * ROWS).cast(pa.timestamp("us", "Europe/Berlin"))
+    ),
     "parquet/truth_for_stamps.parquet": stamps(pa.array([True, None] * (ROWS // 2))),
-    "parquet/integers_that_miss.parquet": stamps(pa.array([None if k == 60 else k for k in range(ROWS)])),
+    "parquet/integers_that_miss.parquet": stamps(
+        pa.array([None if k == 60 else k for k in range(ROWS)])
+    ),
     "parquet_nullable_boolean_time.parquet": stamps(pa.array([True] * ROWS)),
-    "parquet_an_index_of_pandas.parquet": lambda: arrow(lambda _: pa.Table.from_pandas(crossing().set_index("t_s"))),
+    "parquet_an_index_of_pandas.parquet": lambda: arrow(
+        lambda _: pa.Table.from_pandas(crossing().set_index("t_s"))
+    ),
 }
 
 
@@ -318,7 +402,9 @@ def zstd_bomb() -> bytes:
     out = BytesIO()
     writer = Writer(out, chunk_size=1 << 30, compression=ZSTD)
     writer.start("ros2")
-    channel = writer.register_channel("/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data"))
+    channel = writer.register_channel(
+        "/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+    )
     for k in range(10):
         writer.add_message(channel, k, bytes(10_000_000), k)
     writer.finish()
@@ -328,36 +414,59 @@ def zstd_bomb() -> bytes:
 CELLS = {"an_endless_cell": ".inf", "cells_of_kilometres": "1.0e+9"}
 PARAMETERS = "/**:\n  ros__parameters:\n    log:\n      start: {}\n"
 MAPS: dict[str, Make] = {
-    **{f"map/{name}.yaml": lambda value=value: nav2("m.png", resolution=value) for name, value in YAML.items()},
-    **{f"map/{name}.yaml": lambda picture=picture: nav2(picture) for name, (picture, _) in IMAGES.items()},
+    **{
+        f"map/{name}.yaml": lambda value=value: nav2("m.png", resolution=value)
+        for name, value in YAML.items()
+    },
+    **{
+        f"map/{name}.yaml": lambda picture=picture: nav2(picture)
+        for name, (picture, _) in IMAGES.items()
+    },
     **{f"map/{name}__{picture}": make for name, (picture, make) in IMAGES.items()},
     **{f"map/{name}__m.png": lambda: image("png") for name in YAML},
     **{f"map/{name}__m.png": lambda: image("png") for name in CELLS},
-    **{f"map/{name}.yaml": lambda size=size: nav2("m.png", resolution=size) for name, size in CELLS.items()},
+    **{
+        f"map/{name}.yaml": lambda size=size: nav2("m.png", resolution=size)
+        for name, size in CELLS.items()
+    },
     "b1.png": lambda: bomb(13_300, 13_300),
     "b2.png": lambda: bomb(20_000, 20_000),
     "bomb1bit.yaml": lambda: nav2("b1.png"),
     "bomb400M.yaml": lambda: nav2("b2.png"),
     "deep.yaml": lambda: b"a: " + b"[" * 20_000,
     "map_alias_bomb.yaml": lambda: ALIASES.encode() + nav2("m.png", origin="*a7"),
-    "params_alias_bomb.yaml": ("/**:\n  ros__parameters:\n    " + ALIASES.replace("\n", "\n    ")).encode,
+    "params_alias_bomb.yaml": (
+        "/**:\n  ros__parameters:\n    " + ALIASES.replace("\n", "\n    ")
+    ).encode,
 }
 FILES: dict[str, Make] = {
     **TABLES,
     **MAPS,
-    **{f"library/{name}.json": lambda change=change: at(library(), *change) for name, change in LIBRARY.items()},
+    **{
+        f"library/{name}.json": lambda change=change: at(library(), *change)
+        for name, change in LIBRARY.items()
+    },
     "library/too_deep.json": lambda: b'{"format": ' + b"[" * 100_000,
     **{f"result/{name}.json": lambda text=text: text for name, text in RESULT.items()},
     **{f"meta/{name}.yaml": lambda value=value: versioned(value) for name, value in YAML.items()},
-    "meta/a_long_file_name.yaml": lambda: metadata().replace("bag_0.mcap", "b" * 400 + ".mcap").encode(),
-    **{f"params/{name}.yaml": lambda value=value: PARAMETERS.format(value).encode() for name, value in YAML.items()},
-    "params/a_part_of_none.yaml": lambda: b"/**:\n  ros__parameters:\n    log:\n    log:\n      start: 0.0\n  ros__parameters:\n",
+    "meta/a_long_file_name.yaml": lambda: (
+        metadata().replace("bag_0.mcap", "b" * 400 + ".mcap").encode()
+    ),
+    **{
+        f"params/{name}.yaml": lambda value=value: PARAMETERS.format(value).encode()
+        for name, value in YAML.items()
+    },
+    "params/a_part_of_none.yaml": lambda: (
+        b"/**:\n  ros__parameters:\n    log:\n    log:\n      start: 0.0\n  ros__parameters:\n"
+    ),
     "params/a_part_in_itself.yaml": lambda: b"/**:\n  ros__parameters:\n    a: &a {b: *a}\n",
     **{f"mcap_reader/{name}.mcap": make for name, make in MCAP.items()},
     **{f"sqlite/{name}.db3": make for name, make in SQLITE.items()},
     "validate/damaged_all_over.mcap": lambda: flipped(mcap(), b"/a", 1),
     "reindex/a_name_twice.mcap": lambda: mcap()[:-8] + mcap()[8:],
-    "reindex/quality_of_service_too_deep.mcap": lambda: mcap().replace(b"string data", b"[[[[[[[[[[["),
+    "reindex/quality_of_service_too_deep.mcap": lambda: mcap().replace(
+        b"string data", b"[[[[[[[[[[["
+    ),
     "reindex_huge_chunk.mcap": lambda: at_record(mcap(), CHUNK, 1, BEYOND)[:-60],
     "reindex_truncated_struct_error/a.mcap": lambda: b"\x89",
     "mcap_zstd_bomb.mcap": zstd_bomb,

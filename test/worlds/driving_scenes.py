@@ -23,7 +23,11 @@ def crossing(first_speed=8.0, second_speed=8.0, second_start=-60.0):
     """Vehicle 0 crosses from the west, then vehicle 1 from the south."""
     time = np.arange(150) * PERIOD
     zero = np.zeros_like(time)
-    west = (np.stack([-30.0 + first_speed * time, zero], axis=1), zero, np.full_like(time, first_speed))
+    west = (
+        np.stack([-30.0 + first_speed * time, zero], axis=1),
+        zero,
+        np.full_like(time, first_speed),
+    )
     place = np.stack([zero, second_start + second_speed * time], axis=1)
     south = (place, zero + np.pi / 2, zero + second_speed)
     return as_scenario([west, south], len(time))

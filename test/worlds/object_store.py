@@ -12,7 +12,11 @@ import time
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
-KEYS = {"AWS_ACCESS_KEY_ID": "any", "AWS_SECRET_ACCESS_KEY": "any", "AWS_DEFAULT_REGION": "us-east-1"}
+KEYS = {
+    "AWS_ACCESS_KEY_ID": "any",
+    "AWS_SECRET_ACCESS_KEY": "any",
+    "AWS_DEFAULT_REGION": "us-east-1",
+}
 
 
 @contextmanager
@@ -23,7 +27,9 @@ def serving() -> Iterator[str]:
             own.bind(("127.0.0.1", 0))
             address = f"http://127.0.0.1:{own.getsockname()[1]}"
         command = [sys.executable, "-m", "moto.server", "-p", address.rpartition(":")[2]]
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        with subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        ) as process:
             try:
                 while process.poll() is None and not _answers(address):
                     time.sleep(0.1)

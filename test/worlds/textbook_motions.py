@@ -49,7 +49,9 @@ def wander(rng: np.random.Generator, count: int, mean: float, sigma: float = 0.5
 def ramps(count: int, *knots: tuple[float, float]) -> np.ndarray:
     """Speeds through (s, m/s), rounded over .6 s."""
     time, speed = np.array(knots).T
-    return np.asarray(ndimage.uniform_filter1d(np.interp(np.arange(count) * DT, time, speed), 7, mode="nearest"))
+    return np.asarray(
+        ndimage.uniform_filter1d(np.interp(np.arange(count) * DT, time, speed), 7, mode="nearest")
+    )
 
 
 def driven(path: Curve, speed: np.ndarray, at: float, station: float) -> Drive:
@@ -64,9 +66,13 @@ def inside(path: Curve, other: Curve) -> tuple[float, float]:
     stations = np.arange(0.0, path.length, 0.25)
     boxes = corners(path.at(stations), LENGTH, WIDTH)
     sides = np.roll(boxes, 1, axis=1) - boxes
-    edges = np.concatenate([boxes + share * sides for share in np.linspace(0.0, 0.9, 6)], axis=1).reshape(-1, 2)
+    edges = np.concatenate(
+        [boxes + share * sides for share in np.linspace(0.0, 0.9, 6)], axis=1
+    ).reshape(-1, 2)
     points = spatial.KDTree(other.at(np.arange(0.0, other.length, 0.25))[:, :2])
-    rows = np.flatnonzero(points.query(edges)[0].reshape(len(stations), -1).min(axis=1) < 0.5 * WIDTH)
+    rows = np.flatnonzero(
+        points.query(edges)[0].reshape(len(stations), -1).min(axis=1) < 0.5 * WIDTH
+    )
     return float(stations[rows[0]]), float(stations[rows[-1]])
 
 
@@ -77,13 +83,21 @@ RIGHT = line((2.0, -120.0), (2.0, 0.0), (150.0, 0.0))
 RAMP = line((-150.0, -9.0), (-20.0, -9.0), (20.0, 0.0), (150.0, 0.0))
 NARROW = line((150.0, 3.2), (30.0, 3.2), (12.0, 0.3), (-12.0, 0.3), (-30.0, 3.2), (-150.0, 3.2))
 U_TURN = line((-120.0, 0.0), (4.0, 0.0), (4.0, 3.5), (-120.0, 3.5))
-_RING = 16.0 * np.array([(float(np.cos(a)), float(np.sin(a))) for a in np.linspace(-1.2 * np.pi, 0.4 * np.pi, 60)])
+_RING = 16.0 * np.array(
+    [(float(np.cos(a)), float(np.sin(a))) for a in np.linspace(-1.2 * np.pi, 0.4 * np.pi, 60)]
+)
 RING = Curve.through(_RING)
 ENTRY = Curve.through(np.concatenate([[(2.0, -90.0), (2.0, -40.0), (3.0, -25.0)], _RING[30:]]))
 
 
 def yields(
-    rng: np.random.Generator, first: Curve, second: Curve, low: float, *, merges: bool = False, cruise: bool = False
+    rng: np.random.Generator,
+    first: Curve,
+    second: Curve,
+    low: float,
+    *,
+    merges: bool = False,
+    cruise: bool = False,
 ) -> Drive:
     """The second one slows to `low` [m/s] and enters behind the first."""
     count = int(rng.integers(110, 220))
@@ -99,11 +113,18 @@ def yields(
     v0, v1 = rng.uniform(7.0, 13.0), speed if merges else rng.uniform(5.0, 10.0)
     go = clear + gap - (rng.uniform(0.3, 1.5) if low > 1.5 else rng.uniform(0.8, 2.2))
     slow = go - (0.0 if low > 1.5 else rng.uniform(1.0, 4.0))
-    knots = (0.0, v0), (slow - max(v0 - low, 0.0) / rng.uniform(1.2, 2.8), v0), (slow, low), (go, low)
+    knots = (
+        (0.0, v0),
+        (slow - max(v0 - low, 0.0) / rng.uniform(1.2, 2.8), v0),
+        (slow, low),
+        (go, low),
+    )
     own = ramps(count, *knots, (go + abs(v1 - low) / rng.uniform(1.2, 2.4), v1))
     if cruise:
         own = wander(rng, count, v0, 0.15)
-    return driven(first, wander(rng, count, speed, 0.3), clear, leaves), driven(second, own, clear + gap, enters)
+    return driven(first, wander(rng, count, speed, 0.3), clear, leaves), driven(
+        second, own, clear + gap, enters
+    )
 
 
 def behind(rng: np.random.Generator, speed: np.ndarray, gap: float, own: float) -> np.ndarray:
@@ -123,17 +144,29 @@ def behind(rng: np.random.Generator, speed: np.ndarray, gap: float, own: float) 
 def follows(rng: np.random.Generator, leader: np.ndarray, gap: float, own: float) -> Drive:
     """One behind another in a lane."""
     at = -100.0 if leader.max() > 0.0 else 0.0
-    return driven(EAST, leader, 0.0, 150.0 + at), driven(EAST, behind(rng, leader, gap, own), 0.0, 150.0 + at - LENGTH - gap)
+    return driven(EAST, leader, 0.0, 150.0 + at), driven(
+        EAST, behind(rng, leader, gap, own), 0.0, 150.0 + at - LENGTH - gap
+    )
 
 
 def _steady(rng: np.random.Generator) -> Drive:
     v = rng.uniform(7.0, 14.0)
-    return follows(rng, wander(rng, int(rng.integers(80, 200)), v, rng.uniform(0.2, 1.5)), v * rng.uniform(0.9, 3.5) + 2.5, v)
+    return follows(
+        rng,
+        wander(rng, int(rng.integers(80, 200)), v, rng.uniform(0.2, 1.5)),
+        v * rng.uniform(0.9, 3.5) + 2.5,
+        v,
+    )
 
 
 def _stops(rng: np.random.Generator) -> Drive:
     v, stop = rng.uniform(8.0, 14.0), rng.uniform(5.0, 8.0)
-    return follows(rng, ramps(150, (0.0, v), (stop - v / 2.0, v), (stop, 0.0)), v * rng.uniform(1.2, 2.2) + 2.5, v)
+    return follows(
+        rng,
+        ramps(150, (0.0, v), (stop - v / 2.0, v), (stop, 0.0)),
+        v * rng.uniform(1.2, 2.2) + 2.5,
+        v,
+    )
 
 
 def _queue(rng: np.random.Generator) -> Drive:
@@ -148,13 +181,22 @@ def _cut_in(rng: np.random.Generator) -> Drive:
     speed = np.where(np.arange(130) < 50, own, behind(rng, np.full(130, v), gap, own))
     late = behind(rng, np.full(80, v), gap, own)
     speed = np.concatenate([np.full(50, own), late])
-    return driven(lane, np.full(130, v), 5.0, lane.length - 165.0), driven(EAST, speed, 5.0, 135.0 - LENGTH - gap)
+    return driven(lane, np.full(130, v), 5.0, lane.length - 165.0), driven(
+        EAST, speed, 5.0, 135.0 - LENGTH - gap
+    )
 
 
 def _stands_in_the_way(rng: np.random.Generator) -> Drive:
     """The first one backs out of a side road, stands, drives off; the other waits for it, then comes behind."""
     begin, back, stand = rng.uniform(0.0, 2.0), rng.uniform(5.5, 7.0), rng.uniform(0.5, 2.0)
-    out = ramps(160, (0.0, 0.0), (begin, 0.0), (begin + 1.5, 1.6), (begin + back - 1.0, 1.6), (begin + back, 0.0))  # 8.5 m
+    out = ramps(
+        160,
+        (0.0, 0.0),
+        (begin, 0.0),
+        (begin + 1.5, 1.6),
+        (begin + back - 1.0, 1.6),
+        (begin + back, 0.0),
+    )  # 8.5 m
     off = begin + back + stand
     on = ramps(160, (0.0, 0.0), (off, 0.0), (off + 6.0, 9.0))
     share = np.cumsum(out) / out.sum()
@@ -164,12 +206,19 @@ def _stands_in_the_way(rng: np.random.Generator) -> Drive:
     poses[:, 0] += np.cumsum(DT * on)
     place = rng.uniform(-22.0, -14.0)
     own = ramps(
-        160, (0.0, 9.0), (begin + 1.0, 9.0), (begin + 1.0 + 9.0 / 2.0, 0.0), (off + rng.uniform(0.8, 2.0), 0.0), (off + 7.0, 8.0)
+        160,
+        (0.0, 9.0),
+        (begin + 1.0, 9.0),
+        (begin + 1.0 + 9.0 / 2.0, 0.0),
+        (off + rng.uniform(0.8, 2.0), 0.0),
+        (off + 7.0, 8.0),
     )
     return (poses, out + on), driven(EAST, own, off, 150.0 + place)
 
 
-def _apart(first: Curve, second: Curve, low: float, gaps: tuple[float, float]) -> Callable[[np.random.Generator], Drive]:
+def _apart(
+    first: Curve, second: Curve, low: float, gaps: tuple[float, float]
+) -> Callable[[np.random.Generator], Drive]:
     """Two at a crossing who know nothing of each other: the second slows to `low` for a reason of its own."""
 
     def drawn(rng: np.random.Generator) -> Drive:
@@ -179,9 +228,15 @@ def _apart(first: Curve, second: Curve, low: float, gaps: tuple[float, float]) -
         slow = come - (rng.uniform(0.5, 1.0) if low else rng.uniform(1.5, 2.5))
         own = wander(rng, count, v0)
         if low < 5.0:
-            knots = (slow - (0.0 if low else rng.uniform(1.0, 2.5)), low), (slow, low), (slow + 4.0, v0)
+            knots = (
+                (slow - (0.0 if low else rng.uniform(1.0, 2.5)), low),
+                (slow, low),
+                (slow + 4.0, v0),
+            )
             own = ramps(count, (0.0, v0), (knots[0][0] - (v0 - low) / 2.0, v0), *knots)
-        return driven(first, wander(rng, count, rng.uniform(7.0, 14.0)), clear, leaves), driven(second, own, come, enters)
+        return driven(first, wander(rng, count, rng.uniform(7.0, 14.0)), clear, leaves), driven(
+            second, own, come, enters
+        )
 
     return drawn
 
@@ -189,14 +244,18 @@ def _apart(first: Curve, second: Curve, low: float, gaps: tuple[float, float]) -
 def _far_behind(rng: np.random.Generator) -> Drive:
     v, count = rng.uniform(8.0, 13.0), int(rng.integers(100, 200))
     gap = v * rng.uniform(5.5, 8.0)
-    return driven(EAST, wander(rng, count, v + 0.5), 0.0, 60.0 + gap), driven(EAST, wander(rng, count, v - 0.5), 0.0, 60.0)
+    return driven(EAST, wander(rng, count, v + 0.5), 0.0, 60.0 + gap), driven(
+        EAST, wander(rng, count, v - 0.5), 0.0, 60.0
+    )
 
 
 def _by_chance(rng: np.random.Generator) -> Drive:
     """In one lane, each at its own speed, some seconds apart."""
     v, count = rng.uniform(8.0, 13.0), 100
     gap = v * rng.uniform(2.0, 6.0)
-    return driven(EAST, wander(rng, count, v + 0.2), 0.0, 60.0 + gap), driven(EAST, wander(rng, count, v - 0.2), 0.0, 60.0)
+    return driven(EAST, wander(rng, count, v + 0.2), 0.0, 60.0 + gap), driven(
+        EAST, wander(rng, count, v - 0.2), 0.0, 60.0
+    )
 
 
 def _beside(rng: np.random.Generator) -> Drive:
@@ -204,23 +263,41 @@ def _beside(rng: np.random.Generator) -> Drive:
     v, stop = rng.uniform(8.0, 13.0), rng.uniform(6.0, 9.0)
     same = rng.random() < 0.5
     own, other = (
-        ramps(140, (0.0, v), (stop + off - v / 2.0, v), (stop + off, 0.0)) if same else wander(rng, 140, v) for off in (0.0, 0.8)
+        ramps(140, (0.0, v), (stop + off - v / 2.0, v), (stop + off, 0.0))
+        if same
+        else wander(rng, 140, v)
+        for off in (0.0, 0.8)
     )
-    return driven(EAST, own, 0.0, 80.0 + rng.uniform(5.0, 30.0)), driven(line((-150.0, -3.5), (150.0, -3.5)), other, 0.0, 80.0)
+    return driven(EAST, own, 0.0, 80.0 + rng.uniform(5.0, 30.0)), driven(
+        line((-150.0, -3.5), (150.0, -3.5)), other, 0.0, 80.0
+    )
 
 
 def _oncoming(rng: np.random.Generator) -> Drive:
     v, stop = rng.uniform(8.0, 13.0), rng.uniform(5.0, 8.0)
-    own = ramps(140, (0.0, v), (stop - v / 2.0, v), (stop, 0.0), (stop + 3.0, 0.0), (stop + 7.0, v))
-    return driven(EAST, own, stop, 140.0), driven(WEST, own if rng.random() < 0.5 else wander(rng, 140, v), stop, 140.0)
+    own = ramps(
+        140, (0.0, v), (stop - v / 2.0, v), (stop, 0.0), (stop + 3.0, 0.0), (stop + 7.0, v)
+    )
+    return driven(EAST, own, stop, 140.0), driven(
+        WEST, own if rng.random() < 0.5 else wander(rng, 140, v), stop, 140.0
+    )
 
 
 def _meets_closely(rng: np.random.Generator) -> Drive:
     """Where two that come towards each other hardly pass, the one slows until the other has passed."""
     v, at = rng.uniform(7.0, 11.0), rng.uniform(6.0, 8.0)
     low = v * rng.uniform(0.1, 0.35)
-    own = ramps(140, (0.0, v), (at - 1.5 - (v - low) / 2.0, v), (at - 1.5, low), (at + 0.5, low), (at + 4.0, v))
-    return driven(line((150.0, 2.3), (-150.0, 2.3)), wander(rng, 140, v, 0.3), at, 140.0), driven(EAST, own, at, 155.0)
+    own = ramps(
+        140,
+        (0.0, v),
+        (at - 1.5 - (v - low) / 2.0, v),
+        (at - 1.5, low),
+        (at + 0.5, low),
+        (at + 4.0, v),
+    )
+    return driven(line((150.0, 2.3), (-150.0, 2.3)), wander(rng, 140, v, 0.3), at, 140.0), driven(
+        EAST, own, at, 155.0
+    )
 
 
 REACTIONS: dict[str, Callable[[np.random.Generator], Drive]] = {
@@ -237,7 +314,9 @@ REACTIONS: dict[str, Callable[[np.random.Generator], Drive]] = {
     "left turn before oncoming, rolls": lambda rng: yields(rng, WEST, LEFT, rng.uniform(2.0, 4.0)),
     "U-turn": lambda rng: yields(rng, WEST, U_TURN, rng.uniform(0.0, 2.0), merges=True),
     "merges": lambda rng: yields(rng, EAST, RAMP, rng.uniform(5.0, 7.0), merges=True),
-    "right turn into a stream": lambda rng: yields(rng, EAST, RIGHT, rng.choice([0.0, 3.0]), merges=True),
+    "right turn into a stream": lambda rng: yields(
+        rng, EAST, RIGHT, rng.choice([0.0, 3.0]), merges=True
+    ),
     "roundabout entry": lambda rng: yields(rng, RING, ENTRY, rng.choice([0.0, 3.0]), merges=True),
     "meets another one closely": _meets_closely,
     "narrow place": lambda rng: yields(rng, EAST, NARROW, rng.choice([0.0, 1.0])),
@@ -272,9 +351,18 @@ def labelled(kind: str, seed: int) -> Labelled:
     for poses, driven_at in reversed(drives) if swap else drives:
         count = len(driven_at)
         noise = rng.choice([0.0, 0.1, 0.3])
-        xy = poses[:, :2] + noise * ndimage.gaussian_filter1d(rng.standard_normal((count, 2)), 10.0, axis=0) * 4.0
+        xy = (
+            poses[:, :2]
+            + noise
+            * ndimage.gaussian_filter1d(rng.standard_normal((count, 2)), 10.0, axis=0)
+            * 4.0
+        )
         speed = np.maximum(
-            driven_at + rng.choice([0.0, 0.1]) * ndimage.gaussian_filter1d(rng.standard_normal(count), 2.0) * 2.0, 0.0
+            driven_at
+            + rng.choice([0.0, 0.1])
+            * ndimage.gaussian_filter1d(rng.standard_normal(count), 2.0)
+            * 2.0,
+            0.0,
         )
         speed[speed < 0.05] = 0.0
         if rng.random() < 0.3:  # a dropout, filled in

@@ -14,7 +14,10 @@ def write(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Writ
     lines = ["time,vehicle,x,y,heading,speed"]
     for n, vehicle in enumerate(scenario.vehicles):
         columns = (scenario.time, *scenario.position[n].T, scenario.heading[n], scenario.speed[n])
-        lines += [f"{t:.3f},{vehicle.id},{x:.3f},{y:.3f},{yaw:.4f},{v:.3f}" for t, x, y, yaw, v in zip(*columns, strict=True)]
+        lines += [
+            f"{t:.3f},{vehicle.id},{x:.3f},{y:.3f},{yaw:.4f},{v:.3f}"
+            for t, x, y, yaw, v in zip(*columns, strict=True)
+        ]
     name = f"case_{case.number}_{exported.index}.csv"
     (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
     return Written((name,))

@@ -20,7 +20,9 @@ def read(paths: Sequence[Path], _: LogConfig) -> RawLog:
     for row, line in enumerate(lines):
         with guarded(f"{path}, line {row + 1}"):
             entry = json.loads(line)
-            vehicles[entry["vehicle"]].fixes.append((round(entry["t"] * 1e9), row, entry["x"], entry["y"], entry["heading"]))
+            vehicles[entry["vehicle"]].fixes.append(
+                (round(entry["t"] * 1e9), row, entry["x"], entry["y"], entry["heading"])
+            )
     observed = tuple(rows.observations(name) for name, rows in vehicles.items())
     return RawLog(path.stem, False, observed, len(lines), (Segment(0, str(path), "line", 1),))
 

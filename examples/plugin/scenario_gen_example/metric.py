@@ -13,7 +13,11 @@ from scenario_gen.types import Interval, Metric
 
 def of_samples(samples: Samples) -> Mapping[str, Interval]:
     """Return the mean over samples, with its interval."""
-    return {"mean_speed": samples.bootstrap.mean(np.array([motion.speed.mean() for motion in samples.motions]))}
+    return {
+        "mean_speed": samples.bootstrap.mean(
+            np.array([motion.speed.mean() for motion in samples.motions])
+        )
+    }
 
 
 def of_template(template: Template) -> Mapping[str, float]:
@@ -21,4 +25,8 @@ def of_template(template: Template) -> Mapping[str, float]:
     return {"mean_speed": float(template.motion.speed.mean())}
 
 
-SPEED = MetricGroup((Metric("mean_speed", "mean speed", "m/s", "", "Speed", "of all vehicles"),), of_samples, of_template)
+SPEED = MetricGroup(
+    (Metric("mean_speed", "mean speed", "m/s", "", "Speed", "of all vehicles"),),
+    of_samples,
+    of_template,
+)

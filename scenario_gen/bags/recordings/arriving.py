@@ -15,7 +15,9 @@ from scenario_gen.types import Scenario
 TOPICS = (SCENARIOS, INFO, WITNESS)
 MAX_REMEMBERED = 10_000  # witnesses, and scenarios without theirs, that are remembered; beyond, the oldest are forgotten
 Kept = TypeVar("Kept")
-Arrived = tuple[ScenarioEntry, int, Scenario]  # its entry, the template's stamp [ns], and the scenario with its witness
+Arrived = tuple[
+    ScenarioEntry, int, Scenario
+]  # its entry, the template's stamp [ns], and the scenario with its witness
 
 
 class ArrivingScenarios:
@@ -23,10 +25,16 @@ class ArrivingScenarios:
 
     def __init__(self) -> None:
         self._tracker = RequestTracker(MAX_REMEMBERED)
-        self._entries: dict[str, ScenarioEntry] = {}  # by SHA-256; complete, while the tracker keeps no texts
+        self._entries: dict[
+            str, ScenarioEntry
+        ] = {}  # by SHA-256; complete, while the tracker keeps no texts
         self._witnesses: dict[str, bytes] = {}  # by SHA-256
-        self._waiting: dict[str, tuple[ScenarioEntry, bytes]] = {}  # by SHA-256 of the witness that has not come
-        self.unmatched = 0  # messages of scenarios that came, and of which no scenario was completed
+        self._waiting: dict[
+            str, tuple[ScenarioEntry, bytes]
+        ] = {}  # by SHA-256 of the witness that has not come
+        self.unmatched = (
+            0  # messages of scenarios that came, and of which no scenario was completed
+        )
 
     def take(self, topic: str, data: bytes) -> list[Arrived]:
         """Take a message; return the scenarios that it completes.
@@ -57,7 +65,9 @@ class ArrivingScenarios:
     def _matched(self, matches: list[Match | None]) -> list[Arrived]:
         complete = [(match[1], match[2]) for match in matches if match is not None]
         return [
-            arrived for entry, data in complete for arrived in self._with_witness(self._entries.pop(entry.sha256, entry), data)
+            arrived
+            for entry, data in complete
+            for arrived in self._with_witness(self._entries.pop(entry.sha256, entry), data)
         ]
 
     def _with_witness(self, entry: ScenarioEntry, data: bytes) -> list[Arrived]:
@@ -68,7 +78,14 @@ class ArrivingScenarios:
 
     def _complete(self, entry: ScenarioEntry, data: bytes) -> list[Arrived]:
         self.unmatched -= len(entry.messages)
-        return [(entry, *decode_with_witness(data, entry, 0, self._witnesses.pop(entry.witness, None), SCENARIOS, WITNESS))]
+        return [
+            (
+                entry,
+                *decode_with_witness(
+                    data, entry, 0, self._witnesses.pop(entry.witness, None), SCENARIOS, WITNESS
+                ),
+            )
+        ]
 
 
 def _remember(kept: dict[str, Kept], key: str, value: Kept) -> None:

@@ -15,7 +15,9 @@ from scenario_gen.types import Scenario
 TYPES = {OBJECTS: PREDICTED, TRACKS: TRACKED, EGO: odometry.TYPE}
 
 
-def autoware_messages(others: Scenario, ego: Scenario | None, start_ns: int) -> Iterator[tuple[str, bytes, int]]:
+def autoware_messages(
+    others: Scenario, ego: Scenario | None, start_ns: int
+) -> Iterator[tuple[str, bytes, int]]:
     """Yield topic, CDR bytes and log stamp [ns] of every message, in order of the stamps.
 
     Args:

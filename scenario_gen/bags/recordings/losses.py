@@ -21,7 +21,9 @@ from scenario_gen.types import Quality
 
 SETTLED_S = 5.0  # seconds without news after which what a closed request lacks is missing
 LATE = "began late"
-LOST = "pace the publisher by its acknowledgements, or give the recorder a faster disk and processor"
+LOST = (
+    "pace the publisher by its acknowledgements, or give the recorder a faster disk and processor"
+)
 BEGIN = "begin to record before what is to be recorded is published"
 
 
@@ -84,7 +86,9 @@ class Losses:
             numbers.late = 0
         if topic.endswith(("/scenarios", f"/{INFO}")):
             self._news = monotonic()
-            requests = self._requests.setdefault(topic.removesuffix("/info").removesuffix("scenarios"), RequestTracker())
+            requests = self._requests.setdefault(
+                topic.removesuffix("/info").removesuffix("scenarios"), RequestTracker()
+            )
             if topic.endswith("/info"):
                 requests.add_message(data)
             else:
@@ -97,13 +101,17 @@ class Losses:
 
     def summary(self, *, ended: bool = False) -> Mapping[str, str]:
         """Say by topic what is not recorded; at the end of the recording also of requests that are not closed."""
-        messages = {topic: text for topic, numbers in self._numbers.items() if (text := numbers.summary())}
+        messages = {
+            topic: text for topic, numbers in self._numbers.items() if (text := numbers.summary())
+        }
         for space, requests in self._requests.items():
             requests.settle()
             if ended or monotonic() - self._news > SETTLED_S:
                 topic = f"{space}scenarios"
                 for request in requests.incomplete(closed=not ended):
-                    messages[topic] = "; ".join(filter(None, (messages.get(topic), request.sentence())))
+                    messages[topic] = "; ".join(
+                        filter(None, (messages.get(topic), request.sentence()))
+                    )
                 if topic in messages and messages.get(f"{topic}/info", "").endswith(LATE):
                     messages[topic] += f"; the recording {LATE}"
         return messages

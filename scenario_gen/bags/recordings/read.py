@@ -16,7 +16,11 @@ import numpy as np
 
 from msg_conventions import fits
 from msg_conventions.cdr import stamp_of
-from msg_conventions.changepoints import decode_changepoints, decode_posterior, segment_descriptions
+from msg_conventions.changepoints import (
+    decode_changepoints,
+    decode_posterior,
+    segment_descriptions,
+)
 from msg_conventions.ego import WITNESS
 from msg_conventions.hashes import decode_hashes, hash_of
 from msg_conventions.roads import decode_map
@@ -24,11 +28,24 @@ from msg_conventions.scenario_info import encode_info, INFO, RequestSummary, Sce
 from msg_conventions.scenarios import messages_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.recordings.scenarios import RecordedScenarios, SCENARIOS
-from scenario_gen.bags.recordings.template import anchor_index, decode_routes, lanes_beside, template_statuses
+from scenario_gen.bags.recordings.template import (
+    anchor_index,
+    decode_routes,
+    lanes_beside,
+    template_statuses,
+)
 from scenario_gen.bags.storage.bag import BagMessage, read_messages, within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, ScenarioSet, Segmentation
+from scenario_gen.types import (
+    Encounter,
+    Fit,
+    GenerationResult,
+    Road,
+    Route,
+    ScenarioSet,
+    Segmentation,
+)
 
 __all__ = [
     "INFO",
@@ -64,7 +81,11 @@ class Recording:
     @property
     def results(self) -> tuple[str, ...]:
         """The namespaces that hold a template with scenarios."""
-        return tuple(name for name, one in self.namespaces.items() if {"tracks", SCENARIOS} <= one.messages.keys())
+        return tuple(
+            name
+            for name, one in self.namespaces.items()
+            if {"tracks", SCENARIOS} <= one.messages.keys()
+        )
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -77,7 +98,9 @@ class Recording:
         return {key: " | ".join(dict.fromkeys(values)) for key, values in found.items()}
 
 
-def read_recording(path: Path, config: BagConfig = BagConfig(), topics: Collection[str] = ()) -> Recording:
+def read_recording(
+    path: Path, config: BagConfig = BagConfig(), topics: Collection[str] = ()
+) -> Recording:
     """Read the messages of a bag.
 
     Args:
@@ -97,10 +120,20 @@ def read_recording(path: Path, config: BagConfig = BagConfig(), topics: Collecti
     found: dict[str, dict[str, list[BagMessage]]] = {}
     for message in read_messages(path, lambda name: known(name) is not None, config):
         if match := known(message.topic):
-            found.setdefault(match["namespace"] or "", {}).setdefault(match["topic"], []).append(message)
-    shared = [message.data for message in found.get("", {}).get("diagnostics", ())]  # one topic for the nodes of all namespaces
+            found.setdefault(match["namespace"] or "", {}).setdefault(match["topic"], []).append(
+                message
+            )
+    shared = [
+        message.data for message in found.get("", {}).get("diagnostics", ())
+    ]  # one topic for the nodes of all namespaces
     roads: Roads = {}
-    return Recording(path, {name: Namespace(path, name, messages, shared, roads) for name, messages in sorted(found.items())})
+    return Recording(
+        path,
+        {
+            name: Namespace(path, name, messages, shared, roads)
+            for name, messages in sorted(found.items())
+        },
+    )
 
 
 Roads = dict[tuple[str, bytes | None, str], Road]
@@ -115,7 +148,12 @@ class Namespace(RecordedScenarios):
     """
 
     def __init__(
-        self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]], shared: Sequence[bytes], roads: "Roads"
+        self,
+        path: Path,
+        name: str,
+        messages: Mapping[str, Sequence[BagMessage]],
+        shared: Sequence[bytes],
+        roads: "Roads",
     ) -> None:
         """Take the bag's path, the namespace's name, its messages by topic, and /diagnostics and roads of all namespaces."""
         super().__init__(path, name, messages)
@@ -130,7 +168,9 @@ class Namespace(RecordedScenarios):
             InputError: a message is damaged.
         """
         own = entry.template_hash if entry else None
-        data = next((data for data in self.data("tracks") if own and hash_of("tracks", data) == own), None)
+        data = next(
+            (data for data in self.data("tracks") if own and hash_of("tracks", data) == own), None
+        )
         data = data or self.newest("tracks", stamp_ns)
         return decode_tracks(data, self.where("tracks")) if data else None
 
@@ -150,16 +190,23 @@ class Namespace(RecordedScenarios):
         return self._decode_road(data) if data else None
 
     def _decode_road(self, data: bytes) -> Road:
-        lanes = lanes_beside(data, self.data("map"), self.data("road/lanes"), self.data("fit/info"))
+        lanes = lanes_beside(
+            data, self.data("map"), self.data("road/lanes"), self.data("fit/info")
+        )
         key = (hash_of("map", data), lanes, self.road_name)
         if key not in self._roads:
-            self._roads[key] = replace(decode_map(data, lanes=lanes, name=self.where("map"))[1], name=self.road_name)
+            self._roads[key] = replace(
+                decode_map(data, lanes=lanes, name=self.where("map"))[1], name=self.road_name
+            )
         return self._roads[key]
 
     @cached_property
     def roads_differ(self) -> bool:
         """Whether a scenario without an entry may belong to any of several maps, while entries name theirs."""
-        return any(e.map_hash for e in self.entries) and len({hash_of("map", data) for data in self.data("map")}) > 1
+        return (
+            any(e.map_hash for e in self.entries)
+            and len({hash_of("map", data) for data in self.data("map")}) > 1
+        )
 
     def segmentation_of(self, encounter: Encounter) -> Segmentation | None:
         """Return the segmentation of the newest changepoints of an encounter, None if there are none.
@@ -188,7 +235,11 @@ class Namespace(RecordedScenarios):
         for topic, messages in self.messages.items():
             if not TEMPLATE.fullmatch(topic):
                 continue
-            own = [m for m in messages if topic not in together or hash_of(topic, m.data) == together[topic]]
+            own = [
+                m
+                for m in messages
+                if topic not in together or hash_of(topic, m.data) == together[topic]
+            ]
             of_stamp = [m for m in own if stamp_of(m.data, m.topic) == stamp_ns]
             if of_stamp or (own and topic == "map"):
                 found[topic] = (of_stamp or own)[-1]
@@ -200,7 +251,9 @@ class Namespace(RecordedScenarios):
         data = next((message.data for message, sha256 in pairs if sha256 == entry.sha256), b"")
         return data, self.witnesses[entry.witness].data if entry.witness else b""
 
-    def messages_of(self, info: BagMessage, entry: ScenarioEntry, summary: RequestSummary) -> tuple[BagMessage, ...]:
+    def messages_of(
+        self, info: BagMessage, entry: ScenarioEntry, summary: RequestSummary
+    ) -> tuple[BagMessage, ...]:
         """Return the messages for a bag of one scenario: its template, the scenario, its entry, and a summary of it alone.
 
         Args:
@@ -212,13 +265,25 @@ class Namespace(RecordedScenarios):
             InputError: a message is damaged, or the scenario itself or its witness is not in the bag.
         """
         stamp = stamp_of(info.data, info.topic)
-        same = [m for m, sha256 in zip(self.messages.get(SCENARIOS, ()), self.hashes, strict=True) if sha256 == entry.sha256]
+        same = [
+            m
+            for m, sha256 in zip(self.messages.get(SCENARIOS, ()), self.hashes, strict=True)
+            if sha256 == entry.sha256
+        ]
         if not same:
-            raise InputError(f"{self.path}: the scenario with SHA-256 {entry.sha256} is not on {self.where(SCENARIOS)}")
+            raise InputError(
+                f"{self.path}: the scenario with SHA-256 {entry.sha256} is not on {self.where(SCENARIOS)}"
+            )
         closing = replace(info, data=encode_info(summary.of_one_scenario(), stamp))
-        own = [replace(same[-1], data=data) for data in messages_of(same[-1].data)] if len(entry.messages) > 1 else same[-1:]
+        own = (
+            [replace(same[-1], data=data) for data in messages_of(same[-1].data)]
+            if len(entry.messages) > 1
+            else same[-1:]
+        )
         if self.without_witness(entry):
-            raise InputError(f"{self.path}: the reference drive with SHA-256 {entry.witness} is not on {self.where(WITNESS)}")
+            raise InputError(
+                f"{self.path}: the reference drive with SHA-256 {entry.witness} is not on {self.where(WITNESS)}"
+            )
         witness = (self.witnesses[entry.witness],) if entry.witness else ()
         return (*self.template_messages(entry, stamp).values(), *witness, *own, info, closing)
 
@@ -233,12 +298,16 @@ class Namespace(RecordedScenarios):
     def statuses(self) -> Statuses:
         """The diagnostics about the newest template; the last value counts."""
         stamp = self.encounter.start_ns
-        return template_statuses(self._shared, stamp, f"{self.name}/") | template_statuses(self.data("diagnostics"), stamp)
+        return template_statuses(self._shared, stamp, f"{self.name}/") | template_statuses(
+            self.data("diagnostics"), stamp
+        )
 
     @cached_property
     def road_name(self) -> str:
         """Name of the road, by the entries; else the map's topic."""
-        return next((entry.road for entry in reversed(self.entries) if entry.road), self.where("map"))
+        return next(
+            (entry.road for entry in reversed(self.entries) if entry.road), self.where("map")
+        )
 
     @cached_property
     def road(self) -> Road | None:
@@ -257,7 +326,9 @@ class Namespace(RecordedScenarios):
         if not changepoints:
             steps = len(self.encounter.time)
             none = np.zeros(0, dtype=np.int64)
-            return Segmentation(np.zeros(steps, dtype=np.int64), none, np.zeros(steps), ("the whole encounter",))
+            return Segmentation(
+                np.zeros(steps, dtype=np.int64), none, np.zeros(steps), ("the whole encounter",)
+            )
         known = decode_changepoints(changepoints[-1], self.encounter, self.where("changepoints"))
         texts = segment_descriptions(self.statuses)
         if len(texts) != len(known.descriptions):
@@ -267,7 +338,9 @@ class Namespace(RecordedScenarios):
                 whole = decode_posterior(data, texts)
             except InputError:
                 continue
-            if len(whole.labels) == len(known.labels) and np.array_equal(whole.changepoints, known.changepoints):
+            if len(whole.labels) == len(known.labels) and np.array_equal(
+                whole.changepoints, known.changepoints
+            ):
                 return whole
         return Segmentation(known.labels, known.changepoints, known.changepoint_probability, texts)
 
@@ -278,7 +351,9 @@ class Namespace(RecordedScenarios):
         stamps = fits.anchor_stamps(encounter, changepoints)
         try:
             topics = [topic for topic in self.messages if topic.endswith(("fit", "/route"))]
-            messages = {topic: data for topic in topics if (data := self.newest(topic, encounter.start_ns))}
+            messages = {
+                topic: data for topic in topics if (data := self.newest(topic, encounter.start_ns))
+            }
             if "fit" not in messages:
                 return None, ()
             _, _, requested, anchors = fits.decode_fit(messages["fit"])
@@ -290,18 +365,37 @@ class Namespace(RecordedScenarios):
             )
             routes = tuple(
                 fits.with_figures(route, self.statuses, vehicle.id)
-                for vehicle, (_, _, route) in zip(encounter.vehicles, decode_routes(messages, encounter, stamps), strict=True)
+                for vehicle, (_, _, route) in zip(
+                    encounter.vehicles, decode_routes(messages, encounter, stamps), strict=True
+                )
             )
             lost = fits.decode_losses(self.statuses.get("fit", {}))
         except InputError:
             return None, ()
-        remarks = {text for vehicle, route in zip(encounter.vehicles, routes, strict=True) for text in route.remarks(vehicle.id)}
-        noted = tuple(text for key, text in self.statuses.get("fit", {}).items() if key.startswith("note."))
-        notes = tuple(text for text in noted if text not in remarks)  # the remarks come from the routes themselves
-        return Fit(encounter.vehicles, fitted, anchor_index(encounter, changepoints), requested, notes, lost), routes
+        remarks = {
+            text
+            for vehicle, route in zip(encounter.vehicles, routes, strict=True)
+            for text in route.remarks(vehicle.id)
+        }
+        noted = tuple(
+            text for key, text in self.statuses.get("fit", {}).items() if key.startswith("note.")
+        )
+        notes = tuple(
+            text for text in noted if text not in remarks
+        )  # the remarks come from the routes themselves
+        return Fit(
+            encounter.vehicles,
+            fitted,
+            anchor_index(encounter, changepoints),
+            requested,
+            notes,
+            lost,
+        ), routes
 
 
-def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = BagConfig()) -> ScenarioSet:
+def read_scenario_set(
+    path: Path, namespace: str = "", config: BagConfig = BagConfig()
+) -> ScenarioSet:
     """Return the last request's scenarios and counts from a bag, whoever recorded it.
 
     Raises:
@@ -314,7 +408,9 @@ def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = BagCo
         return found.scenario_set()
 
 
-def load(path: Path | str, namespace: str = "", config: BagConfig = BagConfig()) -> GenerationResult:
+def load(
+    path: Path | str, namespace: str = "", config: BagConfig = BagConfig()
+) -> GenerationResult:
     """Return a result that a bag holds: its template and the scenarios of its last request, not evaluated.
 
     Args:
@@ -336,13 +432,24 @@ def result_in(recording: Recording, namespace: str = "") -> GenerationResult:
     """
     if namespace not in recording.results:
         names = " or ".join(map(repr, recording.results))
-        remedy = f"choose one: namespace={names}" if names else "no namespace has any; is it a log?"
-        raise InputError(f"{recording.path}: namespace {namespace!r} holds no recording with scenarios; {remedy}")
+        remedy = (
+            f"choose one: namespace={names}" if names else "no namespace has any; is it a log?"
+        )
+        raise InputError(
+            f"{recording.path}: namespace {namespace!r} holds no recording with scenarios; {remedy}"
+        )
     found = recording.namespaces[namespace]
     with within(recording.path):
         fit, routes = found.fit
         generated = found.scenario_set()
         seed = next((scenario.seed for scenario in generated), 0)
         return GenerationResult(
-            found.encounter, found.segmentation, found.road, fit, routes, generated, seed, provenance=recording.provenance
+            found.encounter,
+            found.segmentation,
+            found.road,
+            fit,
+            routes,
+            generated,
+            seed,
+            provenance=recording.provenance,
         )

@@ -19,7 +19,9 @@ from scenario_gen.base.errors import InputError
 MOST_ENTRIES = 300_000  # that are remembered; beyond, the oldest requests are forgotten
 MOST_UNMATCHED = 10_000  # scenarios that wait for their entry; beyond, the oldest are forgotten
 MOST_WHOLE = 1000  # requests that are remembered as whole
-NO_STATUS = Status("", Level.OK, "")  # of waiting entries: their texts are long, and there may be very many
+NO_STATUS = Status(
+    "", Level.OK, ""
+)  # of waiting entries: their texts are long, and there may be very many
 
 
 @dataclass
@@ -73,7 +75,9 @@ class TrackedRequest:
         return f"request {self.request}: {self.came} of {self.summary.published} scenarios are there, {self.missing} are missing"
 
 
-Match = tuple[TrackedRequest, ScenarioEntry, bytes]  # a request, one of its entries, and what came with the scenario
+Match = tuple[
+    TrackedRequest, ScenarioEntry, bytes
+]  # a request, one of its entries, and what came with the scenario
 
 
 class RequestTracker:
@@ -82,8 +86,12 @@ class RequestTracker:
     def __init__(self, most_unmatched: int = MOST_UNMATCHED) -> None:
         self.open: dict[str, TrackedRequest] = {}  # by request
         self._awaited: dict[str, list[str]] = {}  # SHA-256 -> requests
-        self._unmatched: dict[str, list[bytes]] = {}  # SHA-256 -> data of scenarios that came before their entry
-        self._whole: dict[str, tuple[int | None, int]] = {}  # request -> seed and number of scenarios
+        self._unmatched: dict[
+            str, list[bytes]
+        ] = {}  # SHA-256 -> data of scenarios that came before their entry
+        self._whole: dict[
+            str, tuple[int | None, int]
+        ] = {}  # request -> seed and number of scenarios
         self._most_unmatched = most_unmatched
         self._entries = 0  # of all open requests
         self._partial: dict[

@@ -12,7 +12,14 @@ from pathlib import Path
 
 from msg_conventions.cdr import stamp_of
 from msg_conventions.ego import WITNESS
-from msg_conventions.scenario_info import decode_info, INFO, Info, MESSAGES, RequestSummary, ScenarioEntry
+from msg_conventions.scenario_info import (
+    decode_info,
+    INFO,
+    Info,
+    MESSAGES,
+    RequestSummary,
+    ScenarioEntry,
+)
 from msg_conventions.scenarios import decode_scenario, digest
 from scenario_gen.bags.recordings.requests import RequestTracker
 from scenario_gen.bags.storage.bag import BagMessage
@@ -25,7 +32,9 @@ SCENARIOS = "scenarios"
 class RecordedScenarios:
     """The messages of one namespace of a bag, and the requests and scenarios among them."""
 
-    def __init__(self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]]) -> None:
+    def __init__(
+        self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]]
+    ) -> None:
         """Take the bag's path, the namespace's name and its messages by topic."""
         self.path, self.name, self._recorded = path, name, messages
 
@@ -34,7 +43,10 @@ class RecordedScenarios:
         """The messages by topic; those of one scenario are joined, so that there is one for each scenario."""
         if not (SCENARIOS in self._recorded and INFO in self._recorded):
             return self._recorded
-        return {**self._recorded, SCENARIOS: joined_messages(self._recorded[SCENARIOS], self.entries)}
+        return {
+            **self._recorded,
+            SCENARIOS: joined_messages(self._recorded[SCENARIOS], self.entries),
+        }
 
     def data(self, topic: str) -> list[bytes]:
         """Return the messages of a topic, in order."""
@@ -50,7 +62,14 @@ class RecordedScenarios:
         Raises:
             InputError: a message is damaged.
         """
-        return next((data for data in reversed(self.data(topic)) if stamp_of(data, self.where(topic)) == stamp_ns), None)
+        return next(
+            (
+                data
+                for data in reversed(self.data(topic))
+                if stamp_of(data, self.where(topic)) == stamp_ns
+            ),
+            None,
+        )
 
     # Requests, by `scenarios/info`.
 
@@ -60,7 +79,9 @@ class RecordedScenarios:
         return self._decoded_infos[0]
 
     @cached_property
-    def _decoded_infos(self) -> tuple[list[tuple[BagMessage, tuple[Info, ...]]], InputError | None]:
+    def _decoded_infos(
+        self,
+    ) -> tuple[list[tuple[BagMessage, tuple[Info, ...]]], InputError | None]:
         found, damage = [], None
         for message in self._recorded.get(INFO, ()):
             try:
@@ -82,12 +103,16 @@ class RecordedScenarios:
     @cached_property
     def entries(self) -> tuple[ScenarioEntry, ...]:
         """The entry of every scenario, in order."""
-        return tuple(info for _, infos in self.infos for info in infos if isinstance(info, ScenarioEntry))
+        return tuple(
+            info for _, infos in self.infos for info in infos if isinstance(info, ScenarioEntry)
+        )
 
     @cached_property
     def summaries(self) -> tuple[RequestSummary, ...]:
         """The summaries of the requests, in order."""
-        return tuple(info for _, infos in self.infos for info in infos if isinstance(info, RequestSummary))
+        return tuple(
+            info for _, infos in self.infos for info in infos if isinstance(info, RequestSummary)
+        )
 
     @cached_property
     def missing(self) -> tuple[str, ...]:
@@ -126,7 +151,9 @@ class RecordedScenarios:
     def _decoded(self, data: bytes, entry: ScenarioEntry | None, k: int) -> tuple[int, Scenario]:
         message = self.witnesses.get(entry.witness) if entry else None
         witness = None if message is None else message.data
-        return decode_with_witness(data, entry, k, witness, f"{self.where(SCENARIOS)}, message {k}", self.where(WITNESS))
+        return decode_with_witness(
+            data, entry, k, witness, f"{self.where(SCENARIOS)}, message {k}", self.where(WITNESS)
+        )
 
     @cached_property
     def witnesses(self) -> Mapping[str, BagMessage]:
@@ -156,11 +183,17 @@ class RecordedScenarios:
         seen = list(_numbered(self.hashes))
         there = set(seen)
         lost = [k for k, key in enumerate(entries) if key not in there]
-        known = [(-1, -1), *((k, place[key]) for k, key in enumerate(seen) if key in place), (len(seen), len(entries))]
+        known = [
+            (-1, -1),
+            *((k, place[key]) for k, key in enumerate(seen) if key in place),
+            (len(seen), len(entries)),
+        ]
         found: dict[int, ScenarioEntry | None] = {}
         for (first, after), (last, before) in pairwise(known):
             between = iter([self.entries[k] for k in lost if after < k < before])
-            found |= {k: next(between, None) for k in range(first + 1, last) if self.entry(k) is None}
+            found |= {
+                k: next(between, None) for k in range(first + 1, last) if self.entry(k) is None
+            }
         return found
 
     def scenario_set(self) -> ScenarioSet:
@@ -179,17 +212,25 @@ class RecordedScenarios:
         summary, own = self.summaries[-1], dict[int, ScenarioEntry]()
         for entry in self.entries:
             if entry.request == summary.request:
-                if entry.index in own or any(entry.seed != other.seed for other in islice(own.values(), 1)):
+                if entry.index in own or any(
+                    entry.seed != other.seed for other in islice(own.values(), 1)
+                ):
                     own.clear()
                 own[entry.index] = entry
         by_hash = dict(zip(self.hashes, self.data(SCENARIOS), strict=True))
         what = self.where(SCENARIOS)
         for entry in own.values():
             if entry.sha256 not in by_hash:
-                raise InputError(f"{self.path}: scenario {entry.index} of request {entry.request} is not on {what}")
+                raise InputError(
+                    f"{self.path}: scenario {entry.index} of request {entry.request} is not on {what}"
+                )
         if len(own) != summary.published:
-            raise InputError(f"{self.path}: {summary.published} scenarios were published, {len(own)} are on {what}")
-        return summary.result(tuple(self._decoded(by_hash[e.sha256], e, e.index)[1] for e in own.values()))
+            raise InputError(
+                f"{self.path}: {summary.published} scenarios were published, {len(own)} are on {what}"
+            )
+        return summary.result(
+            tuple(self._decoded(by_hash[e.sha256], e, e.index)[1] for e in own.values())
+        )
 
 
 def decode_with_witness(
@@ -215,14 +256,24 @@ def decode_with_witness(
         scenario = replace(scenario, facts=entry.facts)
     if witness is None:
         return stamp, scenario
-    of, own = decode_scenario(witness, seed=seed, index=index, what=f"{where}, of scenario {index}", late=True)
+    of, own = decode_scenario(
+        witness, seed=seed, index=index, what=f"{where}, of scenario {index}", late=True
+    )
     known = {vehicle.id for vehicle in scenario.vehicles}
-    if (of, own.frame_id) != (stamp, scenario.frame_id) or len(own.vehicles) != 1 or own.vehicles[0].id in known:
-        raise InputError(f"{where}, of scenario {index}: it is not one other vehicle with the scenario's stamp and frame")
+    if (
+        (of, own.frame_id) != (stamp, scenario.frame_id)
+        or len(own.vehicles) != 1
+        or own.vehicles[0].id in known
+    ):
+        raise InputError(
+            f"{where}, of scenario {index}: it is not one other vehicle with the scenario's stamp and frame"
+        )
     return stamp, replace(scenario, reference_drive=own)
 
 
-def joined_messages(messages: Sequence[BagMessage], entries: Iterable[ScenarioEntry]) -> Sequence[BagMessage]:
+def joined_messages(
+    messages: Sequence[BagMessage], entries: Iterable[ScenarioEntry]
+) -> Sequence[BagMessage]:
     """Return one message per scenario: vehicles that come or go are in messages of their own, which an entry names.
 
     A scenario of which a message is missing is not joined: its entry then has no scenario, which `missing` reports.

@@ -30,7 +30,9 @@ def missing_topics(messages: Mapping[str, bytes]) -> list[str]:
     needed = ["tracks", "changepoints", "map", "fit"]
     if "tracks" in messages:
         vehicles = decode_tracks(messages["tracks"]).vehicles
-        needed += [vehicle_topic(name, "route") for name in tokens(vehicle.id for vehicle in vehicles)]
+        needed += [
+            vehicle_topic(name, "route") for name in tokens(vehicle.id for vehicle in vehicles)
+        ]
     return [topic for topic in needed if topic not in messages]
 
 
@@ -44,7 +46,12 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     """
     encounter = decode_tracks(messages["tracks"])
     segmentation = decode_changepoints(messages["changepoints"], encounter)
-    _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
+    _, road = decode_map(
+        messages["map"],
+        messages.get("road/entries"),
+        messages.get("road/exits"),
+        messages.get(LANES),
+    )
     _, frame, requested, poses = decode_fit(messages["fit"])
     anchors = anchor_stamps(encounter, segmentation.changepoints)
     if poses.shape[:2] != (len(encounter.vehicles), len(anchors)):
@@ -55,12 +62,20 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     routes = decode_routes(messages, encounter, anchors)
     for topic, other, _ in routes:
         if {frame, other} != {road.frame_id}:
-            raise InputError(f"{topic}: frame {other!r}, fit {frame!r} and map {road.frame_id!r} must be one and the same")
-    fit = Fit(encounter.vehicles, (), anchor_index(encounter, segmentation.changepoints), requested, ())
-    return GenerationResult(encounter, segmentation, road, fit, tuple(route for _, _, route in routes))
+            raise InputError(
+                f"{topic}: frame {other!r}, fit {frame!r} and map {road.frame_id!r} must be one and the same"
+            )
+    fit = Fit(
+        encounter.vehicles, (), anchor_index(encounter, segmentation.changepoints), requested, ()
+    )
+    return GenerationResult(
+        encounter, segmentation, road, fit, tuple(route for _, _, route in routes)
+    )
 
 
-def decode_routes(messages: Mapping[str, bytes], encounter: Encounter, anchors_ns: Sequence[int]) -> list[tuple[str, str, Route]]:
+def decode_routes(
+    messages: Mapping[str, bytes], encounter: Encounter, anchors_ns: Sequence[int]
+) -> list[tuple[str, str, Route]]:
     """Return topic, frame and route of every vehicle; `messages` are by topic, `anchors_ns` (K + 2,) the template's stamps.
 
     Raises:
@@ -75,7 +90,9 @@ def decode_routes(messages: Mapping[str, bytes], encounter: Encounter, anchors_n
     return found
 
 
-def lanes_beside(grid: bytes, maps: Iterable[bytes], lanes: Sequence[bytes], infos: Iterable[bytes]) -> bytes | None:
+def lanes_beside(
+    grid: bytes, maps: Iterable[bytes], lanes: Sequence[bytes], infos: Iterable[bytes]
+) -> bytes | None:
     """Return the lanes of a map: those that a `fit/info` names beside it; where none does, those of a bag of one map.
 
     Args:
@@ -91,7 +108,9 @@ def lanes_beside(grid: bytes, maps: Iterable[bytes], lanes: Sequence[bytes], inf
     for info in infos if lanes else ():
         together = decode_hashes(info, "fit/info")
         if together.get("map") == own:
-            return next((data for data in lanes if hash_of(LANES, data) == together.get(LANES)), None)
+            return next(
+                (data for data in lanes if hash_of(LANES, data) == together.get(LANES)), None
+            )
     return lanes[-1] if lanes and len({hash_of("map", data) for data in maps}) == 1 else None
 
 
@@ -100,7 +119,9 @@ def anchor_index(encounter: Encounter, changepoints: Ints) -> Ints:
     return np.array([0, *changepoints, encounter.speed.shape[1] - 1])
 
 
-def template_statuses(messages: Iterable[bytes], stamp_ns: int, nodes: str = "/") -> dict[str, Mapping[str, str]]:
+def template_statuses(
+    messages: Iterable[bytes], stamp_ns: int, nodes: str = "/"
+) -> dict[str, Mapping[str, str]]:
     """Return the key-values of diagnostics about one template, by subject ("/planner: fit" is "fit"); the last value counts.
 
     Args:

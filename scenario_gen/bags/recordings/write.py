@@ -27,10 +27,14 @@ from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.types import Encounter, GenerationResult, Scenario, tokens
 
-SCENARIO_STEP_NS = 100_000_000  # scenarios are logged this far apart, so that a player shows one after the other
+SCENARIO_STEP_NS = (
+    100_000_000  # scenarios are logged this far apart, so that a player shows one after the other
+)
 
 
-def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tuple[str, bytes, int]]:
+def result_messages(
+    result: GenerationResult, request: str = "1"
+) -> Iterator[tuple[str, bytes, int]]:
     """Yield topic (without namespace), CDR bytes and log stamp [ns] of every message of a result, in order of the stamps.
 
     Args:
@@ -50,7 +54,10 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     }
     if road.lanes is not None:
         template[LANES] = encode_lanes(road.lanes, road.frame_id, stamp)
-    hashes, infos = template_hashes(template), {"road/info": encode_hashes("road", template, stamp)}
+    hashes, infos = (
+        template_hashes(template),
+        {"road/info": encode_hashes("road", template, stamp)},
+    )
     template["changepoints"] = encode_changepoints(encounter, result.segmentation)
     template["fit"] = encode_fit(encounter, fit, road.frame_id)
     anchors = anchor_stamps(encounter, result.segmentation.changepoints)
@@ -72,7 +79,12 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     ego = result.generated.ego
     for topic, data in () if ego is None else ego_messages(ego, road.frame_id, stamp):
         yield topic, data, stamp
-    messages = RequestMessages(encounter, request, "/gp_sampler", {"template": encounter.name, "road": road.name, **hashes})
+    messages = RequestMessages(
+        encounter,
+        request,
+        "/gp_sampler",
+        {"template": encounter.name, "road": road.name, **hashes},
+    )
     logged = stamp
     for scenario in result.generated.scenarios:
         for topic, data in messages.of_scenario(scenario, fit.requested, ego):
@@ -80,11 +92,20 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
         yield "markers", scenario_markers(scenario, stamp), logged
         logged += SCENARIO_STEP_NS
     provenance = {**result.provenance, **hashes}
-    summary = request_summary(result.generated, request, "/gp_sampler", result.seed, provenance, reactions=result.reacting)
+    summary = request_summary(
+        result.generated,
+        request,
+        "/gp_sampler",
+        result.seed,
+        provenance,
+        reactions=result.reacting,
+    )
     yield INFO, encode_info(summary, stamp), logged
 
 
-def write_recording(folder: Path, results: GenerationResult | Mapping[str, GenerationResult]) -> Path:
+def write_recording(
+    folder: Path, results: GenerationResult | Mapping[str, GenerationResult]
+) -> Path:
     """Write one result, or several by namespace ("" or e.g. "/case_a"), to the bag `folder`, whole or not; return `folder`.
 
     Same results, same bytes. A bag that this function wrote there earlier is replaced.
@@ -106,7 +127,9 @@ def add_results(bag: BagWriter, results: Mapping[str, GenerationResult]) -> None
 
 def add_message(bag: BagWriter, name: str, data: bytes, stamp_ns: int) -> None:
     """Write a message of one of the suite's topics, by its full name, to a bag."""
-    kind, quality = topic_entry(name.lstrip("/"))  # in our bags the diagnostics are a latched topic of the namespace
+    kind, quality = topic_entry(
+        name.lstrip("/")
+    )  # in our bags the diagnostics are a latched topic of the namespace
     bag.add_topic(name, kind, qos_yaml(quality))
     bag.write(name, data, stamp_ns)
 
@@ -129,7 +152,11 @@ def distance_apart(scenario: Scenario, encounter: Encounter, recorded: bytes) ->
     if data == recorded:
         return None
     made, other = (decode_scenario(each)[1] for each in (data, recorded))
-    if made.vehicles != other.vehicles or not np.array_equal(made.time, other.time) or (made.present != other.present).any():
+    if (
+        made.vehicles != other.vehicles
+        or not np.array_equal(made.time, other.time)
+        or (made.present != other.present).any()
+    ):
         return float("inf")
     return float(np.abs(made.position - other.position).max())
 

@@ -14,7 +14,13 @@ import zstandard
 
 from scenario_gen.bags.storage.config import Allowance, BagConfig
 from scenario_gen.bags.storage.files import BagFiles, files_of, METADATA
-from scenario_gen.bags.storage.mcap import BagTopic, DamagedError, decompressed, McapFile, open_mcap
+from scenario_gen.bags.storage.mcap import (
+    BagTopic,
+    DamagedError,
+    decompressed,
+    McapFile,
+    open_mcap,
+)
 from scenario_gen.bags.storage.others import open_ros1, open_sqlite, RosbagsFile
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
@@ -48,30 +54,48 @@ class StoredBag:
             InputError: a file is damaged.
         """
         found: dict[str, BagTopic] = {}
-        for stored in (topic for file, storage in self.files for topic in _topics(file, storage).values()):
+        for stored in (
+            topic for file, storage in self.files for topic in _topics(file, storage).values()
+        ):
             before = found.get(stored.name)
-            found[stored.name] = replace(before, count=before.count + stored.count) if before else stored
+            found[stored.name] = (
+                replace(before, count=before.count + stored.count) if before else stored
+            )
         return tuple(found[name] for name in sorted(found))
 
-    def messages(self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True) -> Iterator[BagMessage]:
+    def messages(
+        self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True
+    ) -> Iterator[BagMessage]:
         """Yield the messages of the topics that are `wanted`, by name and type, in order of their stamps; of all files together.
 
         Raises:
             InputError: a file is damaged, there are more messages than the bounds allow, or a topic's are no CDR of a known type.
         """
-        for message in heapq.merge(*(self._of_file(*entry, wanted) for entry in self.files), key=lambda m: m.stamp_ns):
+        for message in heapq.merge(
+            *(self._of_file(*entry, wanted) for entry in self.files), key=lambda m: m.stamp_ns
+        ):
             self.allowance.hold(len(message.data))
             yield message
 
-    def _of_file(self, file: Path, storage: McapFile | RosbagsFile, wanted: Callable[[str, str], bool]) -> Iterator[BagMessage]:
-        topics = {number: topic for number, topic in _topics(file, storage).items() if wanted(topic.name, topic.type)}
+    def _of_file(
+        self, file: Path, storage: McapFile | RosbagsFile, wanted: Callable[[str, str], bool]
+    ) -> Iterator[BagMessage]:
+        topics = {
+            number: topic
+            for number, topic in _topics(file, storage).items()
+            if wanted(topic.name, topic.type)
+        }
         for topic in topics.values():
             if topic.encoding != "cdr" or not topic.type:
                 how = f"encoded as {shown(topic.encoding)!r}" if topic.type else "of no type"
-                raise InputError(f"{file}: topic {shown(topic.name)} is {how}; only CDR of a ROS type is read: choose others")
+                raise InputError(
+                    f"{file}: topic {shown(topic.name)} is {how}; only CDR of a ROS type is read: choose others"
+                )
         with _place(file):
             for stamp, number, data in storage.in_order(topics) if topics else ():
-                yield BagMessage(topics[number].name, topics[number].type, self._whole(data, file), stamp)
+                yield BagMessage(
+                    topics[number].name, topics[number].type, self._whole(data, file), stamp
+                )
 
     def _whole(self, data: bytes, file: Path) -> bytes:
         """Return a message, decompressed where the bag compresses each by itself."""
@@ -81,7 +105,9 @@ class StoredBag:
         with guarded(f"{file}: a message cannot be decompressed"):
             whole = decompressed(data, most)
         if len(whole) > most:
-            raise InputError(f"{file}: a message decompresses to more than bag.most_chunk_bytes ({most})")
+            raise InputError(
+                f"{file}: a message decompresses to more than bag.most_chunk_bytes ({most})"
+            )
         self.allowance.unpack(len(whole))
         return whole
 
@@ -106,7 +132,9 @@ def _place(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def open_bag(path: Path, config: BagConfig = BagConfig(), bound: str = "bag.most_bytes") -> Iterator[StoredBag]:
+def open_bag(
+    path: Path, config: BagConfig = BagConfig(), bound: str = "bag.most_bytes"
+) -> Iterator[StoredBag]:
     """Open a bag for reading: its folder, or one of its files.
 
     Args:
@@ -121,14 +149,23 @@ def open_bag(path: Path, config: BagConfig = BagConfig(), bound: str = "bag.most
         found = files_of(path) if path.is_dir() or path.is_file() else BagFiles(())
     if not found.files:
         why = "is not a bag" if path.exists() else "does not exist"
-        raise InputError(f"{path} {why}; name a folder with .mcap, .db3 or .bag files, or one of these files")
-    allowance = Allowance(config, str(path), sum(file.stat().st_size for file in found.files), bound)
+        raise InputError(
+            f"{path} {why}; name a folder with .mcap, .db3 or .bag files, or one of these files"
+        )
+    allowance = Allowance(
+        config, str(path), sum(file.stat().st_size for file in found.files), bound
+    )
     with ExitStack() as stack:
-        files = [(file, _opened(file, found.compression == "file", allowance, stack)) for file in found.files]
+        files = [
+            (file, _opened(file, found.compression == "file", allowance, stack))
+            for file in found.files
+        ]
         yield StoredBag(files, found.compression == "message", allowance)
 
 
-def _opened(file: Path, compressed: bool, allowance: Allowance, stack: ExitStack) -> McapFile | RosbagsFile:
+def _opened(
+    file: Path, compressed: bool, allowance: Allowance, stack: ExitStack
+) -> McapFile | RosbagsFile:
     """Open one file of a bag, which may be compressed as a whole."""
     if file.stat().st_size == 0:
         raise InputError(f"{file} is empty (0 bytes); record or copy it again")
@@ -148,7 +185,9 @@ def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:
         InputError: it is damaged, or too large.
     """
     target = stack.enter_context(scratch(Path(tempfile.gettempdir()))) / file.stem
-    problem = guarded(f"{file}: cannot be decompressed", zstandard.ZstdError, remedy="copy it again")
+    problem = guarded(
+        f"{file}: cannot be decompressed", zstandard.ZstdError, remedy="copy it again"
+    )
     with file.open("rb") as packed, target.open("wb") as whole, problem:
         reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
         while block := reader.read(COPIED):

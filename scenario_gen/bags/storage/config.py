@@ -18,7 +18,10 @@ class BagConfig(Parameters):
     """Bounds of reading a bag, so that a small damaged or malicious file cannot take all memory."""
 
     most_bytes: int = parameter(
-        512 * 1024**2, "most bytes of messages that are read from one bag, 256 beside its own for each", low=1, high=2**62
+        512 * 1024**2,
+        "most bytes of messages that are read from one bag, 256 beside its own for each",
+        low=1,
+        high=2**62,
     )
     most_chunk_bytes: int = parameter(
         64 * 1024**2,
@@ -31,7 +34,9 @@ class BagConfig(Parameters):
 class Allowance:
     """Counts the bytes that reading one bag takes, and refuses too many."""
 
-    def __init__(self, config: BagConfig, what: str, file_bytes: int, bound: str = "bag.most_bytes") -> None:
+    def __init__(
+        self, config: BagConfig, what: str, file_bytes: int, bound: str = "bag.most_bytes"
+    ) -> None:
         """Start with nothing counted.
 
         Args:

@@ -16,7 +16,9 @@ from typing import Any
 
 from scenario_gen.base.errors import InputError
 
-PREDICTED, TRACKED = (f"autoware_perception_msgs/msg/{name}" for name in ("PredictedObjects", "TrackedObjects"))
+PREDICTED, TRACKED = (
+    f"autoware_perception_msgs/msg/{name}" for name in ("PredictedObjects", "TrackedObjects")
+)
 KEPT = Path(__file__).resolve().parents[2] / "resources" / "definitions.json"
 MOST_TEXT = 64 * 1024  # characters of a definition in a bag of ROS 1
 
@@ -43,7 +45,9 @@ def ros1_types(kind: str, text: str) -> Any:
     from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
     if len(text) > MOST_TEXT:
-        raise InputError(f"its definition has {len(text)} characters; at most {MOST_TEXT} are read")
+        raise InputError(
+            f"its definition has {len(text)} characters; at most {MOST_TEXT} are read"
+        )
     store, types = get_typestore(Stores.ROS2_JAZZY), get_types_from_msg(text, kind)
     types.pop("std_msgs/msg/Header", None)  # that of ROS 2 has no seq, which rosbags leaves out
     store.register(types)

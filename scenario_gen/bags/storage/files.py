@@ -39,11 +39,17 @@ def files_of(path: Path) -> BagFiles:
         names, compression = _listed(read_yaml(metadata), metadata)
     except InputError as error:
         there = ", ".join(file.name for file in _in_folder(path)[:3])
-        remedy = f"`scenario-gen reindex {path}` makes it anew from its files ({there}, …)" if there else "copy the bag again"
+        remedy = (
+            f"`scenario-gen reindex {path}` makes it anew from its files ({there}, …)"
+            if there
+            else "copy the bag again"
+        )
         raise InputError(f"{error}; {remedy}") from error
     for name in names:
         if not (path / name).is_file():
-            raise InputError(f"{metadata} lists {shown(name)}, which is not there; `scenario-gen reindex {path}` reads what is")
+            raise InputError(
+                f"{metadata} lists {shown(name)}, which is not there; `scenario-gen reindex {path}` reads what is"
+            )
     return BagFiles(tuple(path / name for name in names), compression)
 
 
@@ -64,13 +70,25 @@ def _listed(document: Any, metadata: Path) -> tuple[list[str], str]:
     info = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
     listed = info.get("relative_file_paths") if isinstance(info, dict) else None
     if not isinstance(info, dict) or not isinstance(listed, list):
-        raise InputError(f"{metadata}: damaged, it lists no files under rosbag2_bagfile_information: relative_file_paths")
+        raise InputError(
+            f"{metadata}: damaged, it lists no files under rosbag2_bagfile_information: relative_file_paths"
+        )
     for name in listed:
-        if not isinstance(name, str) or not 0 < len(Path(name).name.encode()) < 256 or "\0" in name:
-            raise InputError(f"{metadata}: damaged, relative_file_paths holds {shown(name)}, no file's name")
+        if (
+            not isinstance(name, str)
+            or not 0 < len(Path(name).name.encode()) < 256
+            or "\0" in name
+        ):
+            raise InputError(
+                f"{metadata}: damaged, relative_file_paths holds {shown(name)}, no file's name"
+            )
     mode, kind = (shown(info.get(f"compression_{key}") or "") for key in ("mode", "format"))
-    if mode.lower() not in ("", "none", "file", "message") or (mode.lower() in ("file", "message") and kind != "zstd"):
-        raise InputError(f"{metadata}: compression {kind!r} by {mode!r}; zstd by file or message is known")
+    if mode.lower() not in ("", "none", "file", "message") or (
+        mode.lower() in ("file", "message") and kind != "zstd"
+    ):
+        raise InputError(
+            f"{metadata}: compression {kind!r} by {mode!r}; zstd by file or message is known"
+        )
     return [Path(name).name for name in listed], mode.lower().replace("none", "")
 
 
@@ -83,6 +101,11 @@ def remarks(path: Path) -> tuple[str, ...]:
         return (f"{path} {words}",) if _in_folder(path) else ()
     with suppress(InputError, KeyError, TypeError, AttributeError):
         custom = read_yaml(path / METADATA)["rosbag2_bagfile_information"]["custom_data"]
-        notes = {key.removeprefix(LOST): text for key, text in custom.items() if key.startswith(LOST)}
-        return tuple(f"not whole, by its recorder: {shown(topic)}: {shown(text, 400)}" for topic, text in notes.items())
+        notes = {
+            key.removeprefix(LOST): text for key, text in custom.items() if key.startswith(LOST)
+        }
+        return tuple(
+            f"not whole, by its recorder: {shown(topic)}: {shown(text, 400)}"
+            for topic, text in notes.items()
+        )
     return ()

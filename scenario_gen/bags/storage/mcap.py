@@ -21,7 +21,17 @@ import zlib
 import lz4.frame
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, Footer, Header, Message, MessageIndex, Schema, Statistics
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    Footer,
+    Header,
+    Message,
+    MessageIndex,
+    Schema,
+    Statistics,
+)
 from mcap.stream_reader import StreamReader
 import zstandard
 
@@ -32,12 +42,19 @@ from scenario_gen.base.errors import describe, InputError, ScenarioGenError
 from scenario_gen.types import Quality
 
 MAGIC = b"\x89MCAP0\r\n"
-HEAD_BYTES, FOOTER_BYTES = 9, 29  # of any record's kind and length, and of the footer's record, before the last magic
-OPCODES = frozenset((*range(Opcode.HEADER, Opcode.CHUNK_INDEX + 1), Opcode.STATISTICS))  # of records that matter here
+HEAD_BYTES, FOOTER_BYTES = (
+    9,
+    29,
+)  # of any record's kind and length, and of the footer's record, before the last magic
+OPCODES = frozenset(
+    (*range(Opcode.HEADER, Opcode.CHUNK_INDEX + 1), Opcode.STATISTICS)
+)  # of records that matter here
 LATEST = 2**63  # rosbag2's stamps are signed
 SLACK = 1024  # bytes that a record may have beside the content that is bounded
 WINDOW = 128 * 1024**2  # zstd's own default [bytes]
-CHUNK = re.compile(rb"(?=\x06.{4}\x00{4})", re.DOTALL)  # may begin the record of a chunk of less than 4 GiB
+CHUNK = re.compile(
+    rb"(?=\x06.{4}\x00{4})", re.DOTALL
+)  # may begin the record of a chunk of less than 4 GiB
 Logged = tuple[int, int, bytes]  # stamp [ns], channel, message
 
 
@@ -81,7 +98,9 @@ def parsed(data: bytes, offset: int) -> Iterator[Any]:
         DamagedError: one is damaged.
     """
     stream = io.BytesIO(data)
-    found = StreamReader(stream, skip_magic=True, emit_chunks=True, record_size_limit=len(data)).records
+    found = StreamReader(
+        stream, skip_magic=True, emit_chunks=True, record_size_limit=len(data)
+    ).records
     while stream.tell() < len(data):
         try:
             yield next(found)
@@ -102,7 +121,9 @@ def unpacked(chunk: Chunk, offset: int, allowance: Allowance) -> bytes:
     """
     size, most = chunk.uncompressed_size, allowance.config.most_chunk_bytes
     if size > most:
-        raise DamagedError(offset, f"a chunk of {size} bytes after decompression; bag.most_chunk_bytes is {most}")
+        raise DamagedError(
+            offset, f"a chunk of {size} bytes after decompression; bag.most_chunk_bytes is {most}"
+        )
     allowance.unpack(size)
     raw = chunk.data
     try:
@@ -111,17 +132,26 @@ def unpacked(chunk: Chunk, offset: int, allowance: Allowance) -> bytes:
         elif chunk.compression == "lz4":
             raw = lz4.frame.LZ4FrameDecompressor().decompress(raw, max_length=size + 1)
         elif chunk.compression:
-            raise DamagedError(offset, f"compression {shown(chunk.compression, 40)!r} is unknown; zstd and lz4 are known")
+            raise DamagedError(
+                offset,
+                f"compression {shown(chunk.compression, 40)!r} is unknown; zstd and lz4 are known",
+            )
     except (zstandard.ZstdError, RuntimeError, MemoryError, EOFError) as error:
-        raise DamagedError(offset, f"a chunk cannot be decompressed ({describe(error)})") from error
+        raise DamagedError(
+            offset, f"a chunk cannot be decompressed ({describe(error)})"
+        ) from error
     if len(raw) != size or (chunk.uncompressed_crc and zlib.crc32(raw) != chunk.uncompressed_crc):
-        raise DamagedError(offset, f"a chunk has not the {size} bytes or the checksum that it announces")
+        raise DamagedError(
+            offset, f"a chunk has not the {size} bytes or the checksum that it announces"
+        )
     return bytes(raw)
 
 
 def decompressed(data: bytes, most: int) -> bytes:
     """Return what zstd compressed, or more than `most` bytes of it."""
-    with zstandard.ZstdDecompressor(max_window_size=WINDOW).stream_reader(io.BytesIO(data), read_across_frames=True) as reader:
+    with zstandard.ZstdDecompressor(max_window_size=WINDOW).stream_reader(
+        io.BytesIO(data), read_across_frames=True
+    ) as reader:
         return bytes(reader.read(most + 1))
 
 
@@ -171,7 +201,9 @@ class McapFile:
         head = self._bytes(offset, HEAD_BYTES)
         length, start = int.from_bytes(head[1:], "little"), offset + HEAD_BYTES
         if head[0] == 0 or length > self.size - start:
-            raise DamagedError(offset, f"{length} bytes are announced where {self.size - start} are left")
+            raise DamagedError(
+                offset, f"{length} bytes are announced where {self.size - start} are left"
+            )
         if head[0] not in OPCODES:
             return None, start + length
         return next(parsed(head + self._bytes(start, length), offset), None), start + length
@@ -193,7 +225,9 @@ class McapFile:
         if statistics is None or statistics.chunk_count != len(self.entries):
             return False
         self.counts = Counter(statistics.channel_message_counts)
-        return bool(self.entries or not statistics.message_count) and set(self.counts) <= set(self.channels)
+        return bool(self.entries or not statistics.message_count) and set(self.counts) <= set(
+            self.channels
+        )
 
     def scan(self) -> None:
         """Read the whole file for topics and places; damage is noted among the gaps, and left out."""
@@ -206,7 +240,9 @@ class McapFile:
                     raise DamagedError(0, "not the beginning of an MCAP file")
                 record, after = self.record(start or len(MAGIC))
                 self._note(start or len(MAGIC), record, after)
-                self.closed = isinstance(record, Footer) and self._bytes(after, len(MAGIC)) == MAGIC
+                self.closed = (
+                    isinstance(record, Footer) and self._bytes(after, len(MAGIC)) == MAGIC
+                )
             except DamagedError as error:
                 after = self._next_chunk(start + 1)
                 self.gaps.append(Gap(start, after - start, error.problem))
@@ -224,7 +260,9 @@ class McapFile:
                 self.entries.append((_stamp(record, offset), offset))
                 self.counts[record.channel_id] += 1
             elif isinstance(record, MessageIndex) and self._lost:
-                self.gaps[-1] = replace(self.gaps[-1], messages=self.gaps[-1].messages + len(record.records))
+                self.gaps[-1] = replace(
+                    self.gaps[-1], messages=self.gaps[-1].messages + len(record.records)
+                )
             else:
                 self._describe(record)
         except (DamagedError, InputError) as error:
@@ -253,7 +291,9 @@ class McapFile:
                     break
         return self.size
 
-    def _in_chunk(self, chunk: Chunk, offset: int, wanted: Collection[int] | None) -> Iterator[tuple[int, int, int, int, bytes]]:
+    def _in_chunk(
+        self, chunk: Chunk, offset: int, wanted: Collection[int] | None
+    ) -> Iterator[tuple[int, int, int, int, bytes]]:
         """Yield stamp, offset, number, channel and bytes of the messages of a chunk; learn what it says of topics."""
         raw = unpacked(chunk, offset, self.allowance)
         try:
@@ -280,7 +320,9 @@ class McapFile:
             kind = self.schemas[channel.schema_id].name if channel.schema_id else ""
             quality = quality_of(channel.metadata.get("offered_qos_profiles", ""))
             count = self.counts[channel.id]
-            found.append(BagTopic(channel.topic, kind, quality, count, channel.id, channel.message_encoding))
+            found.append(
+                BagTopic(channel.topic, kind, quality, count, channel.id, channel.message_encoding)
+            )
         return found
 
     def in_order(self, wanted: Collection[int] | None) -> Iterator[Logged]:
@@ -296,13 +338,18 @@ class McapFile:
                 yield stamp, channel, data
             for message in self._at(offset, wanted):
                 if message[0] < start:
-                    raise DamagedError(offset, f"a message is logged at {message[0]} ns, before its chunk's start at {start} ns")
+                    raise DamagedError(
+                        offset,
+                        f"a message is logged at {message[0]} ns, before its chunk's start at {start} ns",
+                    )
                 heapq.heappush(heap, message)
         while heap:
             stamp, _, _, channel, data = heapq.heappop(heap)
             yield stamp, channel, data
 
-    def _at(self, offset: int, wanted: Collection[int] | None) -> Iterator[tuple[int, int, int, int, bytes]]:
+    def _at(
+        self, offset: int, wanted: Collection[int] | None
+    ) -> Iterator[tuple[int, int, int, int, bytes]]:
         """Yield the messages of the chunk, or the one outside of chunks, at a place, as `_in_chunk` does."""
         record, _ = self.record(offset)
         if isinstance(record, Chunk):
@@ -335,14 +382,18 @@ def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
     if not isinstance(header, Header):
         raise DamagedError(len(MAGIC), "no header at the beginning of the file")
     if header.profile == "ros1":
-        raise InputError(f"{file.name}: an MCAP file of profile 'ros1'; name the .bag file that it was made of")
+        raise InputError(
+            f"{file.name}: an MCAP file of profile 'ros1'; name the .bag file that it was made of"
+        )
     end = max(size - FOOTER_BYTES - len(MAGIC), 0)
     try:
         footer, _ = found.record(end)
     except DamagedError:
         footer = None
     if not isinstance(footer, Footer):
-        raise DamagedError(end, "not the end of an MCAP file: its recorder was stopped, or it is cut off")
+        raise DamagedError(
+            end, "not the end of an MCAP file: its recorder was stopped, or it is cut off"
+        )
     if not found.read_summary(footer):
         found.scan()
         if found.gaps:

@@ -42,8 +42,15 @@ class TopicInfo:
     @property
     def document(self) -> dict[str, Any]:
         """As in metadata.yaml."""
-        about: dict[str, Any] = {"name": self.name, "type": self.type, "serialization_format": "cdr"}
-        about |= {"offered_qos_profiles": profiles(self.qos), "type_description_hash": self.type_hash}
+        about: dict[str, Any] = {
+            "name": self.name,
+            "type": self.type,
+            "serialization_format": "cdr",
+        }
+        about |= {
+            "offered_qos_profiles": profiles(self.qos),
+            "type_description_hash": self.type_hash,
+        }
         return {"topic_metadata": about, "message_count": self.count}
 
 
@@ -65,7 +72,10 @@ class FileInfo:
     def document(self) -> dict[str, Any]:
         """First stamp, duration and count as in metadata.yaml; zeros where there is no message."""
         start, duration = (self.start_ns, self.end_ns - self.start_ns) if self.count else (0, 0)
-        times = {"starting_time": {"nanoseconds_since_epoch": start}, "duration": {"nanoseconds": duration}}
+        times = {
+            "starting_time": {"nanoseconds_since_epoch": start},
+            "duration": {"nanoseconds": duration},
+        }
         return times | {"message_count": self.count}
 
 
@@ -108,9 +118,16 @@ def metadata_yaml(info: BagInfo) -> str:
         whole.add(file.start_ns, file.end_ns, file.count)
     about = {"version": 9, "storage_identifier": "mcap", **whole.document}
     about |= {"topics_with_message_count": [topic.document for topic in info.topics]}
-    about |= {"compression_format": "", "compression_mode": "", "relative_file_paths": [file.path for file in info.files]}
+    about |= {
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.path for file in info.files],
+    }
     about |= {"files": [{"path": file.path} | file.document for file in info.files]}
-    about |= {"custom_data": {f"{LOST}{topic}": words for topic, words in info.lost.items()} or None, "ros_distro": "jazzy"}
+    about |= {
+        "custom_data": {f"{LOST}{topic}": words for topic, words in info.lost.items()} or None,
+        "ros_distro": "jazzy",
+    }
     return dump({"rosbag2_bagfile_information": about})
 
 
@@ -126,14 +143,25 @@ def profiles(text: str) -> list[dict[str, Any]]:
 
 def _is_whole(profile: Any) -> bool:
     """Return whether a profile has the entries that every reader needs."""
-    if not isinstance(profile, dict) or not all(isinstance(profile.get(key), kind) for key, kind in ENTRIES.items()):
+    if not isinstance(profile, dict) or not all(
+        isinstance(profile.get(key), kind) for key, kind in ENTRIES.items()
+    ):
         return False
-    return all({"sec", "nsec"} <= set(value) for value in profile.values() if isinstance(value, dict))
+    return all(
+        {"sec", "nsec"} <= set(value) for value in profile.values() if isinstance(value, dict)
+    )
 
 
 def quality_of(text: str) -> Quality:
     """Return the quality that the first of the profiles offers: volatile, depth 10 where there is none."""
     for profile in profiles(text)[:1]:
-        reliable = str(profile["reliability"]).lower() not in ("best_effort", "2")  # a number, as rosbag2 wrote before Jazzy
-        return Quality(max(1, profile["depth"]), reliable, str(profile["durability"]).lower() in ("transient_local", "1"))
+        reliable = str(profile["reliability"]).lower() not in (
+            "best_effort",
+            "2",
+        )  # a number, as rosbag2 wrote before Jazzy
+        return Quality(
+            max(1, profile["depth"]),
+            reliable,
+            str(profile["durability"]).lower() in ("transient_local", "1"),
+        )
     return Quality(depth=10, transient_local=False)

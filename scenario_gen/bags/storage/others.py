@@ -26,9 +26,15 @@ from scenario_gen.types import Quality
 
 NEEDED = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "timestamp", "data"}}
 STEPS = 1_000_000  # of SQLite's machine between two checks of a query
-FREE_STEPS, STEPS_PER_BYTE = 50_000_000, 10  # a row has thirty bytes or more, and takes a hundred steps or fewer
+FREE_STEPS, STEPS_PER_BYTE = (
+    50_000_000,
+    10,
+)  # a row has thirty bytes or more, and takes a hundred steps or fewer
 BLOCK_BYTES = 1 << 20  # decompressed at a time
-PACKED = {b"BZ": bz2.BZ2File, b"\x04\x22": lz4.frame.LZ4FrameFile}  # by how compressed chunks of ROS 1 begin
+PACKED = {
+    b"BZ": bz2.BZ2File,
+    b"\x04\x22": lz4.frame.LZ4FrameFile,
+}  # by how compressed chunks of ROS 1 begin
 SQLITE_REMEDY = "copy it again, or save what is whole with `sqlite3 FILE .recover`"
 ROS1_REMEDY = "copy it again, or run `rosbag reindex` on it"
 
@@ -52,9 +58,13 @@ class RosbagsFile:
                 raise InputError(
                     f"{self._file}: damaged, it has a topic {shown(connection.topic)} of {shown(connection.msgtype)}"
                 )
-            encoding = getattr(connection.ext, "serialization_format", "cdr")  # of ROS 1 it will be
+            encoding = getattr(
+                connection.ext, "serialization_format", "cdr"
+            )  # of ROS 1 it will be
             name, kind, quality = connection.topic, connection.msgtype, _quality(connection.ext)
-            found.append(BagTopic(name, kind, quality, connection.msgcount, connection.id, encoding))
+            found.append(
+                BagTopic(name, kind, quality, connection.msgcount, connection.id, encoding)
+            )
         return found
 
     def in_order(self, wanted: Collection[int]) -> Iterator[Logged]:
@@ -71,8 +81,14 @@ class RosbagsFile:
                 connection, stamp, data = next(rows, (None, 0, b""))
             if connection is None:
                 return
-            if not isinstance(stamp, int) or not -LATEST <= stamp < LATEST or not isinstance(data, bytes):
-                raise InputError(f"{self._file}: damaged, a message has timestamp {shown(stamp)} and data {shown(data, 40)}")
+            if (
+                not isinstance(stamp, int)
+                or not -LATEST <= stamp < LATEST
+                or not isinstance(data, bytes)
+            ):
+                raise InputError(
+                    f"{self._file}: damaged, a message has timestamp {shown(stamp)} and data {shown(data, 40)}"
+                )
             self._allowance.unpack(len(data))
             yield stamp, connection.id, convert[connection.id](data)
 
@@ -97,7 +113,11 @@ def _quality(ext: Any) -> Quality:
         return Quality(1 if ext.latching else 10, transient_local=bool(ext.latching))
     for offer in ext.offered_qos_profiles[:1]:
         depth = offer.depth if isinstance(offer.depth, int) else 10
-        return Quality(max(1, depth), offer.reliability.name != "BEST_EFFORT", offer.durability.name == "TRANSIENT_LOCAL")
+        return Quality(
+            max(1, depth),
+            offer.reliability.name != "BEST_EFFORT",
+            offer.durability.name == "TRANSIENT_LOCAL",
+        )
     return Quality(10, transient_local=False)
 
 
@@ -128,13 +148,20 @@ def _check_tables(path: Path, file: Path, most: int) -> None:
     uri = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(uri, uri=True)) as base:
         base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(1000, most))
-        left, looks = (FREE_STEPS + STEPS_PER_BYTE * path.stat().st_size) // STEPS, itertools.count()
+        left, looks = (
+            (FREE_STEPS + STEPS_PER_BYTE * path.stat().st_size) // STEPS,
+            itertools.count(),
+        )
         base.set_progress_handler(lambda: next(looks) > left, STEPS)  # ends an endless query
         for table, needed in NEEDED.items():
-            kinds = base.execute("SELECT type FROM sqlite_master WHERE name = ?", (table,)).fetchall()
+            kinds = base.execute(
+                "SELECT type FROM sqlite_master WHERE name = ?", (table,)
+            ).fetchall()
             columns = {row[1] for row in base.execute(f"PRAGMA table_info({table})")}
             if kinds != [("table",)] or not needed <= columns:
-                raise InputError(f"{file}: no bag: it has no table {table} with {', '.join(sorted(needed))}")
+                raise InputError(
+                    f"{file}: no bag: it has no table {table} with {', '.join(sorted(needed))}"
+                )
         base.execute("SELECT sum(length(data)), max(timestamp) FROM messages").fetchall()
         if base.execute("SELECT count(*) - count(DISTINCT id) FROM topics").fetchone()[0]:
             raise InputError(f"{file}: damaged, two topics have one id")
@@ -154,7 +181,9 @@ def open_ros1(path: Path, allowance: Allowance) -> Iterator[RosbagsFile]:
         reader.open()
     with closing(reader), path.open("rb") as stream:
         for chunk in reader.chunks.values():
-            with guarded(f"{path}: cut off or damaged, at byte {chunk.datapos}", remedy=ROS1_REMEDY):
+            with guarded(
+                f"{path}: cut off or damaged, at byte {chunk.datapos}", remedy=ROS1_REMEDY
+            ):
                 _check_chunk(stream, chunk.datapos, chunk.datasize, allowance)
         for connection in reader.connections:
             allowance.unpack(FOUND_BYTES * connection.msgcount)
@@ -165,7 +194,9 @@ def _check_chunk(stream: Any, start: int, length: int, allowance: Allowance) -> 
     """Refuse a chunk that is cut off, or decompresses to more than the bounds allow."""
     most = allowance.config.most_chunk_bytes
     if length > most:
-        raise InputError(f"{stream.name}: a chunk of {length} bytes at byte {start}; bag.most_chunk_bytes is {most}")
+        raise InputError(
+            f"{stream.name}: a chunk of {length} bytes at byte {start}; bag.most_chunk_bytes is {most}"
+        )
     stream.seek(start)
     data = stream.read(length)
     if len(data) < length:

@@ -44,16 +44,23 @@ class Reindexed:
 
     def lines(self) -> list[str]:
         """Return what was lost, where, and what can be done about it, line by line; no line if nothing was."""
-        lines = [f"{name} was not closed: messages that its recorder had not written yet are missing" for name in self.unclosed]
+        lines = [
+            f"{name} was not closed: messages that its recorder had not written yet are missing"
+            for name in self.unclosed
+        ]
         for name, gap in self.gaps:
             known = f", {gap.messages} messages by its index" if gap.messages else ""
-            lines.append(f"lost: {name}, {gap.size} bytes from byte {gap.offset}{known} ({gap.problem})")
+            lines.append(
+                f"lost: {name}, {gap.size} bytes from byte {gap.offset}{known} ({gap.problem})"
+            )
         lines += [f"lost: {count} messages ({why})" for why, count in self.undescribed]
         if len(lines) > MOST_LINES:
             lines = [*lines[:MOST_LINES], f"… and {len(lines) - MOST_LINES} gaps more"]
         if self.gaps or self.undescribed:
             size = sum(gap.size for _, gap in self.gaps)
-            lines.append(f"{size} bytes were passed over in all; copy the files again if they are whole where they were recorded")
+            lines.append(
+                f"{size} bytes were passed over in all; copy the files again if they are whole where they were recorded"
+            )
         return lines
 
 
@@ -68,7 +75,11 @@ def reindex(folder: Path, target: Path, config: BagConfig = BagConfig()) -> Rein
     Raises:
         InputError: there is no MCAP file in `folder`, none holds a whole message, or `target` cannot be written.
     """
-    paths = [folder] if folder.is_file() else sorted(folder.glob("*.mcap"), key=lambda path: (len(path.name), path.name))
+    paths = (
+        [folder]
+        if folder.is_file()
+        else sorted(folder.glob("*.mcap"), key=lambda path: (len(path.name), path.name))
+    )
     if not paths:
         raise InputError(f"{folder}: no .mcap file here; name the folder of a recorded bag")
     with ExitStack() as stack:
@@ -80,21 +91,32 @@ def reindex(folder: Path, target: Path, config: BagConfig = BagConfig()) -> Rein
                 why = f": {gaps[0][1].problem} at byte {gaps[0][1].offset}" if gaps else ""
                 names = shown(", ".join(path.name for path in paths))
                 raise InputError(f"{folder}: not one whole message is left in {names}{why}")
-    return Reindexed(saved, gaps, tuple(sorted(lost.items())), tuple(path.name for path, file in files if not file.closed))
+    return Reindexed(
+        saved,
+        gaps,
+        tuple(sorted(lost.items())),
+        tuple(path.name for path, file in files if not file.closed),
+    )
 
 
-def _salvaged(paths: list[Path], config: BagConfig, stack: ExitStack) -> list[tuple[Path, McapFile]]:
+def _salvaged(
+    paths: list[Path], config: BagConfig, stack: ExitStack
+) -> list[tuple[Path, McapFile]]:
     """Return what is whole in each file."""
     try:
         sizes = [path.stat().st_size for path in paths]
         first, again = (Allowance(config, str(paths[0].parent), sum(sizes)) for _ in range(2))
         streams = [stack.enter_context(path.open("rb")) for path in paths]
-        found = [McapFile(stream, size, first) for stream, size in zip(streams, sizes, strict=True)]
+        found = [
+            McapFile(stream, size, first) for stream, size in zip(streams, sizes, strict=True)
+        ]
         for file in found:
             file.scan()
             file.allowance = again  # for the second reading, which writes
     except OSError as error:
-        raise InputError(f"{error.filename or paths[0]}: cannot be read ({error.strerror or error})") from error
+        raise InputError(
+            f"{error.filename or paths[0]}: cannot be read ({error.strerror or error})"
+        ) from error
     return list(zip(paths, found, strict=True))
 
 
@@ -102,10 +124,16 @@ def _write(bag: BagWriter, files: list[tuple[Path, McapFile]]) -> tuple[int, Cou
     """Write all messages; return how many were written, and how many could not be, by the reason."""
     saved, undescribed, types = 0, Counter[str](), dict[str, str]()
     reasons = {
-        (path, key): _announced(bag, file, channel, types) for path, file in files for key, channel in file.channels.items()
+        (path, key): _announced(bag, file, channel, types)
+        for path, file in files
+        for key, channel in file.channels.items()
     }
-    for path, file, (stamp, number, data) in heapq.merge(*(_messages(*entry) for entry in files), key=lambda entry: entry[2][0]):
-        reason = reasons.get((path, number), f"channel {number} is not described in what is left of {path.name}")
+    for path, file, (stamp, number, data) in heapq.merge(
+        *(_messages(*entry) for entry in files), key=lambda entry: entry[2][0]
+    ):
+        reason = reasons.get(
+            (path, number), f"channel {number} is not described in what is left of {path.name}"
+        )
         if reason:
             undescribed[reason] += 1
         else:
@@ -138,7 +166,12 @@ def _announced(bag: BagWriter, file: McapFile, channel: Channel, types: dict[str
     except InputError as error:
         if not schema.data or schema.encoding == PROTOBUF:
             return str(error)
-        text = (schema.encoding, schema.data.decode(errors="replace"))  # as the recorder described it
-    qos, type_hash = (channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash"))
+        text = (
+            schema.encoding,
+            schema.data.decode(errors="replace"),
+        )  # as the recorder described it
+    qos, type_hash = (
+        channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash")
+    )
     bag.add_topic(channel.topic, schema.name, qos if profiles(qos) else "", type_hash, text)
     return ""

@@ -32,7 +32,14 @@ class Split:
 class BagWriter:
     """Writes one bag; a context manager. Flushed chunk by chunk, so a killed process loses the last one only (see `let_go`)."""
 
-    def __init__(self, folder: Path, *, compress: bool = True, split: Split = Split(), chunk_bytes: int = CHUNK_BYTES) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        compress: bool = True,
+        split: Split = Split(),
+        chunk_bytes: int = CHUNK_BYTES,
+    ) -> None:
         """Create `folder` and its first file.
 
         Raises:
@@ -49,7 +56,9 @@ class BagWriter:
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
-            raise InputError(f"{folder} exists already; name another folder for the bag, or remove it") from None
+            raise InputError(
+                f"{folder} exists already; name another folder for the bag, or remove it"
+            ) from None
         self._open()
 
     def _open(self) -> None:
@@ -59,7 +68,9 @@ class BagWriter:
         path = self.folder / self._file.path
         with naming(path):
             self._stream = path.open("xb")
-            self._writer = Writer(self._stream, chunk_size=self._chunk_bytes, compression=self._compression)
+            self._writer = Writer(
+                self._stream, chunk_size=self._chunk_bytes, compression=self._compression
+            )
             self._writer.start(profile="ros2", library="scenario_gen")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
@@ -72,7 +83,14 @@ class BagWriter:
             self._stream.close()
         sync(path)
 
-    def add_topic(self, name: str, kind: str, qos: str = "", type_hash: str = "", schema: tuple[str, str] | None = None) -> None:
+    def add_topic(
+        self,
+        name: str,
+        kind: str,
+        qos: str = "",
+        type_hash: str = "",
+        schema: tuple[str, str] | None = None,
+    ) -> None:
         """Announce a topic; a second time is ignored.
 
         Args:
@@ -101,9 +119,13 @@ class BagWriter:
         if name not in self._channels:
             topic, (encoding, text) = self._topics[name]
             if topic.type not in self._schemas:
-                self._schemas[topic.type] = self._writer.register_schema(topic.type, encoding, text.encode())
+                self._schemas[topic.type] = self._writer.register_schema(
+                    topic.type, encoding, text.encode()
+                )
             metadata = {"offered_qos_profiles": topic.qos, "topic_type_hash": topic.type_hash}
-            self._channels[name] = self._writer.register_channel(name, "cdr", self._schemas[topic.type], metadata)
+            self._channels[name] = self._writer.register_channel(
+                name, "cdr", self._schemas[topic.type], metadata
+            )
         return self._channels[name]
 
     def write(self, name: str, data: bytes, stamp_ns: int) -> None:
@@ -114,16 +136,24 @@ class BagWriter:
             OSError: the disk is full, or fails; nothing more can be written.
         """
         if stamp_ns < 0:
-            raise InputError(f"{name}: stamp {stamp_ns} ns is before 1970; an MCAP file cannot hold it")
+            raise InputError(
+                f"{name}: stamp {stamp_ns} ns is before 1970; an MCAP file cannot hold it"
+            )
         with self._writing():
             full = self._split.bytes and self._bytes >= self._split.bytes
-            long = self._split.seconds and self._file.count and stamp_ns - self._file.start_ns >= self._split.seconds * 1e9
+            long = (
+                self._split.seconds
+                and self._file.count
+                and stamp_ns - self._file.start_ns >= self._split.seconds * 1e9
+            )
             if full or long:
                 self._close_file()
                 self._open()
             topic, _ = self._topics[name]
             channel = self._channel(name)
-            self._writer.add_message(channel, log_time=stamp_ns, data=data, publish_time=stamp_ns, sequence=topic.count)
+            self._writer.add_message(
+                channel, log_time=stamp_ns, data=data, publish_time=stamp_ns, sequence=topic.count
+            )
             self._stream.flush()  # a full chunk, which the writer has just written
         self._file.add(stamp_ns, stamp_ns)
         self._bytes += len(data)
@@ -170,12 +200,19 @@ class BagWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
 
 @contextmanager
-def atomic_bag(folder: Path, kind: Kind = WRITTEN, inputs: Iterable[Path] = (), **options: Any) -> Iterator[BagWriter]:
+def atomic_bag(
+    folder: Path, kind: Kind = WRITTEN, inputs: Iterable[Path] = (), **options: Any
+) -> Iterator[BagWriter]:
     """Yield a bag to write: it appears complete or not at all, and may replace an earlier one of the same kind.
 
     Args:

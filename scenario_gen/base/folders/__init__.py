@@ -7,4 +7,14 @@ from scenario_gen.base.folders.disk import naming, sync, sync_tree, write_text
 from scenario_gen.base.folders.replace import Kind, MARKER, replaced_folder, sha256_of
 from scenario_gen.base.folders.scratch import scratch
 
-__all__ = ["MARKER", "Kind", "naming", "replaced_folder", "scratch", "sha256_of", "sync", "sync_tree", "write_text"]
+__all__ = [
+    "MARKER",
+    "Kind",
+    "naming",
+    "replaced_folder",
+    "scratch",
+    "sha256_of",
+    "sync",
+    "sync_tree",
+    "write_text",
+]

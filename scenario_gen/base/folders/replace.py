@@ -20,7 +20,9 @@ from scenario_gen.base.folders.scratch import claimed, OLD, PREFIX
 from scenario_gen.base.interrupts import uninterrupted
 
 MARKER, FORMAT = ".scenario_gen.json", 1
-UNTOUCHED = "; what was there is untouched; make room, or name another folder that you may write to"
+UNTOUCHED = (
+    "; what was there is untouched; make room, or name another folder that you may write to"
+)
 Kind = NewType("Kind", str)
 """A kind of result, as markers name it."""
 
@@ -45,8 +47,14 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
     """
     try:
         place = _place(target, inputs)
-    except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a null character
-        raise InputError(f"{target} cannot be written: {describe(error)}; name another folder") from error
+    except (
+        OSError,
+        RuntimeError,
+        ValueError,
+    ) as error:  # too long, a loop of links, a null character
+        raise InputError(
+            f"{target} cannot be written: {describe(error)}; name another folder"
+        ) from error
     own = place.with_name(f"{PREFIX}{place.name}")
     try:
         with claimed(own, target) as above:
@@ -60,10 +68,15 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
                 _put(target, place, new, kind)
     except OSError as error:
         named = place if error.filename is None else Path(os.fsdecode(error.filename))
-        if not any(one.is_relative_to(other) for one, other in ((named, place), (named, own), (own, named))):
+        if not any(
+            one.is_relative_to(other)
+            for one, other in ((named, place), (named, own), (own, named))
+        ):
             raise  # of what the body reads
         waits = f"; the earlier result is in {own / OLD}, the next command puts it back"
-        raise of_system(error, target, waits if os.path.lexists(own / OLD) else UNTOUCHED) from error
+        raise of_system(
+            error, target, waits if os.path.lexists(own / OLD) else UNTOUCHED
+        ) from error
 
 
 def _place(target: Path, inputs: Iterable[Path]) -> Path:
@@ -135,15 +148,23 @@ def _check(target: Path, there: Path, kind: Kind) -> None:
                 files = {**marker["files"], MARKER: present[MARKER]}
     foreign = next((name for name, digest in present.items() if files.get(name) != digest), "")
     if foreign:
-        why = f"{foreign} in it is new or changed" if files else f"it holds {foreign} and is not an earlier result ({kind})"
-        raise InputError(f"{target} is not replaced: {why}; move that away, or name another folder")
+        why = (
+            f"{foreign} in it is new or changed"
+            if files
+            else f"it holds {foreign} and is not an earlier result ({kind})"
+        )
+        raise InputError(
+            f"{target} is not replaced: {why}; move that away, or name another folder"
+        )
 
 
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file, or of a folder's files in order of their names."""
     digest = hashlib.sha256()
     for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
-        if file.is_file() and (file == path or file.name != MARKER):  # which is about the files, and not in every bag
+        if file.is_file() and (
+            file == path or file.name != MARKER
+        ):  # which is about the files, and not in every bag
             with file.open("rb") as stream:
                 hashlib.file_digest(stream, lambda: digest)
     return digest.hexdigest()

@@ -62,7 +62,9 @@ def claimed(own: Path, what: Path, patience_s: float = PATIENCE_S) -> Iterator[P
             with uninterrupted():
                 _acquire(lock, own, what, patience_s)
                 if not _emptied(own):
-                    raise InputError(f"{own / OLD} is an earlier result, in whose place {what} now is; move one of them away")
+                    raise InputError(
+                        f"{own / OLD} is an earlier result, in whose place {what} now is; move one of them away"
+                    )
                 (own / NEW).mkdir()
             yield own / NEW
         finally:
@@ -73,15 +75,23 @@ def claimed(own: Path, what: Path, patience_s: float = PATIENCE_S) -> Iterator[P
 def _acquire(lock: FileLock, own: Path, what: Path, patience_s: float) -> None:
     while not lock.is_locked:
         own.mkdir(0o700, parents=True, exist_ok=True)
-        if (names := {path.name for path in own.iterdir()}) and not {LOCK} <= names <= {LOCK, NEW, OLD}:
-            raise InputError(f"{own} is needed for intermediate files, but holds other ones; move it away")
+        if (names := {path.name for path in own.iterdir()}) and not {LOCK} <= names <= {
+            LOCK,
+            NEW,
+            OLD,
+        }:
+            raise InputError(
+                f"{own} is needed for intermediate files, but holds other ones; move it away"
+            )
         try:
             with suppress(FileNotFoundError):  # another process has just removed the folder
                 lock.acquire(timeout=patience_s, poll_interval=0.02)
         except Timeout as error:
             with suppress(OSError):
                 who = (own / LOCK).read_text(encoding="utf-8")
-                raise InputError(f"{what} is being written by {who}; wait for it, or name another folder") from error
+                raise InputError(
+                    f"{what} is being written by {who}; wait for it, or name another folder"
+                ) from error
     write_text(own / LOCK, f"process {os.getpid()} on {socket.gethostname()}")
 
 
@@ -104,7 +114,9 @@ def _emptied(own: Path) -> bool:
 
 def scratch(parent: Path) -> AbstractContextManager[Path]:
     """Give an empty folder in `parent`, which only this user may enter, and remove it at the end, as `claimed` does."""
-    if parent == Path(tempfile.gettempdir()):  # where workers are killed while their command goes on
+    if parent == Path(
+        tempfile.gettempdir()
+    ):  # where workers are killed while their command goes on
         sweep(parent)
     own = parent / f"{PREFIX}{token_hex(8)}"
     return claimed(own, own)

@@ -33,7 +33,14 @@ from scenario_gen.method.evaluation import measures_in, wilson
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.report.html import render_page
-from scenario_gen.types import EgoSlot, GenerationResult, Interval, Request, ScenarioSet, with_witness
+from scenario_gen.types import (
+    EgoSlot,
+    GenerationResult,
+    Interval,
+    Request,
+    ScenarioSet,
+    with_witness,
+)
 
 JSON, PAGE, BAG = "search.json", "search.html", "bag"
 SEARCHED = Kind("searched")
@@ -78,7 +85,9 @@ class SearchRequest:
         wanted = self.ego or self.request.ego or ids[0]
         found = named_vehicle(ids, wanted)
         if not found:
-            raise InputError(f"--ego {wanted}: there is no such vehicle; there are {', '.join(ids)}")
+            raise InputError(
+                f"--ego {wanted}: there is no such vehicle; there are {', '.join(ids)}"
+            )
         return found
 
     def identity(self) -> dict[str, Any]:
@@ -126,7 +135,11 @@ class SearchResult:
         kinds: dict[str, list[Finding]] = {}
         for one in self.findings:
             kinds.setdefault(one.kind, []).append(one)
-        return dict(sorted(kinds.items(), key=lambda item: -math.fsum(one.weight or 0.0 for one in item[1])))
+        return dict(
+            sorted(
+                kinds.items(), key=lambda item: -math.fsum(one.weight or 0.0 for one in item[1])
+            )
+        )
 
     @property
     def plain(self) -> Rate:
@@ -140,25 +153,42 @@ class SearchResult:
         rate = self.estimate.rate
         half = 0.5 * (rate.high - rate.low)
         z = float(special.ndtri(0.5 + 0.5 * LEVEL))
-        return z * z * rate.value * (1.0 - rate.value) / (half * half) if rate.value > 0.0 and half > 0.0 else math.nan
+        return (
+            z * z * rate.value * (1.0 - rate.value) / (half * half)
+            if rate.value > 0.0 and half > 0.0
+            else math.nan
+        )
 
     def sentences(self) -> list[str]:
         """Return what it came to, in sentences."""
         e, rate = self.estimate, self.estimate.rate
         if self.worst:
-            return [f"{len(self.findings)} failure(s) kept of {e.drives} drives; a search for the worst gives no rate"]
-        messages = [f"no failure in {e.drives} drives; by the natural ones the rate is at most {_share(rate.high)} (95 %)"]
+            return [
+                f"{len(self.findings)} failure(s) kept of {e.drives} drives; a search for the worst gives no rate"
+            ]
+        messages = [
+            f"no failure in {e.drives} drives; by the natural ones the rate is at most {_share(rate.high)} (95 %)"
+        ]
         if e.first:
             interval = f"95 % interval {_share(rate.low)} to {_share(rate.high)}"
-            messages = [f"failure rate {_share(rate.value)} ({interval})", f"first failure: drive {e.first} of {e.drives}"]
+            messages = [
+                f"failure rate {_share(rate.value)} ({interval})",
+                f"first failure: drive {e.first} of {e.drives}",
+            ]
         for name, share in e.events.items():
             words = "collisions by the ego's fault" if name == AT_FAULT else "collisions"
-            messages.append(f"{words}: {_share(share.value)} ({_share(share.low)} to {_share(share.high)})")
+            messages.append(
+                f"{words}: {_share(share.value)} ({_share(share.low)} to {_share(share.high)})"
+            )
         messages.append(f"natural drives alone: {self.plain}")
         if not math.isnan(self.equal_plain):
-            messages.append(f"plain sampling would need {self.equal_plain:,.0f} drives for an interval as narrow")
+            messages.append(
+                f"plain sampling would need {self.equal_plain:,.0f} drives for an interval as narrow"
+            )
         if e.first and not math.isnan(e.unexpected):
-            messages.append(f"failures that the regression does not expect: at most {_share(e.unexpected)} (95 %)")
+            messages.append(
+                f"failures that the regression does not expect: at most {_share(e.unexpected)} (95 %)"
+            )
         return messages
 
 
@@ -167,7 +197,11 @@ def _share(value: float) -> str:
 
 
 def search_failures(
-    request: SearchRequest, out: Path, *, workers: int = 0, progress: Callable[[int, int], None] = lambda *_: None
+    request: SearchRequest,
+    out: Path,
+    *,
+    workers: int = 0,
+    progress: Callable[[int, int], None] = lambda *_: None,
 ) -> SearchResult:
     """Search, and write search.json, search.html, junit.xml and a bag of the failures.
 
@@ -194,30 +228,55 @@ def search_failures(
     measures = measures_in(request.sampling.variety, plan.encounter)
     natural = NaturalScenarios.of(plan, check, request.sampling, request.planned.seed, measures)
     if not natural.size:
-        raise InputError("the scenarios have no freedom: all are the same, so there is nothing to search")
+        raise InputError(
+            "the scenarios have no freedom: all are the same, so there is nothing to search"
+        )
     journal_path = out.with_name(out.name + JOURNAL)
     with replaced_folder(out, SEARCHED) as folder, open_journal(journal_path, identity) as journal:
         with trial_runner(request.planner, config, workers or os.cpu_count() or 1) as run:
             problem = DrivenScenarios(
-                natural, ego, plan.road, request.objective, run, journal, lambda done: progress(done, request.budget)
+                natural,
+                ego,
+                plan.road,
+                request.objective,
+                run,
+                journal,
+                lambda done: progress(done, request.budget),
             )
-            search = Search(problem, request.seed, request.budget, request.worst, told=(COLLISION, AT_FAULT))
+            search = Search(
+                problem, request.seed, request.budget, request.worst, told=(COLLISION, AT_FAULT)
+            )
             estimate = search.run()
             findings = findings_of(search, problem, config)
         names = (JSON, PAGE, JUNIT, *((BAG,) if findings else ()))
-        result = SearchResult(estimate, findings, request.worst, (*(out / name for name in names), journal_path))
+        result = SearchResult(
+            estimate, findings, request.worst, (*(out / name for name in names), journal_path)
+        )
         _write(folder, result, request, identity, plan.requested)
     return result
 
 
-def _write(folder: Path, result: SearchResult, request: SearchRequest, identity: dict[str, Any], asked: Any) -> None:
+def _write(
+    folder: Path,
+    result: SearchResult,
+    request: SearchRequest,
+    identity: dict[str, Any],
+    asked: Any,
+) -> None:
     document = _document(result, request, identity)
-    write_text(folder / JSON, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    write_text(folder / JUNIT, as_junit([one.outcome for one in result.findings], request.planner, _facts(request)))
+    write_text(
+        folder / JSON, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    )
+    write_text(
+        folder / JUNIT,
+        as_junit([one.outcome for one in result.findings], request.planner, _facts(request)),
+    )
     write_text(folder / PAGE, _page(result, request))
     if result.findings:
         encounter, fit = request.planned.encounter, request.planned.road_and_fit()[1]
-        scenarios = tuple(one.scenario() for one in sorted(result.findings, key=lambda one: one.drive))
+        scenarios = tuple(
+            one.scenario() for one in sorted(result.findings, key=lambda one: one.drive)
+        )
         ego = request.request.ego_of(encounter)
         slot = None
         if ego is not None:  # the request left it out
@@ -225,9 +284,19 @@ def _write(folder: Path, result: SearchResult, request: SearchRequest, identity:
             scenarios = tuple(with_witness(one, ego) for one in scenarios)
         note = f"failures of {request.planner}, found by a search: they are no random sample of the natural scenarios"
         drawn = ScenarioSet(len(scenarios), scenarios, len(scenarios), Counter(), (note,), slot)
-        texts = (value if isinstance(value, str) else json.dumps(value, ensure_ascii=False) for value in identity.values())
-        provenance = dict(zip((f"search.{name}" for name in identity), texts, strict=True)) | versions()
-        delivered = replace(request.planned, fit=replace(fit, requested=asked), generated=drawn, provenance=provenance)
+        texts = (
+            value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+            for value in identity.values()
+        )
+        provenance = (
+            dict(zip((f"search.{name}" for name in identity), texts, strict=True)) | versions()
+        )
+        delivered = replace(
+            request.planned,
+            fit=replace(fit, requested=asked),
+            generated=drawn,
+            provenance=provenance,
+        )
         with BagWriter(folder / BAG) as bag:
             add_results(bag, {"": delivered})
 
@@ -236,7 +305,9 @@ def _facts(request: SearchRequest) -> dict[str, str]:
     return {"policy": request.drive_config().policy}
 
 
-def _document(result: SearchResult, request: SearchRequest, identity: dict[str, Any]) -> dict[str, Any]:
+def _document(
+    result: SearchResult, request: SearchRequest, identity: dict[str, Any]
+) -> dict[str, Any]:
     e = result.estimate
 
     def rounded(value: float) -> float | None:
@@ -251,14 +322,21 @@ def _document(result: SearchResult, request: SearchRequest, identity: dict[str, 
         "plain": {"failures": plain.count, "drives": plain.of, **interval(plain.share)},
         "drives": e.drives,
         "first_failure": e.first or None,
-        "plain_drives_for_the_same_interval": None if request.worst else rounded(result.equal_plain),
-        "rates": None if request.worst else {name: interval(each) for name, each in e.events.items()},
+        "plain_drives_for_the_same_interval": None
+        if request.worst
+        else rounded(result.equal_plain),
+        "rates": None
+        if request.worst
+        else {name: interval(each) for name, each in e.events.items()},
         "unexpected_at_most": rounded(e.unexpected),
         "bound": None if request.worst else rounded(e.bound),
         "natural_scenarios": e.seen,
         "valid_share_of_candidates": rounded(e.valid),
         "shares": {kind: rounded(value) for kind, value in sorted(e.shares.items())},
-        "kinds": [{"kind": kind, "kept": len(own), "likeliest": own[0].trial.name} for kind, own in result.kinds.items()],
+        "kinds": [
+            {"kind": kind, "kept": len(own), "likeliest": own[0].trial.name}
+            for kind, own in result.kinds.items()
+        ],
         "findings": [one.document() for one in result.findings],
         "sentences": result.sentences(),
         "search": {**identity, "budget": request.budget},

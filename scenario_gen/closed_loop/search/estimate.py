@@ -26,7 +26,10 @@ from scenario_gen.method.evaluation import wilson
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Interval
 
-POPULATION, LARGEST = 24, 96  # drives of a level of an exploration; it grows with the drives so far, up to the largest
+POPULATION, LARGEST = (
+    24,
+    96,
+)  # drives of a level of an exploration; it grows with the drives so far, up to the largest
 GROWTH = 25  # one drive of a level for so many drives so far
 SEEDS = 4  # one in so many of a population starts a chain
 MOVES = 24  # of a chain, of which one is driven
@@ -39,7 +42,10 @@ LEAST, MOST = 0.005, 0.1  # bounds of the probability with which every scenario 
 OFTEN = 1.5  # times the share of natural drives that fail is driven, where that is above MOST: frequent failures need no choice
 WIDER = 3.0  # factor on the error of the regression: the wider, the more is driven, and the smaller are the weights
 LEVEL = 0.95  # of the intervals
-_STEP, _ACCEPTED = 0.5, 0.4  # first step of a chain, and the share of accepted moves that it is adapted to
+_STEP, _ACCEPTED = (
+    0.5,
+    0.4,
+)  # first step of a chain, and the share of accepted moves that it is adapted to
 
 
 @dataclass(frozen=True)
@@ -149,24 +155,38 @@ class Search:
     responses: list[Response] = field(default_factory=list)
     weights: dict[int, float] = field(default_factory=dict)
     _features: list[tuple[float, ...]] = field(default_factory=list)
-    _natural: list[int] = field(default_factory=list)  # drives of natural scenarios that nobody chose
-    _sampled: list[int] = field(default_factory=list)  # drives of natural scenarios that the regression chose
+    _natural: list[int] = field(
+        default_factory=list
+    )  # drives of natural scenarios that nobody chose
+    _sampled: list[int] = field(
+        default_factory=list
+    )  # drives of natural scenarios that the regression chose
     told: Sequence[str] = ()
-    _even: list[tuple[int, float]] = field(default_factory=list)  # of each batch: scenarios, least probability to be driven
+    _even: list[tuple[int, float]] = field(
+        default_factory=list
+    )  # of each batch: scenarios, least probability to be driven
     _drawn: int = 0  # numbers drawn for natural scenarios
     _certified: int = 0  # of these
-    _floor: list[int] = field(default_factory=list)  # drives of scenarios that were chosen evenly: no failure was expected
+    _floor: list[int] = field(
+        default_factory=list
+    )  # drives of scenarios that were chosen evenly: no failure was expected
     _explored: int = 0
     _runs: int = 0
     _batches: int = 0
-    _known: "tuple[int, _Predictor] | None" = None  # the last regression, and from how many drives it is
-    _evenly: float = 0.02  # probability with which each scenario of the next batch is driven at least
+    _known: "tuple[int, _Predictor] | None" = (
+        None  # the last regression, and from how many drives it is
+    )
+    _evenly: float = (
+        0.02  # probability with which each scenario of the next batch is driven at least
+    )
 
     def run(self) -> Estimate:
         """Search until the budget is spent, or nothing certified is found."""
         try:
             while self.worst or self._explored <= EXPLORED * len(self.z) or self._estimate():
-                if (self.worst or self._explored <= EXPLORED * len(self.z)) and not self._explore():
+                if (
+                    self.worst or self._explored <= EXPLORED * len(self.z)
+                ) and not self._explore():
                     break
         except _SpentError:
             pass
@@ -190,7 +210,9 @@ class Search:
     def _certify(self, z: Floats) -> list[_Drawn]:
         """Return the certified scenarios among those of numbers (S, d)."""
         pairs = zip(z, self.problem.candidates(z), strict=True)
-        return [_Drawn(row, one, self.problem.features(one)) for row, one in pairs if one is not None]
+        return [
+            _Drawn(row, one, self.problem.features(one)) for row, one in pairs if one is not None
+        ]
 
     def _draw(self, generator: np.random.Generator) -> list[_Drawn]:
         """Return the certified scenarios of a batch of natural ones."""
@@ -243,7 +265,11 @@ class Search:
         return found
 
     def _chains(
-        self, generator: np.random.Generator, seeds: list[int], below: tuple[int, float], step: float
+        self,
+        generator: np.random.Generator,
+        seeds: list[int],
+        below: tuple[int, float],
+        step: float,
     ) -> tuple[list[int], float]:
         """Return the population of the next level, and the next step: from each seed a chain, below a threshold."""
         towards, threshold = below
@@ -256,7 +282,9 @@ class Search:
                 drawn = self._certify(math.sqrt(1.0 - step * step) * self.z[head] + step * noise)
                 if drawn:
                     predicted = predict(drawn)[0]
-                    best = np.argmin(predicted[:, towards - 1] if towards else predicted.min(axis=1))
+                    best = np.argmin(
+                        predicted[:, towards - 1] if towards else predicted.min(axis=1)
+                    )
                     chosen[place] = drawn[best]
             for place, k in zip(chosen, self._drive(list(chosen.values())), strict=False):
                 if self._distance(k, towards) <= threshold:
@@ -278,7 +306,10 @@ class Search:
         for part in figures.T:  # a failure is one of the least part
             part[failed & (part == figures.min(axis=1))] = -math.inf
         count = len(self._features[0])
-        self._known = len(self.z), _Predictor([Surrogate.fit(columns, part, count, natural) for part in figures.T])
+        self._known = (
+            len(self.z),
+            _Predictor([Surrogate.fit(columns, part, count, natural) for part in figures.T]),
+        )
         return self._known[1]
 
     def _estimate(self) -> bool:
@@ -322,7 +353,9 @@ class Search:
         shares: dict[str, float] = {}
         failed = [k for k in self.weights if self.responses[k].failed]
         for k in failed:
-            shares[self.responses[k].kind] = shares.get(self.responses[k].kind, 0.0) + self.weights[k]
+            shares[self.responses[k].kind] = (
+                shares.get(self.responses[k].kind, 0.0) + self.weights[k]
+            )
         seen = sum(count for count, _ in self._even)
         return Estimate(
             rate=self._rate(failed, also=not hits) if seen else plain,
@@ -331,7 +364,11 @@ class Search:
             first=next((k for k, one in enumerate(self.responses, start=1) if one.failed), 0),
             seen=seen,
             valid=self._certified / max(self._drawn, 1),
-            unexpected=self._rate([k for k in self._floor if self.responses[k].failed], also=not hits).high if seen else math.nan,
+            unexpected=self._rate(
+                [k for k in self._floor if self.responses[k].failed], also=not hits
+            ).high
+            if seen
+            else math.nan,
             shares={kind: part / math.fsum(shares.values()) for kind, part in shares.items()},
             events={name: self._event(name) for name in self.told},
         )
@@ -340,14 +377,24 @@ class Search:
         """Return the rate of an event."""
         if self._even:
             never = not any(name in self.responses[k].events for k in self._natural)
-            return self._rate([k for k in self.weights if name in self.responses[k].events], also=never)
+            return self._rate(
+                [k for k in self.weights if name in self.responses[k].events], also=never
+            )
         hits = sum(name in self.responses[k].events for k in self._natural)
-        return wilson(hits, len(self._natural), LEVEL) if self._natural else Interval(math.nan, 0.0, 1.0)
+        return (
+            wilson(hits, len(self._natural), LEVEL)
+            if self._natural
+            else Interval(math.nan, 0.0, 1.0)
+        )
 
     def deviation(self, k: int) -> float:
         """Return how far a drive's scenario is from the mean, in standard deviations along what the regression goes by."""
         parts = self.responses[k].parts
-        slope = self._predictor().surrogates[int(np.argmin(parts)) if parts else 0].direction(self.problem.size)
+        slope = (
+            self._predictor()
+            .surrogates[int(np.argmin(parts)) if parts else 0]
+            .direction(self.problem.size)
+        )
         return abs(float(slope @ self.z[k]))
 
     def _rate(self, hits: Sequence[int], *, also: bool) -> Interval:
@@ -363,7 +410,15 @@ class Search:
             tail, most = math.log(0.5 - 0.5 * LEVEL), 1.0 - 1e-12
             if count @ np.log1p(-most * evenly) > tail:
                 return Interval(0.0, 0.0, 1.0)
-            return Interval(0.0, 0.0, float(optimize.brentq(lambda rate: count @ np.log1p(-rate * evenly) - tail, 0.0, most)))
+            return Interval(
+                0.0,
+                0.0,
+                float(
+                    optimize.brentq(
+                        lambda rate: count @ np.log1p(-rate * evenly) - tail, 0.0, most
+                    )
+                ),
+            )
         seen = sum(count for count, _ in self._even)
         total, square = float(w.sum()), float((w * (w - w.sum() / seen)).sum())
         low = _gamma_quantile(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)

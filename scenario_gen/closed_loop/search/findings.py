@@ -67,7 +67,9 @@ class Finding:
         return replace(self.trial.scenario, facts=facts)
 
 
-def findings_of(search: Search, problem: DrivenScenarios, config: ClosedLoopConfig) -> list[Finding]:
+def findings_of(
+    search: Search, problem: DrivenScenarios, config: ClosedLoopConfig
+) -> list[Finding]:
     """Drive again in the failures of a search, and sort them: the likeliest of each kind first; the worst first, if it asked."""
     failures = [k for k, one in enumerate(search.responses) if one.failed]
     deviation = {k: search.deviation(k) for k in failures}
@@ -78,13 +80,25 @@ def findings_of(search: Search, problem: DrivenScenarios, config: ClosedLoopConf
         counts[search.responses[k].kind] += 1
         if counts[search.responses[k].kind] <= OF_ONE_KIND and len(chosen) < SHOWN:
             chosen.append(k)
-    scenarios = problem.natural.scenarios(np.stack([search.z[k] for k in chosen])) if chosen else []
-    trials = [problem.trial(k, one) for k, one in zip(chosen, scenarios, strict=True) if one is not None]
+    scenarios = (
+        problem.natural.scenarios(np.stack([search.z[k] for k in chosen])) if chosen else []
+    )
+    trials = [
+        problem.trial(k, one) for k, one in zip(chosen, scenarios, strict=True) if one is not None
+    ]
     outcomes = list(problem.run(trials))
     places = [_station(one) for one in outcomes]
     kinds = _kinds([search.responses[k].kind for k in chosen], places)
     return [
-        Finding(k, kind, search.weights.get(k), deviation[k], trial, outcome, _witness_passes(trial, config))
+        Finding(
+            k,
+            kind,
+            search.weights.get(k),
+            deviation[k],
+            trial,
+            outcome,
+            _witness_passes(trial, config),
+        )
         for k, kind, trial, outcome in zip(chosen, kinds, trials, outcomes, strict=True)
     ]
 
@@ -97,7 +111,11 @@ def _witness_passes(trial: Trial, config: ClosedLoopConfig) -> bool:
 def _station(outcome: Outcome) -> float:
     """Return how far [m] the ego had come when it failed."""
     drive, verdict = outcome.drive, outcome.verdict
-    times = [verdict.collision.time if verdict.collision else np.nan, verdict.off_road, float(drive.motion.time[-1])]
+    times = [
+        verdict.collision.time if verdict.collision else np.nan,
+        verdict.off_road,
+        float(drive.motion.time[-1]),
+    ]
     way = np.concatenate([[0.0], np.cumsum(edge_lengths(drive.motion.position[drive.ego]))])
     return float(np.interp(np.nanmin(times), drive.motion.time, way))
 
@@ -106,8 +124,12 @@ def _kinds(kinds: Sequence[str], places: Sequence[float]) -> list[str]:
     """Return the kinds with their places: those of one kind are split where SAME_PLACE of the way lie between two."""
     result = list(kinds)
     for kind in set(kinds):
-        rows = np.array(sorted((k for k, each in enumerate(kinds) if each == kind), key=lambda k: places[k]))
-        for group in np.split(rows, np.flatnonzero(np.diff(np.array(places)[rows]) > SAME_PLACE) + 1):
+        rows = np.array(
+            sorted((k for k, each in enumerate(kinds) if each == kind), key=lambda k: places[k])
+        )
+        for group in np.split(
+            rows, np.flatnonzero(np.diff(np.array(places)[rows]) > SAME_PLACE) + 1
+        ):
             low, high = (round(places[k]) for k in group[[0, -1]])
             where = f"{low} m" if low == high else f"{low} to {high} m"
             for k in group:

@@ -59,12 +59,17 @@ def read_journal(path: Path) -> tuple[dict[str, Any], list[Response], bool]:
     what = f"{path} is no journal of a search"
     if path.is_symlink():
         raise InputError(f"{path} is a link{REMEDY}")
-    lines = read_text(path, LARGEST, what).split("\n")  # as they were written: other characters end no line
+    lines = read_text(path, LARGEST, what).split(
+        "\n"
+    )  # as they were written: other characters end no line
     try:
         head, *drives = parse_json(f"[{','.join(lines[:-1])}]", what, LINES)
     except InputError as error:
         raise InputError(f"{error}{REMEDY}") from error
-    known = [Response(float(margin), tuple(parts), kind, tuple(events)) for _, margin, parts, kind, events, _ in drives]
+    known = [
+        Response(float(margin), tuple(parts), kind, tuple(events))
+        for _, margin, parts, kind, events, _ in drives
+    ]
     for number, (response, line) in enumerate(zip(known, lines[1:], strict=False), start=1):
         if _line(number, response) != f"{line}\n":
             raise InputError(f"{path}, line {number + 1}: not as a search wrote it{REMEDY}")
@@ -83,15 +88,22 @@ def open_journal(path: Path, identity: Mapping[str, Any]) -> Iterator[Journal]:
     try:
         if path.is_symlink() or (path.exists() and (not path.is_file() or path.stat().st_size)):
             before, known, whole = read_journal(path)
-            differ = sorted(name for name in head.keys() | before.keys() if before.get(name) != head.get(name))
+            differ = sorted(
+                name for name in head.keys() | before.keys() if before.get(name) != head.get(name)
+            )
             if differ:
-                raise InputError(f"{path} has the drives of another search ({', '.join(differ)} differ){REMEDY}")
+                raise InputError(
+                    f"{path} has the drives of another search ({', '.join(differ)} differ){REMEDY}"
+                )
         else:
             path.parent.mkdir(parents=True, exist_ok=True)
             whole = False
         if not whole:
             first = json.dumps(head, sort_keys=True)
-            write_text(path, f"{first}\n{''.join(_line(number, one) for number, one in enumerate(known, start=1))}")
+            write_text(
+                path,
+                f"{first}\n{''.join(_line(number, one) for number, one in enumerate(known, start=1))}",
+            )
         file = path.open("a", encoding="utf-8")
     except OSError as error:
         raise of_system(error, path, "; give another --out") from error

@@ -14,7 +14,14 @@ from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.method.evaluation import time_apart
 
-AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = "at_fault", "collision", "off_road", "goal", "ttc", "pet"
+AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = (
+    "at_fault",
+    "collision",
+    "off_road",
+    "goal",
+    "ttc",
+    "pet",
+)
 NAMES = (AT_FAULT, COLLISION, OFF_ROAD, GOAL)
 CONTACT = 0.1  # added to the speed of an impact, so that every contact is a failure
 LEAST = 1e-3  # s, margin of a drive in which footprints met at no instant that counts
@@ -40,7 +47,9 @@ class Objective:
             return cls(bound[1], float(bound[2]))
         if text.strip() not in NAMES:
             known = f"{', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds)"
-            raise InputError(f"objective {text!r} is not known; take {known}{did_you_mean(text, NAMES)}")
+            raise InputError(
+                f"objective {text!r} is not known; take {known}{did_you_mean(text, NAMES)}"
+            )
         return cls(text.strip())
 
     def __str__(self) -> str:
@@ -59,16 +68,28 @@ class Objective:
         elif self.name == OFF_ROAD:
             margin = verdict.road_margin + verdict.off_road_depth
         elif self.name == GOAL:
-            margin = verdict.progress - 1.0 - 1e-3 if math.isnan(verdict.goal) else 1.0 / (1.0 + max(verdict.delay, 0.0))
+            margin = (
+                verdict.progress - 1.0 - 1e-3
+                if math.isnan(verdict.goal)
+                else 1.0 / (1.0 + max(verdict.delay, 0.0))
+            )
         elif self.name == TTC:
             margin = verdict.min_ttc - self.limit if hit is None else contact
             if margin > 0.0:
-                margin += 0.1 * nearest  # many drives have no time to collision: the nearer, the better
+                margin += (
+                    0.1 * nearest
+                )  # many drives have no time to collision: the nearer, the better
         else:
-            margin = NO_MARGIN + nearest if math.isnan(verdict.min_pet) else verdict.min_pet - self.limit
+            margin = (
+                NO_MARGIN + nearest
+                if math.isnan(verdict.min_pet)
+                else verdict.min_pet - self.limit
+            )
         margin = NO_MARGIN if math.isnan(margin) else float(margin)
         parts = apart if self.name in (AT_FAULT, COLLISION) else ()
-        events = ((COLLISION,) if hit is not None else ()) + ((AT_FAULT,) if verdict.at_fault else ())
+        events = ((COLLISION,) if hit is not None else ()) + (
+            (AT_FAULT,) if verdict.at_fault else ()
+        )
         return Response(margin, parts, _kind(outcome, self.name) if margin <= 0.0 else "", events)
 
 
@@ -87,7 +108,13 @@ def _kind(outcome: Outcome, name: str) -> str:
     if name == OFF_ROAD:
         return "the ego leaves the road"
     if name == GOAL:
-        why = " after a collision" if hit is not None else ": it stands" if outcome.verdict.fault == "standing" else ""
+        why = (
+            " after a collision"
+            if hit is not None
+            else ": it stands"
+            if outcome.verdict.fault == "standing"
+            else ""
+        )
         return f"the ego does not come to its goal{why}"
     others = [i for i in range(len(outcome.drive.motion.vehicles)) if i != outcome.drive.ego]
     nearest = others[int(np.argmin(_apart(outcome)))] if others else 0

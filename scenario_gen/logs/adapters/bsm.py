@@ -51,7 +51,10 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         segments.append(Segment(len(rows), str(path), "message", 1))
         for number, record in enumerate(_records(path)):
             with guarded(
-                f"{path}, record {number + 1} is no basic safety message that is known", KeyError, TypeError, ValueError
+                f"{path}, record {number + 1} is no basic safety message that is known",
+                KeyError,
+                TypeError,
+                ValueError,
             ):
                 rows += _rows_of(record, number)
             check_size(str(path), 0, len(rows), config)
@@ -81,16 +84,31 @@ def _records(path: Path) -> Iterator[Any]:
 
 def _of_table(row: dict[str, str]) -> Row:
     """Return a row of a table as the document that it was made of."""
-    found = {name.strip().lower(): text or None for name, text in row.items() if isinstance(name, str)}
+    found = {
+        name.strip().lower(): text or None for name, text in row.items() if isinstance(name, str)
+    }
     core: Row = {name: found.get(f"coredata_{name}") for name in ("id", "speed", "heading")}
     size, mark = found.get("coredata_size"), found.get("coredata_secmark")
-    core |= {"size": json.loads(size) if size else {}, "secMark": None if mark is None else float(mark)}
-    lat, long = (float(found.get(f"coredata_position_{name}") or math.nan) for name in ("lat", "long"))
+    core |= {
+        "size": json.loads(size) if size else {},
+        "secMark": None if mark is None else float(mark),
+    }
+    lat, long = (
+        float(found.get(f"coredata_position_{name}") or math.nan) for name in ("lat", "long")
+    )
     if abs(lat) > 90.0:  # in the units of the messages
-        core |= {"lat": lat, "long": long, "speed": core["speed"] or 8191, "heading": core["heading"] or 28800}
+        core |= {
+            "lat": lat,
+            "long": long,
+            "speed": core["speed"] or 8191,
+            "heading": core["heading"] or 28800,
+        }
     else:
         core["position"] = {"latitude": lat, "longitude": long}
-    return {"metadata": {"recordGeneratedAt": found["metadata_generatedat"]}, "payload": {"data": {"coreData": core}}}
+    return {
+        "metadata": {"recordGeneratedAt": found["metadata_generatedat"]},
+        "payload": {"data": {"coreData": core}},
+    }
 
 
 def _rows_of(record: Any, number: int) -> list[Row]:
@@ -99,7 +117,11 @@ def _rows_of(record: Any, number: int) -> list[Row]:
         cores = [entry["bsmRecord"]["bsmMsg"]["coreData"] for entry in record["bsmList"]]
         return [
             _row(
-                core, core["T_s"] + number * EVENT_S, {"x": core["X_m"], "y": core["Y_m"]}, core["speed_mps"], core["heading_deg"]
+                core,
+                core["T_s"] + number * EVENT_S,
+                {"x": core["X_m"], "y": core["Y_m"]},
+                core["speed_mps"],
+                core["heading_deg"],
             )
             for core in cores
         ]
@@ -109,7 +131,10 @@ def _rows_of(record: Any, number: int) -> list[Row]:
     if "lat" in core:
         speed, heading = float(core["speed"]), float(core["heading"])
         place = {"lat": float(core["lat"]) * 1e-7, "lon": float(core["long"]) * 1e-7}
-        speed, heading = math.nan if speed == 8191 else speed * 0.02, math.nan if heading == 28800 else heading * 0.0125
+        speed, heading = (
+            math.nan if speed == 8191 else speed * 0.02,
+            math.nan if heading == 28800 else heading * 0.0125,
+        )
         return [_row(core, seconds, place, speed, heading)]
     place = {"lat": core["position"]["latitude"], "lon": core["position"]["longitude"]}
     return [_row(core, seconds, place, core.get("speed"), core.get("heading"))]
@@ -117,12 +142,24 @@ def _rows_of(record: Any, number: int) -> list[Row]:
 
 def _row(core: Any, seconds: float, place: Row, speed: Any, heading: Any) -> Row:
     size = core.get("size") or {}
-    values = {**place, "speed": speed, "heading": heading, "length": size.get("length"), "width": size.get("width")}
-    row: Row = {name: math.nan if value is None else float(value) for name, value in values.items()}
+    values = {
+        **place,
+        "speed": speed,
+        "heading": heading,
+        "length": size.get("length"),
+        "width": size.get("width"),
+    }
+    row: Row = {
+        name: math.nan if value is None else float(value) for name, value in values.items()
+    }
     row["heading"] = math.pi / 2.0 - math.radians(row["heading"])
     row |= {name: row[name] * 0.01 or math.nan for name in ("length", "width")}  # 0: unknown
     known = math.isfinite(seconds) and abs(seconds) < LATEST_S
-    return row | {"time": np.int64(round(seconds * 1e9)) if known else np.int64(0), "time_ok": known, "vehicle": str(core["id"])}
+    return row | {
+        "time": np.int64(round(seconds * 1e9)) if known else np.int64(0),
+        "time_ok": known,
+        "vehicle": str(core["id"]),
+    }
 
 
 def _seconds(generated: str, mark: Any) -> float:

@@ -28,9 +28,18 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, has_root, read_xml
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, only_file, RawLog, Segment
+from scenario_gen.logs.raw import (
+    check_size,
+    check_vehicles,
+    Observations,
+    only_file,
+    RawLog,
+    Segment,
+)
 
-_SKIPPED = frozenset(("lanelet", "trafficSign", "trafficLight", "intersection", "planningProblem", "staticObstacle"))
+_SKIPPED = frozenset(
+    ("lanelet", "trafficSign", "trafficLight", "intersection", "planningProblem", "staticObstacle")
+)
 
 
 def is_commonroad(path: Path) -> bool:
@@ -70,18 +79,31 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     if not vehicles:
         raise InputError(f"{path}: no road user with a trajectory in it")
     counted = ", ".join(f"{count} × {name}" for name, count in sorted(left_out.items()))
-    notes = ("read as CommonRoad", *((f"left out, without a trajectory: {counted}",) if counted else ()))
-    return RawLog(path.stem, False, tuple(vehicles), row, (Segment(0, str(path), "state", 1),), notes)
+    notes = (
+        "read as CommonRoad",
+        *((f"left out, without a trajectory: {counted}",) if counted else ()),
+    )
+    return RawLog(
+        path.stem, False, tuple(vehicles), row, (Segment(0, str(path), "state", 1),), notes
+    )
 
 
 def _observations(obstacle: Element, states: list[Element], step: float, row: int) -> Observations:
     values = np.array([_state(state) for state in states]).reshape(-1, 5)
     stamps = np.round(values[:, 0] * (step * 1e9)).astype(np.int64)
     box, disc = obstacle.first("shape", "rectangle"), obstacle.first("shape", "circle")
-    length, width = (box.one(name).value() if box is not None else math.nan for name in ("length", "width"))
+    length, width = (
+        box.one(name).value() if box is not None else math.nan for name in ("length", "width")
+    )
     if disc is not None:
         length = width = 2.0 * disc.one("radius").value()
-    return Observations.of_rows(obstacle.get("id"), stamps, values[:, 1:], np.arange(row, row + len(states)), (length, width))
+    return Observations.of_rows(
+        obstacle.get("id"),
+        stamps,
+        values[:, 1:],
+        np.arange(row, row + len(states)),
+        (length, width),
+    )
 
 
 def _state(state: Element) -> tuple[float, float, float, float, float]:

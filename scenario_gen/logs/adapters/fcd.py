@@ -45,14 +45,24 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         time = step.number("time")
         for one in step.children:
             kind = "pedestrian" if one.tag == "person" else one.attributes.get("type", "")
-            values = one.number("x"), one.number("y"), one.number("speed", math.nan), one.number("angle", math.nan)
+            values = (
+                one.number("x"),
+                one.number("y"),
+                one.number("speed", math.nan),
+                one.number("angle", math.nan),
+            )
             rows.append((time, one.get("id"), *values, kind))
         check_size(str(path), 0, len(rows), config)
     if not rows:
         raise InputError(f"{path}: no vehicle in any of its steps")
-    frame = pd.DataFrame(rows, columns=pd.Index(["time", "vehicle", "x", "y", "speed", "angle", "kind"]))
+    frame = pd.DataFrame(
+        rows, columns=pd.Index(["time", "vehicle", "x", "y", "speed", "angle", "kind"])
+    )
     frame["heading"] = math.pi / 2.0 - np.radians(frame.pop("angle"))
-    frame["time"], frame["time_ok"] = (frame["time"].clip(-LATEST_S, LATEST_S) * 1e9).round().astype(np.int64), True
+    frame["time"], frame["time_ok"] = (
+        (frame["time"].clip(-LATEST_S, LATEST_S) * 1e9).round().astype(np.int64),
+        True,
+    )
     own = frame.groupby("vehicle")
     driven = np.hypot(own["x"].diff(), own["y"].diff()) / (own["time"].diff() * 1e-9)
     moves = frame["speed"] > MOVES
@@ -63,4 +73,6 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         frame["x"] -= half * np.cos(frame["heading"].fillna(0.0))
         frame["y"] -= half * np.sin(frame["heading"].fillna(0.0))
     log = from_frame(frame, paths, (Segment(0, str(path), "vehicle", 1),), config)
-    return replace(log, notes=("read as SUMO's floating-car data: x, y are of the front bumper", *log.notes))
+    return replace(
+        log, notes=("read as SUMO's floating-car data: x, y are of the front bumper", *log.notes)
+    )

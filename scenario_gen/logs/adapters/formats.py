@@ -42,7 +42,11 @@ class Format:
     @property
     def needed(self) -> frozenset[str]:
         """The columns that a file must have."""
-        wanted = {column.name for quantity, column in self.columns.items() if quantity not in self.optional}
+        wanted = {
+            column.name
+            for quantity, column in self.columns.items()
+            if quantity not in self.optional
+        }
         return frozenset(wanted | set(self.signs))
 
     @property
@@ -54,13 +58,35 @@ class Format:
 def _columns(names: str, **scaled: tuple[str, float]) -> dict[str, Column]:
     """Return columns by quantity, of a text `x=xCenter y=yCenter`; those with a factor to our unit are given by themselves."""
     plain = (part.split("=") for part in names.split())
-    return {quantity: Column(name) for quantity, name in plain} | {key: Column(*column) for key, column in scaled.items()}
+    return {quantity: Column(name) for quantity, name in plain} | {
+        key: Column(*column) for key, column in scaled.items()
+    }
 
 
 OSI_TYPES = dict(enumerate(("unknown", "other", "vehicle", "pedestrian", "animal")))
 _OSI_NAMES = (  # 0 and 1 are unknown and other: a vehicle, no more is said
-    *("vehicle", "vehicle", "small car", "compact car", "car", "luxury car", "delivery van", "heavy truck", "semitrailer"),
-    *("trailer", "motorbike", "bicycle", "bus", "tram", "train", "wheelchair", "semitractor", "standup scooter"),
+    *(
+        "vehicle",
+        "vehicle",
+        "small car",
+        "compact car",
+        "car",
+        "luxury car",
+        "delivery van",
+        "heavy truck",
+        "semitrailer",
+    ),
+    *(
+        "trailer",
+        "motorbike",
+        "bicycle",
+        "bus",
+        "tram",
+        "train",
+        "wheelchair",
+        "semitractor",
+        "standup scooter",
+    ),
     *("micromobility device", "work machine", "watercraft", "aircraft", "land vehicle"),
 )
 OSI_VEHICLES = dict(enumerate(_OSI_NAMES))
@@ -97,7 +123,9 @@ FORMATS = {
     "highd": Format(
         title="highD",
         source="highD: format page (Krajewski et al. 2018): x, y the upper left corner, y down, width along the road",
-        columns=_columns("vehicle=id time=frame x=x y=y vx=xVelocity vy=yVelocity length=width width=height"),
+        columns=_columns(
+            "vehicle=id time=frame x=x y=y vx=xVelocity vy=yVelocity length=width width=height"
+        ),
         companions=_LEVELX,
         image=True,
         signs=("laneId",),
@@ -111,7 +139,8 @@ FORMATS = {
         ),
         names={
             "kind": {str(number): name for number, name in OSI_TYPES.items()},
-            "subkind": {"-1": "vehicle"} | {str(number): name for number, name in OSI_VEHICLES.items()},
+            "subkind": {"-1": "vehicle"}
+            | {str(number): name for number, name in OSI_VEHICLES.items()},
         },
         optional=frozenset(("vx", "vy", "heading", "length", "width", "subkind")),
     ),

@@ -26,7 +26,14 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, only_file, RawLog, Segment
+from scenario_gen.logs.raw import (
+    check_size,
+    check_vehicles,
+    Observations,
+    only_file,
+    RawLog,
+    Segment,
+)
 from scenario_gen.numerics import Floats
 
 STEP_NS = 100_000_000
@@ -76,12 +83,21 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         values = np.column_stack([own[:, :2], heading, np.hypot(own[:, 3], own[:, 4])])[there]
         size = (_number(one, "length"), _number(one, "width"))
         vehicles.append(
-            Observations.of_rows(name, there.astype(np.int64) * STEP_NS, values, there + row, size, kind=str(one.get("type", "")))
+            Observations.of_rows(
+                name,
+                there.astype(np.int64) * STEP_NS,
+                values,
+                there + row,
+                size,
+                kind=str(one.get("type", "")),
+            )
         )
         row += len(own)
     unit = "degrees" if degrees else "rad"
     notes = (f"read as a scene of Nocturne or GPUDrive, headings in {unit}",)
-    return RawLog(path.stem, False, tuple(vehicles), rows, (Segment(0, str(path), "state", 1),), notes)
+    return RawLog(
+        path.stem, False, tuple(vehicles), rows, (Segment(0, str(path), "state", 1),), notes
+    )
 
 
 def _states(place: str, one: Mapping[str, Any]) -> Floats:
@@ -92,13 +108,19 @@ def _states(place: str, one: Mapping[str, Any]) -> Floats:
     """
     try:
         valid = np.array([bool(there) for there in one["valid"]], dtype=float)
-        position = np.array([(step["x"], step["y"]) for step in one["position"]], dtype=float).reshape(-1, 2)
-        velocity = np.array([(step["x"], step["y"]) for step in one["velocity"]], dtype=float).reshape(-1, 2)
+        position = np.array(
+            [(step["x"], step["y"]) for step in one["position"]], dtype=float
+        ).reshape(-1, 2)
+        velocity = np.array(
+            [(step["x"], step["y"]) for step in one["velocity"]], dtype=float
+        ).reshape(-1, 2)
         heading = np.array(list(one["heading"]), dtype=float).reshape(-1)
     except KeyError as error:
         raise InputError(f"{place} has no {error.args[0]!r}") from None
     except (TypeError, ValueError, IndexError, OverflowError):
-        raise InputError(f"{place}: position, velocity, heading or valid is no list of numbers, one for each step") from None
+        raise InputError(
+            f"{place}: position, velocity, heading or valid is no list of numbers, one for each step"
+        ) from None
     lengths = {len(valid), len(position), len(velocity), len(heading)}
     if len(lengths) > 1:
         raise InputError(
@@ -116,7 +138,10 @@ def _in_degrees(states: Floats) -> bool:
         there = states[states[:, 5] > 0.0, 2]
         return bool((np.abs(there) > 2.0 * np.pi).any())
     course = np.arctan2(velocity[moves, 1], velocity[moves, 0])
-    agree = [float(np.cos(course - taken).mean()) for taken in (np.radians(heading[moves]), heading[moves])]
+    agree = [
+        float(np.cos(course - taken).mean())
+        for taken in (np.radians(heading[moves]), heading[moves])
+    ]
     return agree[0] > agree[1]
 
 

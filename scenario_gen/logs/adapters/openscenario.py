@@ -28,7 +28,14 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, has_root, read_xml
 from scenario_gen.logs.adapters.openscenario_values import resolved
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, only_file, RawLog, Segment
+from scenario_gen.logs.raw import (
+    check_size,
+    check_vehicles,
+    Observations,
+    only_file,
+    RawLog,
+    Segment,
+)
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import edge_lengths, place
 from scenario_gen.types import VEHICLE_TYPES
@@ -60,7 +67,9 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     speeds = {
         private.get("entityRef"): target.number("value")
         for private in root.all("Storyboard/Init/Actions/Private")
-        for target in private.all("PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed")
+        for target in private.all(
+            "PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed"
+        )
     }
     seen: dict[str, Observations] = {}
     rows = 0
@@ -68,7 +77,9 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         if name not in vehicles or name in seen:
             continue
         try:
-            seen[name] = _observations(follow, name, vehicles[name], start, (speeds.get(name, 0.0), rows))
+            seen[name] = _observations(
+                follow, name, vehicles[name], start, (speeds.get(name, 0.0), rows)
+            )
         except InputError as error:
             notes.append(f"{name} left out: {error}")
             del vehicles[name]
@@ -76,11 +87,22 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         rows += len(seen[name].fix)
         check_size(str(path), 0, rows, config)
         if follow.first("TimeReference", "Timing") is None:
-            notes.append(f"{name} follows its trajectory without a time reference: its first speed, or its vertices' times count")
-    notes += [f"{name} left out: it follows no trajectory" for name in vehicles if name not in seen]
+            notes.append(
+                f"{name} follows its trajectory without a time reference: its first speed, or its vertices' times count"
+            )
+    notes += [
+        f"{name} left out: it follows no trajectory" for name in vehicles if name not in seen
+    ]
     if not seen:
         raise InputError(f"{path}: no vehicle with a trajectory in it; {'; '.join(notes[1:])}")
-    return RawLog(path.stem, False, tuple(seen.values()), rows, (Segment(0, str(path), "vertex", 1),), tuple(notes))
+    return RawLog(
+        path.stem,
+        False,
+        tuple(seen.values()),
+        rows,
+        (Segment(0, str(path), "vertex", 1),),
+        tuple(notes),
+    )
 
 
 def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
@@ -89,12 +111,20 @@ def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
     for entity in root.all("Entities/ScenarioObject"):
         name, vehicle = entity.get("name"), entity.first("Vehicle") or entity.first("Pedestrian")
         if vehicle is None or vehicle.first("BoundingBox") is None:
-            notes.append(f"{name} left out: it is no road user with a bounding box in this file or its catalogs")
+            notes.append(
+                f"{name} left out: it is no road user with a bounding box in this file or its catalogs"
+            )
         else:
             vehicles[name] = vehicle
-            notes += [f"trailer {one.get('name')} of {name} left out: it is part of it" for one in vehicle.all("Trailer/Trailer")]
+            notes += [
+                f"trailer {one.get('name')} of {name} left out: it is part of it"
+                for one in vehicle.all("Trailer/Trailer")
+            ]
             parts = vehicle.all("Trailer/TrailerRef")
-            notes += [f"trailer {one.get('entityRef')} belongs to {name}: read as a road user by itself" for one in parts]
+            notes += [
+                f"trailer {one.get('entityRef')} belongs to {name}: read as a road user by itself"
+                for one in parts
+            ]
     return vehicles
 
 
@@ -103,7 +133,11 @@ def _category(entity: Element) -> str:
     named = entity.attributes.get("name", "")
     key = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory"}[entity.tag]
     category = entity.attributes.get(key, entity.tag)
-    return named if named in VEHICLE_TYPES and VEHICLE_TYPES[named].openscenario == category else category
+    return (
+        named
+        if named in VEHICLE_TYPES and VEHICLE_TYPES[named].openscenario == category
+        else category
+    )
 
 
 def _followers(root: Element) -> Iterator[tuple[str, Element, float]]:
@@ -112,13 +146,20 @@ def _followers(root: Element) -> Iterator[tuple[str, Element, float]]:
         yield from ((private.get("entityRef"), follow, 0.0) for follow in private.all(_FOLLOWS))
     for group in root.all("Storyboard/Story/Act/ManeuverGroup"):
         for event in group.all("Maneuver/Event"):
-            conditions = event.all("StartTrigger/ConditionGroup/Condition/ByValueCondition/SimulationTimeCondition")
+            conditions = event.all(
+                "StartTrigger/ConditionGroup/Condition/ByValueCondition/SimulationTimeCondition"
+            )
             start = conditions[0].number("value") if conditions else 0.0
             for follow in event.all(f"Action/{_FOLLOWS}"):
-                yield from ((actor.get("entityRef"), follow, start) for actor in group.all("Actors/EntityRef"))
+                yield from (
+                    (actor.get("entityRef"), follow, start)
+                    for actor in group.all("Actors/EntityRef")
+                )
 
 
-def _observations(follow: Element, name: str, vehicle: Element, start: float, given: tuple[float, int]) -> Observations:
+def _observations(
+    follow: Element, name: str, vehicle: Element, start: float, given: tuple[float, int]
+) -> Observations:
     """Return where a vehicle is that follows a trajectory.
 
     Args:
@@ -128,13 +169,24 @@ def _observations(follow: Element, name: str, vehicle: Element, start: float, gi
         start: seconds at which the action begins.
         given: its first speed [m/s], 0 if it has none; the row of its first vertex.
     """
-    trajectory = follow.first("TrajectoryRef", "Trajectory") or follow.one("Trajectory")  # before, in 1.0
+    trajectory = follow.first("TrajectoryRef", "Trajectory") or follow.one(
+        "Trajectory"
+    )  # before, in 1.0
     rows = []
     for vertex in trajectory.one("Shape/Polyline").all("Vertex"):
         world = vertex.one("Position/WorldPosition")
-        rows.append((vertex.number("time", math.nan), world.number("x"), world.number("y"), world.number("h", math.nan)))
+        rows.append(
+            (
+                vertex.number("time", math.nan),
+                world.number("x"),
+                world.number("y"),
+                world.number("h", math.nan),
+            )
+        )
     if len(rows) < 2:
-        raise InputError(f"{follow.place}: its polyline has {len(rows)} vertices; at least 2 are needed")
+        raise InputError(
+            f"{follow.place}: its polyline has {len(rows)} vertices; at least 2 are needed"
+        )
     (time, x, y, heading), (speed, first) = np.array(rows).T, given
     xy, timing = np.column_stack((x, y)), follow.first("TimeReference", "Timing")
     if timing is not None:
@@ -143,13 +195,17 @@ def _observations(follow: Element, name: str, vehicle: Element, start: float, gi
     elif speed > 0.0:
         time = start + np.concatenate(([0.0], np.cumsum(edge_lengths(xy)))) / speed
     if not np.isfinite(time).all():
-        raise InputError(f"{follow.place}: its vertices have no times, and the vehicle has no first speed")
+        raise InputError(
+            f"{follow.place}: its vertices have no times, and the vehicle has no first speed"
+        )
     step = np.gradient(xy, axis=0)
     heading = np.where(np.isnan(heading), np.arctan2(step[:, 1], step[:, 0]), heading)
     center, size = vehicle.one("BoundingBox/Center"), vehicle.one("BoundingBox/Dimensions")
     middle = place(np.column_stack((xy, heading)), center.number("x"), center.number("y"))
     speeds = _own_speeds(vehicle, len(rows))
-    states = np.column_stack((middle, heading, speeds if speeds is not None else np.zeros(len(rows))))
+    states = np.column_stack(
+        (middle, heading, speeds if speeds is not None else np.zeros(len(rows)))
+    )
     return Observations.of_rows(
         name, np.round(time * 1e9).astype(np.int64), states, np.arange(first, first + len(rows)),
         (size.number("length"), size.number("width")), kind=_category(vehicle), measured=speeds is not None,

@@ -29,9 +29,18 @@ _OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
     ast.UAdd: operator.pos,
 }
 _FUNCTIONS: dict[str, Callable[..., float]] = {
-    name: getattr(math, name) for name in ("floor", "ceil", "sqrt", "pow", "sin", "cos", "tan", "asin", "acos", "atan")
+    name: getattr(math, name)
+    for name in ("floor", "ceil", "sqrt", "pow", "sin", "cos", "tan", "asin", "acos", "atan")
 } | {"round": round, "abs": abs, "max": max, "min": min}
-_NO_VALUE = (KeyError, TypeError, ValueError, SyntaxError, ArithmeticError, RecursionError, MemoryError)
+_NO_VALUE = (
+    KeyError,
+    TypeError,
+    ValueError,
+    SyntaxError,
+    ArithmeticError,
+    RecursionError,
+    MemoryError,
+)
 
 Catalogs = Mapping[tuple[str, str], Element]
 """Entries by the names of their catalog and their own."""
@@ -49,23 +58,40 @@ def resolved(root: Element, path: Path) -> Element:
 
 def _entries(root: Element, folder: Path) -> Iterator[tuple[tuple[str, str], Element]]:
     """Yield the entries of all catalogs in the folders that a file names."""
-    for location in (location for locations in root.all("CatalogLocations") for location in locations.children):
+    for location in (
+        location for locations in root.all("CatalogLocations") for location in locations.children
+    ):
         for directory in location.all("Directory"):
-            for file in sorted((folder / directory.attributes.get("path", "")).glob("*.xosc"))[:MOST_FILES]:
+            for file in sorted((folder / directory.attributes.get("path", "")).glob("*.xosc"))[
+                :MOST_FILES
+            ]:
                 with suppress(InputError):  # a file beside those that are needed
                     for catalog in read_xml(file, str(file)).all("Catalog"):
-                        yield from (((catalog.get("name"), entry.get("name")), entry) for entry in catalog.children)
+                        yield from (
+                            ((catalog.get("name"), entry.get("name")), entry)
+                            for entry in catalog.children
+                        )
 
 
-def _resolved(element: Element, scope: Mapping[str, str], catalogs: Catalogs, assigned: Mapping[str, str] = {}) -> Element:
+def _resolved(
+    element: Element,
+    scope: Mapping[str, str],
+    catalogs: Catalogs,
+    assigned: Mapping[str, str] = {},
+) -> Element:
     own = dict(scope)
     declared = element.all("ParameterDeclarations/ParameterDeclaration")
-    for each in (*declared, *declared):  # twice: one may stand before another one of which it is made
+    for each in (
+        *declared,
+        *declared,
+    ):  # twice: one may stand before another one of which it is made
         own[each.get("name")] = value_of(each.get("value"), own)
     own |= assigned
     children = []
     for child in element.children:
-        catalog, entry = (value_of(child.attributes.get(key, ""), own) for key in ("catalogName", "entryName"))
+        catalog, entry = (
+            value_of(child.attributes.get(key, ""), own) for key in ("catalogName", "entryName")
+        )
         if child.tag == "CatalogReference" and (catalog, entry) in catalogs:
             values = child.all("ParameterAssignments/ParameterAssignment")
             given = {each.get("parameterRef"): value_of(each.get("value"), own) for each in values}
@@ -83,7 +109,11 @@ def value_of(text: str, scope: Mapping[str, str]) -> str:
     if not (text.startswith("${") and text.endswith("}")):
         return scope.get(text[1:], text)
     try:
-        return repr(_number(ast.parse(re.sub(r"\$(?=\w)", "", text[2:-1]).strip(), mode="eval").body, scope))
+        return repr(
+            _number(
+                ast.parse(re.sub(r"\$(?=\w)", "", text[2:-1]).strip(), mode="eval").body, scope
+            )
+        )
     except _NO_VALUE:
         return text
 

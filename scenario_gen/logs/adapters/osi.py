@@ -39,7 +39,19 @@ from scenario_gen.logs.raw import check_size, RawLog
 
 KINDS = ("osi3.GroundTruth", "GroundTruth")
 LATEST = 9_000_000_000  # seconds that a stamp in 64 bits of nanoseconds can be
-COLUMNS = ("total_nanos", "idx", "x", "y", "vel_x", "vel_y", "yaw", "length", "width", "type", "subtype")
+COLUMNS = (
+    "total_nanos",
+    "idx",
+    "x",
+    "y",
+    "vel_x",
+    "vel_y",
+    "yaw",
+    "length",
+    "width",
+    "type",
+    "subtype",
+)
 Row = tuple[int, str, float, float, float, float, float, float, float, int, int]
 
 
@@ -52,11 +64,16 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """
     trailers: dict[str, str] = {}
     log = tracks.read(paths, config, name="omega_prime", load=partial(_table, trailers))
-    notes = (f"trailer {one} belongs to {owner}: read as a road user by itself" for one, owner in trailers.items())
+    notes = (
+        f"trailer {one} belongs to {owner}: read as a road user by itself"
+        for one, owner in trailers.items()
+    )
     return replace(log, notes=(*log.notes, *notes))
 
 
-def _table(trailers: dict[str, str], path: Path, _: Format, before: int, config: LogConfig) -> pd.DataFrame:
+def _table(
+    trailers: dict[str, str], path: Path, _: Format, before: int, config: LogConfig
+) -> pd.DataFrame:
     """Return the moving objects of all messages as omega-prime's table; without velocities where no object has any.
 
     Whose `trailers` there are, by their numbers, is written.
@@ -67,11 +84,15 @@ def _table(trailers: dict[str, str], path: Path, _: Format, before: int, config:
         place = f"{path}, message {k + 1}"
         offset = _offset(message) if k == 0 else offset
         if _offset(message) != offset:
-            raise InputError(f"{place}: its proj_frame_offset is another than before; coordinates of one frame are read")
+            raise InputError(
+                f"{place}: its proj_frame_offset is another than before; coordinates of one frame are read"
+            )
         rows += _rows(message, place)
         pulling = ((thing, thing.vehicle_classification) for thing in message.moving_object)
         trailers |= {
-            str(kind.trailer_id.value): str(thing.id.value) for thing, kind in pulling if kind is not None and kind.trailer_id
+            str(kind.trailer_id.value): str(thing.id.value)
+            for thing, kind in pulling
+            if kind is not None and kind.trailer_id
         }
         check_size(str(path), 0, before + len(rows), config)
     if not rows:
@@ -84,7 +105,9 @@ def _messages(path: Path, config: LogConfig) -> Iterator[Any]:
     """Yield the GroundTruth messages of one channel, in order of their stamps in the file."""
     size = path.stat().st_size
     check_size(str(path), size, 0, config)
-    allowance = Allowance(BagConfig(most_bytes=config.size_limit << 20), str(path), size, "log.size_limit")
+    allowance = Allowance(
+        BagConfig(most_bytes=config.size_limit << 20), str(path), size, "log.size_limit"
+    )
     with path.open("rb") as stream, _whole(path):
         file = open_mcap(stream, size, allowance)
         channel = _channel(file, path, config)
@@ -115,8 +138,15 @@ def _channel(file: McapFile, path: Path, config: LogConfig) -> int:
     wanted = listed(config.topics)
     chosen = [topic for topic in found if topic.name in wanted] if wanted else found
     if len(chosen) != 1:
-        there = ", ".join(f"{shown(topic.name)} ({shown(topic.type)})" for topic in (found or topics)) or "no topics"
-        need = "choose one with the parameter topics" if found else "one of osi3.GroundTruth is needed"
+        there = (
+            ", ".join(f"{shown(topic.name)} ({shown(topic.type)})" for topic in (found or topics))
+            or "no topics"
+        )
+        need = (
+            "choose one with the parameter topics"
+            if found
+            else "one of osi3.GroundTruth is needed"
+        )
         raise InputError(f"{path} has {there}; {need}")
     return chosen[0].id
 

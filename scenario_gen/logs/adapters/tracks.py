@@ -16,12 +16,21 @@ from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.adapters.formats import Format, FORMATS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
-from scenario_gen.logs.tables import from_frame, read_text, reals, segment_of, to_numbers, vehicle_name
+from scenario_gen.logs.tables import (
+    from_frame,
+    read_text,
+    reals,
+    segment_of,
+    to_numbers,
+    vehicle_name,
+)
 
 Load = Callable[[Path, Format, int, LogConfig], pd.DataFrame]
 
 
-def read(paths: Sequence[Path], config: LogConfig, *, name: str, load: Load | None = None) -> RawLog:
+def read(
+    paths: Sequence[Path], config: LogConfig, *, name: str, load: Load | None = None
+) -> RawLog:
     """Read one recording of a data set.
 
     Args:
@@ -45,11 +54,17 @@ def read(paths: Sequence[Path], config: LogConfig, *, name: str, load: Load | No
     frames, segments, row = [], [], 0
     for path in tracks:
         table = (load or _read_table)(path, known, row, config)
-        frames.append(_convert(table, path, known).assign(kind=_kinds(path, known, table), row=range(row, row + len(table))))
+        frames.append(
+            _convert(table, path, known).assign(
+                kind=_kinds(path, known, table), row=range(row, row + len(table))
+            )
+        )
         segments.append(segment_of(path, row))
         row += len(table)
     frame = pd.concat(frames, ignore_index=True)
-    without = () if "speed" in frame else ("there are no speeds: they are derived from the positions",)
+    without = (
+        () if "speed" in frame else ("there are no speeds: they are derived from the positions",)
+    )
     notes = (f"read as {known.title}", *without)
     return replace(from_frame(frame, main, tuple(segments), config), rows=row, notes=notes)
 
@@ -71,7 +86,10 @@ def recognised(path: Path) -> str:
                 return recognised(main) if main.is_file() else ""
         with path.open(encoding="utf-8-sig", errors="replace") as file:
             names = {field.strip() for field in file.readline().split(",")}
-        if path.name.startswith("pedestrian_tracks") and {"track_id", "timestamp_ms", "agent_type"} <= names:
+        if (
+            path.name.startswith("pedestrian_tracks")
+            and {"track_id", "timestamp_ms", "agent_type"} <= names
+        ):
             return "interaction"
     else:
         return ""
@@ -80,7 +98,9 @@ def recognised(path: Path) -> str:
 
 def _companion_ending(path: Path, known: Format) -> str:
     """Return the ending by which a file belongs to another one of tracks, "" if it does not."""
-    return next((ending for ending in (known.companions or ())[1:] if path.name.endswith(ending)), "")
+    return next(
+        (ending for ending in (known.companions or ())[1:] if path.name.endswith(ending)), ""
+    )
 
 
 def _is_of_pedestrians(path: Path, name: str) -> bool:
@@ -100,12 +120,18 @@ def _read_table(path: Path, known: Format, before: int, config: LogConfig) -> pd
         table = read_text(path, before, config, sep=",")
     table.columns = pd.Index([str(column).strip() for column in table.columns])
     missing = sorted(known.needed - set(table.columns))
-    if missing and not (known is FORMATS["interaction"] and _is_of_pedestrians(path, "interaction")):
-        raise InputError(f"{path} lacks columns of {known.title}: {', '.join(missing)}; it has {', '.join(table.columns)}")
+    if missing and not (
+        known is FORMATS["interaction"] and _is_of_pedestrians(path, "interaction")
+    ):
+        raise InputError(
+            f"{path} lacks columns of {known.title}: {', '.join(missing)}; it has {', '.join(table.columns)}"
+        )
     return table
 
 
-def _read_companion(path: Path, known: Format, which: int, columns: tuple[str, ...]) -> pd.DataFrame:
+def _read_companion(
+    path: Path, known: Format, which: int, columns: tuple[str, ...]
+) -> pd.DataFrame:
     """Return a companion of a file of tracks.
 
     Raises:
@@ -115,12 +141,16 @@ def _read_companion(path: Path, known: Format, which: int, columns: tuple[str, .
     ending = known.companions[0]
     file = path.with_name(path.name.removesuffix(ending) + known.companions[which])
     if not path.name.endswith(ending) or not file.is_file():
-        raise InputError(f"{path}: {known.title} has {file.name} beside it, which is not there; put it there under its own name")
+        raise InputError(
+            f"{path}: {known.title} has {file.name} beside it, which is not there; put it there under its own name"
+        )
     with guarded(f"{file} cannot be read as a table"):
         frame = pd.read_csv(file, nrows=1_000_000)
     missing = [column for column in columns if column not in frame.columns]
     if missing or frame.empty:
-        raise InputError(f"{file} lacks {', '.join(missing) or 'rows'}; it has {', '.join(map(str, frame.columns))}")
+        raise InputError(
+            f"{file} lacks {', '.join(missing) or 'rows'}; it has {', '.join(map(str, frame.columns))}"
+        )
     return frame
 
 
@@ -134,7 +164,13 @@ def _kinds(path: Path, known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
         return kinds.astype(str).str.strip().str.lower()
     column = known.columns["vehicle"].name
     meta = _read_companion(path, known, 1, (column, "class"))
-    classes = dict(zip(meta[column].map(vehicle_name), meta["class"].astype(str).str.strip().str.lower(), strict=True))
+    classes = dict(
+        zip(
+            meta[column].map(vehicle_name),
+            meta["class"].astype(str).str.strip().str.lower(),
+            strict=True,
+        )
+    )
     return table[column].map(vehicle_name).map(lambda name: classes.get(name, "without a class"))
 
 
@@ -143,10 +179,18 @@ def _named(known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
 
     def named(quantity: str) -> "pd.Series[Any]":
         names = known.names[quantity]
-        return table[known.columns[quantity].name].map(vehicle_name).map(lambda number: names.get(number, f"type {number}"))
+        return (
+            table[known.columns[quantity].name]
+            .map(vehicle_name)
+            .map(lambda number: names.get(number, f"type {number}"))
+        )
 
     kinds = named("kind")
-    return kinds.where(kinds != "vehicle", named("subkind")) if known.columns["subkind"].name in table else kinds
+    return (
+        kinds.where(kinds != "vehicle", named("subkind"))
+        if known.columns["subkind"].name in table
+        else kinds
+    )
 
 
 def _convert(table: pd.DataFrame, path: Path, known: Format) -> pd.DataFrame:
@@ -159,11 +203,17 @@ def _convert(table: pd.DataFrame, path: Path, known: Format) -> pd.DataFrame:
     if known.companions:
         rate = float(reals(_read_companion(path, known, 2, ("frameRate",))["frameRate"]).iloc[0])
         if not 0.1 <= rate <= 1000.0:
-            raise InputError(f"{path}: the recordingMeta beside it says {rate:g} frames per second; 0.1 to 1000 are read")
+            raise InputError(
+                f"{path}: the recordingMeta beside it says {rate:g} frames per second; 0.1 to 1000 are read"
+            )
         columns["time"] = replace(columns["time"], factor=1.0 / rate)
     out = to_numbers(table, columns, path)
     if known.image:
-        out["x"], out["y"], out["vy"] = out["x"] + out["length"] / 2.0, -(out["y"] + out["width"] / 2.0), -out["vy"]
+        out["x"], out["y"], out["vy"] = (
+            out["x"] + out["length"] / 2.0,
+            -(out["y"] + out["width"] / 2.0),
+            -out["vy"],
+        )
     if not {"vx", "vy"} <= set(out):
         return out
     vx, vy = out["vx"].to_numpy(float), out["vy"].to_numpy(float)

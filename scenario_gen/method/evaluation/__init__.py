@@ -3,8 +3,18 @@
 
 """DTW features (paper V-B), realism and criticality."""
 
-from scenario_gen.method.evaluation.bootstrap import Bootstrap, clustered_wilson, paired_difference, wilson
-from scenario_gen.method.evaluation.comparison import compare, comparison_table, Difference, read_evaluations
+from scenario_gen.method.evaluation.bootstrap import (
+    Bootstrap,
+    clustered_wilson,
+    paired_difference,
+    wilson,
+)
+from scenario_gen.method.evaluation.comparison import (
+    compare,
+    comparison_table,
+    Difference,
+    read_evaluations,
+)
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
 from scenario_gen.method.evaluation.criticality import criticality
@@ -16,11 +26,21 @@ from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.metrics import MetricGroup
 from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, Motion
 from scenario_gen.method.evaluation.nearness import time_apart
-from scenario_gen.method.evaluation.non_reactive import BRAKING, free_acceleration, PULLS_AWAY, STANDS, wanted_speeds
+from scenario_gen.method.evaluation.non_reactive import (
+    BRAKING,
+    free_acceleration,
+    PULLS_AWAY,
+    STANDS,
+    wanted_speeds,
+)
 from scenario_gen.method.evaluation.references import uniform_changepoints, without_changepoints
 from scenario_gen.method.evaluation.replay import replay
 from scenario_gen.method.evaluation.samples import Samples, Template
-from scenario_gen.method.evaluation.similarity import mean_correlation, mean_error, pair_similarities
+from scenario_gen.method.evaluation.similarity import (
+    mean_correlation,
+    mean_error,
+    pair_similarities,
+)
 
 __all__ = [
     "BRAKING", "MEASURED", "MEASURES", "PULLS_AWAY", "STANDS", "Bootstrap", "Difference",

@@ -44,8 +44,14 @@ class Bootstrap:
             seed: of the draws.
         """
         units, member = np.unique(unit, return_inverse=True)
-        generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, len(unit), resamples])))
-        drawn = generator.integers(len(units), size=(resamples, len(units))) if len(units) else np.zeros((resamples, 0), np.int64)
+        generator = np.random.Generator(
+            np.random.PCG64(np.random.SeedSequence([seed, len(unit), resamples]))
+        )
+        drawn = (
+            generator.integers(len(units), size=(resamples, len(units)))
+            if len(units)
+            else np.zeros((resamples, 0), np.int64)
+        )
         times = np.zeros((resamples, len(units)))
         np.add.at(times, (np.arange(resamples)[:, None], drawn), 1.0)
         return cls(times[:, member], level, member)
@@ -135,12 +141,18 @@ def paired_difference(differences: Floats, unit: Ints, level: float) -> Interval
         return Interval(0.0, -high, high)
     apart = np.bincount(member, weights=differences - mean)
     half = (
-        float(special.stdtrit(units - 1, 0.5 + 0.5 * level)) * float(np.sqrt(np.sum(apart * apart) * units / (units - 1))) / total
+        float(special.stdtrit(units - 1, 0.5 + 0.5 * level))
+        * float(np.sqrt(np.sum(apart * apart) * units / (units - 1)))
+        / total
     )
     return Interval(mean, max(mean - half, -1.0), min(mean + half, 1.0))
 
 
 def _wilson(share: float, total: float, z: float) -> Interval:
     centre = (share + z * z / (2 * total)) / (1 + z * z / total)
-    half = z / (1 + z * z / total) * float(np.sqrt(share * (1 - share) / total + z * z / (4 * total * total)))
+    half = (
+        z
+        / (1 + z * z / total)
+        * float(np.sqrt(share * (1 - share) / total + z * z / (4 * total * total)))
+    )
     return Interval(share, max(0.0, centre - half), min(1.0, centre + half))

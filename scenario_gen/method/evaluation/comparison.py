@@ -44,7 +44,9 @@ class Difference:
         if self.first is None or self.second is None:
             return False
         bounds = (self.first.low, self.first.high, self.second.low, self.second.high)
-        return all(math.isfinite(b) for b in bounds) and (bounds[1] < bounds[2] or bounds[3] < bounds[0])
+        return all(math.isfinite(b) for b in bounds) and (
+            bounds[1] < bounds[2] or bounds[3] < bounds[0]
+        )
 
     @property
     def better(self) -> str:
@@ -52,10 +54,16 @@ class Difference:
         if not self.clear or not self.metric.better or self.first is None or self.second is None:
             return ""
         lower = "first" if self.first.value < self.second.value else "second"
-        return lower if self.metric.better == "lower" else {"first": "second", "second": "first"}[lower]
+        return (
+            lower
+            if self.metric.better == "lower"
+            else {"first": "second", "second": "first"}[lower]
+        )
 
 
-def compare(first: Sequence[Evaluation], second: Sequence[Evaluation], row: str = WITH) -> tuple[Difference, ...]:
+def compare(
+    first: Sequence[Evaluation], second: Sequence[Evaluation], row: str = WITH
+) -> tuple[Difference, ...]:
     """Pair the cases of two sets by encounter and road, and every metric of `row`.
 
     Raises:
@@ -73,13 +81,23 @@ def compare(first: Sequence[Evaluation], second: Sequence[Evaluation], row: str 
         for metric in own.metrics:
             pair = mine.values.get(metric.id), theirs.values.get(metric.id)
             if any(pair):
-                differences.append(Difference(own.encounter, own.road, metric, *pair, (own.changepoints, other.changepoints)))
+                differences.append(
+                    Difference(
+                        own.encounter,
+                        own.road,
+                        metric,
+                        *pair,
+                        (own.changepoints, other.changepoints),
+                    )
+                )
     if not differences:
         raise InputError("the two sets have no encounter on the same road in common")
     return tuple(differences)
 
 
-def comparison_table(differences: Sequence[Difference], names: tuple[str, str] = ("A", "B")) -> str:
+def comparison_table(
+    differences: Sequence[Difference], names: tuple[str, str] = ("A", "B")
+) -> str:
     """Return Markdown: one table per case; the better one is named where the intervals do not overlap."""
     lines: list[str] = []
     case = ("", "")
@@ -97,8 +115,13 @@ def comparison_table(differences: Sequence[Difference], names: tuple[str, str] =
                 "|---|---|---|---|",
             ]
         unit = f" [{entry.metric.unit}]" if entry.metric.unit else ""
-        cells = [formatted(estimate, entry.metric.unit, cap=entry.metric.cap) for estimate in (entry.first, entry.second)]
-        better = {"first": names[0], "second": names[1], "": "differs" if entry.clear else ""}[entry.better]
+        cells = [
+            formatted(estimate, entry.metric.unit, cap=entry.metric.cap)
+            for estimate in (entry.first, entry.second)
+        ]
+        better = {"first": names[0], "second": names[1], "": "differs" if entry.clear else ""}[
+            entry.better
+        ]
         lines.append(f"| {entry.metric.label}{unit} | {cells[0]} | {cells[1]} | {better} |")
     return "\n".join(lines).lstrip("\n") + "\n"
 

@@ -25,7 +25,13 @@ LABELS = {
     "closing_speed": ("closing speed", "m/s"),
     "speed": ("mean speed", "m/s"),
 }
-ALIKE = ("pet", "arrival_gap", "gap", "closing_speed", "speed")  # by which scenarios are typical or different
+ALIKE = (
+    "pet",
+    "arrival_gap",
+    "gap",
+    "closing_speed",
+    "speed",
+)  # by which scenarios are typical or different
 
 
 def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage:
@@ -37,10 +43,14 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
     """
     whole = [join_ego(scenario) for scenario in measured(scenarios)]
     each = [figures_of(scenario) for scenario in whole]
-    rows = [_row(scenario, most_critical(figures)) for scenario, figures in zip(whole, each, strict=True)]
+    rows = [
+        _row(scenario, most_critical(figures))
+        for scenario, figures in zip(whole, each, strict=True)
+    ]
     template = _row(encounter, most_critical(figures_of(encounter)))
     spreads = {
-        name: Spread(label, unit, tuple(row[name] for row in rows), template[name]) for name, (label, unit) in LABELS.items()
+        name: Spread(label, unit, tuple(row[name] for row in rows), template[name])
+        for name, (label, unit) in LABELS.items()
     }
     pairs: dict[str, Counter[int]] = {}
     for scenario, figures in zip(whole, each, strict=True):
@@ -48,13 +58,18 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
         for figure in figures:
             kind = " and ".join(sorted(names[n] for n in figure.pair))
             pairs.setdefault(kind, Counter())[_bin(figure.pet)] += 1
-    orders = Counter(scenario.facts["passing_order"] for scenario in whole if "passing_order" in scenario.facts)
+    orders = Counter(
+        scenario.facts["passing_order"] for scenario in whole if "passing_order" in scenario.facts
+    )
     index = tuple(scenario.index for scenario in whole)
     return Coverage(
         index,
         spreads,
         BINS,
-        {kind: tuple(counts[k] for k in range(len(BINS))) for kind, counts in sorted(pairs.items())},
+        {
+            kind: tuple(counts[k] for k in range(len(BINS)))
+            for kind, counts in sorted(pairs.items())
+        },
         _picks(index, rows, template),
         dict(sorted(orders.items())),
     )
@@ -72,15 +87,27 @@ def _bin(pet: float) -> int:
     return len(BINS) - 1 if math.isnan(pet) else int(np.searchsorted(EDGES, pet, side="right"))
 
 
-def _picks(index: Sequence[int], rows: Sequence[dict[str, float]], template: dict[str, float]) -> dict[str, int]:
+def _picks(
+    index: Sequence[int], rows: Sequence[dict[str, float]], template: dict[str, float]
+) -> dict[str, int]:
     """Index of the scenarios that stand out."""
     if not rows:
         return {}
     table = np.array([[row[name] for name in ALIKE] for row in rows])
     own = np.array([template[name] for name in ALIKE])
     critical = table[:, 0] if np.isfinite(table[:, 0]).any() else table[:, 2]
-    middle = np.array([float(np.median(column[np.isfinite(column)])) if np.isfinite(column).any() else 0.0 for column in table.T])
-    spread = np.maximum(np.array([float(np.nanstd(column)) if np.isfinite(column).any() else 1.0 for column in table.T]), 1e-3)
+    middle = np.array(
+        [
+            float(np.median(column[np.isfinite(column)])) if np.isfinite(column).any() else 0.0
+            for column in table.T
+        ]
+    )
+    spread = np.maximum(
+        np.array(
+            [float(np.nanstd(column)) if np.isfinite(column).any() else 1.0 for column in table.T]
+        ),
+        1e-3,
+    )
     return {
         "most critical": index[int(np.argmin(np.where(np.isfinite(critical), critical, np.inf)))],
         "most typical": index[int(np.argmin(_from(table, middle, spread)))],

@@ -45,14 +45,26 @@ class Criticality:
 
 def criticality(motion: Motion, horizon: float) -> Criticality:
     """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""
-    pairs = [(a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)]
+    pairs = [
+        (a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)
+    ]
     pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
     everybody = combinations(range(len(motion.vehicles)), 2)
-    conflicts = [conflict for a, b in everybody if (conflict := conflict_of(motion, a, b)) is not None]
+    conflicts = [
+        conflict for a, b in everybody if (conflict := conflict_of(motion, a, b)) is not None
+    ]
     encroachments = [c.encroachment for c in conflicts if not c.following]
     return Criticality(
-        min_distance=min((float(footprint_distance(motion, a, b)[both].min()) for a, b, both in pairs), default=float("nan")),
-        min_ttc=min((horizon, *(float(time_to_collision(motion, a, b)[both].min()) for a, b, both in pairs)))
+        min_distance=min(
+            (float(footprint_distance(motion, a, b)[both].min()) for a, b, both in pairs),
+            default=float("nan"),
+        ),
+        min_ttc=min(
+            (
+                horizon,
+                *(float(time_to_collision(motion, a, b)[both].min()) for a, b, both in pairs),
+            )
+        )
         if pairs
         else float("nan"),
         pet=min(encroachments, default=float("nan")),

@@ -96,14 +96,18 @@ class Comparison:
         """Return Wasserstein distances (B,) under weights (B, S), integrated over the grid (for intervals)."""
         with np.errstate(invalid="ignore"):
             apart = weights @ self.sample_cdf[:, :-1]
-            apart /= (weights @ self.sizes)[:, None]  # in place: new arrays of this size cost more than their numbers
+            apart /= (weights @ self.sizes)[
+                :, None
+            ]  # in place: new arrays of this size cost more than their numbers
         apart -= self.template_cdf[:-1]
         return np.abs(apart, out=apart) @ np.diff(self.grid)
 
     def coverage(self, weights: Floats) -> Floats:
         """Return the share (B,) of the template's values that lie in a bin which the set visits too."""
         with np.errstate(invalid="ignore"):
-            return np.asarray((((weights @ self.samples) > 0.0) @ self.template) / self.template.sum())
+            return np.asarray(
+                (((weights @ self.samples) > 0.0) @ self.template) / self.template.sum()
+            )
 
 
 def wasserstein(a: Floats, b: Floats) -> float:
@@ -112,11 +116,16 @@ def wasserstein(a: Floats, b: Floats) -> float:
     Source: Vallender 1974.
     """
     values = np.sort(np.concatenate([a, b]))
-    below = [np.searchsorted(np.sort(sample), values[:-1], side="right") / sample.size for sample in (a, b)]
+    below = [
+        np.searchsorted(np.sort(sample), values[:-1], side="right") / sample.size
+        for sample in (a, b)
+    ]
     return float(np.sum(np.abs(below[0] - below[1]) * np.diff(values)))
 
 
-def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], points: int = 513) -> Comparison:
+def compare(
+    quantity: Quantity, template: Floats, samples: Sequence[Floats], points: int = 513
+) -> Comparison:
     """Compare the values of one quantity; bins are `quantity.bin_width` wide and aligned at zero.
 
     Args:
@@ -132,7 +141,15 @@ def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], poi
     everything = np.concatenate([template, pooled])
     if template.size == 0 or pooled.size == 0:
         empty = np.zeros((len(samples), 1))
-        return Comparison(np.zeros(1), empty, np.zeros(2), np.zeros(2), np.zeros((len(samples), 2)), empty[:, 0], float("nan"))
+        return Comparison(
+            np.zeros(1),
+            empty,
+            np.zeros(2),
+            np.zeros(2),
+            np.zeros((len(samples), 2)),
+            empty[:, 0],
+            float("nan"),
+        )
 
     def bin_of(values: Floats) -> Ints:
         return np.asarray(np.floor(values / quantity.bin_width + ROUNDING), dtype=np.int64)
@@ -146,13 +163,19 @@ def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], poi
     first, last = (int(bin_of(np.array(bound))) for bound in (everything.min(), everything.max()))
 
     def counts(values: Floats) -> Floats:
-        return np.asarray(np.bincount(bin_of(values) - first, minlength=last - first + 1), dtype=np.float64)
+        return np.asarray(
+            np.bincount(bin_of(values) - first, minlength=last - first + 1), dtype=np.float64
+        )
 
     grid = np.linspace(everything.min(), everything.max(), points)
-    middle = 0.5 * (grid[1:] + grid[:-1])  # the distribution function of an interval is taken in its middle
+    middle = 0.5 * (
+        grid[1:] + grid[:-1]
+    )  # the distribution function of an interval is taken in its middle
 
     def below(values: Floats) -> Floats:
-        return np.append(np.searchsorted(np.sort(values), middle, side="right"), values.size).astype(np.float64)
+        return np.append(
+            np.searchsorted(np.sort(values), middle, side="right"), values.size
+        ).astype(np.float64)
 
     return Comparison(
         template=counts(template),
@@ -174,5 +197,9 @@ def jensen_shannon(p: Floats, q: Floats) -> Floats:
         p = p / p.sum(axis=-1, keepdims=True)
         q = q / q.sum()
         middle = 0.5 * (p + q)
-        result = 0.5 * (special.rel_entr(p, middle) + special.rel_entr(q, middle)).sum(axis=-1) / np.log(2.0)
+        result = (
+            0.5
+            * (special.rel_entr(p, middle) + special.rel_entr(q, middle)).sum(axis=-1)
+            / np.log(2.0)
+        )
     return np.where(np.isfinite(p.sum(axis=-1)), np.maximum(result, 0.0), np.nan)

@@ -36,7 +36,11 @@ def diversity(table: Floats, weights: Floats) -> Floats:
 
 def _mean(distance: Floats, there: Bools | None) -> Floats:
     """Mean (S,) of distances (S, N, T) over the vehicles and instants that count."""
-    return np.asarray(distance.mean(axis=(1, 2)) if there is None or there.all() else distance[:, there].mean(axis=1))
+    return np.asarray(
+        distance.mean(axis=(1, 2))
+        if there is None or there.all()
+        else distance[:, there].mean(axis=1)
+    )
 
 
 def displacement_to(position: Floats, target: Floats, there: Bools | None = None) -> Floats:

@@ -68,7 +68,9 @@ def _extent(a: Floats, b: Floats, turn: float, out: Floats) -> None:
 
 
 @kernel(F3, F3, F2, F, I, OUT2)
-def _feature_rows(a: Floats, b: Floats, extents: Floats, turn: float, first: int, out: Floats) -> None:
+def _feature_rows(
+    a: Floats, b: Floats, extents: Floats, turn: float, first: int, out: Floats
+) -> None:
     """Write rows first, first + 1, … of every sample's normalised matrix into out (S, rows·m)."""
     m = b.shape[2]
     for s in range(a.shape[0]):
@@ -94,7 +96,10 @@ def _wavefront(a: Floats, b: Floats, turn: float, band: int) -> float:
     for channel in range(channels):
         for j in range(m):
             reverse[channel, j] = b[channel, m - 1 - j]
-    below, above = max(0, n - m) + band, max(0, m - n) + band  # how far i may lead j, and j may lead i
+    below, above = (
+        max(0, n - m) + band,
+        max(0, m - n) + band,
+    )  # how far i may lead j, and j may lead i
     older, old, new = np.full(n + 2, np.inf), np.full(n + 2, np.inf), np.full(n + 2, np.inf)
     cost = np.empty(n)
     older[0] = 0.0  # the virtual cell (-1, -1)
@@ -108,7 +113,11 @@ def _wavefront(a: Floats, b: Floats, turn: float, band: int) -> float:
             for q in range(count):
                 step = _step(left[q] - right[q], turn)
                 cost[q] = step if channel == 0 else cost[q] + step
-        vertical, horizontal, diagonal = old[first : last + 1], old[first + 1 : last + 2], older[first : last + 1]
+        vertical, horizontal, diagonal = (
+            old[first : last + 1],
+            old[first + 1 : last + 2],
+            older[first : last + 1],
+        )
         target = new[first + 1 : last + 2]
         for q in range(count):
             best = vertical[q] if vertical[q] < horizontal[q] else horizontal[q]
@@ -119,7 +128,9 @@ def _wavefront(a: Floats, b: Floats, turn: float, band: int) -> float:
     return float(old[n])
 
 
-def dtw_distance(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean", band: int | None = None) -> float:
+def dtw_distance(
+    a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean", band: int | None = None
+) -> float:
     """Exact DTW distance of two series: the least sum of distances over all monotone paths.
 
     Source: Sakoe & Chiba 1978; paper V-B.
@@ -156,13 +167,17 @@ def feature_extents(a: Floats, b: Floats, distance: Distance = "euclidean") -> F
     return extents
 
 
-def feature_rows(a: Floats, b: Floats, extents: Floats, rows: range, distance: Distance = "euclidean") -> Floats:
+def feature_rows(
+    a: Floats, b: Floats, extents: Floats, rows: range, distance: Distance = "euclidean"
+) -> Floats:
     """Return rows `rows` of the feature matrices of S samples, (S, len(rows)·m), given their extents (S, 2).
 
     A set of long encounters does not fit in memory at once, so what sums over matrices goes through them row by row.
     """
     out = np.empty((a.shape[0], len(rows) * b.shape[2]))
-    _feature_rows(_within(a, distance), _within(b, distance), extents, _TURN[distance], rows.start, out)
+    _feature_rows(
+        _within(a, distance), _within(b, distance), extents, _TURN[distance], rows.start, out
+    )
     return out
 
 
@@ -175,7 +190,9 @@ def mean_feature(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floa
     n, m = a.shape[2], b.shape[2]
     mean = np.empty((n, m))
     for rows in blocks(n, a.shape[0] * m):
-        mean[rows.start : rows.stop] = feature_rows(a, b, extents, rows, distance).mean(axis=0).reshape(-1, m)
+        mean[rows.start : rows.stop] = (
+            feature_rows(a, b, extents, rows, distance).mean(axis=0).reshape(-1, m)
+        )
     return mean
 
 
@@ -189,7 +206,9 @@ def _channels(series: npt.ArrayLike, distance: Distance) -> Floats:
     """Lay a series (n,) or (n, D) out as (D, n); angles [rad] within one turn."""
     array = np.asarray(series, dtype=np.float64)
     if array.ndim not in (1, 2) or array.size == 0:
-        raise InputError(f"a series of shape {array.shape} cannot be compared; give (samples,) or (samples, channels)")
+        raise InputError(
+            f"a series of shape {array.shape} cannot be compared; give (samples,) or (samples, channels)"
+        )
     if not np.isfinite(array).all():
         raise InputError("a series holds a value that is not finite")
     return np.ascontiguousarray(_within(array.reshape(array.shape[0], -1).T, distance))

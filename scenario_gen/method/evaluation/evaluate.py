@@ -35,7 +35,9 @@ LEAST_STEPS = 20  # instants of a feature matrix, however many vehicles there ar
 Scenarios = Sequence[Scenario] | ScenarioSet
 
 
-def evaluate(result: GenerationResult, config: EvaluationConfig = EvaluationConfig()) -> Evaluation:
+def evaluate(
+    result: GenerationResult, config: EvaluationConfig = EvaluationConfig()
+) -> Evaluation:
     """Measure what was generated, beside its references and the fitted template replayed.
 
     Args:
@@ -53,7 +55,9 @@ def evaluate(result: GenerationResult, config: EvaluationConfig = EvaluationConf
         sets[REPLAY] = (result.replay,)
     road = result.road.name if result.road else ""
     points = len(result.segmentation.changepoints)
-    return evaluate_scenarios(result.encounter, sets, changepoints=points, road=road, config=config, seed=result.seed)
+    return evaluate_scenarios(
+        result.encounter, sets, changepoints=points, road=road, config=config, seed=result.seed
+    )
 
 
 def evaluate_scenarios(
@@ -90,18 +94,38 @@ def evaluate_scenarios(
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
     """
-    named = {row_name(name): given for name, given in sets.items()} if isinstance(sets, Mapping) else {"scenarios": sets}
-    accounts = {name: CheckCounts.of_set(given) for name, given in named.items() if isinstance(given, ScenarioSet)}
+    named = (
+        {row_name(name): given for name, given in sets.items()}
+        if isinstance(sets, Mapping)
+        else {"scenarios": sets}
+    )
+    accounts = {
+        name: CheckCounts.of_set(given)
+        for name, given in named.items()
+        if isinstance(given, ScenarioSet)
+    }
     counts = accounts | dict(checks or {})
-    rows = {name: given.scenarios if isinstance(given, ScenarioSet) else given for name, given in named.items()}
+    rows = {
+        name: given.scenarios if isinstance(given, ScenarioSet) else given
+        for name, given in named.items()
+    }
     sizes = {name: len(scenarios) for name, scenarios in rows.items()}
     rows = {name: measured(scenarios) for name, scenarios in rows.items()}
     ids = shared_vehicles(encounter, rows)
     pairs = max(math.comb(len(ids), 2), 1)
-    steps = min(encounter.speed.shape[1], config.max_steps, max(math.isqrt(config.max_entries // pairs), LEAST_STEPS))
-    template = Template(encounter, ids, steps, next(iter(rows.get(replay, ())), None), config, seed)
+    steps = min(
+        encounter.speed.shape[1],
+        config.max_steps,
+        max(math.isqrt(config.max_entries // pairs), LEAST_STEPS),
+    )
+    template = Template(
+        encounter, ids, steps, next(iter(rows.get(replay, ())), None), config, seed
+    )
     own = _template_row(template)
-    evaluated = [_row(name, sizes[name], Samples(scenarios, counts.get(name), template)) for name, scenarios in rows.items()]
+    evaluated = [
+        _row(name, sizes[name], Samples(scenarios, counts.get(name), template))
+        for name, scenarios in rows.items()
+    ]
     return Evaluation(
         encounter=encounter.name,
         road=road,
@@ -129,7 +153,9 @@ def measured(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
     return tuple(chain.from_iterable(scenarios[start : start + length] for start in starts))
 
 
-def shared_vehicles(encounter: Encounter, rows: Mapping[str, Sequence[Scenario]]) -> tuple[str, ...]:
+def shared_vehicles(
+    encounter: Encounter, rows: Mapping[str, Sequence[Scenario]]
+) -> tuple[str, ...]:
     """Return the ids of the vehicles that every scenario has, in the encounter's order.
 
     Raises:
@@ -147,15 +173,23 @@ def shared_vehicles(encounter: Encounter, rows: Mapping[str, Sequence[Scenario]]
                 )
             shared = [known for known in shared if known in own]
     if not shared:
-        raise InputError(f"no vehicle of {encounter.name!r} is in all scenarios; measure requests with different egos one by one")
+        raise InputError(
+            f"no vehicle of {encounter.name!r} is in all scenarios; measure requests with different egos one by one"
+        )
     return tuple(shared)
 
 
 def _template_row(template: Template) -> Row:
-    values = {key: Interval(value) for group in METRICS.values() for key, value in group.of_template(template).items()}
+    values = {
+        key: Interval(value)
+        for group in METRICS.values()
+        for key, value in group.of_template(template).items()
+    }
     resampled = template.steps < template.encounter.speed.shape[1]
     notes = (
-        (f"longer than max_steps and max_entries allow: the feature matrices have {template.steps} instants",)
+        (
+            f"longer than max_steps and max_entries allow: the feature matrices have {template.steps} instants",
+        )
         if resampled
         else ()
     )
@@ -174,13 +208,23 @@ def _row(name: str, size: int, samples: Samples) -> Row:
 
 def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple[str, ...]:
     notes = []
-    measured, vehicles, enough = len(samples.scenarios), len(samples.template.ids), samples.template.config.enough
+    measured, vehicles, enough = (
+        len(samples.scenarios),
+        len(samples.template.ids),
+        samples.template.config.enough,
+    )
     if apart := vehicles * (vehicles - 1) // 2 - len(samples.pairs):
-        notes.append(f"E leaves out {apart} pair(s) of vehicles that are not there together for {COMMON:g} s")
+        notes.append(
+            f"E leaves out {apart} pair(s) of vehicles that are not there together for {COMMON:g} s"
+        )
     if measured < size:
-        notes.append(f"measured on {measured:,} of {size:,} scenarios, in {RUNS} evenly spaced runs; candidates are all counted")
+        notes.append(
+            f"measured on {measured:,} of {size:,} scenarios, in {RUNS} evenly spaced runs; candidates are all counted"
+        )
     if 1 < measured < enough:
-        notes.append(f"few scenarios: every figure, E included, comes from {measured}, not {enough}")
+        notes.append(
+            f"few scenarios: every figure, E included, comes from {measured}, not {enough}"
+        )
     if np.isnan(values["min_distance"].value):
         return (*notes, "one vehicle is left: there is no pair to be measured")
     notes += [
@@ -190,5 +234,7 @@ def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple
     ]
     if values["vanished_conflicts"].value > 0.0:
         vanished, kept = (values[key].value for key in ("vanished_conflicts", "conflicts"))
-        notes.append(f"{vanished:.3g} of the recording's {vanished + kept:.0f} conflict(s) vanish, mean over scenarios")
+        notes.append(
+            f"{vanished:.3g} of the recording's {vanished + kept:.0f} conflict(s) vanish, mean over scenarios"
+        )
     return tuple(notes)

@@ -32,7 +32,10 @@ def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
 def _nearness(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
     """Distance [m] and time to collision [s], (T,) each."""
     ahead = unit(motion.heading)
-    one, other = (_Driven(motion.position[n], ahead[n], motion.speed[n], *motion.vehicles[n].half) for n in (a, b))
+    one, other = (
+        _Driven(motion.position[n], ahead[n], motion.speed[n], *motion.vehicles[n].half)
+        for n in (a, b)
+    )
     distance, time = np.empty_like(one.speed), np.empty_like(one.speed)
     _fill_nearness(one, other, distance, time)
     return distance, time
@@ -63,5 +66,8 @@ def _fill_nearness(a: _Driven, b: _Driven, distance: Floats, time: Floats) -> No
     for t in range(len(time)):
         one, other = _box(a, t), _box(b, t)
         distance[t] = box_distance(one, other)
-        vx, vy = b.speed[t] * other.cos - a.speed[t] * one.cos, b.speed[t] * other.sin - a.speed[t] * one.sin
+        vx, vy = (
+            b.speed[t] * other.cos - a.speed[t] * one.cos,
+            b.speed[t] * other.sin - a.speed[t] * one.sin,
+        )
         time[t] = time_to_touch(one, other, vx, vy)

@@ -30,7 +30,10 @@ from scenario_gen.numerics import Floats
 from scenario_gen.types import Encounter, Measures, once_per_object, Scenario
 
 SHIPPED = Path(scenario_gen.__file__).parent / "resources" / "population.json"
-MEAN_ENCOUNTERS, SPREAD_ENCOUNTERS = 2.0, 10.0  # a and b: that the shipped mean and covariance count as
+MEAN_ENCOUNTERS, SPREAD_ENCOUNTERS = (
+    2.0,
+    10.0,
+)  # a and b: that the shipped mean and covariance count as
 UNCORRELATED = 0.3  # c: share by which correlations are smaller than seen
 USUAL = 0.6  # d, in standard deviations, root mean square over features: what is nearer to the middle is usual
 
@@ -65,10 +68,14 @@ class Law:
 
 def shrunk(covariance: Floats) -> Floats:
     """Return a covariance (F, F) with smaller correlations."""
-    return np.asarray((1.0 - UNCORRELATED) * covariance + UNCORRELATED * np.diag(np.diag(covariance)))
+    return np.asarray(
+        (1.0 - UNCORRELATED) * covariance + UNCORRELATED * np.diag(np.diag(covariance))
+    )
 
 
-def rarity_in(encounter: Encounter, population: Sequence[Encounter] = ()) -> Callable[[Scenario], float]:
+def rarity_in(
+    encounter: Encounter, population: Sequence[Encounter] = ()
+) -> Callable[[Scenario], float]:
     """Return what says how unusual scenarios of a template are: their distance from the middle over USUAL.
 
     The law is that of the scenario's own kind, which on another road may be another one than the template's. Of those whose
@@ -80,21 +87,37 @@ def rarity_in(encounter: Encounter, population: Sequence[Encounter] = ()) -> Cal
     """
     members = [_member(encounter)]
     for member in map(_member, population):
-        if not any(member.kind == other.kind and np.allclose(member.features, other.features) for other in members):
+        if not any(
+            member.kind == other.kind and np.allclose(member.features, other.features)
+            for other in members
+        ):
             members.append(member)
-    laws = {kind: Law.of(kind, [member.features for member in members if member.kind == kind]) for kind in _shipped()}
+    laws = {
+        kind: Law.of(kind, [member.features for member in members if member.kind == kind])
+        for kind in _shipped()
+    }
 
     @once_per_object
     def rarity(scenario: Scenario) -> float:
         member = generated_member(scenario, _member(encounter), encounter)
-        return laws[member.kind].distance(member.features) / USUAL if member.kind in laws else math.inf
+        return (
+            laws[member.kind].distance(member.features) / USUAL
+            if member.kind in laws
+            else math.inf
+        )
 
     return rarity
 
 
-def measures_in(variety: str, encounter: Encounter, population: Sequence[Encounter] = ()) -> Measures:
+def measures_in(
+    variety: str, encounter: Encounter, population: Sequence[Encounter] = ()
+) -> Measures:
     """Return what measures scenarios of a template, with variety `population` their rarity, too."""
-    return replace(MEASURES, rarity=rarity_in(encounter, population)) if variety == "population" else MEASURES
+    return (
+        replace(MEASURES, rarity=rarity_in(encounter, population))
+        if variety == "population"
+        else MEASURES
+    )
 
 
 @once_per_object
@@ -107,4 +130,7 @@ def _shipped() -> dict[str, tuple[Floats, Floats]]:
     """Return mean (F,) and covariance (F, F) by kind."""
     document = json.loads(SHIPPED.read_text())
     assert tuple(document["features"]) == FEATURES
-    return {kind: (np.array(law["mean"]), np.array(law["covariance"])) for kind, law in document["kinds"].items()}
+    return {
+        kind: (np.array(law["mean"]), np.array(law["covariance"]))
+        for kind, law in document["kinds"].items()
+    }

@@ -62,7 +62,11 @@ def measure(scenario: Scenario | Encounter, name: str, pair: Pair | None = None)
     motion = at_period(scenario, PERIOD)
     ordered = permutations(range(len(motion.vehicles)), 2)
     chosen, directed = pair or (), name == "baseline_margin"
-    pairs = [(a, b) for a, b in ordered if (a, b)[: len(chosen)] == chosen and (chosen or a < b or directed)]
+    pairs = [
+        (a, b)
+        for a, b in ordered
+        if (a, b)[: len(chosen)] == chosen and (chosen or a < b or directed)
+    ]
     values = [value for a, b in pairs if not math.isnan(value := _figure(motion, name, a, b))]
     if len(chosen) < 2 and name == "arrival_gap":
         values = [abs(value) for value in values]
@@ -83,14 +87,22 @@ def figures_of(scenario: Scenario | Encounter) -> tuple[PairFigures, ...]:
             first = conflict.first
             pet, arrival = conflict.encroachment, conflict.arrival_gap
         ttc, gap = _figure(motion, "ttc", a, b), _figure(motion, "gap", a, b)
-        figures.append(PairFigures((a, b), first, pet, arrival, ttc, gap, _closing_speed(motion, a, b, conflict)))
+        figures.append(
+            PairFigures(
+                (a, b), first, pet, arrival, ttc, gap, _closing_speed(motion, a, b, conflict)
+            )
+        )
     return tuple(figures)
 
 
 def most_critical(figures: Sequence[PairFigures]) -> PairFigures | None:
     """Return the figures of the pair with the least PET, or, where no pair crosses, with the least gap; None without pairs."""
     crossing = [pair for pair in figures if not math.isnan(pair.pet)]
-    return min(crossing, key=lambda pair: pair.pet) if crossing else min(figures, key=lambda pair: pair.gap, default=None)
+    return (
+        min(crossing, key=lambda pair: pair.pet)
+        if crossing
+        else min(figures, key=lambda pair: pair.gap, default=None)
+    )
 
 
 def features(scenario: Scenario | Encounter) -> tuple[float, ...]:

@@ -22,7 +22,12 @@ from scenario_gen.numerics import Floats
 from scenario_gen.template import keeps
 from scenario_gen.types import Cause, Interval, Metric
 
-LIMIT_CAUSES = (Cause.SPEED, Cause.LONGITUDINAL_ACCELERATION, Cause.LATERAL_ACCELERATION, Cause.CURVATURE)
+LIMIT_CAUSES = (
+    Cause.SPEED,
+    Cause.LONGITUDINAL_ACCELERATION,
+    Cause.LATERAL_ACCELERATION,
+    Cause.CURVATURE,
+)
 """Causes that count as a violated limit."""
 TURNS = math.radians(10.0)
 """Of a pair whose headings' differences spread by less, E for heading would measure noise; it has none."""
@@ -71,10 +76,29 @@ def rates(samples: Samples) -> Estimates:
 
 VALIDITY = MetricGroup(
     (
-        Metric("acceptance", "accepted", "%", "higher", _VALID, "share of candidates that the checker accepted"),
-        Metric("collision_rate", "overlap", "%", "lower", _VALID, "share of candidates refused because footprints overlap"),
         Metric(
-            "off_road_rate", "off road", "%", "lower", _VALID, "share of candidates refused because a footprint leaves the road"
+            "acceptance",
+            "accepted",
+            "%",
+            "higher",
+            _VALID,
+            "share of candidates that the checker accepted",
+        ),
+        Metric(
+            "collision_rate",
+            "overlap",
+            "%",
+            "lower",
+            _VALID,
+            "share of candidates refused because footprints overlap",
+        ),
+        Metric(
+            "off_road_rate",
+            "off road",
+            "%",
+            "lower",
+            _VALID,
+            "share of candidates refused because a footprint leaves the road",
         ),
         Metric(
             "limit_rate",
@@ -104,8 +128,14 @@ def _similarity(samples: Samples) -> Estimates:
         del compared["heading"]
     interval = samples.pooled.of_units().interval
     return {
-        **{f"e_{what}": interval(partial(similarity.mean_error, of)) for what, of in compared.items()},
-        **{f"correlation_{what}": interval(partial(similarity.mean_correlation, of)) for what, of in compared.items()},
+        **{
+            f"e_{what}": interval(partial(similarity.mean_error, of))
+            for what, of in compared.items()
+        },
+        **{
+            f"correlation_{what}": interval(partial(similarity.mean_correlation, of))
+            for what, of in compared.items()
+        },
         "turn_kept": samples.bootstrap.mean(_turn_kept(samples)),
     }
 
@@ -113,7 +143,10 @@ def _similarity(samples: Samples) -> Estimates:
 def _turn_kept(samples: Samples) -> Floats:
     """Share (S,) of vehicles that turn from start to end as the template's do."""
     turns = samples.template.motion.heading[:, -1] - samples.template.motion.heading[:, 0]
-    kept = [[keeps(a, b) for a, b in zip(turns, m.heading[:, -1] - m.heading[:, 0], strict=True)] for m in samples.motions]
+    kept = [
+        [keeps(a, b) for a, b in zip(turns, m.heading[:, -1] - m.heading[:, 0], strict=True)]
+        for m in samples.motions
+    ]
     return np.array([np.mean(row) for row in kept])
 
 
@@ -123,11 +156,21 @@ SIMILARITY = MetricGroup(
         Metric("e_position", "E position", "", "lower", _SIMILARITY, f"{_E} positions"),
         Metric("e_speed", "E speed", "", "lower", _SIMILARITY, f"{_E} speeds"),
         Metric(
-            "e_heading", "E heading", "", "lower", _SIMILARITY, f"{_E} headings; none where they hardly differ in the recording"
+            "e_heading",
+            "E heading",
+            "",
+            "lower",
+            _SIMILARITY,
+            f"{_E} headings; none where they hardly differ in the recording",
         ),
         *(
             Metric(
-                f"correlation_{what}", f"correlation {what}", "", "higher", _SIMILARITY, "of the mean matrix with the recording's"
+                f"correlation_{what}",
+                f"correlation {what}",
+                "",
+                "higher",
+                _SIMILARITY,
+                "of the mean matrix with the recording's",
             )
             for what in ("position", "speed", "heading")
         ),
@@ -148,7 +191,10 @@ def _distributions(samples: Samples) -> Estimates:
     """Compare the values of each quantity; the coverage, which stands under diversity, is counted in the same bins."""
     values = [values_of(motion) for motion in samples.periodic]
     bootstrap, template = samples.bootstrap, samples.template.values
-    units, drawn = [np.flatnonzero(bootstrap.unit == k) for k in range(bootstrap.unit.max() + 1)], bootstrap.of_units()
+    units, drawn = (
+        [np.flatnonzero(bootstrap.unit == k) for k in range(bootstrap.unit.max() + 1)],
+        bootstrap.of_units(),
+    )
     result: Estimates = {}
     covered = []
     for quantity in QUANTITIES:
@@ -162,14 +208,31 @@ def _distributions(samples: Samples) -> Estimates:
         )
         if template[quantity.id].size:
             covered.append(compared)
-    return result | {"coverage": drawn.interval(lambda weights: np.mean([c.coverage(weights) for c in covered], axis=0))}
+    return result | {
+        "coverage": drawn.interval(
+            lambda weights: np.mean([c.coverage(weights) for c in covered], axis=0)
+        )
+    }
 
 
 _JS, _W = "Jensen–Shannon divergence, bins of", "Wasserstein distance of the values"
 DISTRIBUTIONS = MetricGroup(
     (
-        *(Metric(f"js_{q.id}", f"JS {q.label}", "bit", "lower", _REALISM, f"{_JS} {q.bin_width} {q.unit}") for q in QUANTITIES),
-        *(Metric(f"wasserstein_{q.id}", f"W {q.label}", q.unit, "lower", _REALISM, _W) for q in QUANTITIES),
+        *(
+            Metric(
+                f"js_{q.id}",
+                f"JS {q.label}",
+                "bit",
+                "lower",
+                _REALISM,
+                f"{_JS} {q.bin_width} {q.unit}",
+            )
+            for q in QUANTITIES
+        ),
+        *(
+            Metric(f"wasserstein_{q.id}", f"W {q.label}", q.unit, "lower", _REALISM, _W)
+            for q in QUANTITIES
+        ),
     ),
     _distributions,
 )
@@ -177,13 +240,17 @@ DISTRIBUTIONS = MetricGroup(
 
 def _criticality(samples: Samples) -> Estimates:
     template, mean = samples.template.critical, samples.bootstrap.mean
-    per_scenario = [criticality(motion, samples.template.config.ttc_horizon) for motion in samples.periodic]
+    per_scenario = [
+        criticality(motion, samples.template.config.ttc_horizon) for motion in samples.periodic
+    ]
     vanished = np.array([float(critical.vanished_of(template)) for critical in per_scenario])
     return {
         "min_distance": mean(np.array([critical.min_distance for critical in per_scenario])),
         "min_ttc": mean(np.array([critical.min_ttc for critical in per_scenario])),
         "pet": mean(np.array([critical.pet for critical in per_scenario])),
-        "order_kept": mean(np.array([critical.keeps_order_of(template) for critical in per_scenario])),
+        "order_kept": mean(
+            np.array([critical.keeps_order_of(template) for critical in per_scenario])
+        ),
         "conflicts": mean(len(template.order) - vanished),
         "vanished_conflicts": mean(vanished),
     }
@@ -191,14 +258,40 @@ def _criticality(samples: Samples) -> Estimates:
 
 def _criticality_of(template: Template) -> Mapping[str, float]:
     own = template.critical
-    return {"min_distance": own.min_distance, "min_ttc": own.min_ttc, "pet": own.pet, "conflicts": float(len(own.order))}
+    return {
+        "min_distance": own.min_distance,
+        "min_ttc": own.min_ttc,
+        "pet": own.pet,
+        "conflicts": float(len(own.order)),
+    }
 
 
 CRITICALITY = MetricGroup(
     (
-        Metric("min_distance", "min distance", "m", "", _CRITICAL, "smallest distance of two footprints, mean over scenarios"),
-        Metric("min_ttc", "min TTC", "s", "", _CRITICAL, "smallest time to collision at constant velocity, capped, mean"),
-        Metric("pet", "PET", "s", "", _CRITICAL, "from the first vehicle's exit of the shared area to the second's entry, mean"),
+        Metric(
+            "min_distance",
+            "min distance",
+            "m",
+            "",
+            _CRITICAL,
+            "smallest distance of two footprints, mean over scenarios",
+        ),
+        Metric(
+            "min_ttc",
+            "min TTC",
+            "s",
+            "",
+            _CRITICAL,
+            "smallest time to collision at constant velocity, capped, mean",
+        ),
+        Metric(
+            "pet",
+            "PET",
+            "s",
+            "",
+            _CRITICAL,
+            "from the first vehicle's exit of the shared area to the second's entry, mean",
+        ),
         Metric(
             "order_kept",
             "passing order kept",
@@ -207,7 +300,14 @@ CRITICALITY = MetricGroup(
             _CRITICAL,
             "conflicts of the recording in which the same vehicle goes first",
         ),
-        Metric("conflicts", "conflicts", "", "", _CRITICAL, "conflicts of the recording, and how many a scenario has, mean"),
+        Metric(
+            "conflicts",
+            "conflicts",
+            "",
+            "",
+            _CRITICAL,
+            "conflicts of the recording, and how many a scenario has, mean",
+        ),
         Metric(
             "vanished_conflicts",
             "conflicts vanished",
@@ -227,14 +327,23 @@ def _diversity(samples: Samples) -> Estimates:
     table, interval = diversity.displacements(position, samples.there), samples.bootstrap.interval
     result = {"diversity": interval(partial(diversity.diversity, table))}
     if samples.template.fitted is not None:
-        error = diversity.displacement_to(position, samples.template.fitted.position, samples.there)
+        error = diversity.displacement_to(
+            position, samples.template.fitted.position, samples.there
+        )
         result["min_ade"] = interval(partial(diversity.weighted_min, error))
     return result
 
 
 DIVERSITY = MetricGroup(
     (
-        Metric("diversity", "diversity", "m", "", _DIVERSITY, "mean displacement between two scenarios"),
+        Metric(
+            "diversity",
+            "diversity",
+            "m",
+            "",
+            _DIVERSITY,
+            "mean displacement between two scenarios",
+        ),
         Metric(
             "coverage",
             "coverage",
@@ -243,7 +352,14 @@ DIVERSITY = MetricGroup(
             _DIVERSITY,
             "share of the recording's values in histogram bins that the set visits",
         ),
-        Metric("min_ade", "min ADE", "m", "lower", _DIVERSITY, "mean displacement of the scenario nearest to the replay"),
+        Metric(
+            "min_ade",
+            "min ADE",
+            "m",
+            "lower",
+            _DIVERSITY,
+            "mean displacement of the scenario nearest to the replay",
+        ),
     ),
     _diversity,
 )
@@ -269,7 +385,11 @@ def catalogue(config: EvaluationConfig = EvaluationConfig()) -> tuple[Metric, ..
         InputError: two metrics have one id, or a plugin cannot be loaded.
     """
     caps = {"min_ttc": config.ttc_horizon}
-    metrics = [replace(metric, cap=caps.get(metric.id)) for group in METRICS.values() for metric in group.metrics]
+    metrics = [
+        replace(metric, cap=caps.get(metric.id))
+        for group in METRICS.values()
+        for metric in group.metrics
+    ]
     for k, metric in enumerate(metrics):
         if metric.id in {other.id for other in metrics[:k]}:
             raise InputError(

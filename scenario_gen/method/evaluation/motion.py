@@ -10,7 +10,16 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
-from scenario_gen.types import ALWAYS, always, Encounter, mask, once_per_object, Scenario, together, Vehicle
+from scenario_gen.types import (
+    ALWAYS,
+    always,
+    Encounter,
+    mask,
+    once_per_object,
+    Scenario,
+    together,
+    Vehicle,
+)
 
 COMMON = 1.0
 """Seconds that two vehicles must be there together to be compared."""
@@ -38,7 +47,11 @@ class Motion:
 
     def __post_init__(self) -> None:
         if not len(self.present):
-            object.__setattr__(self, "present", np.tile(np.array([0, self.speed.shape[1] - 1]), (len(self.speed), 1)))
+            object.__setattr__(
+                self,
+                "present",
+                np.tile(np.array([0, self.speed.shape[1] - 1]), (len(self.speed), 1)),
+            )
 
     @property
     def always(self) -> bool:
@@ -75,8 +88,14 @@ def at_period(source: Encounter | Scenario, dt: float) -> Motion:
     """
     count = int(np.floor(source.time[-1] / dt + 1e-6)) + 1
     if count < 2:
-        name = f"encounter {source.name!r}" if isinstance(source, Encounter) else f"scenario {source.index}"
-        raise InputError(f"{name} lasts {source.time[-1]:g} s, shorter than evaluation.period ({dt:g} s)")
+        name = (
+            f"encounter {source.name!r}"
+            if isinstance(source, Encounter)
+            else f"scenario {source.index}"
+        )
+        raise InputError(
+            f"{name} lasts {source.time[-1]:g} s, shorter than evaluation.period ({dt:g} s)"
+        )
     return _motion(source, np.minimum(np.arange(count) * dt, source.time[-1]), dt)
 
 
@@ -97,12 +116,16 @@ def at_common(source: Encounter | Scenario, pair: tuple[str, str], count: int) -
     if both.stop - both.start < 2 or source.time[both.stop - 1] - source.time[both.start] < COMMON:
         return None
     first, last = source.time[both.start], source.time[both.stop - 1]
-    return of_vehicles(_motion(source, np.linspace(first, last, count), float(last - first) / (count - 1)), rows)
+    return of_vehicles(
+        _motion(source, np.linspace(first, last, count), float(last - first) / (count - 1)), rows
+    )
 
 
 def _motion(source: Encounter | Scenario, time: Floats, dt: float) -> Motion:
     if time.shape == source.time.shape and np.allclose(time, source.time, rtol=0.0, atol=1e-9):
-        return Motion(source.vehicles, dt, source.position, source.heading, source.speed, source.present)
+        return Motion(
+            source.vehicles, dt, source.position, source.heading, source.speed, source.present
+        )
 
     def interpolated(values: Floats) -> Floats:
         return frozen([np.interp(time, source.time, row) for row in values])
@@ -124,10 +147,19 @@ def of_vehicles(motion: Motion, rows: Sequence[int]) -> Motion:
         return motion
     at = list(rows)
     names = tuple(motion.vehicles[n] for n in at)
-    return Motion(names, motion.dt, motion.position[at], motion.heading[at], motion.speed[at], motion.present[at])
+    return Motion(
+        names,
+        motion.dt,
+        motion.position[at],
+        motion.heading[at],
+        motion.speed[at],
+        motion.present[at],
+    )
 
 
 def stacked(motions: Sequence[Motion]) -> tuple[Floats, Floats, Floats]:
     """Stack S motions of equal T: positions (S, N, T, 2) [m], speeds [m/s] and headings [rad], both (S, N, T)."""
-    position, speed, heading = ([getattr(motion, name) for motion in motions] for name in ("position", "speed", "heading"))
+    position, speed, heading = (
+        [getattr(motion, name) for motion in motions] for name in ("position", "speed", "heading")
+    )
     return np.stack(position), np.stack(speed), np.stack(heading)

@@ -30,8 +30,14 @@ def time_apart(motion: Scenario, here: Bools, ego: int, other: int) -> float:
         other: index.
     """
     mine = np.flatnonzero(here[ego])
-    poses = np.column_stack([motion.time[mine], motion.position[ego][mine], motion.heading[ego][mine]])
-    return least_shift(poses, timed_poses(motion, here[other], other), (motion.vehicles[ego], motion.vehicles[other]))
+    poses = np.column_stack(
+        [motion.time[mine], motion.position[ego][mine], motion.heading[ego][mine]]
+    )
+    return least_shift(
+        poses,
+        timed_poses(motion, here[other], other),
+        (motion.vehicles[ego], motion.vehicles[other]),
+    )
 
 
 def timed_poses(motion: Scenario | Motion, here: Bools, n: int) -> Floats:
@@ -42,7 +48,9 @@ def timed_poses(motion: Scenario | Motion, here: Bools, n: int) -> Floats:
     time = motion.time
     fine = np.linspace(time[its[0]], time[its[-1]], FINER * (len(its) - 1) + 1)
     columns = (*motion.position[n].T, motion.heading[n])
-    return np.column_stack([fine, *(np.interp(fine, time[its], column[its]) for column in columns)])
+    return np.column_stack(
+        [fine, *(np.interp(fine, time[its], column[its]) for column in columns)]
+    )
 
 
 def least_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) -> float:
@@ -72,7 +80,9 @@ def _least_shift(a: Floats, b: Floats, half: Floats, out: Floats) -> None:
     count = b.shape[0]
     farthest = 0.0  # that the other moves from one of its instants to the next
     for k in range(1, count):
-        farthest = max(farthest, np.sqrt((b[k, 1] - b[k - 1, 1]) ** 2 + (b[k, 2] - b[k - 1, 2]) ** 2))
+        farthest = max(
+            farthest, np.sqrt((b[k, 1] - b[k - 1, 1]) ** 2 + (b[k, 2] - b[k - 1, 2]) ** 2)
+        )
     reach = np.sqrt(half[0, 0] ** 2 + half[0, 1] ** 2) + np.sqrt(half[1, 0] ** 2 + half[1, 1] ** 2)
     box, its = np.empty(7), np.empty(7)
     for i in range(a.shape[0]):

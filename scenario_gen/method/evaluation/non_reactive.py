@@ -14,7 +14,11 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import edge_lengths
 
-PULLS_AWAY, BRAKING, LATERAL = 2.5, 2.5, 2.5  # m/s², with which it speeds up, slows down, and takes bends
+PULLS_AWAY, BRAKING, LATERAL = (
+    2.5,
+    2.5,
+    2.5,
+)  # m/s², with which it speeds up, slows down, and takes bends
 STANDS = 0.5  # m/s, below which a vehicle's last speed says that it stands at its end
 _FORESIGHT = np.arange(0.0, 21.0, 4.0)  # m ahead of it where it looks for bends
 _CELL = 0.5  # m of its path for which it has one speed
@@ -22,10 +26,15 @@ _CELL = 0.5  # m of its path for which it has one speed
 
 def wanted_speeds(route: Curve, station: Floats, top: float, *, stops: bool) -> Floats:
     """Return (S,) speeds [m/s] wanted at stations (S,) [m] of a free route: `top`, less before bends and a stop at its end."""
-    bend = np.abs(np.diff(route.at(station[:, None] + _FORESIGHT)[..., 2], axis=1)).max(axis=1) / _FORESIGHT[1]
+    bend = (
+        np.abs(np.diff(route.at(station[:, None] + _FORESIGHT)[..., 2], axis=1)).max(axis=1)
+        / _FORESIGHT[1]
+    )
     wanted = np.minimum(top, np.sqrt(LATERAL / np.maximum(bend, 1e-6)))
     if stops:
-        wanted = np.minimum(wanted, np.sqrt(2.0 * BRAKING * np.maximum(route.length - station, 0.0)) + 0.3)
+        wanted = np.minimum(
+            wanted, np.sqrt(2.0 * BRAKING * np.maximum(route.length - station, 0.0)) + 0.3
+        )
     return np.asarray(wanted)
 
 
@@ -47,11 +56,17 @@ def baseline_margin(motion: Motion, a: int, b: int) -> float:
         return APART
     route = Curve.through(position)
     stops = bool(speed[-1] < STANDS)
-    wanted = wanted_speeds(route, np.arange(0.0, route.length + _CELL, _CELL), float(speed.max()), stops=stops).tolist()
+    wanted = wanted_speeds(
+        route, np.arange(0.0, route.length + _CELL, _CELL), float(speed.max()), stops=stops
+    ).tolist()
     stations, now, dt = [0.0], float(speed[0]), motion.dt
     while stations[-1] < route.length and len(stations) < motion.speed.shape[1]:
         after = max(now + free_acceleration(now, wanted[int(stations[-1] / _CELL)]) * dt, 0.0)
         stations.append(stations[-1] + 0.5 * (now + after) * dt)
         now = after
-    poses = np.column_stack([motion.time[own.start] + dt * np.arange(len(stations)), route.at(np.array(stations))])
-    return least_shift(poses, timed_poses(motion, motion.there[b], b), (motion.vehicles[a], motion.vehicles[b]))
+    poses = np.column_stack(
+        [motion.time[own.start] + dt * np.arange(len(stations)), route.at(np.array(stations))]
+    )
+    return least_shift(
+        poses, timed_poses(motion, motion.there[b], b), (motion.vehicles[a], motion.vehicles[b])
+    )

@@ -28,11 +28,26 @@ from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template import Conflict, conflict_of
-from scenario_gen.types import Encounter, GenerationResult, Interval, join_ego, Pair, RECOMBINED, Scenario
+from scenario_gen.types import (
+    Encounter,
+    GenerationResult,
+    Interval,
+    join_ego,
+    Pair,
+    RECOMBINED,
+    Scenario,
+)
 
 APART = "apart"  # a scenario whose pair shares no area any more: it is near nothing
 KINDS = ("crossing", "turn", "merge", "following", APART)
-EACH = ("first speed", "least speed before", "speed at conflict", "braking", "acceleration", "standing time")
+EACH = (
+    "first speed",
+    "least speed before",
+    "speed at conflict",
+    "braking",
+    "acceleration",
+    "standing time",
+)
 COMMON = ("gap", "arrival gap", "distance", "time to collision", "closing speed", "approach")
 FEATURES = (*COMMON, *(f"{name} of the {who}" for who in ("first", "second") for name in EACH))
 DISTANCE = FEATURES.index("distance")
@@ -42,7 +57,9 @@ SECOND = round(1.0 / PERIOD)  # samples
 STANDS_MPS = 0.5
 SMALLEST_R = 0.05  # standard deviations: the same encounter in two files makes no smaller ball
 SMALLEST_SHARE = 0.05  # of the largest standard deviation: a feature in which nobody differs does not count for all
-CHOSEN = 0.5  # share of the encounters that are drawn at most; those of other recordings are unseen
+CHOSEN = (
+    0.5  # share of the encounters that are drawn at most; those of other recordings are unseen
+)
 SHOWN = 10  # scenarios that are like nothing recorded
 WANTED = 0.9  # coverage
 FARTHEST_TOLD = 100.0  # times the largest number of templates that was measured
@@ -144,17 +161,31 @@ class Population:
 
     def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Return the columns and the rows of the curves as texts; in brackets the 5 and 95 % quantiles over draws."""
-        columns = ("of", "templates", "coverage alone", "with generated", "precision", "of the recorded", "stand for")
+        columns = (
+            "of",
+            "templates",
+            "coverage alone",
+            "with generated",
+            "precision",
+            "of the recorded",
+            "stand for",
+        )
         rows = []
         for kind, curve in {"all kinds": self.curve, **self.by_kind}.items():
             for point in curve:
                 shares = (point.alone, point.generated, point.precision, point.recorded)
-                rows.append((kind, str(point.templates), *map(in_words, shares), _stands_for(point)))
+                rows.append(
+                    (kind, str(point.templates), *map(in_words, shares), _stands_for(point))
+                )
         return columns, rows
 
     def remarks(self) -> list[str]:
         """Return what the curve says, in sentences."""
-        needed = f"{self.needed:.0f} recorded encounters" if math.isfinite(self.needed) else "more encounters than can be told"
+        needed = (
+            f"{self.needed:.0f} recorded encounters"
+            if math.isfinite(self.needed)
+            else "more encounters than can be told"
+        )
         lines = [f"coverage of {WANTED} takes {needed}, if the curve goes on as it does"]
         if self.unreached:
             worst = self.unreached[0]
@@ -167,7 +198,11 @@ def _stands_for(point: Point) -> str:
     """How many recordings, with the quantiles."""
 
     def words(multiplier: float) -> str:
-        return f"{multiplier * point.templates:.0f}" if math.isfinite(multiplier) else "more than there are"
+        return (
+            f"{multiplier * point.templates:.0f}"
+            if math.isfinite(multiplier)
+            else "more than there are"
+        )
 
     return f"{words(point.multiplier.value)} [{words(point.multiplier.low)}, {words(point.multiplier.high)}]"
 
@@ -184,7 +219,9 @@ def _over_draws(values: Iterable[float]) -> Interval:
     return Interval(middle, low, high)
 
 
-def member_of(motion: Encounter | Scenario, recording: str, template: int, pair: Pair | None = None) -> Member:
+def member_of(
+    motion: Encounter | Scenario, recording: str, template: int, pair: Pair | None = None
+) -> Member:
     """Return kind and features of a motion's pair, the one that has most to do with each other by default.
 
     That is, of the pairs that cross or merge the one with the least PET, and where there are none the followers nearest to each
@@ -198,7 +235,9 @@ def member_of(motion: Encounter | Scenario, recording: str, template: int, pair:
 
     def closeness(own: Pair) -> tuple[bool, float]:
         conflict = conflicts[own]
-        return conflict.following, figures[own].gap if conflict.following else conflict.encroachment
+        return conflict.following, figures[
+            own
+        ].gap if conflict.following else conflict.encroachment
 
     chosen = min(conflicts, key=closeness)
     conflict, most = conflicts[chosen], figures[chosen]
@@ -215,14 +254,22 @@ def member_of(motion: Encounter | Scenario, recording: str, template: int, pair:
     ]
     entries = (conflict.entry_first, conflict.entry_second)
     each = [_driving(whole, n, entry) for n, entry in zip((first, second), entries, strict=True)]
-    return Member(_kind(whole, conflict), np.array([*common, *each[0], *each[1]]), recording, template, chosen)
+    return Member(
+        _kind(whole, conflict),
+        np.array([*common, *each[0], *each[1]]),
+        recording,
+        template,
+        chosen,
+    )
 
 
 def generated_member(scenario: Scenario, template: Member, encounter: Encounter) -> Member:
     """The member that a scenario is, by the pair of its template, whose vehicles may stand in another order."""
     ids = [vehicle.id for vehicle in scenario.vehicles]
     a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
-    return replace(member_of(scenario, template.recording, template.template, (a, b)), scenario=scenario.index)
+    return replace(
+        member_of(scenario, template.recording, template.template, (a, b)), scenario=scenario.index
+    )
 
 
 def _kind(motion: Motion, conflict: Conflict) -> str:
@@ -254,11 +301,22 @@ def _driving(motion: Motion, n: int, entry: float) -> list[float]:
     at = int(np.clip(round(entry / motion.dt) - own.start, 0, len(speed) - 1))
     change = (speed[SECOND:] - speed[:-SECOND]) if len(speed) > SECOND else np.zeros(1)
     standing = float((speed < STANDS_MPS).sum() * motion.dt)
-    return [speed[0], speed[: at + 1].min(), speed[at], max(-change.min(), 0.0), max(change.max(), 0.0), standing]
+    return [
+        speed[0],
+        speed[: at + 1].min(),
+        speed[at],
+        max(-change.min(), 0.0),
+        max(change.max(), 0.0),
+        standing,
+    ]
 
 
 def population_of(
-    results: Iterable[tuple[str, GenerationResult]], counts: Sequence[int] = (5, 10, 20), *, draws: int = 200, seed: int = 0
+    results: Iterable[tuple[str, GenerationResult]],
+    counts: Sequence[int] = (5, 10, 20),
+    *,
+    draws: int = 200,
+    seed: int = 0,
 ) -> Population:
     """Measure what recordings and the sets generated from them cover.
 
@@ -273,7 +331,9 @@ def population_of(
     """
     found = members_of(results)
     if found.recordings < 2:
-        raise InputError("encounters of at least two recordings are needed; give results of more logs")
+        raise InputError(
+            "encounters of at least two recordings are needed; give results of more logs"
+        )
     drawn = [n for n in sorted(set(counts)) if n <= CHOSEN * len(found.recorded)]
     if not drawn:
         known, most = len(found.recorded), int(CHOSEN * len(found.recorded))
@@ -281,7 +341,10 @@ def population_of(
             f"{known} encounters share an area: at most {most} templates can be drawn; ask for fewer, or give more logs"
         )
     near, points = found.near, found.curve(drawn, draws=draws, seed=seed)
-    counted, generated = (dict(Counter(member.kind for member in members)) for members in (found.recorded, found.made))
+    counted, generated = (
+        dict(Counter(member.kind for member in members))
+        for members in (found.recorded, found.made)
+    )
     by_kind = {}
     for kind in KINDS:
         own = found.of_kind(kind)
@@ -289,7 +352,13 @@ def population_of(
         if few and own.recordings > 1:
             by_kind[kind] = own.curve(few, draws=draws, seed=seed)
     return Population(
-        counted, generated, points, by_kind, tuple(near.unreached(found.names)), near.farthest(found), _needed(points)
+        counted,
+        generated,
+        points,
+        by_kind,
+        tuple(near.unreached(found.names)),
+        near.farthest(found),
+        _needed(points),
     )
 
 
@@ -313,11 +382,16 @@ class Members:
 
     def name_of(self, member: Member) -> str:
         """Return the name of a member's template."""
-        return self.names[member.template] + (RECOMBINED + self.names[member.other] if member.other >= 0 else "")
+        return self.names[member.template] + (
+            RECOMBINED + self.names[member.other] if member.other >= 0 else ""
+        )
 
     def of_kind(self, kind: str) -> "Members":
         """Return the recorded of a kind, and what is generated from them, of whatever kind that is."""
-        places = {n: k for k, n in enumerate(n for n, own in enumerate(self.recorded) if own.kind == kind)} | {-1: -1}
+        places = {
+            n: k
+            for k, n in enumerate(n for n, own in enumerate(self.recorded) if own.kind == kind)
+        } | {-1: -1}
 
         def own(members: Sequence[Member]) -> list[Member]:
             return [
@@ -326,21 +400,39 @@ class Members:
                 if member.template in places
             ]
 
-        return Members(own(self.recorded), own(self.made), [self.names[n] for n in places if 0 <= n < len(self.names)])
+        return Members(
+            own(self.recorded),
+            own(self.made),
+            [self.names[n] for n in places if 0 <= n < len(self.names)],
+        )
 
-    def shares(self, count: int, *, draws: int = 200, seed: int = 0) -> tuple[Interval, Interval, Interval, Interval]:
+    def shares(
+        self, count: int, *, draws: int = 200, seed: int = 0
+    ) -> tuple[Interval, Interval, Interval, Interval]:
         """Return coverage alone and with what is generated, and precision of the generated and of the templates, as `Point` has.
 
         Arguments as of `population_of`.
         """
         near, rng = self.near, np.random.default_rng(seed)
-        alone, generated, precision, recorded = zip(*(near.judged(near.chosen(rng, count)) for _ in range(draws)), strict=True)
-        return _over_draws(alone), _over_draws(generated), _over_draws(precision), _over_draws(recorded)
+        alone, generated, precision, recorded = zip(
+            *(near.judged(near.chosen(rng, count)) for _ in range(draws)), strict=True
+        )
+        return (
+            _over_draws(alone),
+            _over_draws(generated),
+            _over_draws(precision),
+            _over_draws(recorded),
+        )
 
-    def curve(self, counts: Sequence[int], *, draws: int = 200, seed: int = 0) -> tuple[Point, ...]:
+    def curve(
+        self, counts: Sequence[int], *, draws: int = 200, seed: int = 0
+    ) -> tuple[Point, ...]:
         """Return what so many templates cover, and what they stand for; arguments as of `population_of`."""
         near, rng = self.near, np.random.default_rng(seed)
-        alone = {n: _over_draws(near.alone(near.chosen(rng, n)) for _ in range(draws)) for n in range(1, len(self.recorded))}
+        alone = {
+            n: _over_draws(near.alone(near.chosen(rng, n)) for _ in range(draws))
+            for n in range(1, len(self.recorded))
+        }
 
         def stands_for(coverage: float) -> float:
             return next((m for m, share in alone.items() if share.value >= coverage), math.inf)
@@ -348,7 +440,10 @@ class Members:
         points = []
         for n in counts:
             shares = self.shares(n, draws=draws, seed=seed)
-            equal = [stands_for(coverage) / n for coverage in (shares[1].value, shares[1].low, shares[1].high)]
+            equal = [
+                stands_for(coverage) / n
+                for coverage in (shares[1].value, shares[1].low, shares[1].high)
+            ]
             points.append(Point(n, *shares, Interval(*equal)))
         return tuple(points)
 
@@ -367,7 +462,9 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
         own = member_of(result.encounter, recording, len(recorded))
         if own.kind == APART:
             continue
-        generated = [generated_member(join_ego(scenario), own, result.encounter) for scenario in result]
+        generated = [
+            generated_member(join_ego(scenario), own, result.encounter) for scenario in result
+        ]
         if parents := result.encounter.parents:
             recombined.append((parents, generated))
         else:
@@ -377,7 +474,10 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     for (one, other), generated in recombined:
         if one in names and other in names:
             first, second = recorded[names.index(one)], names.index(other)
-            made += [replace(member, recording=first.recording, template=first.template, other=second) for member in generated]
+            made += [
+                replace(member, recording=first.recording, template=first.template, other=second)
+                for member in generated
+            ]
     return Members(recorded, made, names)
 
 
@@ -388,7 +488,11 @@ def _needed(points: Sequence[Point]) -> float:
         return math.inf
     slope, level = np.polyfit(np.log([point.templates for point in points]), np.log(missed), 1)
     needed = (math.log(1.0 - WANTED) - level) / slope if slope < 0.0 else math.inf
-    return math.ceil(math.exp(needed)) if needed < math.log(FARTHEST_TOLD * points[-1].templates) else math.inf
+    return (
+        math.ceil(math.exp(needed))
+        if needed < math.log(FARTHEST_TOLD * points[-1].templates)
+        else math.inf
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -418,17 +522,27 @@ class _Near:
         scaled = np.array([member.features for member in every])
         apart = np.full((len(every), len(recorded)), math.inf)
         for kind in np.unique(kinds[: len(recorded)]):
-            rows, columns = np.flatnonzero(kinds == kind), np.flatnonzero(kinds[: len(recorded)] == kind)
+            rows, columns = (
+                np.flatnonzero(kinds == kind),
+                np.flatnonzero(kinds[: len(recorded)] == kind),
+            )
             spread = scaled[columns].std(axis=0)
             scaled[rows] /= np.maximum(spread, max(SMALLEST_SHARE * float(spread.max()), 1e-9))
             between = distance.cdist(scaled[rows], scaled[columns]) / math.sqrt(scaled.shape[1])
-            others = np.where(recording[columns, None] == recording[columns], math.inf, between[: len(columns)])
+            others = np.where(
+                recording[columns, None] == recording[columns], math.inf, between[: len(columns)]
+            )
             nearest = others.min(axis=1)
             known = nearest[np.isfinite(nearest)]
             if len(known):
                 apart[np.ix_(rows, columns)] = between / max(float(np.median(known)), SMALLEST_R)
-        template = [(member.template, member.template if member.other < 0 else member.other) for member in made]
-        return cls(recorded, recording, np.array(template, dtype=np.int64).reshape(-1, 2), scaled, apart)
+        template = [
+            (member.template, member.template if member.other < 0 else member.other)
+            for member in made
+        ]
+        return cls(
+            recorded, recording, np.array(template, dtype=np.int64).reshape(-1, 2), scaled, apart
+        )
 
     def chosen(self, rng: np.random.Generator, count: int) -> Ints:
         """Draw `count` templates, recording by recording in a random order."""
@@ -461,22 +575,37 @@ class _Near:
 
     def _covered(self, members: Ints, unseen: Bools) -> float:
         """The share of unseen encounters within r of a member."""
-        return float((self.apart[members][:, unseen].min(axis=0) <= 1.0).mean()) if unseen.any() else math.nan
+        return (
+            float((self.apart[members][:, unseen].min(axis=0) <= 1.0).mean())
+            if unseen.any()
+            else math.nan
+        )
 
     def _precision(self, members: Ints, own: Ints) -> float:
         """The share of members within r of an encounter of another recording than their own (K, 1 or 2)."""
-        there = np.where((own[..., None] == self.recording).any(axis=1), math.inf, self.apart[members])
+        there = np.where(
+            (own[..., None] == self.recording).any(axis=1), math.inf, self.apart[members]
+        )
         return float((there.min(axis=1) <= 1.0).mean()) if len(members) else math.nan
 
     def unreached(self, names: Sequence[str]) -> list[Unreached]:
         """Return the recorded encounters that nothing from other recordings is near, the farthest first."""
-        source = np.concatenate([np.repeat(self.recording[:, None], 2, axis=1), self.recording[self.template]])
+        source = np.concatenate(
+            [np.repeat(self.recording[:, None], 2, axis=1), self.recording[self.template]]
+        )
         found = []
         for n, member in enumerate(self.members):
             far = np.where((source == self.recording[n]).any(axis=1), math.inf, self.apart[:, n])
             nearest = int(far.argmin())
             if far[nearest] > 1.0:
-                found.append(Unreached(names[n], member.kind, float(far[nearest]), self._differ(nearest, n, far[nearest])))
+                found.append(
+                    Unreached(
+                        names[n],
+                        member.kind,
+                        float(far[nearest]),
+                        self._differ(nearest, n, far[nearest]),
+                    )
+                )
         return sorted(found, key=lambda one: -one.distance)
 
     def farthest(self, found: Members) -> tuple[Unreached, ...]:

@@ -14,12 +14,16 @@ from scenario_gen.numerics import Ints
 from scenario_gen.types import Segmentation
 
 
-def with_changepoints_at(segmentation: Segmentation, changepoints: Ints, what: str) -> Segmentation:
+def with_changepoints_at(
+    segmentation: Segmentation, changepoints: Ints, what: str
+) -> Segmentation:
     """Return a segmentation of the same encounter with changepoints (K,), every segment a primitive of its own."""
     labels = np.zeros(len(segmentation.labels), dtype=np.int64)
     labels[changepoints] = 1
     names = tuple(f"{what} {k + 1}" for k in range(len(changepoints) + 1))
-    return replace(segmentation, labels=np.cumsum(labels), changepoints=changepoints, descriptions=names)
+    return replace(
+        segmentation, labels=np.cumsum(labels), changepoints=changepoints, descriptions=names
+    )
 
 
 def without_changepoints(segmentation: Segmentation) -> Segmentation:

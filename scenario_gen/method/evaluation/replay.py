@@ -21,7 +21,13 @@ def replay(encounter: Encounter, fit: Fit, frame_id: str = "map") -> Scenario:
     first, last = int(fit.anchor_index[0]), int(fit.anchor_index[-1])
     window = slice(first, last + 1)
     states = [
-        _replayed(encounter.position[n], encounter.heading[n], encounter.speed[n], fit.anchor_index, fitted)[window]
+        _replayed(
+            encounter.position[n],
+            encounter.heading[n],
+            encounter.speed[n],
+            fit.anchor_index,
+            fitted,
+        )[window]
         for n, fitted in enumerate(fit.fitted)
     ]
     state = np.stack(states)
@@ -38,7 +44,9 @@ def replay(encounter: Encounter, fit: Fit, frame_id: str = "map") -> Scenario:
     )
 
 
-def _replayed(position: Floats, heading: Floats, speed: Floats, index: np.ndarray, fitted: FittedVehicle) -> Floats:
+def _replayed(
+    position: Floats, heading: Floats, speed: Floats, index: np.ndarray, fitted: FittedVehicle
+) -> Floats:
     """Return (T, 4): x, y, yaw, speed of one vehicle on the road."""
     out = np.empty((len(speed), 4))
     for k in range(len(index) - 1):

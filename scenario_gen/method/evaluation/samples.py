@@ -15,7 +15,14 @@ from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.criticality import Criticality, criticality
 from scenario_gen.method.evaluation.distributions import values_of
 from scenario_gen.method.evaluation.dtw import Distance
-from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, Motion, of_vehicles, stacked
+from scenario_gen.method.evaluation.motion import (
+    at_common,
+    at_count,
+    at_period,
+    Motion,
+    of_vehicles,
+    stacked,
+)
 from scenario_gen.method.evaluation.similarity import pair_similarity, PairSimilarity
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.types import CheckCounts, Encounter, Scenario
@@ -106,14 +113,20 @@ class Samples:
     def bootstrap(self) -> Bootstrap:
         """What turns a figure of each sample, or a statistic of weights, into an estimate with its interval."""
         config = self.template.config
-        return Bootstrap.draw(antithetic_pairs(self.scenarios), config.resamples, config.level, self.template.seed)
+        return Bootstrap.draw(
+            antithetic_pairs(self.scenarios), config.resamples, config.level, self.template.seed
+        )
 
     @cached_property
     def pooled(self) -> Bootstrap:
         """The same of at most MOST_UNITS units, neighbours drawn together: the cost of E grows with their square."""
         unit, config = self.bootstrap.unit, self.template.config
         size = -(-(int(unit.max(initial=0)) + 1) // MOST_UNITS)
-        return self.bootstrap if size == 1 else Bootstrap.draw(unit // size, config.resamples, config.level, self.template.seed)
+        return (
+            self.bootstrap
+            if size == 1
+            else Bootstrap.draw(unit // size, config.resamples, config.level, self.template.seed)
+        )
 
     @cached_property
     def pairs(self) -> tuple["VehiclePair", ...]:
@@ -130,7 +143,11 @@ class Samples:
                 continue
             names = template.vehicles[a].id, template.vehicles[b].id
             sources: list[Encounter | Scenario] = [self.template.encounter, *self.scenarios]
-            common = [motion for source in sources if (motion := at_common(source, names, steps)) is not None]
+            common = [
+                motion
+                for source in sources
+                if (motion := at_common(source, names, steps)) is not None
+            ]
             if len(common) == len(sources):
                 own = common[0].position, common[0].speed, common[0].heading
                 pairs.append(VehiclePair(own, stacked(common[1:])))
@@ -147,13 +164,17 @@ class VehiclePair:
     template: tuple[Floats, ...]
     samples: tuple[Floats, ...]
 
-    def similarity(self, k: int, distance: Distance, least: float = 0.0, unit: Ints | None = None) -> PairSimilarity:
+    def similarity(
+        self, k: int, distance: Distance, least: float = 0.0, unit: Ints | None = None
+    ) -> PairSimilarity:
         """Compare one of the three, as `pair_similarity` does; `unit` (S,) as there."""
         target, series = self.template[k], self.samples[k]
         if target.ndim == 2:
             target, series = target[..., None], series[..., None]
         target, series = np.moveaxis(target, -1, -2), np.moveaxis(series, -1, -2)
-        return pair_similarity((target[0], target[1]), (series[:, 0], series[:, 1]), distance, least, unit)
+        return pair_similarity(
+            (target[0], target[1]), (series[:, 0], series[:, 1]), distance, least, unit
+        )
 
 
 def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
@@ -172,4 +193,7 @@ def antithetic_pairs(scenarios: Sequence[Scenario]) -> Ints:
     if len(set(numbers)) < len(numbers):
         return np.arange(len(numbers))
     pairs: dict[tuple[int, int], int] = {}
-    return np.array([pairs.setdefault((seed, index // 2), len(pairs)) for seed, index in numbers], dtype=np.int64)
+    return np.array(
+        [pairs.setdefault((seed, index // 2), len(pairs)) for seed, index in numbers],
+        dtype=np.int64,
+    )

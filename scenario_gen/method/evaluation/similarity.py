@@ -45,7 +45,11 @@ class PairSimilarity:
         shares = self._shares(weights)
         square = ((shares @ self.gram) * shares).sum(axis=1)
         norm = self.template[2]
-        return np.sqrt(np.maximum(square, 0.0) / norm) if norm > 0.0 else np.full(len(weights), np.nan)
+        return (
+            np.sqrt(np.maximum(square, 0.0) / norm)
+            if norm > 0.0
+            else np.full(len(weights), np.nan)
+        )
 
     def correlation(self, weights: Floats) -> Floats:
         """Return Pearson's r (B,) of the mean matrix and T; NaN if one of them is constant."""
@@ -105,7 +109,9 @@ def pair_similarity(
     return PairSimilarity(gram, cross, total, (steps * steps, first, second), count)
 
 
-def pair_similarities(template: Floats, generated: Floats, distance: Distance, least: float = 0.0) -> list[PairSimilarity]:
+def pair_similarities(
+    template: Floats, generated: Floats, distance: Distance, least: float = 0.0
+) -> list[PairSimilarity]:
     """Compare all pairs of vehicles: template (N, T, D) against generated (S, N, T, D), as `pair_similarity` does."""
     target, series = np.moveaxis(template, -1, -2), np.moveaxis(generated, -1, -2)
     return [
@@ -130,4 +136,6 @@ def _mean_over_pairs(values: list[Floats]) -> Floats:
     table = np.stack(values)
     known = np.isfinite(table)
     count = known.sum(axis=0)
-    return np.where(count > 0, np.where(known, table, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+    return np.where(
+        count > 0, np.where(known, table, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan
+    )

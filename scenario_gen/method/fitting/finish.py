@@ -50,7 +50,9 @@ def finish(
             anchors[progress == progress[0]] = given[i, 0, :3]
         if given is not None and given_ends[1] and not track.still:
             anchors[progress == progress[-1]] = given[i, 1, :3]
-        anchors, moved, sentences = _repaired(ground, track, anchors, progress, [float(t) for t in index * encounter.dt], config)
+        anchors, moved, sentences = _repaired(
+            ground, track, anchors, progress, [float(t) for t in index * encounter.dt], config
+        )
         notes += sentences
         moved = moved + placement.moved[i]
         if moved.max() > config.max_move:
@@ -61,14 +63,18 @@ def finish(
         turned = turn_of(tracks[i]), turn_of(track)
         scale = float(placement.scale[i])
         manoeuvre = "wait" if track.still else manoeuvre_of(turned[1])
-        fitted.append(FittedVehicle(anchors, moved, stands, scale, manoeuvre, turned, _path(track)))
+        fitted.append(
+            FittedVehicle(anchors, moved, stands, scale, manoeuvre, turned, _path(track))
+        )
         ends = encounter.speed[i, [0, last]] * placement.scale[i]
         ends = np.where(ends < STAND_SPEED, 0.0, ends)
         if given is not None:
             ends = np.where(given_ends, given[i, :, 3], ends)
         ends = np.where(track.still, 0.0, ends)
         states.append(np.column_stack((anchors[[0, -1]], ends)))
-    requested = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))
+    requested = BoundaryStates(
+        start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states])
+    )
     lost = (*find_losses(tracks, placement.tracks), *placement.unused)
     return Fit(encounter.vehicles, tuple(fitted), index, requested, tuple(notes), lost)
 
@@ -78,7 +84,9 @@ def _path(track: Track) -> Floats:
     if track.still:
         return track.curve.points[:1]
     first, last = float(track.progress[0]), float(track.progress[-1])
-    return track.curve.at(np.linspace(first, last, max(int(np.ceil((last - first) / _PATH_STEP)), 1) + 1))
+    return track.curve.at(
+        np.linspace(first, last, max(int(np.ceil((last - first) / _PATH_STEP)), 1) + 1)
+    )
 
 
 def _stands(track: Track, index: Ints) -> Bools:
@@ -98,12 +106,19 @@ def _snapped(track: Track, index: Ints, stands: Bools) -> Floats:
     """(K + 2,) progress at the anchors; the two ends of a dwell are one place, and start and end stay where they are."""
     progress = track.progress[index].copy()
     for first, last in runs(stands):
-        progress[first : last + 1] = progress[last] if last == len(stands) and first > 0 else progress[first]
+        progress[first : last + 1] = (
+            progress[last] if last == len(stands) and first > 0 else progress[first]
+        )
     return progress
 
 
 def _repaired(
-    road: Road, track: Track, anchors: Floats, progress: Floats, times: list[float], config: FittingConfig
+    road: Road,
+    track: Track,
+    anchors: Floats,
+    progress: Floats,
+    times: list[float],
+    config: FittingConfig,
 ) -> tuple[Floats, Floats, list[str]]:
     """Anchors (K + 2, 3), how far each was moved (K + 2,), and sentences about it."""
     anchors = anchors.copy()
@@ -114,8 +129,16 @@ def _repaired(
             anchors[k], moved[k] = anchors[k - 1], moved[k - 1]
             continue
         vehicle = track.vehicle
-        what = "start" if k == 0 else "end" if k == len(anchors) - 1 else f"changepoint at {times[k]:.1f} s"
-        answer = nearest_pose_with_room(road, anchors[k], vehicle.length, vehicle.width, config.max_move)
+        what = (
+            "start"
+            if k == 0
+            else "end"
+            if k == len(anchors) - 1
+            else f"changepoint at {times[k]:.1f} s"
+        )
+        answer = nearest_pose_with_room(
+            road, anchors[k], vehicle.length, vehicle.width, config.max_move
+        )
         if answer is None:
             x, y = anchors[k, :2]
             raise RefusedError(
@@ -124,5 +147,7 @@ def _repaired(
             )
         anchors[k], moved[k] = answer
         if moved[k] > 0.0:
-            sentences.append(f"vehicle {vehicle.id}: its {what} had no room and was moved by {moved[k]:.2f} m")
+            sentences.append(
+                f"vehicle {vehicle.id}: its {what} had no room and was moved by {moved[k]:.2f} m"
+            )
     return anchors, moved, sentences

@@ -67,15 +67,26 @@ def fit_template(
 
 
 def _fit_request(
-    encounter: Encounter, segmentation: Segmentation, road: Road, config: FittingConfig, request: Request, limits: TypeLimits
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    config: FittingConfig,
+    request: Request,
+    limits: TypeLimits,
 ) -> Fit:
     starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))
     refuse_impossible(encounter, road, starts, goals, limits)
-    base = _place(encounter, road.cleared, config) if np.isnan(starts).any() or np.isnan(goals).any() else None
+    base = (
+        _place(encounter, road.cleared, config)
+        if np.isnan(starts).any() or np.isnan(goals).any()
+        else None
+    )
     placement, given = place_given(encounter, road, config, starts, goals, base)
     fit = finish(encounter, segmentation, road, placement, config, given)
     refuse_misfits(fit, starts, goals)
-    refuse_lost((loss for loss in fit.losses if loss.kind == "conflict"), config.allow, road.name)  # lanes are as requested
+    refuse_lost(
+        (loss for loss in fit.losses if loss.kind == "conflict"), config.allow, road.name
+    )  # lanes are as requested
     return fit
 
 
@@ -94,10 +105,16 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         reason = f"where it was recorded, {error}"
         if config.placement == "identity":
             raise
-    if own is not None and (config.placement == "identity" or share >= (_NEAR_HOME if road.lanes is None else _AT_HOME)):
+    if own is not None and (
+        config.placement == "identity" or share >= (_NEAR_HOME if road.lanes is None else _AT_HOME)
+    ):
         return own
     try:
-        return place_by_search(tracks, road, config) if road.lanes is None else place_on_lanes(tracks, road, config)
+        return (
+            place_by_search(tracks, road, config)
+            if road.lanes is None
+            else place_on_lanes(tracks, road, config)
+        )
     except RefusedError as error:
         if share < _NEAR_HOME or not reason:
             raise

@@ -11,7 +11,13 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.finish import STAND_SPEED
-from scenario_gen.method.fitting.placement import check_scale, has_room, max_repair, Placement, share_with_room
+from scenario_gen.method.fitting.placement import (
+    check_scale,
+    has_room,
+    max_repair,
+    Placement,
+    share_with_room,
+)
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import place
@@ -27,9 +33,15 @@ def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) 
         RefusedError: a sampled pose is farther than `max_move` from the nearest with room.
     """
     separation = own_paths(encounter)
-    max_repair([track for track in separation.tracks if share_with_room(road, track) < 1.0], road, config.max_move)
+    max_repair(
+        [track for track in separation.tracks if share_with_room(road, track) < 1.0],
+        road,
+        config.max_move,
+    )
     notes = (f"placed on road {road.name} in the recording's own frame", *separation.notes)
-    return replace(Placement.of(separation.tracks, 1.0, notes), moved=separation.moved, at_home=True)
+    return replace(
+        Placement.of(separation.tracks, 1.0, notes), moved=separation.moved, at_home=True
+    )
 
 
 def share_at_home(encounter: Encounter, road: Road) -> float:
@@ -67,9 +79,19 @@ def place_given(
         RefusedError: a scale is out of range, or a vehicle that waits throughout is asked to move.
     """
     tracks = clean_tracks(encounter)
-    states = np.stack((_states("starts", starts, encounter, 0, base), _states("goals", goals, encounter, -1, base)), axis=1)
+    states = np.stack(
+        (
+            _states("starts", starts, encounter, 0, base),
+            _states("goals", goals, encounter, -1, base),
+        ),
+        axis=1,
+    )
     has_state = np.asarray(np.isfinite(states[..., 0]))
-    ends = states if base is None else np.where(has_state[..., None], states, _ends_of(base, encounter))
+    ends = (
+        states
+        if base is None
+        else np.where(has_state[..., None], states, _ends_of(base, encounter))
+    )
     given = np.where(np.any(has_state, axis=1, keepdims=True)[..., None], ends, np.nan)
     joint = _joint_similarity(tracks, ends)
     rows, notes = [], []
@@ -93,20 +115,26 @@ def _ends_of(base: Placement, encounter: Encounter) -> Floats:
     return np.concatenate((poses, np.where(speed < STAND_SPEED, 0.0, speed)[..., None]), axis=-1)
 
 
-def _states(name: str, given: Floats | None, encounter: Encounter, sample: int, base: Placement | None) -> Floats:
+def _states(
+    name: str, given: Floats | None, encounter: Encounter, sample: int, base: Placement | None
+) -> Floats:
     """(N, 4) given states; a missing speed is the template's, a row that is left to `base` is NaN."""
     n = len(encounter.vehicles)
     if given is None:
         raise InputError(f"{name} is missing; give both starts and goals, or neither")
     array = np.asarray(given, dtype=np.float64)
     if array.ndim != 2 or array.shape[0] != n or array.shape[1] not in (3, 4):
-        raise InputError(f"{name} has shape {array.shape}; one row of x, y, yaw and optionally speed per vehicle ({n}) is needed")
+        raise InputError(
+            f"{name} has shape {array.shape}; one row of x, y, yaw and optionally speed per vehicle ({n}) is needed"
+        )
     left = np.isnan(array).all(axis=1) if base is not None else np.zeros(n, dtype=np.bool_)
     speed = np.where(encounter.speed[:, sample] < STAND_SPEED, 0.0, encounter.speed[:, sample])
     if array.shape[1] == 3:
         array = np.column_stack((array, speed))
     elif base is not None:
-        array = np.column_stack((array[:, :3], np.where(np.isnan(array[:, 3]), speed, array[:, 3])))
+        array = np.column_stack(
+            (array[:, :3], np.where(np.isnan(array[:, 3]), speed, array[:, 3]))
+        )
     if not np.isfinite(array[~left]).all() or (array[~left, 3] < 0.0).any():
         raise InputError(f"{name} holds a value that is not finite, or a negative speed")
     array[left] = np.nan
@@ -125,7 +153,9 @@ def _joint_similarity(tracks: tuple[Track, ...], states: Floats) -> tuple[float,
     return float(np.arctan2(sine, cosine)), float(np.hypot(sine, cosine) / (np.square(u)).sum())
 
 
-def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, config: FittingConfig) -> tuple[Track, float, str]:
+def _place(
+    track: Track, ends: Floats, joint: tuple[float, float], road: Road, config: FittingConfig
+) -> tuple[Track, float, str]:
     vehicle = track.vehicle
     start, goal = ends[0], ends[1]
     v = goal[:2] - start[:2]
@@ -139,10 +169,17 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
 
     template_turn = float(track.curve.points[-1, 2] - track.curve.points[0, 2])
     route = draw_route(start[:3], goal[:3], partial(has_room, road, vehicle))
-    if route is not None and abs(float(route.points[-1, 2] - route.points[0, 2]) - template_turn) < _TURN:
+    if (
+        route is not None
+        and abs(float(route.points[-1, 2] - route.points[0, 2]) - template_turn) < _TURN
+    ):
         scale = route.length / track.travelled
         if config.accepts(scale):
-            placed = replace(track, curve=route.cut(0.0, route.length, 0.25), progress=frozen(scale * track.progress))
+            placed = replace(
+                track,
+                curve=route.cut(0.0, route.length, 0.25),
+                progress=frozen(scale * track.progress),
+            )
             return placed, scale, f"along a drawn route (s = {scale:.2f})"
     u = (track.poses[-1] - track.poses[0])[:2]
     if np.hypot(*u) < _CHORD:
@@ -150,11 +187,21 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
     else:
         turn = float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))  # eq 8a
         scale, how = float(np.hypot(*v) / np.hypot(*u)), "similarity"
-    check_scale(scale, f"vehicle {vehicle.id} (recorded chord {np.hypot(*u):.1f} m, requested {np.hypot(*v):.1f} m)", config)
+    check_scale(
+        scale,
+        f"vehicle {vehicle.id} (recorded chord {np.hypot(*u):.1f} m, requested {np.hypot(*v):.1f} m)",
+        config,
+    )
     points = track.curve.points.copy()
-    points[:, :2] = place(np.array([*start[:2], turn]), *(scale * (points[:, :2] - points[0, :2]).T))  # eqs 8b, 9
+    points[:, :2] = place(
+        np.array([*start[:2], turn]), *(scale * (points[:, :2] - points[0, :2]).T)
+    )  # eqs 8b, 9
     share = track.curve.station / track.curve.length
     points[:, :2] += share[:, None] * (goal[:2] - points[-1, :2])  # zero but for short chords
     curve = Curve.through(points[:, :2])
     progress = np.interp(track.progress / track.curve.length, share, curve.station)
-    return replace(track, curve=curve, progress=frozen(progress)), scale, f"{how} (s = {scale:.2f}, {np.degrees(turn):.0f}°)"
+    return (
+        replace(track, curve=curve, progress=frozen(progress)),
+        scale,
+        f"{how} (s = {scale:.2f}, {np.degrees(turn):.0f}°)",
+    )

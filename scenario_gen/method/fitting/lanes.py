@@ -12,7 +12,13 @@ from scipy.spatial.distance import cdist
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import find_losses, find_unused, refused_losses
-from scenario_gen.method.fitting.placement import check_scale, max_repair, Placement, SCALES, separated
+from scenario_gen.method.fitting.placement import (
+    check_scale,
+    max_repair,
+    Placement,
+    SCALES,
+    separated,
+)
 from scenario_gen.numerics import frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
@@ -23,7 +29,10 @@ from scenario_gen.types import LaneNetwork, lanes_for, Road
 _END_ROOM = 1.0  # metres kept between a footprint and the end of the road
 _ROUNDING = 1e-3  # metres that a shortened template is shorter than it might be: which side it rounds to depends on the CPU
 _ASTRAY = 0.3  # metres that a footprint may be from room on the best place
-_TRIED, _MORE = 12, 40  # placements that are looked at cell by cell; where something is lost on all of these, more
+_TRIED, _MORE = (
+    12,
+    40,
+)  # placements that are looked at cell by cell; where something is lost on all of these, more
 
 
 def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:
@@ -39,7 +48,9 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     own = tracks if network.drawn else ()
     reason, best = "", None
     if drivers[0].vehicle.kind.walks:
-        raise RefusedError(f"no recorded vehicle drives, so the encounter cannot be laid on the lanes of road {road.name}")
+        raise RefusedError(
+            f"no recorded vehicle drives, so the encounter cannot be laid on the lanes of road {road.name}"
+        )
     if network.drawn:
         _refuse_turns(drivers, road)
     shortened = _shortened(drivers, road, config) if network.drawn else 1.0
@@ -48,10 +59,15 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     for tried, (match, scale) in enumerate(placements(network, laid, scales=scales)):
         if tried >= (_TRIED if best is None else _MORE):
             break
-        notes = [*network.notes, *(_note(c, t, network) for c, t in zip(match.courses, drivers, strict=True))]
+        notes = [
+            *network.notes,
+            *(_note(c, t, network) for c, t in zip(match.courses, drivers, strict=True)),
+        ]
         if scale * shortened != 1.0:
             notes.append(f"scaled by {scale * shortened:.3g} to fit the lanes")
-        placement = Placement.of(_with_walkers(tracks, drivers, tracks_on(match, laid)), scale * shortened, notes)
+        placement = Placement.of(
+            _with_walkers(tracks, drivers, tracks_on(match, laid)), scale * shortened, notes
+        )
         try:
             placement = separated(placement, config, sideways=0.0, own=own)
             astray = max_repair(placement.tracks, road, config.max_move) > _ASTRAY
@@ -70,10 +86,14 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     return best[1]
 
 
-def _with_walkers(tracks: tuple[Track, ...], drivers: tuple[Track, ...], placed: tuple[Track, ...]) -> tuple[Track, ...]:
+def _with_walkers(
+    tracks: tuple[Track, ...], drivers: tuple[Track, ...], placed: tuple[Track, ...]
+) -> tuple[Track, ...]:
     """All tracks on the road: drivers as they are placed, who walks as before beside the driver that comes nearest."""
     where = dict(zip((track.vehicle.id for track in drivers), placed, strict=True))
-    return tuple(where.get(track.vehicle.id) or _beside_nearest(track, drivers, placed) for track in tracks)
+    return tuple(
+        where.get(track.vehicle.id) or _beside_nearest(track, drivers, placed) for track in tracks
+    )
 
 
 def _beside_nearest(track: Track, drivers: tuple[Track, ...], placed: tuple[Track, ...]) -> Track:
@@ -84,7 +104,9 @@ def _beside_nearest(track: Track, drivers: tuple[Track, ...], placed: tuple[Trac
     k = int(np.argmin(away[n].min(axis=0)))
     before, after = drivers[n].poses[k], placed[n].poses[k]
     moved = place(after, *ahead_and_left(points[:, :2] - before[:2], before[2]))
-    return replace(track, curve=Curve(np.column_stack((moved, points[:, 2] + after[2] - before[2]))))
+    return replace(
+        track, curve=Curve(np.column_stack((moved, points[:, 2] + after[2] - before[2])))
+    )
 
 
 def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
@@ -100,7 +122,9 @@ def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
     right = max(float((np.maximum.accumulate(yaw) - yaw).max()) for yaw in yaws)
     for track in tracks:
         if not -right - MOST_CHANGE <= turn_of(track) <= left + MOST_CHANGE:
-            raise RefusedError(f"vehicle {track.vehicle.id} {in_words(turn_of(track))}: road {road.name} has no lanes for that")
+            raise RefusedError(
+                f"vehicle {track.vehicle.id} {in_words(turn_of(track))}: road {road.name} has no lanes for that"
+            )
 
 
 def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> float:
@@ -114,13 +138,19 @@ def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> 
         return 1.0
     cars = max(track.vehicle.length for track in tracks)
     scale = (size - 2.0 * _END_ROOM - _ROUNDING - cars) / (high - low - cars)
-    check_scale(scale, f"the recording is {high - low:.0f} m long, road {road.name} {size:.0f} m: it", config)
+    check_scale(
+        scale,
+        f"the recording is {high - low:.0f} m long, road {road.name} {size:.0f} m: it",
+        config,
+    )
     return scale
 
 
 def _ways(road: Road) -> list[Curve]:
     """The ways through a drawn road; of one without a junction its lanes."""
-    return list(ways_through(road).values()) or [Curve.through(lane.centre) for lane in _lanes_of(road).lanes]
+    return list(ways_through(road).values()) or [
+        Curve.through(lane.centre) for lane in _lanes_of(road).lanes
+    ]
 
 
 def _scaled(track: Track, scale: float) -> Track:
@@ -140,5 +170,9 @@ def _note(course: Course, track: Track, network: LaneNetwork) -> str:
     lanes = ", ".join(network.lanes[k].id for k in course.lanes)
     limit = max((network.lanes[k].speed_limit for k in course.lanes), default=math.nan)
     fastest = float(track.speed.max())
-    speed = f"; its {fastest:.1f} m/s are more than their limit of {limit:.1f} m/s" if fastest > limit + 0.5 else ""
+    speed = (
+        f"; its {fastest:.1f} m/s are more than their limit of {limit:.1f} m/s"
+        if fastest > limit + 0.5
+        else ""
+    )
     return f"vehicle {track.vehicle.id} drives on lanes {lanes}{speed}"

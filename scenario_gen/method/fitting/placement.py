@@ -44,7 +44,12 @@ class Placement:
     @classmethod
     def of(cls, tracks: tuple[Track, ...], scale: float, notes: Iterable[str]) -> "Placement":
         """Return the placement of tracks on the road that all have one scale s of eq 9, none of them shifted."""
-        return cls(tracks, frozen(np.full(len(tracks), scale)), frozen(np.zeros(len(tracks))), tuple(notes))
+        return cls(
+            tracks,
+            frozen(np.full(len(tracks), scale)),
+            frozen(np.zeros(len(tracks))),
+            tuple(notes),
+        )
 
 
 def check_scale(scale: float, what: str, config: FittingConfig) -> None:
@@ -59,7 +64,9 @@ def check_scale(scale: float, what: str, config: FittingConfig) -> None:
         )
 
 
-def separated(placement: Placement, config: FittingConfig, *, sideways: float, own: Sequence[Track] = ()) -> Placement:
+def separated(
+    placement: Placement, config: FittingConfig, *, sideways: float, own: Sequence[Track] = ()
+) -> Placement:
     """Shift vehicles that come too close on this road, as little as possible.
 
     Args:
@@ -90,13 +97,19 @@ def separated(placement: Placement, config: FittingConfig, *, sideways: float, o
 
 def has_room(road: Road, vehicle: Vehicle, poses: Floats) -> bool:
     """Whether a vehicle's footprint has room at all poses (M, 3)."""
-    return bool(footprint_fits(ground_for(road, vehicle), poses, vehicle.length, vehicle.width).all())
+    return bool(
+        footprint_fits(ground_for(road, vehicle), poses, vehicle.length, vehicle.width).all()
+    )
 
 
 def share_with_room(road: Road, track: Track, every: int = 5) -> Floats:
     """Share (scalar array), 0 to 1, of the track's samples (every n-th and the last) at which its footprint has room."""
     poses = np.concatenate((track.poses[:-1:every], track.poses[-1:]))
-    return np.asarray(footprint_fits(ground_for(road, track.vehicle), poses, track.vehicle.length, track.vehicle.width).mean())
+    return np.asarray(
+        footprint_fits(
+            ground_for(road, track.vehicle), poses, track.vehicle.length, track.vehicle.width
+        ).mean()
+    )
 
 
 def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
@@ -113,9 +126,13 @@ def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
         poses, ground = track.poses, ground_for(road, track.vehicle)
         worst, at = 0.0, first
         for t in sorted({first, last, *range(first, last + 1, 5)}):
-            answer = nearest_pose_with_room(ground, poses[t], track.vehicle.length, track.vehicle.width, max_move)
+            answer = nearest_pose_with_room(
+                ground, poses[t], track.vehicle.length, track.vehicle.width, max_move
+            )
             if answer is None:
-                answer = nearest_pose_with_room(ground, poses[t], track.vehicle.length, track.vehicle.width, _LOOKED)
+                answer = nearest_pose_with_room(
+                    ground, poses[t], track.vehicle.length, track.vehicle.width, _LOOKED
+                )
             away = np.inf if answer is None else answer[1]
             if away > worst:
                 worst, at = away, t
@@ -125,7 +142,9 @@ def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
         if worst > max_move:
             far = f"{worst:.1f} m" if worst <= _LOOKED else f"more than {_LOOKED:g} m"
             x, y = poses[at, :2]
-            astray.append(f"vehicle {track.vehicle.id} is {far} from any pose with room at sample {at} (x {x:.1f}, y {y:.1f})")
+            astray.append(
+                f"vehicle {track.vehicle.id} is {far} from any pose with room at sample {at} (x {x:.1f}, y {y:.1f})"
+            )
     if astray:
         ids = ", ".join(text.split(" ", 2)[1] for text in astray)
         remedy = (
@@ -133,5 +152,7 @@ def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
             if len(astray) == len(tracks) > 1
             else f"set fitting.max_move to more, mend the map there, or leave {ids} out (log.vehicles names who is kept)"
         )
-        raise RefusedError(f"on road {road.name} {'; '.join(astray)}; at most {max_move:g} m is bridged; {remedy}")
+        raise RefusedError(
+            f"on road {road.name} {'; '.join(astray)}; at most {max_move:g} m is bridged; {remedy}"
+        )
     return farthest

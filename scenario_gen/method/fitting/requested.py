@@ -17,7 +17,9 @@ STAND = 0.05  # m/s, a speed below this is met by standing
 NAMES = {"starts": "start", "goals": "goal"}
 
 
-def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: Floats, limits: TypeLimits) -> None:
+def refuse_impossible(
+    encounter: Encounter, road: Road, starts: Floats, goals: Floats, limits: TypeLimits
+) -> None:
     """Refuse states, (N, 4) each with NaN where none is requested, that no motion can have.
 
     Raises:
@@ -33,7 +35,9 @@ def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: F
                 raise RefusedError(
                     f"{what} has {state[3]:g} m/s; at most {max_speed:g} m/s is planned, 8/9 of limits.{vehicle.type}.max_speed"
                 )
-            if not footprint_fits(ground_for(road, vehicle), state[None, :3], vehicle.length, vehicle.width)[0]:
+            if not footprint_fits(
+                ground_for(road, vehicle), state[None, :3], vehicle.length, vehicle.width
+            )[0]:
                 raise RefusedError(
                     f"{what} is off the road: a footprint of {vehicle.length:g} m by {vehicle.width:g} m has no room there"
                 )
@@ -45,12 +49,17 @@ def refuse_misfits(fit: Fit, starts: Floats, goals: Floats) -> None:
     Raises:
         RefusedError: two footprints overlap at the start or the end, or a vehicle that stands there is asked to drive.
     """
-    for name, rows, states, first in (("starts", starts, fit.requested.start, True), ("goals", goals, fit.requested.end, False)):
+    for name, rows, states, first in (
+        ("starts", starts, fit.requested.start, True),
+        ("goals", goals, fit.requested.end, False),
+    ):
         requested = ~np.isnan(rows[:, 0])
         for (i, a), (j, b) in combinations(enumerate(fit.vehicles), 2):
             gap = float(footprint_gaps(a.half, states[[i], :3], b.half, states[[j], :3])[0][0])
             if gap <= 0.0 and (requested[i] or requested[j]):
-                raise RefusedError(f"at the requested {NAMES[name]} vehicles {a.id} and {b.id} overlap by {-gap:.2f} m")
+                raise RefusedError(
+                    f"at the requested {NAMES[name]} vehicles {a.id} and {b.id} overlap by {-gap:.2f} m"
+                )
         for i in np.flatnonzero(requested).tolist():
             stands = fit.fitted[i].stands
             if rows[i, 3] > STAND and stands[0 if first else -1]:

@@ -16,7 +16,13 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.placement import max_repair, Placement, SCALES, separated, share_with_room
+from scenario_gen.method.fitting.placement import (
+    max_repair,
+    Placement,
+    SCALES,
+    separated,
+    share_with_room,
+)
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.pattern_search import pattern_search
@@ -56,7 +62,9 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
     reason = f"the recording ({np.ptp(discs, axis=0).max():.0f} m) is larger than the map"
     for scale in filter(config.accepts, SCALES):
         placements = sorted(_coarse(discs, road, required, scale), key=_order)[:_KEPT]
-        for motion in sorted((_refined(discs, road, required, motion) for motion in placements), key=_order):
+        for motion in sorted(
+            (_refined(discs, road, required, motion) for motion in placements), key=_order
+        ):
             stop_if_cancelled()
             try:
                 placement, share, farthest = _tried(tracks, centre, motion, road, config)
@@ -70,7 +78,9 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
             elif best is None:
                 reason = f"in the best placement a vehicle has room at only {100.0 * share:.0f} % of its samples"
     if best is None:
-        raise RefusedError(f"no placement on road {road.name} has room for the recording: {reason}")
+        raise RefusedError(
+            f"no placement on road {road.name} has room for the recording: {reason}"
+        )
     return best[1]
 
 
@@ -117,7 +127,9 @@ def _coarse(discs: Floats, road: Road, required: float, scale: float) -> list[_M
     every = max(round(_CELL / road.resolution), 1)
     cell = every * road.resolution
     field = _penalty(clearance_field(road)[every // 2 :: every, every // 2 :: every], required)
-    field = field - float(_penalty(np.zeros(1), required)[0])  # outside the map counts as blocked: make that the zero of the sum
+    field = field - float(
+        _penalty(np.zeros(1), required)[0]
+    )  # outside the map counts as blocked: make that the zero of the sum
     whole = np.fft.rfft2(np.round(field * _WHOLE))
     best = []
     for yaw in np.arange(_TURNS) * 2.0 * np.pi / _TURNS:
@@ -133,9 +145,18 @@ def _coarse(discs: Floats, road: Road, required: float, scale: float) -> list[_M
         total = np.round(product[size[1] - 1 :, size[0] - 1 :])
         cost = total / (_WHOLE * len(points))
         row, column = np.unravel_index(int(np.argmin(total)), total.shape)
-        grid = np.array([column - low[0], row - low[1]]) * cell + (every // 2 + 0.5) * road.resolution
+        grid = (
+            np.array([column - low[0], row - low[1]]) * cell + (every // 2 + 0.5) * road.resolution
+        )
         at = np.asarray(road.origin) + grid
-        best.append(_Motion(float(np.round(cost[row, column], 9)), scale, float(yaw), (float(at[0]), float(at[1]))))
+        best.append(
+            _Motion(
+                float(np.round(cost[row, column], 9)),
+                scale,
+                float(yaw),
+                (float(at[0]), float(at[1])),
+            )
+        )
     return best
 
 
@@ -144,9 +165,15 @@ def _refined(discs: Floats, road: Road, required: float, motion: _Motion) -> _Mo
 
     def costs(states: Floats) -> Floats:
         row, column, inside = road.cells(place(states[:, None], *(motion.scale * discs).T))
-        return np.asarray(_penalty(np.where(inside, clearance_field(road)[row, column], 0.0), required).mean(axis=1))
+        return np.asarray(
+            _penalty(np.where(inside, clearance_field(road)[row, column], 0.0), required).mean(
+                axis=1
+            )
+        )
 
-    state, cost = pattern_search(costs, np.array([*motion.at, motion.yaw]), np.array([1.0, 1.0, np.radians(3.0)]), 0.05)
+    state, cost = pattern_search(
+        costs, np.array([*motion.at, motion.yaw]), np.array([1.0, 1.0, np.radians(3.0)]), 0.05
+    )
     return _Motion(cost, motion.scale, float(state[2]), (float(state[0]), float(state[1])))
 
 
@@ -154,7 +181,11 @@ def _moved(tracks: tuple[Track, ...], centre: Floats, motion: _Motion) -> tuple[
     moved = []
     for track in tracks:
         points = track.curve.points.copy()
-        points[:, :2] = place(np.array([*motion.at, motion.yaw]), *(motion.scale * (points[:, :2] - centre)).T)
+        points[:, :2] = place(
+            np.array([*motion.at, motion.yaw]), *(motion.scale * (points[:, :2] - centre)).T
+        )
         points[:, 2] += motion.yaw
-        moved.append(replace(track, curve=Curve(points), progress=frozen(motion.scale * track.progress)))
+        moved.append(
+            replace(track, curve=Curve(points), progress=frozen(motion.scale * track.progress))
+        )
     return tuple(moved)

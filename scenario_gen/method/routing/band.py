@@ -65,7 +65,11 @@ def _clearance_at(field: Floats, x: float, y: float) -> tuple[float, float, floa
     u, v = min(max(u - j, 0.0), 1.0), min(max(v - i, 0.0), 1.0)
     a, b, c, d = field[i, j], field[i, j + 1], field[i + 1, j], field[i + 1, j + 1]
     low, high = a + u * (b - a), c + u * (d - c)
-    return low + v * (high - low), (b - a) + v * ((d - c) - (b - a)), (c - a) + u * ((d - b) - (c - a))
+    return (
+        low + v * (high - low),
+        (b - a) + v * ((d - c) - (b - a)),
+        (c - a) + u * ((d - b) - (c - a)),
+    )
 
 
 @kernel(inline=True)
@@ -90,7 +94,16 @@ def _solve(matrix: Floats, right: Floats) -> None:
 
 
 @kernel(inline=True)
-def _add(matrix: Floats, right: Floats, first: int, row: Floats, terms: int, weight: float, tx: float, ty: float) -> None:
+def _add(
+    matrix: Floats,
+    right: Floats,
+    first: int,
+    row: Floats,
+    terms: int,
+    weight: float,
+    tx: float,
+    ty: float,
+) -> None:
     """Add weight * |sum_k row[k] p[first + k] - (tx, ty)|^2 to the problem."""
     for k in range(terms):
         right[first + k, 0] += weight * row[k] * tx
@@ -104,19 +117,29 @@ def _bending(points: Floats, ends: Floats, spacing: float, i: int) -> tuple[floa
     """Second derivative of the band at point i, with mirrored points beyond its ends."""
     n = points.shape[0]
     if i == 0:
-        before_x, before_y = points[1, 0] - 2.0 * spacing * ends[0, 0], points[1, 1] - 2.0 * spacing * ends[0, 1]
+        before_x, before_y = (
+            points[1, 0] - 2.0 * spacing * ends[0, 0],
+            points[1, 1] - 2.0 * spacing * ends[0, 1],
+        )
     else:
         before_x, before_y = points[i - 1, 0], points[i - 1, 1]
     if i == n - 1:
-        after_x, after_y = points[n - 2, 0] + 2.0 * spacing * ends[1, 0], points[n - 2, 1] + 2.0 * spacing * ends[1, 1]
+        after_x, after_y = (
+            points[n - 2, 0] + 2.0 * spacing * ends[1, 0],
+            points[n - 2, 1] + 2.0 * spacing * ends[1, 1],
+        )
     else:
         after_x, after_y = points[i + 1, 0], points[i + 1, 1]
     square = spacing * spacing
-    return (before_x - 2.0 * points[i, 0] + after_x) / square, (before_y - 2.0 * points[i, 1] + after_y) / square
+    return (before_x - 2.0 * points[i, 0] + after_x) / square, (
+        before_y - 2.0 * points[i, 1] + after_y
+    ) / square
 
 
 @kernel(inline=True, forced=True)
-def _add_tension(i: int, band: Band, points: Floats, stiff: Floats, matrix: Floats, right: Floats) -> None:
+def _add_tension(
+    i: int, band: Band, points: Floats, stiff: Floats, matrix: Floats, right: Floats
+) -> None:
     """Add what draws point i to the guess, to its anchor and to where it is, and what bending costs."""
     n, curve, twist = points.shape[0], band.bend / band.spacing**4, band.bend / band.spacing**6
     _add(matrix, right, i, UNIT, 1, band.hold[i], band.guess[i, 0], band.guess[i, 1])
@@ -129,7 +152,9 @@ def _add_tension(i: int, band: Band, points: Floats, stiff: Floats, matrix: Floa
 
 
 @kernel(inline=True, forced=True)
-def _add_obstacles(i: int, band: Band, points: Floats, row: Floats, matrix: Floats, right: Floats) -> float:
+def _add_obstacles(
+    i: int, band: Band, points: Floats, row: Floats, matrix: Floats, right: Floats
+) -> float:
     """Add what pushes the discs of point i away from obstacles, with weight row[3]; how much the nearest lacks, as a share."""
     disc, cell = band.disc, band.resolution
     tx, ty = points[i + 1, 0] - points[i - 1, 0], points[i + 1, 1] - points[i - 1, 1]
@@ -143,7 +168,16 @@ def _add_obstacles(i: int, band: Band, points: Floats, row: Floats, matrix: Floa
         if room < aim and slope > 1e-9:
             away = (aim - room) / slope
             row[0], row[1], row[2] = -disc[k] / norm, 1.0, disc[k] / norm
-            _add(matrix, right, i - 1, row, 3, row[3] if room < needed else WISH_WEIGHT, x + away * gx, y + away * gy)
+            _add(
+                matrix,
+                right,
+                i - 1,
+                row,
+                3,
+                row[3] if room < needed else WISH_WEIGHT,
+                x + away * gx,
+                y + away * gy,
+            )
             if room < needed:
                 worst = max(worst, (needed - room) / needed)
     return worst
@@ -159,9 +193,20 @@ def _pin_ends(band: Band, points: Floats, stiff: Floats, matrix: Floats, right: 
         sign = band.spacing if side == 0 else -band.spacing
         hx, hy = sign * band.ends[side, 0], sign * band.ends[side, 1]
         _add(matrix, right, i, UNIT, 1, PINNED, points[i, 0], points[i, 1])
-        _add(matrix, right, inner, UNIT, 1, 4.0 * stiff[i] * curve, points[i, 0] + hx, points[i, 1] + hy)
+        _add(
+            matrix,
+            right,
+            inner,
+            UNIT,
+            1,
+            4.0 * stiff[i] * curve,
+            points[i, 0] + hx,
+            points[i, 1] + hy,
+        )
         edge, first = (FIRST_THIRD, 0) if side == 0 else (LAST_THIRD, n - 3)
-        _add(matrix, right, first, edge, 3, (stiff[i] + stiff[inner]) * twist, -2.0 * hx, -2.0 * hy)
+        _add(
+            matrix, right, first, edge, 3, (stiff[i] + stiff[inner]) * twist, -2.0 * hx, -2.0 * hy
+        )
 
 
 @kernel(I, BAND, OUT1, OUT1, OUT2)
@@ -187,11 +232,17 @@ def relax(steps: int, band: Band, stiff: Floats, push: Floats, points: Floats) -
             _add_tension(i, band, points, stiff, matrix, right)
             if 1 <= i < n - 1:
                 row[3] = push[i]
-                push[i] = min(push[i] * (1.0 + _add_obstacles(i, band, points, row, matrix, right)), STRONG)
+                push[i] = min(
+                    push[i] * (1.0 + _add_obstacles(i, band, points, row, matrix, right)), STRONG
+                )
         _pin_ends(band, points, stiff, matrix, right)
         _solve(matrix, right)
         points[1 : n - 1] = right[1 : n - 1]
         for i in range(n):
             bx, by = _bending(points, band.ends, band.spacing, i)
             excess = np.sqrt(bx * bx + by * by) / (CURVATURE_THRESHOLD * band.limit)
-            stiff[i] = min(stiff[i] * min(excess, 1.5), STRONG) if excess > 1.0 else max(0.98 * stiff[i], 1.0)
+            stiff[i] = (
+                min(stiff[i] * min(excess, 1.5), STRONG)
+                if excess > 1.0
+                else max(0.98 * stiff[i], 1.0)
+            )

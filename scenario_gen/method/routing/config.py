@@ -12,7 +12,10 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
 from scenario_gen.method.routing.search.planner import Planner
 from scenario_gen.method.routing.search.pose_planner import PoseRrtStarConnect, PoseSearchConfig
-from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.method.routing.search.rrt_star_connect import (
+    RrtStarConnect,
+    RrtStarConnectConfig,
+)
 from scenario_gen.types import OF_CARS
 
 
@@ -50,11 +53,24 @@ class PlanningConfig(Parameters):
 
     replaced = OF_CARS
 
-    planner: str = parameter("rrt_star_connect", "geometric planner", choices=tuple(PLANNERS.built_in), group=PLANNERS.group)
-    iterations: int = parameter(1000, "iterations of the planner between two anchors", low=1, high=10_000_000)
-    margin: float = parameter(0.3, "room to keep beside the footprint where the road has it", unit="m", low=0.0, high=5.0)
-    drivable: bool = parameter(True, "smooth routes that can be driven; false: the planner's bare polylines")
-    spacing: float = parameter(0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5)
+    planner: str = parameter(
+        "rrt_star_connect",
+        "geometric planner",
+        choices=tuple(PLANNERS.built_in),
+        group=PLANNERS.group,
+    )
+    iterations: int = parameter(
+        1000, "iterations of the planner between two anchors", low=1, high=10_000_000
+    )
+    margin: float = parameter(
+        0.3, "room to keep beside the footprint where the road has it", unit="m", low=0.0, high=5.0
+    )
+    drivable: bool = parameter(
+        True, "smooth routes that can be driven; false: the planner's bare polylines"
+    )
+    spacing: float = parameter(
+        0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5
+    )
     keep_side: float = parameter(
         0.05,
         "price of a metre driven a metre beside a leg's direct line, threefold towards oncoming traffic; 0: no side is dearer",
@@ -62,7 +78,9 @@ class PlanningConfig(Parameters):
         low=0.0,
         high=10.0,
     )
-    traffic_side: str = parameter("right", "the side of the road to keep to", choices=("right", "left"))
+    traffic_side: str = parameter(
+        "right", "the side of the road to keep to", choices=("right", "left")
+    )
 
     rrt_star_connect: RrtStarConnectConfig = field(default_factory=RrtStarConnectConfig)
     pose: PoseSearchConfig = field(default_factory=PoseSearchConfig)

@@ -20,7 +20,9 @@ WIDEST = 12.0  # [m] radius of an arc: a wider one cuts a junction's corner
 PARALLEL = np.radians(8.0)
 
 
-def direct(road: Road, vehicle: Vehicle, start: Floats, end: Floats, limit: float) -> Floats | None:
+def direct(
+    road: Road, vehicle: Vehicle, start: Floats, end: Floats, limit: float
+) -> Floats | None:
     """The first free one of the curves of `candidates`: poses (P, 3); None if there is none."""
     for poses in candidates(start, end, limit):
         if (sweep_is_free(road, poses, vehicle.length, vehicle.width)[:, 0] > 0.0).all():
@@ -40,7 +42,10 @@ def candidates(start: Floats, end: Floats, limit: float) -> Iterator[Floats]:
             yield poses
     yield from _by_an_arc(start, end, limit)
     (word, *lengths), _ = shortest_curve(Pose(*start), Pose(*end), 1.0 / limit)
-    yield chained(start, [(float(turn) * limit, length) for turn, length in zip(TURNS[word], lengths, strict=True)])
+    yield chained(
+        start,
+        [(float(turn) * limit, length) for turn, length in zip(TURNS[word], lengths, strict=True)],
+    )
 
 
 def hermite(start: Floats, end: Floats, stretch: float, limit: float) -> Floats | None:
@@ -50,7 +55,12 @@ def hermite(start: Floats, end: Floats, stretch: float, limit: float) -> Floats 
     t = np.linspace(0.0, 1.0, count)[:, None]
     a, b = (stretch * chord * unit(pose[2]) for pose in (start, end))
     rise = end[:2] - start[:2]
-    points = start[:2] + rise * np.square(t) * (3 - 2 * t) + a * t * np.square(1 - t) + b * np.square(t) * (t - 1)
+    points = (
+        start[:2]
+        + rise * np.square(t) * (3 - 2 * t)
+        + a * t * np.square(1 - t)
+        + b * np.square(t) * (t - 1)
+    )
     first = 6.0 * rise * t * (1 - t) + a * (1 - t) * (1 - 3 * t) + b * t * (3 * t - 2)
     second = 6.0 * rise * (1 - 2 * t) + a * (6 * t - 4) + b * (6 * t - 2)
     speed = np.hypot(*first.T)
@@ -78,7 +88,10 @@ def _by_an_arc(start: Floats, end: Floats, limit: float) -> Iterator[Floats]:
     for radius in np.linspace(widest, tightest, steps + 1) if steps else ():
         tangent = float(radius) * half
         arc = math.copysign(1.0 / float(radius), turn)
-        yield chained(start, [(0.0, before - tangent), (arc, abs(turn) * float(radius)), (0.0, after - tangent)])
+        yield chained(
+            start,
+            [(0.0, before - tangent), (arc, abs(turn) * float(radius)), (0.0, after - tangent)],
+        )
 
 
 def chained(start: Floats, parts: list[tuple[float, float]]) -> Floats:
@@ -93,7 +106,10 @@ def chained(start: Floats, parts: list[tuple[float, float]]) -> Floats:
         if curvature == 0.0:
             piece = (x + s * np.cos(yaw), y + s * np.sin(yaw), heading)
         else:
-            sin, cos = (np.sin(heading) - np.sin(yaw)) / curvature, (np.cos(heading) - np.cos(yaw)) / curvature
+            sin, cos = (
+                (np.sin(heading) - np.sin(yaw)) / curvature,
+                (np.cos(heading) - np.cos(yaw)) / curvature,
+            )
             piece = (x + sin, y - cos, heading)
         poses.append(np.column_stack(piece))
     return np.concatenate(poses)

@@ -27,11 +27,24 @@ from scenario_gen.method.routing.search.planner import (  # fmt: skip
 )
 from scenario_gen.method.routing.search.pose_planner import PlansPoses, PoseQuery, Wishes
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, squared_gaps, Targets
+from scenario_gen.method.routing.smooth import (
+    Curve,
+    Guess,
+    monotone_matching,
+    smooth,
+    squared_gaps,
+    Targets,
+)
 from scenario_gen.method.routing.tight import off_road, too_tight
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
-from scenario_gen.roads import clearance_field, footprint_fits, ground_for, nearest_pose_with_room, own_ground
+from scenario_gen.roads import (
+    clearance_field,
+    footprint_fits,
+    ground_for,
+    nearest_pose_with_room,
+    own_ground,
+)
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits, Vehicle
 
 STANDS = 0.05  # [m] a vehicle whose start and end are nearer than this has no path
@@ -41,7 +54,12 @@ DENSE = 0.05  # metres between places of a curve at which an anchor may lie,
 MOST_DENSE = 20_000  # so many at most: each is compared with each anchor
 SHARP = np.deg2rad(100.0)  # a waypoint farther off the heading than this lies behind
 SOFT_WEIGHT = 0.1  # weight of an anchor that is no waypoint
-FIRMNESS = ((1.0, 12), (10.0, 12), (100.0, 12), (1000.0, 24))  # by which a guess is held, ever more firmly, and rounds for each
+FIRMNESS = (
+    (1.0, 12),
+    (10.0, 12),
+    (100.0, 12),
+    (1000.0, 24),
+)  # by which a guess is held, ever more firmly, and rounds for each
 OWN_HOLD, DIRECT_HOLD, PATH_HOLD = 1.0, 0.3, 0.1
 ON_PATH = 0.05  # [m] an anchor nearer to the fitted path than this is on it
 GUIDE_STRIDE = 10  # poses of a guide that are left out between two
@@ -49,7 +67,11 @@ AGAINST = 3.0  # times as dear as the other way it is to leave a leg's direct li
 HALF_LANE = 1.75  # [m] that far towards it is one's own side
 LACK = 1.0  # price of a metre without the room wished for, beside the metre itself
 ROOMY = 0.05  # [m] more on every side than a footprint needs
-TIGHTEST = (0.97, 0.9, 0.8)  # shares of the largest curvature that a search may use, one after another: smoothing needs some
+TIGHTEST = (
+    0.97,
+    0.9,
+    0.8,
+)  # shares of the largest curvature that a search may use, one after another: smoothing needs some
 OWN_SHARE = 0.1  # of the iterations, in which a way is looked for that stays on its own side: there is one at once, or none
 EASE, FARTHEST = 0.15, 1.0  # [m] room around a waypoint that is eased, and how far it may be moved
 PATIENCE = 20  # times the iterations in which a search goes on for a first path
@@ -114,7 +136,17 @@ def plan_routes(
     tasks = []
     for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True)):
         sharpest = limits.of(vehicle.type).planned.max_curvature
-        tasks.append(_Task(ground_for(road, vehicle), vehicle, fitted, config, planner, seed + 7919 * n, sharpest))
+        tasks.append(
+            _Task(
+                ground_for(road, vehicle),
+                vehicle,
+                fitted,
+                config,
+                planner,
+                seed + 7919 * n,
+                sharpest,
+            )
+        )
     return tuple(_on_own_lanes(task) for task in tasks)
 
 
@@ -152,21 +184,32 @@ def _found(task: _Task, find: Callable[[], Any], name: str, columns: int) -> Flo
     """Return the path (P, columns) of this name in the plan that a planner finds; one of a plugin may return anything."""
     with PLANNERS.running(task.config.planner):
         path = np.asarray(getattr(find(), name), dtype=np.float64)
-        if path.ndim != 2 or len(path) < 2 or path.shape[1] < columns or not np.isfinite(path).all():
-            raise ValueError(f"its path is no array of two or more finite rows of {columns} numbers")
+        if (
+            path.ndim != 2
+            or len(path) < 2
+            or path.shape[1] < columns
+            or not np.isfinite(path).all()
+        ):
+            raise ValueError(
+                f"its path is no array of two or more finite rows of {columns} numbers"
+            )
         return path
 
 
 def _route(task: _Task) -> Route:
     anchors = task.anchors
     for k in (0, len(anchors) - 1):
-        if not footprint_fits(task.road, anchors[k][None], task.vehicle.length, task.vehicle.width)[0]:
+        if not footprint_fits(
+            task.road, anchors[k][None], task.vehicle.length, task.vehicle.width
+        )[0]:
             raise RefusedError(
                 f"{task.name(k)} is blocked: its footprint, {task.vehicle.length:.2f} m by {task.vehicle.width:.2f} m, "
                 f"has no room there on road {task.road.name!r}"
             )
     if task.fitted.stands.all() or np.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
-        return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1), joined=0, searched=0)
+        return Route(
+            anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1), joined=0, searched=0
+        )
     waypoints = _waypoints(anchors, task.fitted.stands, task.max_curvature)
     if not task.config.drivable:
         return _polyline(task, waypoints)
@@ -199,16 +242,34 @@ def _smoothed(task: _Task, waypoints: list[int]) -> Route | _Rough:
     legs, waypoints, left_out = _legs(task, waypoints)
     weights = _weights(anchors, waypoints)
     targets = Targets(anchors[weights > 0.0, :2], weights[weights > 0.0])
-    guess, searched = _joined([leg.guess for leg in legs]), len([leg for leg in legs if leg.searched])
+    guess, searched = (
+        _joined([leg.guess for leg in legs]),
+        len([leg for leg in legs if leg.searched]),
+    )
     curve: Curve | None = None
     for firmness, rounds in FIRMNESS:
         stop_if_cancelled()
         held = Guess(guess.points, guess.hold * firmness)
-        curve = smooth(task.road, task.vehicle, (anchors[0], anchors[-1]), targets, held, task.config, task.max_curvature, rounds)
+        curve = smooth(
+            task.road,
+            task.vehicle,
+            (anchors[0], anchors[-1]),
+            targets,
+            held,
+            task.config,
+            task.max_curvature,
+            rounds,
+        )
         if curve.curvature <= task.max_curvature and not len(curve.off_road):
             route = _sampled(task, curve.poses, curve.length)
             far = farthest(route.points, task.fitted.path)
-            return replace(route, joined=len(legs) - searched, searched=searched, left_out=left_out, farthest=far)
+            return replace(
+                route,
+                joined=len(legs) - searched,
+                searched=searched,
+                left_out=left_out,
+                farthest=far,
+            )
     assert curve is not None
     return _Rough(RefusedError(_reason(task, curve)), searched > 0)
 
@@ -314,7 +375,9 @@ def _leg(task: _Task, a: int, b: int, poses: Floats, *, last: bool) -> _Leg:
     if curve is not None:
         return _Leg(Guess(curve[:, :2], np.full(len(curve), DIRECT_HOLD)), searched=False)
     if isinstance(task.planner, PlansPoses):
-        points = _searched_poses(task, task.planner, (a, b), (start, end), PATIENCE if last else 1)[:, :2]
+        points = _searched_poses(
+            task, task.planner, (a, b), (start, end), PATIENCE if last else 1
+        )[:, :2]
     else:
         points = _searched(task, a, b)
     return _Leg(Guess(points, np.full(len(points), PATH_HOLD)), searched=True)
@@ -332,7 +395,9 @@ def _fitted_piece(task: _Task, start: Floats, end: Floats) -> Floats | None:
     if max(distances_to_line(np.stack([start, end]), path)) > ON_PATH:
         return None
     step = edge_lengths(poses[:, :2])
-    bend = np.abs(wrap_angle(np.diff(path[first : last + 1, 2]))) / edge_lengths(path[first : last + 1, :2])
+    bend = np.abs(wrap_angle(np.diff(path[first : last + 1, 2]))) / edge_lengths(
+        path[first : last + 1, :2]
+    )
     if bend.max() > task.max_curvature or step.min() < 1e-6:
         return None
     free = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
@@ -340,7 +405,11 @@ def _fitted_piece(task: _Task, start: Floats, end: Floats) -> Floats | None:
 
 
 def _searched_poses(
-    task: _Task, planner: PlansPoses, anchors: tuple[int, int], ends: tuple[Floats, Floats], patience: int
+    task: _Task,
+    planner: PlansPoses,
+    anchors: tuple[int, int],
+    ends: tuple[Floats, Floats],
+    patience: int,
 ) -> Floats:
     """A path (P, 3) between two anchors, whose poses (3,) are `ends`, for the vehicle itself.
 
@@ -348,7 +417,9 @@ def _searched_poses(
     """
     (a, b), (start, end), config, vehicle = anchors, ends, task.config, task.vehicle
     guide = next(candidates(start, end, task.max_curvature))[::GUIDE_STRIDE]
-    free = Wishes(config.margin, LACK, guide, *_sides(config, config.keep_side * AGAINST, config.keep_side))
+    free = Wishes(
+        config.margin, LACK, guide, *_sides(config, config.keep_side * AGAINST, config.keep_side)
+    )
     most_left, most_right = _sides(config, HALF_LANE, np.inf)
     own = replace(free, about=_own_side(guide, config), most_left=most_left, most_right=most_right)
     own_iterations = max(int(OWN_SHARE * config.iterations), 1)
@@ -359,16 +430,25 @@ def _searched_poses(
     limit = task.tightest * task.max_curvature
     error: RefusedError | None = None
     for wishes, extra, iterations in attempts:
-        query = PoseQuery(start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit)
+        query = PoseQuery(
+            start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit
+        )
         try:
             try:
-                search = partial(planner.plan_poses, task.road, query, Budget(iterations), task.seed + a, wishes)
+                search = partial(
+                    planner.plan_poses, task.road, query, Budget(iterations), task.seed + a, wishes
+                )
                 return _found(task, search, "poses", 3)
             except BudgetSpentError:
                 if extra or patience == 1:
                     raise
                 budget = Budget(patience * config.iterations, first=True)
-                return _found(task, partial(planner.plan_poses, task.road, query, budget, task.seed + a, wishes), "poses", 3)
+                return _found(
+                    task,
+                    partial(planner.plan_poses, task.road, query, budget, task.seed + a, wishes),
+                    "poses",
+                    3,
+                )
         except NoWayError as reason:
             error = RefusedError(f"{where}: {reason}")
         except BudgetSpentError:
@@ -378,7 +458,9 @@ def _searched_poses(
                 f"iterations{off_road(task.road, vehicle, task.fitted.path)}"
             )
         except BlockedError as reason:  # of the larger footprint: the anchors themselves have room
-            error = RefusedError(f"{task.name(a if reason.end == 'start' else b)} is blocked: {reason}")
+            error = RefusedError(
+                f"{task.name(a if reason.end == 'start' else b)} is blocked: {reason}"
+            )
     assert error is not None
     raise error
 
@@ -391,7 +473,9 @@ def _sides(config: PlanningConfig, against: float, away: float) -> tuple[float, 
 def _own_side(guide: Floats, config: PlanningConfig) -> Floats:
     """Poses on a guide (G, 3), and some metres beside it, away from oncoming traffic."""
     sign = 1.0 if config.traffic_side == "right" else -1.0
-    aside = sign * np.column_stack((np.sin(guide[:, 2]), -np.cos(guide[:, 2]), np.zeros(len(guide))))
+    aside = sign * np.column_stack(
+        (np.sin(guide[:, 2]), -np.cos(guide[:, 2]), np.zeros(len(guide)))
+    )
     return np.concatenate([guide + metres * aside for metres in (0.0, 1.0, 2.0, 3.0)])
 
 
@@ -407,10 +491,14 @@ def _searched(task: _Task, a: int, b: int) -> Floats:
     start, end = task.anchors[a], task.anchors[b]
     query = Query(start[:2], end[:2], _radius(task, start, end))
     try:
-        search = partial(plan_with_retry, task.planner, task.road, query, task.config.iterations, task.seed + a)
+        search = partial(
+            plan_with_retry, task.planner, task.road, query, task.config.iterations, task.seed + a
+        )
         return _found(task, search, "path", 2)
     except BlockedError as error:
-        raise RefusedError(f"{task.name(a if error.end == 'start' else b)} is blocked: {error}") from error
+        raise RefusedError(
+            f"{task.name(a if error.end == 'start' else b)} is blocked: {error}"
+        ) from error
     except RefusedError as error:
         raise RefusedError(f"between {task.name(a)} and {task.name(b)}: {error}") from error
 
@@ -458,7 +546,9 @@ def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
     nearest = monotone_matching(per_group)
     offset = task.anchors[:, :2] - poses[nearest[group], :2]
     yaw = poses[nearest[group], 2]
-    ahead = np.bincount(group, offset[:, 0] * np.cos(yaw) + offset[:, 1] * np.sin(yaw)) / np.bincount(group)
+    ahead = np.bincount(
+        group, offset[:, 0] * np.cos(yaw) + offset[:, 1] * np.sin(yaw)
+    ) / np.bincount(group)
     step = length[1] if len(length) > 1 else 0.0
     refined = length[nearest] + np.clip(ahead, -step, step)  # between the dense points
     refined[0], refined[-1] = 0.0, length[-1]
@@ -474,7 +564,9 @@ def _polyline(task: _Task, waypoints: list[int]) -> Route:
 
     def poses_at(length: Floats) -> Floats:
         which = np.clip(np.searchsorted(at, length, side="right") - 1, 0, len(yaw) - 1)
-        return np.column_stack((np.interp(length, at, path[:, 0]), np.interp(length, at, path[:, 1]), yaw[which]))
+        return np.column_stack(
+            (np.interp(length, at, path[:, 0]), np.interp(length, at, path[:, 1]), yaw[which])
+        )
 
     return _sampled(task, poses_at, float(at[-1]))
 
@@ -492,4 +584,7 @@ def _reason(task: _Task, curve: Curve) -> str:
         where = curve.off_road[len(curve.off_road) // 2, :2]
         reasons.append(f"its footprint leaves the road at ({where[0]:.2f}, {where[1]:.2f}) m")
     nearest = task.name(int(np.argmin(np.hypot(*(task.anchors[:, :2] - where).T))))
-    return f"no drivable route for vehicle {task.vehicle.id} on road {task.road.name!r} near {nearest}: " + "; ".join(reasons)
+    return (
+        f"no drivable route for vehicle {task.vehicle.id} on road {task.road.name!r} near {nearest}: "
+        + "; ".join(reasons)
+    )

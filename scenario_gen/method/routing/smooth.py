@@ -140,7 +140,9 @@ def _room(road: Road, points: Floats, disc: Floats) -> Floats:
     return np.where(inside, clearance_field(road)[row, column], 0.0)
 
 
-def _wished(road: Road, disc: Floats, wish: float, start: Floats, end: Floats, spacing: float, count: int) -> Floats:
+def _wished(
+    road: Road, disc: Floats, wish: float, start: Floats, end: Floats, spacing: float, count: int
+) -> Floats:
     """Clearance wanted along the band (count,): what there is at its ends, rising from there by 5 cm per metre to `wish`."""
     field = clearance_field(road)
     along = np.arange(count) * spacing
@@ -157,13 +159,21 @@ def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: F
     spline = CubicSpline(knots, points, bc_type=((1, unit(start[2])), (1, unit(end[2]))))
     u = np.linspace(0.0, knots[-1], int(np.ceil(knots[-1] / CHECK)) + 1)
     first, second = spline(u, 1), spline(u, 2)
-    bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.hypot(*first.T) ** 3
+    bend = (
+        np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.hypot(*first.T) ** 3
+    )
     poses = np.column_stack((spline(u), np.arctan2(first[:, 1], first[:, 0])))
-    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(edge_lengths(poses[:, :2]), 1e-6)
-    bend[1:] = np.maximum(bend[1:], turned)  # a cusp on a straight line has no curvature, but turns round
+    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(
+        edge_lengths(poses[:, :2]), 1e-6
+    )
+    bend[1:] = np.maximum(
+        bend[1:], turned
+    )  # a cusp on a straight line has no curvature, but turns round
     poses[0], poses[-1] = start, end
     fits = sweep_is_free(road, poses, vehicle.length, vehicle.width)[:, 0] > 0.0
-    return Curve(spline, float(knots[-1]), float(bend.max()), poses[np.argmax(bend), :2], poses[~fits])
+    return Curve(
+        spline, float(knots[-1]), float(bend.max()), poses[np.argmax(bend), :2], poses[~fits]
+    )
 
 
 def resampled(guess: Guess, spacing: float, count: int | None = None) -> Guess:

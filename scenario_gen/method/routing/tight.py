@@ -31,7 +31,10 @@ def too_tight(road: Road, vehicle: Vehicle, path: Floats, limit: float) -> str:
         return ""
     reach = np.cumsum(np.concatenate(([0.0], edge_lengths(path[:, :2]))))
     driven = np.maximum(reach[_STEPS:] - reach[:-_STEPS], _SHORTEST_M)
-    bend, middle = np.abs(wrap_angle(path[_STEPS:, 2] - path[:-_STEPS, 2])) / driven, path[_STEPS // 2 :][: len(driven)]
+    bend, middle = (
+        np.abs(wrap_angle(path[_STEPS:, 2] - path[:-_STEPS, 2])) / driven,
+        path[_STEPS // 2 :][: len(driven)],
+    )
     needs = f"it turns with at most {limit:.3f} 1/m ({1.0 / limit:.1f} m)"
     if bend.max() <= limit:
         bend = np.where(footprint_fits(road, middle, vehicle.length, vehicle.width), 0.0, bend)

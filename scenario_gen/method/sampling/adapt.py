@@ -9,19 +9,44 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, PATIENCE, PLAIN, Seen, STAGE, STAGES
+from scenario_gen.method.sampling.directed import (
+    Aim,
+    CHUNK,
+    FAIR,
+    GOOD,
+    PATIENCE,
+    PLAIN,
+    Seen,
+    STAGE,
+    STAGES,
+)
 from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
 from scenario_gen.template import closest_crossing, Conflict, conflict_of, conflicts_in
-from scenario_gen.types import Cause, Encounter, Measures, Reaction, reaction_facts, Request, Scenario, Target, token, Verdict
+from scenario_gen.types import (
+    Cause,
+    Encounter,
+    Measures,
+    Reaction,
+    reaction_facts,
+    Request,
+    Scenario,
+    Target,
+    token,
+    Verdict,
+)
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 
 ANY = 1 << 30  # conflicts: with one clock for all a road alone says which there are
 MOST_BEYOND = 3.0  # s
-STARTS_INSIDE = 0.5  # s; who is in the shared area so soon has no way on which the other one could come first
-Judged = tuple[int, Scenario | None, Cause | None]  # an index, the candidate if it has a speed profile, why it is refused
+STARTS_INSIDE = (
+    0.5  # s; who is in the shared area so soon has no way on which the other one could come first
+)
+Judged = tuple[
+    int, Scenario | None, Cause | None
+]  # an index, the candidate if it has a speed profile, why it is refused
 
 
 @dataclass(frozen=True)
@@ -57,7 +82,9 @@ class Judge:
             verdicts = sorted(check(first), key=lambda own: own.not_applicable)
             absent = min(absent, verdicts[len(verdicts) // 4].not_applicable)
             keep = [_reactions_lost(own) for own in verdicts if own.not_applicable <= absent]
-            lost = {pair: message for pair, message in lost.items() if all(pair in own for own in keep)}
+            lost = {
+                pair: message for pair, message in lost.items() if all(pair in own for own in keep)
+            }
         return cls(check, absent, enough, lost)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
@@ -88,13 +115,17 @@ def aim_of(encounter: Encounter, request: Request, measures: Measures | None) ->
         if closest is not None:
             names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
             targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
-            beyond = min(closest.exit_first - closest.entry_first, MOST_BEYOND)  # it must have left by then
+            beyond = min(
+                closest.exit_first - closest.entry_first, MOST_BEYOND
+            )  # it must have left by then
             if closest.entry_first <= STARTS_INSIDE:
                 note = f"; in the recording vehicle {names[0]} is in the shared area {closest.entry_first:.1f} s after the start"
     if not targets:
         return None
     if measures is None:
-        raise InputError("a target or another order is requested, but nothing is given that measures scenarios (`measures`)")
+        raise InputError(
+            "a target or another order is requested, but nothing is given that measures scenarios (`measures`)"
+        )
     return Aim.of(targets, encounter, measures.figure, beyond, note)
 
 
@@ -117,11 +148,17 @@ def label_of(
     def label(whole: Scenario) -> dict[str, str]:
         facts = held | (measures.nearness(whole) if measures is not None else {})
         if aim is not None:
-            facts |= {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
+            facts |= {
+                f"target.{t.label}": f"{v:.6g}"
+                for t, v in zip(aim.targets, aim.values(whole), strict=True)
+            }
         if request.order == "keep":
             return facts
         messages = [_order(encounter, own, whole) for own in conflicts]
-        return facts | {"order": request.order, "passing_order": "; ".join(messages) or "nobody meets anybody"}
+        return facts | {
+            "order": request.order,
+            "passing_order": "; ".join(messages) or "nobody meets anybody",
+        }
 
     return label
 
@@ -133,7 +170,11 @@ def _order(encounter: Encounter, own: Conflict, whole: Scenario) -> str:
     one, two = (encounter.vehicles[n].id for n in (own.first, own.second))
     if conflict is None:
         return f"{one} and {two} do not meet (in the recording {one} goes first)"
-    return f"{one} before {two}, as in the recording" if conflict.first == own.first else f"{two} before {one}, swapped"
+    return (
+        f"{one} before {two}, as in the recording"
+        if conflict.first == own.first
+        else f"{two} before {one}, swapped"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +199,11 @@ def adapted(sampler: Sampler, judge: Judge, aim: Aim, cancelled: Cancelled) -> A
     for level in range(len(LEVELS)):
         pilots.append(Seen())
         judged.append([])
-        share.append(_stage(sampler, level, 0, judge, aim, pilots[-1], np.ones(len(aim.targets)), judged[-1]))
+        share.append(
+            _stage(
+                sampler, level, 0, judge, aim, pilots[-1], np.ones(len(aim.targets)), judged[-1]
+            )
+        )
         if share[-1] >= judge.enough or cancelled():
             break
     best = int(np.argmax(share))
@@ -179,13 +224,29 @@ def adapted(sampler: Sampler, judge: Judge, aim: Aim, cancelled: Cancelled) -> A
         now = seen.hits() - hits
         hits, since = seen.hits(), 0 if now > most else since + 1
         most = max(most, now)
-        if most >= GOOD * STAGE or (most >= FAIR * STAGE and since >= 1) or (most and since >= PATIENCE):
+        if (
+            most >= GOOD * STAGE
+            or (most >= FAIR * STAGE and since >= 1)
+            or (most and since >= PATIENCE)
+        ):
             break
-    return Adapted(replace(staged, proposal=seen.proposal() if seen.hits() else None), seen, len(seen.z) - 1, candidates)
+    return Adapted(
+        replace(staged, proposal=seen.proposal() if seen.hits() else None),
+        seen,
+        len(seen.z) - 1,
+        candidates,
+    )
 
 
 def _stage(
-    sampler: Sampler, level: int, stage: int, judge: Judge, aim: Aim, seen: Seen, unit: Floats, judged: list[Judged] | None = None
+    sampler: Sampler,
+    level: int,
+    stage: int,
+    judge: Judge,
+    aim: Aim,
+    seen: Seen,
+    unit: Floats,
+    judged: list[Judged] | None = None,
 ) -> float:
     """Draw a stage's candidates, measure them, check those nearest to the range; return the share of the checked that is valid.
 
@@ -202,7 +263,9 @@ def _stage(
         drawn += scenarios
     seen.add(aim, z, sampler.proposal, drawn, unit)
     checked = good = 0
-    nearest = [k for k in np.argsort(seen.distance[-1], kind="stable").tolist() if drawn[k] is not None]
+    nearest = [
+        k for k in np.argsort(seen.distance[-1], kind="stable").tolist() if drawn[k] is not None
+    ]
     for start in range(0, len(nearest), CHUNK):
         rows = nearest[start : start + CHUNK]
         verdicts = judge([scenario for k in rows if (scenario := drawn[k]) is not None])

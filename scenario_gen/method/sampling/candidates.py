@@ -58,7 +58,11 @@ class VehicleModel:
     @property
     def size(self) -> int:
         """Standard normal numbers needed per candidate."""
-        return int(self.lateral_root.shape[1]) + self.speed.size + (self.freedom.size if self.freedom else 0)
+        return (
+            int(self.lateral_root.shape[1])
+            + self.speed.size
+            + (self.freedom.size if self.freedom else 0)
+        )
 
     def draw(self, z: Floats, scale: Scale, shared: Clock, nominal: Clock) -> "_Drawn":
         """Draw S candidates of this vehicle from numbers z (S, size), on the clocks that all share."""
@@ -70,7 +74,9 @@ class VehicleModel:
             own = self.freedom.clock.size
             clock = self.freedom.clock.sample(free[:, :own], scale.own, shared, nominal)
             deviation = deviation + scale.lateral * self.freedom.across(free[:, own])
-            faster = scale.longitudinal * self.freedom.faster(free[:, own + 1 : own + 3], -0.8 * self.speed.mean[[0, -1]])
+            faster = scale.longitudinal * self.freedom.faster(
+                free[:, own + 1 : own + 3], -0.8 * self.speed.mean[[0, -1]]
+            )
             if scale.lateral == 1.0:
                 vehicles = self.freedom.vehicles(free[:, own + 3], self.vehicle)
         curve, arc = self.path.displaced(soft_clipped(deviation, self.room))
@@ -80,7 +86,11 @@ class VehicleModel:
         if self.freedom is not None:
             ends = np.where(self.freedom.end_speed > 0.0, 1.0, ends)
         speed, ok = self.speed.draw(
-            scale.longitudinal * z[:, across:along], arc[:, -1] - self.path.length, pace[:, cell], ends, faster
+            scale.longitudinal * z[:, across:along],
+            arc[:, -1] - self.path.length,
+            pace[:, cell],
+            ends,
+            faster,
         )
         return _Drawn(vehicles, clock, curve, arc, np.ascontiguousarray(speed), ok)
 
@@ -88,7 +98,13 @@ class VehicleModel:
 def curvature(two: Floats) -> Floats:
     """Curvature (S,) [1/m] between two states (S, 2, 5) that follow each other."""
     apart = np.hypot(*(two[:, 1, :2] - two[:, 0, :2]).T)
-    return np.asarray(np.where(apart > _APART, wrap_angle(two[:, 1, 2] - two[:, 0, 2]) / np.maximum(apart, _APART), 0.0))
+    return np.asarray(
+        np.where(
+            apart > _APART,
+            wrap_angle(two[:, 1, 2] - two[:, 0, 2]) / np.maximum(apart, _APART),
+            0.0,
+        )
+    )
 
 
 def nearest_cell(clock: Clock, at: Floats) -> Ints:
@@ -111,7 +127,9 @@ class _Drawn:
     speed: Floats
     ok: Bools
 
-    def states(self, model: VehicleModel, at: Floats, counts: Ints, read: _Read | None = None) -> tuple[Floats, _Read]:
+    def states(
+        self, model: VehicleModel, at: Floats, counts: Ints, read: _Read | None = None
+    ) -> tuple[Floats, _Read]:
         """States (S, T, 5) at times (S, T) [s] on the clock, the first `counts` (S,) of them; and what was read of the clock."""
         if read is None or read[0] is not self.clock:  # a shared one is read once
             now = ClockRead(np.zeros(at.shape), np.ones(at.shape), np.zeros(at.shape), counts)
@@ -149,7 +167,10 @@ class Batch:
 
     @classmethod
     def of(
-        cls, models: tuple[VehicleModel, ...], drawn: Sequence[_Drawn], window: tuple[Window, Floats] | None = None
+        cls,
+        models: tuple[VehicleModel, ...],
+        drawn: Sequence[_Drawn],
+        window: tuple[Window, Floats] | None = None,
     ) -> "Batch":
         """Join what is drawn: a scenario is the stretch in which all are there who are there throughout the template.
 
@@ -167,24 +188,47 @@ class Batch:
         if any(model.freedom is not None for model in models):
             four, near = np.full(len(ends), 4), np.array([0.0, DT, -DT, 0.0])
             numbered = enumerate(zip(models, drawn, strict=True))
-            at_ends = np.stack([one.states(m, ends[:, n, [0, 0, 1, 1]] + near, four)[0] for n, (m, one) in numbered])
+            at_ends = np.stack(
+                [
+                    one.states(m, ends[:, n, [0, 0, 1, 1]] + near, four)[0]
+                    for n, (m, one) in numbered
+                ]
+            )
             for n, model in enumerate(models):
                 for end, sign in ((0, -1.0), (1, 1.0)):
                     if there[n, end] and model.speed.spline.still[-end]:
                         reach[:, n, end] = sign * np.inf
                     elif there[n, end] and model.freedom is not None:
-                        reach[:, n, end] += sign * seconds_onward(at_ends[n, :, -end], float(model.freedom.ahead[end]), sign)
-        begin = np.maximum(reach[:, there[:, 0], 0].max(axis=1, initial=-np.inf), ends[..., 0].min(axis=1))
-        end = np.minimum(reach[:, there[:, 1], 1].min(axis=1, initial=np.inf), ends[..., 1].max(axis=1))
+                        reach[:, n, end] += sign * seconds_onward(
+                            at_ends[n, :, -end], float(model.freedom.ahead[end]), sign
+                        )
+        begin = np.maximum(
+            reach[:, there[:, 0], 0].max(axis=1, initial=-np.inf), ends[..., 0].min(axis=1)
+        )
+        end = np.minimum(
+            reach[:, there[:, 1], 1].min(axis=1, initial=np.inf), ends[..., 1].max(axis=1)
+        )
         if window is not None:
-            kept = np.stack([one.clock.time[:, nearest_cell(one.clock, window[0].between)] for one in drawn])
+            kept = np.stack(
+                [one.clock.time[:, nearest_cell(one.clock, window[0].between)] for one in drawn]
+            )
             span = np.column_stack([begin, end])
-            begin, end = window[0].cut(window[1], np.column_stack([kept[..., 0].min(axis=0), kept[..., 1].max(axis=0)]), span).T
+            begin, end = (
+                window[0]
+                .cut(
+                    window[1],
+                    np.column_stack([kept[..., 0].min(axis=0), kept[..., 1].max(axis=0)]),
+                    span,
+                )
+                .T
+            )
         ends_shown = ends.copy()
         ends_shown[:, there[:, 0], 0], ends_shown[:, there[:, 1], 1] = begin[:, None], end[:, None]
         count = np.floor((end - begin) / DT + 1e-6).astype(np.int64) + 1
         at = (ends_shown - begin[:, None, None]) / DT
-        present = np.stack([np.ceil(at[..., 0] - 1e-6), np.floor(at[..., 1] + 1e-6)], axis=-1).astype(np.int64)
+        present = np.stack(
+            [np.ceil(at[..., 0] - 1e-6), np.floor(at[..., 1] + 1e-6)], axis=-1
+        ).astype(np.int64)
         present = np.clip(present, 0, np.maximum(count - 1, 0)[:, None, None])
         feasible = np.logical_and.reduce([one.ok for one in drawn])
         feasible &= (count >= 2) & (present[..., 1] > present[..., 0]).all(axis=1)
@@ -196,7 +240,9 @@ class Batch:
         Times count from the scenario's begin. Of a candidate only the first `count` are filled.
         """
         samples = len(self.feasible)
-        counts = np.full(samples, len(time)) if count is None else np.asarray(count, dtype=np.int64)
+        counts = (
+            np.full(samples, len(time)) if count is None else np.asarray(count, dtype=np.int64)
+        )
         at = time + self.begin[:, None]
         out = np.empty((len(self.models), samples, len(time), 5))
         read: _Read | None = None
@@ -209,8 +255,12 @@ class Batch:
                 beyond = np.flatnonzero((since > 0.0).any(axis=0))
                 if len(beyond) and not model.speed.spline.still[-end]:
                     since, state = since[:, beyond], self.at_ends[n][:, -end]
-                    further = onward(state, curvature(self.at_ends[n][:, 2 * end : 2 * end + 2]), since, sign)
-                    out[n][:, beyond] = np.where((since > 0.0)[..., None], further, out[n][:, beyond])
+                    further = onward(
+                        state, curvature(self.at_ends[n][:, 2 * end : 2 * end + 2]), since, sign
+                    )
+                    out[n][:, beyond] = np.where(
+                        (since > 0.0)[..., None], further, out[n][:, beyond]
+                    )
         return out
 
     def scenarios(self, seed: int, index: Sequence[int], frame_id: str) -> list[Scenario | None]:
@@ -218,11 +268,32 @@ class Batch:
         time = np.round(np.arange(max(int(self.count.max()), 2)) * DT, 9)
         out = self.states(time, np.maximum(self.count, 0).tolist())
         results: list[Scenario | None] = []
-        for s, (ok, count) in enumerate(zip(self.feasible.tolist(), self.count.tolist(), strict=True)):
+        for s, (ok, count) in enumerate(
+            zip(self.feasible.tolist(), self.count.tolist(), strict=True)
+        ):
             if not ok:
                 results.append(None)
                 continue
-            t, (x, y, yaw, speed, acceleration) = time[:count], np.moveaxis(out[:, s, :count], -1, 0)
-            position, vehicles = np.stack([x, y], axis=-1), tuple(one.vehicles[s] for one in self.drawn)
-            results.append(Scenario(vehicles, t, position, yaw, speed, acceleration, seed, index[s], frame_id, self.present[s]))
+            t, (x, y, yaw, speed, acceleration) = (
+                time[:count],
+                np.moveaxis(out[:, s, :count], -1, 0),
+            )
+            position, vehicles = (
+                np.stack([x, y], axis=-1),
+                tuple(one.vehicles[s] for one in self.drawn),
+            )
+            results.append(
+                Scenario(
+                    vehicles,
+                    t,
+                    position,
+                    yaw,
+                    speed,
+                    acceleration,
+                    seed,
+                    index[s],
+                    frame_id,
+                    self.present[s],
+                )
+            )
         return results

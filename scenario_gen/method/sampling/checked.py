@@ -45,11 +45,24 @@ def sample_scenarios(
     plan = plan_of(planned, sampling, limits, request, waits)
     check = checker_of(plan, sampling, limits, request).check
     drawn = draw_scenarios(
-        plan, check, sampling, count=count, seed=planned.seed, request=request, callbacks=callbacks, measures=measures
+        plan,
+        check,
+        sampling,
+        count=count,
+        seed=planned.seed,
+        request=request,
+        callbacks=callbacks,
+        measures=measures,
     )
     road, fit = planned.road_and_fit()
-    mirrored = [note for note in (road.lanes.notes if road.lanes is not None else ()) if note.startswith(MIRRORED)]
-    drawn = replace(drawn, adaptations=(*mirrored, *drawn.adaptations), graph=reactions_of(plan.encounter))
+    mirrored = [
+        note
+        for note in (road.lanes.notes if road.lanes is not None else ())
+        if note.startswith(MIRRORED)
+    ]
+    drawn = replace(
+        drawn, adaptations=(*mirrored, *drawn.adaptations), graph=reactions_of(plan.encounter)
+    )
     return replace(planned, fit=replace(fit, requested=plan.requested), generated=drawn)
 
 
@@ -65,7 +78,11 @@ def plan_of(
     Raises:
         InputError: road or fit are not known.
     """
-    encounter, segmentation, (road, fit) = planned.encounter, planned.segmentation, planned.road_and_fit()
+    encounter, segmentation, (road, fit) = (
+        planned.encounter,
+        planned.segmentation,
+        planned.road_and_fit(),
+    )
     states = relaxed_states(fit.requested, encounter, sampling, request)
     waits = waits_to_keep(encounter, segmentation) if waits is None else waits
     return Plan(encounter, segmentation, road, planned.routes, states, waits, limits)
@@ -78,4 +95,6 @@ def checker_of(plan: Plan, sampling: SamplingConfig, limits: Limits, request: Re
         RefusedError: an order is to be swapped, and there is none.
     """
     edges = kept_reactions(plan.encounter, sampling, request.order).edges
-    return Checker.of_template(plan.encounter, plan.road, plan.requested, plan.waits, limits, request.order, edges)
+    return Checker.of_template(
+        plan.encounter, plan.road, plan.requested, plan.waits, limits, request.order, edges
+    )

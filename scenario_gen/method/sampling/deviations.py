@@ -15,10 +15,16 @@ from scenario_gen.numerics import Floats
 from scenario_gen.roads import along_lanes
 from scenario_gen.types import Road, Vehicle
 
-LENGTH_SHARE = 0.25  # of the route, at most: what varies more slowly between given ends hardly varies
-SHORTEST_LENGTH = 15.0  # m; drivers do not wander within less, so on a short route there is little to draw
+LENGTH_SHARE = (
+    0.25  # of the route, at most: what varies more slowly between given ends hardly varies
+)
+SHORTEST_LENGTH = (
+    15.0  # m; drivers do not wander within less, so on a short route there is little to draw
+)
 SHORTEST_ROUTE = 3.0  # m; a shorter one is driven as planned
-ROOM_SIGMAS = 2.0  # a deviation of so many standard deviations still leaves the footprint on the road
+ROOM_SIGMAS = (
+    2.0  # a deviation of so many standard deviations still leaves the footprint on the road
+)
 MAX_ROOM_SIGMAS = 5.0  # more room than so many standard deviations is not looked for
 BEND_FROM_SHARE = 0.6  # share of the room from which on a deviation is bent back
 _FLANK_STEP = 0.5  # m
@@ -31,7 +37,9 @@ _MOVES = 0.5  # m/s, from which on a heading tells of them
 _CORRECTIONS = 0.5, 2.0  # s, least and greatest length scale
 _MOST_LENGTHS = 200  # of those in a drive, so that long ones cost no more than their length
 _MOST_CORRECTION = 0.1  # m, standard deviation at most
-_GAUSSIAN_MEDIAN = 1.4826  # standard deviation of a Gaussian over the median of its absolute values
+_GAUSSIAN_MEDIAN = (
+    1.4826  # standard deviation of a Gaussian over the median of its absolute values
+)
 
 
 @dataclass(frozen=True)
@@ -78,11 +86,21 @@ class Steering:
         if len(inside) < width:
             return cls(0.0, 1.0, driven, passed)
         rest = yaw - course
-        sideways = rest * at_least, np.gradient(rest, dt) * np.square(at_least) / np.maximum(speed, _MOVES)
-        quick, curved = (_GAUSSIAN_MEDIAN * float(np.median(np.abs(values[inside]))) for values in sideways)
+        sideways = (
+            rest * at_least,
+            np.gradient(rest, dt) * np.square(at_least) / np.maximum(speed, _MOVES),
+        )
+        quick, curved = (
+            _GAUSSIAN_MEDIAN * float(np.median(np.abs(values[inside]))) for values in sideways
+        )
         low, high = max(_CORRECTIONS[0], float(passed[-1]) / _MOST_LENGTHS), _CORRECTIONS[1]
         scale = max(min(float(np.sqrt(3.0)) * quick / max(curved, 1e-9), high), low)
-        return cls(min(scale * quick, _MOST_CORRECTION), scale, driven * (length / max(driven[-1], 1e-9)), passed)
+        return cls(
+            min(scale * quick, _MOST_CORRECTION),
+            scale,
+            driven * (length / max(driven[-1], 1e-9)),
+            passed,
+        )
 
     def root(self, arc: Floats) -> Floats:
         """Square root (G, r) of the covariance at arc lengths (G,) [m], with value and slope 0 at both ends."""
@@ -94,7 +112,9 @@ class Steering:
         return Regression(features, tied).predict(np.interp(arc, self.driven, self.passed)).factor
 
 
-def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig, steering: Steering) -> Floats:
+def lateral_covariance_root(
+    path: BasePath, room: Floats, config: SamplingConfig, steering: Steering
+) -> Floats:
     """Square root (G, r) of the covariance of the deviation [m] at the route's nodes.
 
     Source: eqs 12 to 15, of the deviation as a function of arc length.
@@ -158,10 +178,18 @@ def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Fl
         ahead = np.array([float(np.cos(yaw)), float(np.sin(yaw))])
         step = np.arange(_FLANK_STEP, most[end] + 0.5 * vehicle.length + _FLANK_STEP, _FLANK_STEP)
         side = np.array([-0.5, 0.0, 0.5]) * (vehicle.width + 2.0 * _SIDE)
-        points = np.array([x, y]) + sign * step[:, None, None] * ahead + side[:, None] * np.array([-ahead[1], ahead[0]])
+        points = (
+            np.array([x, y])
+            + sign * step[:, None, None] * ahead
+            + side[:, None] * np.array([-ahead[1], ahead[0]])
+        )
         free = road.drivable_at(points).all(axis=1)
         flat = points.reshape(-1, 2)
-        free &= along_lanes(road, np.column_stack((flat, np.full(len(flat), yaw)))).reshape(len(points), -1).all(axis=1)
+        free &= (
+            along_lanes(road, np.column_stack((flat, np.full(len(flat), yaw))))
+            .reshape(len(points), -1)
+            .all(axis=1)
+        )
         clear = float(step[-1]) if free.all() else _FLANK_STEP * int(np.argmin(free))
         metres[end] = min(max(clear - 0.5 * vehicle.length - _FLANK_STEP, 0.0), most[end])
     return metres
@@ -172,5 +200,9 @@ def soft_clipped(deviation: Floats, room: Floats) -> Floats:
     share = np.abs(deviation) / np.maximum(room, 1e-9)
     if (share <= BEND_FROM_SHARE).all():
         return deviation
-    bent = BEND_FROM_SHARE + (1.0 - BEND_FROM_SHARE) * np.tanh((share - BEND_FROM_SHARE) / (1.0 - BEND_FROM_SHARE))
-    return np.asarray(np.where(share <= BEND_FROM_SHARE, deviation, np.sign(deviation) * bent * room))
+    bent = BEND_FROM_SHARE + (1.0 - BEND_FROM_SHARE) * np.tanh(
+        (share - BEND_FROM_SHARE) / (1.0 - BEND_FROM_SHARE)
+    )
+    return np.asarray(
+        np.where(share <= BEND_FROM_SHARE, deviation, np.sign(deviation) * bent * room)
+    )

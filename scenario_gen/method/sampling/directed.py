@@ -27,14 +27,19 @@ from scenario_gen.types import Cause, Encounter, Measure, Pair, Scenario, Target
 NATURAL_SHARE = 0.1  # of the proposal's candidates that are drawn as without a target
 PLAIN = 0.35  # share of natural candidates that are valid and in the range, from which on no proposal is needed
 GOOD = 0.4  # the same share of the proposal's candidates, from which on it is good enough
-FAIR, PATIENCE = 0.1, 4  # with this share one stage without a better one ends the search, with less so many do
+FAIR, PATIENCE = (
+    0.1,
+    4,
+)  # with this share one stage without a better one ends the search, with less so many do
 STAGES = 10  # at most
 STAGE = 64  # candidates of a stage
 ELITE = 16  # candidates that a proposal is made from, at least
 CHUNK = 16  # candidates that are checked together, the nearest to the range first
 POOL = 256  # candidates of which the regression is made at most, the latest
 HORIZON = 10.0  # s; a time to collision above it says nothing
-_RIDGE = 0.1  # variance that the regression leaves to what is not linear, as a share of the response's
+_RIDGE = (
+    0.1  # variance that the regression leaves to what is not linear, as a share of the response's
+)
 _FEWEST = 8  # candidates of a regression, at least
 _PASSES = 3  # of the regression, each with the last one's squared coefficients as prior variances
 _INVALID = 1.0  # what is not valid, or not checked, counts as so much farther from the range
@@ -66,14 +71,21 @@ class Aim:
 
     @classmethod
     def of(
-        cls, targets: tuple[Target, ...], encounter: Encounter, measure: Measure, beyond: float = 0.0, note: str = ""
+        cls,
+        targets: tuple[Target, ...],
+        encounter: Encounter,
+        measure: Measure,
+        beyond: float = 0.0,
+        note: str = "",
     ) -> "Aim":
         """Resolve the vehicles that the targets name.
 
         Raises:
             InputError: one of them does not exist.
         """
-        return cls(targets, tuple(target.pair(encounter) for target in targets), measure, beyond, note)
+        return cls(
+            targets, tuple(target.pair(encounter) for target in targets), measure, beyond, note
+        )
 
     @property
     def guided(self) -> int:
@@ -82,7 +94,10 @@ class Aim:
 
     def values(self, scenario: Scenario) -> list[float]:
         """Return the figure of each target."""
-        return [self.measure(scenario, target.name, pair) for target, pair in zip(self.targets, self.pairs, strict=True)]
+        return [
+            self.measure(scenario, target.name, pair)
+            for target, pair in zip(self.targets, self.pairs, strict=True)
+        ]
 
     def holds(self, values: Sequence[float]) -> bool:
         """Whether every figure is in its range."""
@@ -98,7 +113,9 @@ class Aim:
                 found.append(value)
         return found
 
-    def distance(self, values: Sequence[float], guides: Sequence[float], scale: Sequence[float]) -> float:
+    def distance(
+        self, values: Sequence[float], guides: Sequence[float], scale: Sequence[float]
+    ) -> float:
         """Return how far the figures are from their ranges, in units of `scale`; NaN counts as infinitely far."""
         total, k = 0.0, 0
         for target, value, unit in zip(self.targets, values, scale, strict=True):
@@ -106,7 +123,9 @@ class Aim:
             high = target.high if target is not self.targets[0] else target.high - self.beyond
             total += max(target.low - seen, seen - high, 0.0) / unit
             if target.name == "ttc":
-                total += 0.2 * guides[k + 1] if value > HORIZON else 0.0  # on no collision course: first as near as that
+                total += (
+                    0.2 * guides[k + 1] if value > HORIZON else 0.0
+                )  # on no collision course: first as near as that
             k += 2 if target.name == "ttc" else 1
         return math.inf if math.isnan(total) else total
 
@@ -136,7 +155,10 @@ class Proposal:
         """Return q(z) / phi(z) (S,), a plain number, at samples z (S, d)."""
         u = z @ self.basis.T
         power = 0.5 * (np.square(u) - np.square((u - self.mean) / self.sigma)).sum(axis=1)
-        return np.asarray(NATURAL_SHARE + (1.0 - NATURAL_SHARE) * np.exp(np.minimum(power, 600.0)) / np.prod(self.sigma))
+        return np.asarray(
+            NATURAL_SHARE
+            + (1.0 - NATURAL_SHARE) * np.exp(np.minimum(power, 600.0)) / np.prod(self.sigma)
+        )
 
     def weights(self, z: Floats) -> Floats:
         """Return the importance weights phi(z) / q(z) (S,), at most 1 / NATURAL_SHARE."""
@@ -168,7 +190,14 @@ class Seen:
     refused: Counter[Cause] = field(default_factory=Counter)
     checked: int = 0
 
-    def add(self, aim: Aim, z: Floats, proposal: Proposal | None, drawn: Sequence[Scenario | None], unit: Floats) -> None:
+    def add(
+        self,
+        aim: Aim,
+        z: Floats,
+        proposal: Proposal | None,
+        drawn: Sequence[Scenario | None],
+        unit: Floats,
+    ) -> None:
         """Take in a stage's candidates, none of them checked yet.
 
         Args:
@@ -180,13 +209,17 @@ class Seen:
         """
         figures = [None if scenario is None else aim.values(scenario) for scenario in drawn]
         guides = [
-            [math.nan] * aim.guided if scenario is None or own is None else aim.guides(scenario, own)
+            [math.nan] * aim.guided
+            if scenario is None or own is None
+            else aim.guides(scenario, own)
             for scenario, own in zip(drawn, figures, strict=True)
         ]
         self.z.append(z)
         self.proposals.append(proposal)
         self.guides.append(np.array(guides))
-        self.figures.append([[math.nan] * len(aim.targets) if own is None else own for own in figures])
+        self.figures.append(
+            [[math.nan] * len(aim.targets) if own is None else own for own in figures]
+        )
         self.distance.append(np.zeros(len(z)))
         self.valid.append(np.zeros(len(z), dtype=np.bool_))
         self._measure(aim, unit, len(self.z) - 1)
@@ -207,7 +240,11 @@ class Seen:
         found = []
         for values in np.array(self.figures[0]).T:
             seen = np.sort(values[np.isfinite(values)])
-            found.append(0.5 * float(seen[int(0.83 * len(seen))] - seen[int(0.17 * len(seen))]) if len(seen) > 2 else 1.0)
+            found.append(
+                0.5 * float(seen[int(0.83 * len(seen))] - seen[int(0.17 * len(seen))])
+                if len(seen) > 2
+                else 1.0
+            )
         return np.asarray(np.maximum(np.array(found), 0.05))
 
     def rescale(self, aim: Aim, unit: Floats) -> None:
@@ -223,7 +260,10 @@ class Seen:
 
     def hits(self) -> int:
         """How many are valid and in the range."""
-        return sum(int((valid & (distance == 0.0)).sum()) for valid, distance in zip(self.valid, self.distance, strict=True))
+        return sum(
+            int((valid & (distance == 0.0)).sum())
+            for valid, distance in zip(self.valid, self.distance, strict=True)
+        )
 
     def proposal(self) -> Proposal | None:
         """Return the next proposal; None if nothing can be learned."""
@@ -294,7 +334,11 @@ def estimated(weights: Floats, candidates: int) -> tuple[float, float, float]:
     variance = max(float(np.square(weights).sum()) / candidates - share * share, 0.0) / candidates
     half = 1.96 * math.sqrt(variance)
     most = float(weights.max()) if len(weights) else 1.0 / NATURAL_SHARE
-    return share, max(0.0, share - half), min(1.0, share + half + (0.0 if len(weights) else 3.0 * most / candidates))
+    return (
+        share,
+        max(0.0, share - half),
+        min(1.0, share + half + (0.0 if len(weights) else 3.0 * most / candidates)),
+    )
 
 
 def reachable(aim: Aim, seen_all: Seen) -> str:
@@ -303,7 +347,9 @@ def reachable(aim: Aim, seen_all: Seen) -> str:
     for k, target in enumerate(aim.targets):
         seen = np.sort([row[k] for row in seen_all.values if math.isfinite(row[k])])
         if not len(seen):
-            every = [row[k] for stage in seen_all.figures for row in stage if math.isfinite(row[k])]
+            every = [
+                row[k] for stage in seen_all.figures for row in stage if math.isfinite(row[k])
+            ]
             those = (
                 f"of {len(every)} others it is {min(every):.2f} to {max(every):.2f} {UNITS[target.name]}"
                 if every
@@ -317,5 +363,11 @@ def reachable(aim: Aim, seen_all: Seen) -> str:
             f"{target.label} from {low:.2f} to {high:.2f} {unit} (5 % to 95 % of {len(seen)} valid candidates seen; "
             f"all: {seen[0]:.2f} to {seen[-1]:.2f} {unit})"
         )
-    causes = ", ".join(f"{number} × {cause.value}" for cause, number in seen_all.refused.most_common(3))
-    return "; ".join(messages) + (f"; of {seen_all.checked} checked were refused: {causes}" if causes else "") + aim.note
+    causes = ", ".join(
+        f"{number} × {cause.value}" for cause, number in seen_all.refused.most_common(3)
+    )
+    return (
+        "; ".join(messages)
+        + (f"; of {seen_all.checked} checked were refused: {causes}" if causes else "")
+        + aim.note
+    )

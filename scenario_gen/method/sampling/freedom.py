@@ -22,15 +22,29 @@ from scenario_gen.method.sampling.window import seconds_left_out
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import BoundaryStates, CAR, Encounter, Request, Vehicle
 
-CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
+CATALOGUE = (
+    (3.60, 1.62),
+    (4.05, 1.75),
+    (4.25, 1.79),
+    (4.46, 1.83),
+    (4.63, 1.83),
+    (4.69, 1.85),
+    (4.77, 1.88),
+    (4.96, 1.93),
+)
 """Length and width [m] of cars, each as likely: our choice of typical ones, from a city car to a large saloon."""
 _CARS = 3.2, 5.4  # m: a vehicle of such a length gets the size of another car
 _GROWS = 0.15  # of its least gap in the template, by which a vehicle is longer at most: cars stand close in a queue
 _RAMP = 6.0  # s, over which an own clock leaves the shared one where states are asked
 _RAMP_SHARE = 1.0 / 3.0  # of the duration, or of a way, that this takes at most
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
-_MADE_UP = 0.5 * (1.0 - SHORTEST_SHARE) / 1.875  # s of a wait for each second left, made up for at half the pace that is free
-_LEAST_STAND, _SHORTER = 1.5, 0.3  # s that are left of a wait, and share by which it is shorter at most: clocks run forward
+_MADE_UP = (
+    0.5 * (1.0 - SHORTEST_SHARE) / 1.875
+)  # s of a wait for each second left, made up for at half the pace that is free
+_LEAST_STAND, _SHORTER = (
+    1.5,
+    0.3,
+)  # s that are left of a wait, and share by which it is shorter at most: clocks run forward
 _LEAST_SHARE = 0.5  # of a speed, that is left while acceleration dies away
 FADES, _LEAST_FADES = 0.5, 0.2  # s, in which it does, without a jolt: its jerk begins at 0
 EASES = 4.0  # m, in which curvature does
@@ -45,24 +59,36 @@ def cut(z: Floats, bound: float) -> Floats:
     return np.asarray(special.ndtri(low + (1.0 - 2.0 * low) * special.ndtr(z)))
 
 
-def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request) -> BoundaryStates:
+def relaxed_states(
+    requested: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request
+) -> BoundaryStates:
     """Return the states with how far each may be left: 0 where it was asked for, or nothing is freed.
 
     A vehicle that starts a seconds later or earlier, starts as far along its lane as it drives in that time.
     """
     config = config.drawn
     if config.variety != "wide":
-        return replace(requested, relaxed=np.zeros_like(requested.relaxed)) if requested.relaxed.any() else requested
+        return (
+            replace(requested, relaxed=np.zeros_like(requested.relaxed))
+            if requested.relaxed.any()
+            else requested
+        )
     ego = request.ego_of(encounter)
     relaxed = np.zeros((len(encounter.vehicles), 2, 2))
-    own = [np.asarray(np.isfinite(request.rows(end, encounter)).any(axis=1)) for end in ("starts", "goals")]
+    own = [
+        np.asarray(np.isfinite(request.rows(end, encounter)).any(axis=1))
+        for end in ("starts", "goals")
+    ]
     if ego is not None and config.ego == "keep":
         for rows in own:
             rows[ego] = True
     tied = [rows.any() for rows in own]
     length = encounter.duration
     bound = config.freedom
-    seconds = 2.0 * bound * (config.arrival_sigma + 0.5 * length * config.pace_sigma) + bound * config.wait_sigma
+    seconds = (
+        2.0 * bound * (config.arrival_sigma + 0.5 * length * config.pace_sigma)
+        + bound * config.wait_sigma
+    )
     seconds += config.duration_tolerance * length
     free = (seconds + seconds_left_out(encounter, config.leave_out)).tolist()
     slowest = 1.0 / SHORTEST_SHARE
@@ -71,7 +97,10 @@ def relaxed_states(requested: BoundaryStates, encounter: Encounter, config: Samp
     for n, (first, last) in enumerate(encounter.present.tolist()):
         speed = encounter.speed[n, first : last + 1]
         for end, (near, state) in enumerate(
-            ((speed[: steps[0] + 1], requested.start[n]), (speed[-steps[1] - 1 :], requested.end[n]))
+            (
+                (speed[: steps[0] + 1], requested.start[n]),
+                (speed[-steps[1] - 1 :], requested.end[n]),
+            )
         ):
             if own[end][n]:
                 continue
@@ -112,7 +141,11 @@ class OwnClock:
 
     @classmethod
     def of(
-        cls, nominal: Clock, rests: Sequence[tuple[float, float]], requested: tuple[bool, bool], config: SamplingConfig
+        cls,
+        nominal: Clock,
+        rests: Sequence[tuple[float, float]],
+        requested: tuple[bool, bool],
+        config: SamplingConfig,
     ) -> "OwnClock":
         """Prepare.
 
@@ -124,23 +157,34 @@ class OwnClock:
         """
         grid, ramp = nominal.grid, min(_RAMP, _RAMP_SHARE * float(nominal.grid[-1]))
         shift, shift_rate = np.ones(len(grid)), np.zeros(len(grid))
-        for tied, since, sign in ((requested[0], grid - grid[0], 1.0), (requested[1], grid[-1] - grid, -1.0)):
+        for tied, since, sign in (
+            (requested[0], grid - grid[0], 1.0),
+            (requested[1], grid[-1] - grid, -1.0),
+        ):
             if tied:
                 value, rate = _smooth_step(since / ramp)
                 shift, shift_rate = shift * value, shift_rate * value + shift * sign * rate / ramp
         about = nominal.time - 0.5 * nominal.time[-1]
         length = np.array([b - a for a, b in rests])
-        left = np.array([grid[-1] - b if requested[1] else np.inf for _, b in rests])  # s, to make up for a wait
+        left = np.array(
+            [grid[-1] - b if requested[1] else np.inf for _, b in rests]
+        )  # s, to make up for a wait
         waits, rates, made_up = (np.zeros((len(rests), len(grid))) for _ in range(3))
         for k, (a, b) in enumerate(rests):
             waits[k], rates[k] = _smooth_step((grid - a) / (b - a))
             rates[k] /= b - a
             if np.isfinite(left[k]):
                 value, rate = _smooth_step((grid[-1] - grid) / max(left[k], 1e-9))
-                waits[k], rates[k], made_up[k] = waits[k] * value, rates[k] * value, -waits[k] * rate / max(left[k], 1e-9)
+                waits[k], rates[k], made_up[k] = (
+                    waits[k] * value,
+                    rates[k] * value,
+                    -waits[k] * rate / max(left[k], 1e-9),
+                )
                 rates[k] += made_up[k]
         most = np.minimum(config.freedom * config.wait_sigma, _MADE_UP * left)
-        shortest = np.minimum(np.maximum(np.minimum(_SHORTER * length, length - _LEAST_STAND), 0.0), _MADE_UP * left)
+        shortest = np.minimum(
+            np.maximum(np.minimum(_SHORTER * length, length - _LEAST_STAND), 0.0), _MADE_UP * left
+        )
         return cls(
             shift,
             about * shift,
@@ -149,7 +193,9 @@ class OwnClock:
             about * shift_rate + nominal.rate * shift,
             rates,
             made_up,
-            np.array([config.arrival_sigma, config.pace_sigma, *(config.wait_sigma for _ in rests)]),
+            np.array(
+                [config.arrival_sigma, config.pace_sigma, *(config.wait_sigma for _ in rests)]
+            ),
             -np.minimum(shortest, most),
             most,
             config.freedom,
@@ -173,9 +219,17 @@ class OwnClock:
         waits = off[:, 2:]
         rate = off[:, :1] * self.shift_rate + off[:, 1:2] * self.pace_rate
         runs = shared.rate + waits @ self.made_up
-        room = np.where(rate < 0.0, runs - SHORTEST_SHARE * nominal.rate, LONGEST_SHARE * nominal.rate - runs)
-        damped = np.clip((np.maximum(room, 0.0) / np.maximum(np.abs(rate), 1e-9)).min(axis=1), 0.0, 1.0)[:, None]
-        time = shared.time + damped * (off[:, :1] * self.shift + off[:, 1:2] * self.pace) + waits @ self.waits
+        room = np.where(
+            rate < 0.0, runs - SHORTEST_SHARE * nominal.rate, LONGEST_SHARE * nominal.rate - runs
+        )
+        damped = np.clip(
+            (np.maximum(room, 0.0) / np.maximum(np.abs(rate), 1e-9)).min(axis=1), 0.0, 1.0
+        )[:, None]
+        time = (
+            shared.time
+            + damped * (off[:, :1] * self.shift + off[:, 1:2] * self.pace)
+            + waits @ self.waits
+        )
         return Clock(shared.grid, time, shared.rate + damped * rate + waits @ self.wait_rates)
 
 
@@ -217,8 +271,13 @@ class Freedom:
         """The vehicle in the size that each of the numbers z (S,) chooses."""
         if len(self.sizes) == 0:
             return [own] * len(z)
-        chosen = np.minimum((special.ndtr(z) * len(self.sizes)).astype(np.int64), len(self.sizes) - 1)
-        return [replace(own, length=float(length), width=float(width)) for length, width in self.sizes[chosen].tolist()]
+        chosen = np.minimum(
+            (special.ndtr(z) * len(self.sizes)).astype(np.int64), len(self.sizes) - 1
+        )
+        return [
+            replace(own, length=float(length), width=float(width))
+            for length, width in self.sizes[chosen].tolist()
+        ]
 
 
 def onward(state: Floats, bend: Floats, since: Floats, sign: float) -> Floats:
@@ -233,12 +292,20 @@ def onward(state: Floats, bend: Floats, since: Floats, sign: float) -> Floats:
     x, y, yaw, speed, acceleration = (column[:, None] for column in state.T)
     gains, fades = sign * acceleration, _fades(state, sign)[:, None]
     left = np.exp(-since / fades)
-    driven = speed * since + gains * fades * (2.0 * since - 3.0 * fades + (3.0 * fades + since) * left)
+    driven = speed * since + gains * fades * (
+        2.0 * since - 3.0 * fades + (3.0 * fades + since) * left
+    )
     out = np.empty((*since.shape, 5))
     turned, along, aside = _eased(sign * bend[:, None], driven)
     cos, sin = np.cos(yaw), np.sin(yaw)
-    out[..., 0], out[..., 1] = x + sign * (along * cos - aside * sin), y + sign * (along * sin + aside * cos)
-    out[..., 2], out[..., 3] = yaw + turned, speed + gains * (2.0 * fades - (2.0 * fades + since) * left)
+    out[..., 0], out[..., 1] = (
+        x + sign * (along * cos - aside * sin),
+        y + sign * (along * sin + aside * cos),
+    )
+    out[..., 2], out[..., 3] = (
+        yaw + turned,
+        speed + gains * (2.0 * fades - (2.0 * fades + since) * left),
+    )
     out[..., 4] = acceleration * (1.0 + since / fades) * left
     return out
 
@@ -250,7 +317,10 @@ def _eased(bend: Floats, driven: Floats) -> tuple[Floats, Floats, Floats]:
     for node, weight in zip(_GAUSS_NODES.tolist(), _GAUSS_WEIGHTS.tolist(), strict=True):
         part = curved * (0.5 + 0.5 * node)
         turned = bend * EASES * (1.0 - np.exp(-part / EASES))
-        along, aside = along + 0.5 * weight * curved * np.cos(turned), aside + 0.5 * weight * curved * np.sin(turned)
+        along, aside = (
+            along + 0.5 * weight * curved * np.cos(turned),
+            aside + 0.5 * weight * curved * np.sin(turned),
+        )
     turned = bend * EASES * (1.0 - np.exp(-curved / EASES))
     rest = driven - curved
     return turned, along + rest * np.cos(turned), aside + rest * np.sin(turned)
@@ -294,11 +364,21 @@ def freedom_of(
     place = np.ones(len(arc))
     for end, since in ((0, arc - arc[0]), (1, arc[-1] - arc)):
         if relaxed[end, 0] == 0.0:
-            place = place * _smooth_step(since / max(min(_TAPER, _RAMP_SHARE * float(arc[-1])), 1e-9))[0]
+            place = (
+                place
+                * _smooth_step(since / max(min(_TAPER, _RAMP_SHARE * float(arc[-1])), 1e-9))[0]
+            )
     still = len(arc) == 1 or relaxed[:, 0].min() == 0.0
-    sizes = np.array([size for size in CATALOGUE if size[0] - vehicle.length <= max(_GROWS * gap, 0.0)]).reshape(-1, 2)
+    sizes = np.array(
+        [size for size in CATALOGUE if size[0] - vehicle.length <= max(_GROWS * gap, 0.0)]
+    ).reshape(-1, 2)
     is_car = vehicle.type == CAR
-    other_size = config.sizes == "catalogue" and is_car and _CARS[0] <= vehicle.length <= _CARS[1] and not still
+    other_size = (
+        config.sizes == "catalogue"
+        and is_car
+        and _CARS[0] <= vehicle.length <= _CARS[1]
+        and not still
+    )
     return Freedom(
         clock,
         place if len(arc) > 1 else np.zeros(1),

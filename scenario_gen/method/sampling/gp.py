@@ -27,7 +27,9 @@ RELATIVE_RANK = 1e-15  # of the largest variance: what is below is rounding
 
 def squared_exponential(a: Floats, b: Floats, sigma: float, length: float) -> Floats:
     """Kernel matrix (n, m) of eq 14 for a (n,) and b (m,): sigma² exp(-(a - b)² / (2 length²))."""
-    return np.asarray(np.square(sigma) * np.exp(-0.5 * np.square((a[:, None] - b[None, :]) / length)))
+    return np.asarray(
+        np.square(sigma) * np.exp(-0.5 * np.square((a[:, None] - b[None, :]) / length))
+    )
 
 
 def covariance_root(covariance: Floats) -> Floats:
@@ -45,14 +47,18 @@ def principal(factor: Floats, tolerance: float) -> Floats:
     """
     direction, deviation, _ = np.linalg.svd(factor, full_matrices=False)
     direction = direction[:, deviation > tolerance]
-    sign = np.where((direction / np.arange(1.0, len(direction) + 1.0)[:, None]).sum(axis=0) < 0.0, -1.0, 1.0)
+    sign = np.where(
+        (direction / np.arange(1.0, len(direction) + 1.0)[:, None]).sum(axis=0) < 0.0, -1.0, 1.0
+    )
     return np.asarray(direction * sign * deviation[deviation > tolerance])
 
 
 class Features:
     """φ with φ(x)ᵀφ(x') = k(x, x') on an interval, from Chebyshev interpolation of the kernel in both arguments."""
 
-    def __init__(self, low: float, high: float, sigma: float, length: float, degree: int = -1) -> None:
+    def __init__(
+        self, low: float, high: float, sigma: float, length: float, degree: int = -1
+    ) -> None:
         """Build the features.
 
         Args:
@@ -63,7 +69,9 @@ class Features:
             degree: p of the polynomial mean; -1 for a zero mean.
         """
         if not (high > low and length > 0.0 and sigma >= 0.0):
-            raise InputError(f"a Gaussian process needs low < high, length > 0, sigma >= 0, not {low}, {high}, {length}, {sigma}")
+            raise InputError(
+                f"a Gaussian process needs low < high, length > 0, sigma >= 0, not {low}, {high}, {length}, {sigma}"
+            )
         self.low, self.high, self.degree = low, high, degree
         ratio = (high - low) / length
         n = 20 + int(np.ceil(3.0 * ratio))
@@ -85,10 +93,18 @@ class Features:
         scale = 2.0 / (self.high - self.low)
         u = scale * (np.asarray(x, dtype=np.float64) - self.low) - 1.0
         power = scale**derivative
-        coefficients = chebyshev.chebder(self._coefficients, derivative) * power if derivative else self._coefficients
+        coefficients = (
+            chebyshev.chebder(self._coefficients, derivative) * power
+            if derivative
+            else self._coefficients
+        )
         columns = [chebyshev.chebvander(u, coefficients.shape[0] - 1) @ coefficients]
         if self.degree >= 0:
-            mean = np.polynomial.legendre.legder(np.eye(self.degree + 1), derivative) if derivative else np.eye(self.degree + 1)
+            mean = (
+                np.polynomial.legendre.legder(np.eye(self.degree + 1), derivative)
+                if derivative
+                else np.eye(self.degree + 1)
+            )
             columns.append((np.polynomial.legendre.legvander(u, mean.shape[0] - 1) @ mean) * power)
         return np.hstack(columns)
 
@@ -170,8 +186,12 @@ class Regression:
         stacked = np.vstack([(noisy / noise[:, None]) @ basis, basis[: width - p]])
         target = np.concatenate([(y - noisy @ start) / noise, -start[: width - p]])
         q, r = np.linalg.qr(stacked)
-        if r.shape[0] < r.shape[1] or np.abs(np.diag(r)).min(initial=np.inf) < 1e-13 * np.abs(r).max(initial=0.0):
-            raise InputError(f"{len(seen.x)} observations are too few for a mean of degree {features.degree}")
+        if r.shape[0] < r.shape[1] or np.abs(np.diag(r)).min(initial=np.inf) < 1e-13 * np.abs(
+            r
+        ).max(initial=0.0):
+            raise InputError(
+                f"{len(seen.x)} observations are too few for a mean of degree {features.degree}"
+            )
         self._weights = start + basis @ linalg.solve_triangular(r, q.T @ target)
         self._root = linalg.solve_triangular(r, basis.T, trans="T").T  # basis·r⁻¹
 
@@ -189,5 +209,7 @@ def _constrained(rows: Floats, values: Floats, width: int) -> tuple[Floats, Floa
     q, r = np.linalg.qr((rows / norm[:, None]).T, mode="complete")
     c = len(rows)
     if c > width or np.abs(np.diag(r)).min() < 1e-12:
-        raise InputError("two exact observations of a Gaussian process repeat or contradict one another")
+        raise InputError(
+            "two exact observations of a Gaussian process repeat or contradict one another"
+        )
     return q[:, :c] @ linalg.solve_triangular(r[:c], values / norm, trans="T"), q[:, c:]

@@ -39,12 +39,21 @@ from scenario_gen.types import FOLLOW, Reaction, ReactionGraph
 
 _STEP, _MOST = 0.8, 60  # [s] between the equations of a follower; largest number of them
 _BLUR = 3.0  # [s] to either side over which a leader's motion is averaged, in the part that its follower answers late
-_SLOWLY, _QUICKLY = 8.0, 1.2  # [s] correlation lengths of the slow and the quick part of a follower's residual
+_SLOWLY, _QUICKLY = (
+    8.0,
+    1.2,
+)  # [s] correlation lengths of the slow and the quick part of a follower's residual
 _QUICK = 0.08  # [m] standard deviation of the quick part
 _ROUGH = 0.05  # share of a residual that is independent in each equation
-_ENTERS, _OF_GAP = 0.3, 0.2  # [s] and share of the gap, standard deviation of when a yielder enters
+_ENTERS, _OF_GAP = (
+    0.3,
+    0.2,
+)  # [s] and share of the gap, standard deviation of when a yielder enters
 _STANDSTILL = 2.0  # [m] of a follower's gap that does not depend on its speed
-_SLOWEST, _STANDS = 1.0, 0.5  # [m/s] least speeds, of a crossing vehicle and of a follower, that turn metres into seconds
+_SLOWEST, _STANDS = (
+    1.0,
+    0.5,
+)  # [m/s] least speeds, of a crossing vehicle and of a follower, that turn metres into seconds
 _EVENT = 0.05  # [s] standard deviation of when a vehicle clears or leaves, beside the residual
 
 Rows = dict[int, Floats]
@@ -78,7 +87,12 @@ class Mixing:
 
     @classmethod
     def of(
-        cls, models: Sequence[VehicleModel], first: Sequence[int], nominal: Clock, graph: ReactionGraph, scale: Scale
+        cls,
+        models: Sequence[VehicleModel],
+        first: Sequence[int],
+        nominal: Clock,
+        graph: ReactionGraph,
+        scale: Scale,
     ) -> "Mixing":
         """Prepare the steps of all vehicles.
 
@@ -93,7 +107,10 @@ class Mixing:
         for n in graph.order if graph.edges else ():
             edges = [edge for edge in graph.edges if edge.who == n]
             equations = [
-                equation for edge in edges for equation in _equations(edge, models, nominal, scale) if equation[0][n].any()
+                equation
+                for edge in edges
+                for equation in _equations(edge, models, nominal, scale)
+                if equation[0][n].any()
             ]
             freedom = models[n].freedom
             clock = freedom.clock if freedom else None
@@ -114,7 +131,9 @@ class Mixing:
         return z
 
 
-def _solved(n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[int]) -> tuple[Floats, Floats]:
+def _solved(
+    n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[int]
+) -> tuple[Floats, Floats]:
     """`into` and `out` of vehicle n given equations (rows, covariance of residuals): rows times numbers, plus residual, are 0."""
     if not equations:
         return np.zeros((first[-1], 0)), np.zeros((0, first[n + 1] - first[n]))
@@ -134,7 +153,9 @@ def _solved(n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[in
     return into, v
 
 
-def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, scale: Scale) -> list[tuple[Rows, Floats]]:
+def _equations(
+    edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, scale: Scale
+) -> list[tuple[Rows, Floats]]:
     """The equations of a reaction, with the covariance of their residuals."""
     who, whom = models[edge.who], models[edge.whom]
     if edge.kind == FOLLOW:
@@ -144,37 +165,62 @@ def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, s
         speed = _speeds(who, at)
         gap = _STANDSTILL + edge.headway[1] * speed
         residual = edge.residual * np.minimum(gap / np.median(gap), 1.0)
-        spread = residual / np.maximum(speed, _STANDS)  # [s] the slower it drives, the less its lateness shows
+        spread = residual / np.maximum(
+            speed, _STANDS
+        )  # [s] the slower it drives, the less its lateness shows
         slow, quick = _alike(at, _SLOWLY), _alike(at, _QUICKLY)
         rough = np.square(_ROUGH) * np.eye(count)
-        late = {edge.who: lateness(who, at, nominal, scale), edge.whom: -lateness(whom, before, nominal, scale)}
-        ahead = {edge.who: advance(who, at, scale), edge.whom: -_answered(edge, whom, before, scale)}
+        late = {
+            edge.who: lateness(who, at, nominal, scale),
+            edge.whom: -lateness(whom, before, nominal, scale),
+        }
+        ahead = {
+            edge.who: advance(who, at, scale),
+            edge.whom: -_answered(edge, whom, before, scale),
+        }
         return [
             (late, spread[:, None] * spread * (slow + rough)),
             (ahead, residual[:, None] * residual * (slow + rough) + np.square(_QUICK) * quick),
         ]
     if edge.gap == math.inf:
         slows = np.array([edge.since if edge.stands else edge.until])
-        rows = {edge.who: lateness(who, slows, nominal, scale), edge.whom: -lateness(whom, slows, nominal, scale)}
+        rows = {
+            edge.who: lateness(who, slows, nominal, scale),
+            edge.whom: -lateness(whom, slows, nominal, scale),
+        }
         return [(rows, np.array([[np.square(edge.residual)]]))]
     first = -_arrival(whom, edge.clears, nominal, scale)
     entry = _ENTERS + _OF_GAP * abs(edge.gap)
-    equations = [({edge.who: _arrival(who, edge.enters, nominal, scale), edge.whom: first}, np.array([[np.square(entry)]]))]
+    equations = [
+        (
+            {edge.who: _arrival(who, edge.enters, nominal, scale), edge.whom: first},
+            np.array([[np.square(entry)]]),
+        )
+    ]
     if edge.stands:
         leaves = lateness(who, np.array([edge.until]), nominal, scale)
-        equations.append(({edge.who: leaves, edge.whom: first}, np.array([[np.square(edge.residual) + np.square(_EVENT)]])))
+        equations.append(
+            (
+                {edge.who: leaves, edge.whom: first},
+                np.array([[np.square(edge.residual) + np.square(_EVENT)]]),
+            )
+        )
     return equations
 
 
 def _arrival(model: VehicleModel, at: float, nominal: Clock, scale: Scale) -> Floats:
     """(1, d) seconds by which each number makes a vehicle late at the place where it is at a template time [s]."""
     times = np.array([at])
-    return lateness(model, times, nominal, scale) - advance(model, times, scale) / np.maximum(_speeds(model, times), _SLOWEST)
+    return lateness(model, times, nominal, scale) - advance(model, times, scale) / np.maximum(
+        _speeds(model, times), _SLOWEST
+    )
 
 
 def _answered(edge: Reaction, leader: VehicleModel, at: Floats, scale: Scale) -> Floats:
     """(q, d) metres of the leader's motion that a follower answers: the share `gain` at once, the rest over some seconds."""
-    averaged = np.mean([advance(leader, at + off, scale) for off in np.linspace(-_BLUR, _BLUR, 7)], axis=0)
+    averaged = np.mean(
+        [advance(leader, at + off, scale) for off in np.linspace(-_BLUR, _BLUR, 7)], axis=0
+    )
     return np.asarray(edge.gain * advance(leader, at, scale) + (1.0 - edge.gain) * averaged)
 
 
@@ -211,5 +257,7 @@ def advance(model: VehicleModel, at: Floats, scale: Scale) -> Floats:
     rows[:, begin : begin + model.speed.size] = scale.longitudinal * (driven @ model.speed.factor)
     if model.freedom is not None:
         end = begin + model.speed.size + model.freedom.clock.size + 1
-        rows[:, end : end + 2] = scale.longitudinal * (driven @ model.speed.faster) * model.freedom.end_speed
+        rows[:, end : end + 2] = (
+            scale.longitudinal * (driven @ model.speed.faster) * model.freedom.end_speed
+        )
     return rows

@@ -14,7 +14,9 @@ from scenario_gen.types import Scenario
 class LazyScenarios(Sequence[Scenario]):
     """Eight bytes in memory for each scenario, however long it is and however many vehicles it has."""
 
-    def __init__(self, redraw: Callable[[Sequence[int]], list[Scenario]], index: Ints, block: int) -> None:
+    def __init__(
+        self, redraw: Callable[[Sequence[int]], list[Scenario]], index: Ints, block: int
+    ) -> None:
         """Take what draws them.
 
         Args:
@@ -39,5 +41,7 @@ class LazyScenarios(Sequence[Scenario]):
         return self._redraw([int(self._index[at])])[0]
 
     def __iter__(self) -> Iterator[Scenario]:
-        for _, together in groupby((int(index) for index in self._index), lambda index: index // self._block):
+        for _, together in groupby(
+            (int(index) for index in self._index), lambda index: index // self._block
+        ):
             yield from self._redraw(list(together))

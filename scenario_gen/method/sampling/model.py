@@ -49,10 +49,14 @@ class CandidateModel:
             v.draw(z[:, a:b], scale, clock, self.warp.nominal)
             for v, (a, b) in zip(self.vehicles, pairwise(self._parts), strict=True)
         ]
-        return Batch.of(self.vehicles, drawn, None if self.window is None else (self.window, of_window))
+        return Batch.of(
+            self.vehicles, drawn, None if self.window is None else (self.window, of_window)
+        )
 
     def _mixing(self, scale: Scale) -> Mixing:
         """The mixing at a scale, made once."""
         if scale not in self._mixings:
-            self._mixings[scale] = Mixing.of(self.vehicles, self._parts, self.warp.nominal, self.reactions, scale)
+            self._mixings[scale] = Mixing.of(
+                self.vehicles, self._parts, self.warp.nominal, self.reactions, scale
+            )
         return self._mixings[scale]

@@ -34,7 +34,12 @@ class NaturalScenarios:
 
     @classmethod
     def of(
-        cls, plan: Plan, check: Check, config: SamplingConfig, seed: int, measures: Measures | None = None
+        cls,
+        plan: Plan,
+        check: Check,
+        config: SamplingConfig,
+        seed: int,
+        measures: Measures | None = None,
     ) -> "NaturalScenarios":
         """Prepare a template on its road; the level is the first of which enough candidates are valid, or the best.
 
@@ -49,8 +54,12 @@ class NaturalScenarios:
         rarity = None if measures is None else measures.rarity
         level, valid = pilot(sampler, judge, 0 if rarity is None else FEW)
         if not valid:
-            raise RefusedError(f"none of {PILOT * len(LEVELS)} candidates is valid; there is nothing to search in")
-        return cls(sampler, judge, level, Usual() if rarity is None else Usual.among(rarity, valid))
+            raise RefusedError(
+                f"none of {PILOT * len(LEVELS)} candidates is valid; there is nothing to search in"
+            )
+        return cls(
+            sampler, judge, level, Usual() if rarity is None else Usual.among(rarity, valid)
+        )
 
     @property
     def size(self) -> int:
@@ -60,7 +69,15 @@ class NaturalScenarios:
     def scenarios(self, numbers: Floats) -> list[Scenario | None]:
         """Return the certified scenarios, of all vehicles, of numbers (S, size); None where a candidate is refused."""
         batch = self.sampler.model.draw(numbers, LEVELS[self.level])
-        drawn = batch.scenarios(self.sampler.seed, [searched_index(row) for row in numbers], self.sampler.frame_id)
+        drawn = batch.scenarios(
+            self.sampler.seed, [searched_index(row) for row in numbers], self.sampler.frame_id
+        )
         causes = iter(self.judge([scenario for scenario in drawn if scenario is not None]))
-        valid = [scenario if scenario is not None and next(causes) is None else None for scenario in drawn]
-        return [scenario if scenario is not None and self.usual(scenario) else None for scenario in valid]
+        valid = [
+            scenario if scenario is not None and next(causes) is None else None
+            for scenario in drawn
+        ]
+        return [
+            scenario if scenario is not None and self.usual(scenario) else None
+            for scenario in valid
+        ]

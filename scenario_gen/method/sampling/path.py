@@ -19,7 +19,9 @@ from scenario_gen.numerics import Floats, frozen, Ints
 from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, named, OUT2, OUT3
 from scenario_gen.types import Route
 
-NODE_SPACING = 1.0  # m; a cubic through nodes this far apart is within 0.1 mm of an arc of radius 5 m
+NODE_SPACING = (
+    1.0  # m; a cubic through nodes this far apart is within 0.1 mm of an arc of radius 5 m
+)
 MIN_NODES = 5
 _GAUSS_X = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))
 _GAUSS_W = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
@@ -59,7 +61,9 @@ class BasePath:
         at = CubicSpline(arc, fine)(u)
         tangent = curve(at, 1)
         yaw = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
-        return cls(frozen(np.column_stack([curve(at), yaw])), float(u[1]), frozen(arc[route.anchor * 8]))
+        return cls(
+            frozen(np.column_stack([curve(at), yaw])), float(u[1]), frozen(arc[route.anchor * 8])
+        )
 
     @property
     def length(self) -> float:
@@ -74,7 +78,9 @@ class BasePath:
     @cached_property
     def curvature(self) -> Floats:
         """(G,) 1/m, by central differences of the yaw."""
-        return frozen(np.gradient(self.node[:, 2], self.arc)) if len(self.node) > 1 else frozen([0.0])
+        return (
+            frozen(np.gradient(self.node[:, 2], self.arc)) if len(self.node) > 1 else frozen([0.0])
+        )
 
     def displaced(self, deviation: Floats) -> tuple[Floats, Floats]:
         """Paths of S samples.
@@ -159,7 +165,9 @@ def _pose(c: Floats, j: int, h: float, x: float, out: Floats) -> None:
     y = 1.0 - x
     p, q, r, w = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x), h * x * y * y, -h * x * x * y
     for axis in range(2):
-        out[axis] = p * c[j, axis] + q * c[j + 1, axis] + r * c[j, 2 + axis] + w * c[j + 1, 2 + axis]
+        out[axis] = (
+            p * c[j, axis] + q * c[j + 1, axis] + r * c[j, 2 + axis] + w * c[j + 1, 2 + axis]
+        )
     e, f, d = 6.0 * x * y / h, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
     dx = e * (c[j + 1, 0] - c[j, 0]) + f * c[j, 2] + d * c[j + 1, 2]
     dy = e * (c[j + 1, 1] - c[j, 1]) + f * c[j, 3] + d * c[j + 1, 3]
@@ -227,7 +235,12 @@ def _driven(p: Floats, x: float) -> float:
     return float(x * (p[0] + x * (p[1] / 2.0 + x * (p[2] / 3.0 + x * p[3] / 4.0))))
 
 
-@kernel(named(Displaced, F3, F2, F), named(SpeedDrawn, F1, I1, F3, F2), named(ClockRead, F2, F2, F2, I1), OUT3)
+@kernel(
+    named(Displaced, F3, F2, F),
+    named(SpeedDrawn, F1, I1, F3, F2),
+    named(ClockRead, F2, F2, F2, I1),
+    OUT3,
+)
 def states(path: Displaced, speed: SpeedDrawn, clock: ClockRead, out: Floats) -> None:
     """Fill `out` (S, T, 5) with x, y [m], yaw [rad, not unwrapped], speed [m/s], acceleration [m/s²] of one vehicle."""
     breaks, h = speed.breaks, path.spacing
@@ -244,7 +257,10 @@ def states(path: Displaced, speed: SpeedDrawn, clock: ClockRead, out: Floats) ->
                 i += 1
                 _read_piece(speed, s, i, p)
             x, r = t - breaks[i], clock.pace[s, k]
-            u, du = p[0] + x * (p[1] + x * (p[2] + x * p[3])), p[1] + x * (2.0 * p[2] + x * 3.0 * p[3])
+            u, du = (
+                p[0] + x * (p[1] + x * (p[2] + x * p[3])),
+                p[1] + x * (2.0 * p[2] + x * 3.0 * p[3]),
+            )
             out[s, k, 3] = max(u / r, 0.0)
             out[s, k, 4] = (du - u / r * clock.slope[s, k]) / (r * r)
             if g == 1:

@@ -7,11 +7,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from scenario_gen.template import Wait
-from scenario_gen.types import BoundaryStates, EgoSlot, Encounter, Road, Route, Scenario, Segmentation, TypeLimits
+from scenario_gen.types import (
+    BoundaryStates,
+    EgoSlot,
+    Encounter,
+    Road,
+    Route,
+    Scenario,
+    Segmentation,
+    TypeLimits,
+)
 
-Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
+Progress = Callable[
+    [int, int, int], None
+]  # of scenarios so far, scenarios wanted, candidates so far
 Cancelled = Callable[[], bool]
-OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]  # a valid one, the states requested, what the ego is given
+OnValid = Callable[
+    [Scenario, BoundaryStates, EgoSlot | None], None
+]  # a valid one, the states requested, what the ego is given
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,11 +34,19 @@ from scenario_gen.template import least_gaps, reactions_of
 from scenario_gen.types import Encounter, FOLLOW, ReactionGraph, Road
 
 _STRETCHES = 9
-_TIME_SHARE = 1.0 / 3.0  # of the duration, at most: what varies more slowly between given ends hardly varies
-_FREE_SHIFT = 1.5  # m, by which changepoints may be passed from their place before the clock is stretched
+_TIME_SHARE = (
+    1.0 / 3.0
+)  # of the duration, at most: what varies more slowly between given ends hardly varies
+_FREE_SHIFT = (
+    1.5  # m, by which changepoints may be passed from their place before the clock is stretched
+)
 _ANSWERS = 1.4  # times the bound of one that reacts to nobody
 _HALTS = 0.3  # m/s; who is slower at an end of the template halts there, in every scenario
-_REPORTED_PACE, _REPORTED_SHIFT, _REPORTED_JERK = 0.02, 0.3, 0.2  # slowing, m and m/s³ from which on they are reported
+_REPORTED_PACE, _REPORTED_SHIFT, _REPORTED_JERK = (
+    0.02,
+    0.3,
+    0.2,
+)  # slowing, m and m/s³ from which on they are reported
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,48 +72,91 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
     """
     config = config.drawn
     encounter, road, routes, requested = plan.encounter, plan.road, plan.routes, plan.requested
-    times = encounter.time[np.concatenate([[0], plan.segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
-    if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
-        raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
+    times = encounter.time[
+        np.concatenate(
+            [[0], plan.segmentation.changepoints, [encounter.speed.shape[1] - 1]]
+        ).astype(np.int64)
+    ]
+    if len(routes) != len(encounter.vehicles) or any(
+        len(route.anchor) != len(times) for route in routes
+    ):
+        raise InputError(
+            f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each"
+        )
     waits = [standing_part(encounter, wait) for wait in plan.waits]
-    routed_vehicles = [routed_vehicle(n, plan, times, waits, config) for n in range(len(encounter.vehicles))]
+    routed_vehicles = [
+        routed_vehicle(n, plan, times, waits, config) for n in range(len(encounter.vehicles))
+    ]
     clock, sentences = _slowed(routed_vehicles, template_grid(encounter), config)
     left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
     best: tuple[float, float, list[MeanSpeed]] | None = None
     failed: list[tuple[RoutedVehicle, str]] = []
     for stretch in np.linspace(1.0, max(left, 1.0), _STRETCHES if left > 1.0 else 1).tolist():
-        means = [routed.mean(clock_of(clock.grid, stretch * clock.rate)) for routed in routed_vehicles]
+        means = [
+            routed.mean(clock_of(clock.grid, stretch * clock.rate)) for routed in routed_vehicles
+        ]
         feasible = [mean for mean in means if not isinstance(mean, str)]
         if len(feasible) < len(means):
-            failed = [(routed, m) for routed, m in zip(routed_vehicles, means, strict=True) if isinstance(m, str)]
+            failed = [
+                (routed, m)
+                for routed, m in zip(routed_vehicles, means, strict=True)
+                if isinstance(m, str)
+            ]
             continue
-        shift = max(routed.largest_shift(mean[0]) for routed, mean in zip(routed_vehicles, feasible, strict=True))
+        shift = max(
+            routed.largest_shift(mean[0])
+            for routed, mean in zip(routed_vehicles, feasible, strict=True)
+        )
         if best is None or shift < best[0] - _FREE_SHIFT:
             best = shift, stretch, feasible
         if shift <= _FREE_SHIFT:
             break
     if best is None:
-        reasons = (f"vehicle {routed.vehicle.id} {reason}{routed.blamed(clock)}" for routed, reason in failed)
+        reasons = (
+            f"vehicle {routed.vehicle.id} {reason}{routed.blamed(clock)}"
+            for routed, reason in failed
+        )
         return Prepared(None, (), "; ".join(reasons))
     _, stretch, feasible = best
     if stretch > 1.0:
         share = 100.0 * (stretch - 1.0)
-        sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints")
-    warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
-    vehicles = [_model(routed, road, *mean, config, sentences) for routed, mean in zip(routed_vehicles, feasible, strict=True)]
+        sentences.append(
+            f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints"
+        )
+    warp = TimeWarp(
+        clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits)
+    )
+    vehicles = [
+        _model(routed, road, *mean, config, sentences)
+        for routed, mean in zip(routed_vehicles, feasible, strict=True)
+    ]
     reactions, window = kept_reactions(encounter, config, order), None
     if config.variety == "wide":
         answers = {edge.who for edge in reactions.edges}
         tied, gaps = (requested.relaxed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
         vehicles = [
-            replace(v, freedom=_freedom(routed, n in answers, warp.nominal, requested.relaxed[n], tied, road, gaps[n], config))
+            replace(
+                v,
+                freedom=_freedom(
+                    routed,
+                    n in answers,
+                    warp.nominal,
+                    requested.relaxed[n],
+                    tied,
+                    road,
+                    gaps[n],
+                    config,
+                ),
+            )
             for n, (v, routed) in enumerate(zip(vehicles, routed_vehicles, strict=True))
         ]
         window = window_of(encounter, config.leave_out, tied)
     return Prepared(CandidateModel(tuple(vehicles), warp, reactions, window), tuple(sentences))
 
 
-def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "keep") -> ReactionGraph:
+def kept_reactions(
+    encounter: Encounter, config: SamplingConfig, order: str = "keep"
+) -> ReactionGraph:
     """Return the reactions of the template that scenarios keep, without edges where none is to be kept.
 
     Where an `order` other than the template's is requested, nobody is made to wait for anybody.
@@ -113,7 +164,9 @@ def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "k
     graph = reactions_of(encounter)
     if config.reactions != "keep":
         return replace(graph, edges=())
-    return replace(graph, edges=tuple(edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW))
+    return replace(
+        graph, edges=tuple(edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW)
+    )
 
 
 def _freedom(
@@ -128,8 +181,14 @@ def _freedom(
 ) -> Freedom:
     """What preset `wide` relaxes for a vehicle that came so near [m] to others in the template, and `answers` one or not."""
     config = config.of(routed.vehicle.kind)
-    fastest = routed.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * routed.limits.max_acceleration * FADES
-    ahead = road_ahead(routed.path, routed.vehicle, ground_for(road, routed.vehicle), MOST_ONWARD * fastest)
+    fastest = (
+        routed.speed[[0, -1]]
+        + config.freedom * config.end_speed_sigma
+        + 2.0 * routed.limits.max_acceleration * FADES
+    )
+    ahead = road_ahead(
+        routed.path, routed.vehicle, ground_for(road, routed.vehicle), MOST_ONWARD * fastest
+    )
     clock = OwnClock.of(nominal, routed.rests, (bool(tied[0]), bool(tied[1])), config)
     if answers:  # what the other one does comes on top of its own
         clock = replace(clock, bound=_ANSWERS * clock.bound)
@@ -137,13 +196,17 @@ def _freedom(
     return freedom_of(routed.vehicle, routed.path.arc, clock, relaxed, tied, ahead, gap, config)
 
 
-def _slowed(routed_vehicles: Sequence[RoutedVehicle], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:
+def _slowed(
+    routed_vehicles: Sequence[RoutedVehicle], grid: Floats, config: SamplingConfig
+) -> tuple[Clock, list[str]]:
     """The nominal clock on template times (G,) [s], and the notes on it."""
     plain = clock_of(grid, np.ones(len(grid)))
     slowdowns = []
     for routed in routed_vehicles:
         mean = routed.without_bends.mean(plain)
-        slowdowns.append(np.ones(len(grid)) if isinstance(mean, str) else routed.slowdown(mean[0], grid))
+        slowdowns.append(
+            np.ones(len(grid)) if isinstance(mean, str) else routed.slowdown(mean[0], grid)
+        )
     clock = slowed_clock(grid, slowdowns, 1.0 + config.max_stretch)
     if clock.rate.max() < 1.0 + _REPORTED_PACE:
         return plain, []
@@ -170,12 +233,27 @@ def _model(
         sentences.append(f"{name} passes changepoints up to {shift:.2f} m from their place")
     jerk = float(np.abs(motion.jerk @ mean).max())
     if jerk > bounds.jerk + _REPORTED_JERK:
-        sentences.append(f"{name} needs a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth")
-    room = lateral_room(path, routed.vehicle, ground_for(road, routed.vehicle), MAX_ROOM_SIGMAS * config.lateral_sigma)
+        sentences.append(
+            f"{name} needs a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth"
+        )
+    room = lateral_room(
+        path,
+        routed.vehicle,
+        ground_for(road, routed.vehicle),
+        MAX_ROOM_SIGMAS * config.lateral_sigma,
+    )
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
-        sentences.append(f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow")
+        sentences.append(
+            f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow"
+        )
     length = min(config.longitudinal_time, _TIME_SHARE * float(routed.times[-1] - routed.times[0]))
     sigma = config.of(routed.vehicle.kind).longitudinal_sigma
     speed = speed_model(spline, mean, motion, bounds, routed.time, routed.speed, sigma, length)
-    return VehicleModel(routed.vehicle, path, lateral_covariance_root(path, room, config, routed.steering), room, speed)
+    return VehicleModel(
+        routed.vehicle,
+        path,
+        lateral_covariance_root(path, room, config, routed.steering),
+        room,
+        speed,
+    )

@@ -14,28 +14,51 @@ from scenario_gen.method.sampling.deviations import Steering
 from scenario_gen.method.sampling.path import BasePath, MIN_NODES, NODE_SPACING
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
-from scenario_gen.method.sampling.speed_profile.mean import Bounds, mean_speed, Motion, rounded_lines, Target
+from scenario_gen.method.sampling.speed_profile.mean import (
+    Bounds,
+    mean_speed,
+    Motion,
+    rounded_lines,
+    Target,
+)
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
-from scenario_gen.method.sampling.speed_profile.stops import lengthened, SHORTEST_WAIT, standing_within
+from scenario_gen.method.sampling.speed_profile.stops import (
+    lengthened,
+    SHORTEST_WAIT,
+    standing_within,
+)
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Floats
 from scenario_gen.template import clean_tracks, Track, Wait
 from scenario_gen.types import Dynamics, Encounter, Vehicle
 
-_MOST_SCALE = 4.0  # largest factor on the template's speeds; a longer route only has the mean speed raised
-_SLOW_WAIT = 0.9  # of the speed below which its type waits: fastest while a wait is kept by moving slowly
+_MOST_SCALE = (
+    4.0  # largest factor on the template's speeds; a longer route only has the mean speed raised
+)
+_SLOW_WAIT = (
+    0.9  # of the speed below which its type waits: fastest while a wait is kept by moving slowly
+)
 _RAMP = 1.5  # m/s², acceleration from the template's speed to a requested end speed
 _CURVE_REACH = 2.0  # m, to either side of a position, over which the sharpest curvature counts
-_CURVE_MARGIN = 0.85  # share of the lateral limit that the mean may use; the rest is for deviations
+_CURVE_MARGIN = (
+    0.85  # share of the lateral limit that the mean may use; the rest is for deviations
+)
 _OWN_MARGIN = 0.95  # the same where the template itself takes bends that fast
 _BOUND_ROUNDS = 4  # times that speeds are bounded by the bends where the mean then is
 _JERK_SHARE, _LEAST_JERK = 1.2, 1.0  # of the template's largest jerk; at least, m/s³
-_BEND_SHARE, _LEAST_BEND = 1.2, 2.0  # of the template's largest lateral acceleration; at least, m/s²
+_BEND_SHARE, _LEAST_BEND = (
+    1.2,
+    2.0,
+)  # of the template's largest lateral acceleration; at least, m/s²
 _SMOOTH = 0.5  # s, over which that acceleration is averaged
 _EARLY = 0.3  # s, by which a vehicle moves before its speed lines do: these are rounded
-_LEAST_REST = SHORTEST_WAIT - 0.2  # s; the checker still counts the slow start after it as standing
+_LEAST_REST = (
+    SHORTEST_WAIT - 0.2
+)  # s; the checker still counts the slow start after it as standing
 
-MeanSpeed = tuple[Floats, Motion, Bounds]  # coefficients of a mean speed, with its motion and bounds
+MeanSpeed = tuple[
+    Floats, Motion, Bounds
+]  # coefficients of a mean speed, with its motion and bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,15 +102,26 @@ class RoutedVehicle:
 
     def target(self, clock: Clock) -> Target:
         """The speeds and places that its mean should be near, on this clock."""
-        grid = clock.grid[(clock.grid >= self.times[0] - 1e-9) & (clock.grid <= self.times[-1] + 1e-9)]
+        grid = clock.grid[
+            (clock.grid >= self.times[0] - 1e-9) & (clock.grid <= self.times[-1] + 1e-9)
+        ]
         line = np.interp(grid, self.knots.knot, self.knots.lines)
         rates = clock.at(self.times[[0, -1]])[1]
         ends = (self.ends[0] * float(rates[0]), self.ends[1] * float(rates[1]))
         for end, since in ((0, grid - grid[0]), (-1, grid[-1] - grid)):
             off = ends[end] - self.recorded[end]
-            line = line + off * np.square(np.maximum(1.0 - since / max(2.0 * abs(off) / _RAMP, 1.0), 0.0))
+            line = line + off * np.square(
+                np.maximum(1.0 - since / max(2.0 * abs(off) / _RAMP, 1.0), 0.0)
+            )
         inner = 1 + np.flatnonzero(np.diff(self.anchor[:-1]) != 0.0)
-        return Target(grid, np.maximum(line, 0.0), self.times[inner], self.anchor[inner], ends, self.path.length)
+        return Target(
+            grid,
+            np.maximum(line, 0.0),
+            self.times[inner],
+            self.anchor[inner],
+            ends,
+            self.path.length,
+        )
 
     @property
     def without_bends(self) -> "RoutedVehicle":
@@ -102,16 +136,28 @@ class RoutedVehicle:
         top, slow = self.limits.max_speed * pace, _SLOW_WAIT * self.vehicle.kind.waits_below
         for a, b in self.knots.stretches(self.knots.creeping):
             margin = float(spline.breaks[1] - spline.breaks[0])
-            top = np.where((at > a - margin) & (at < b + margin), np.minimum(top, slow * pace), top)
+            top = np.where(
+                (at > a - margin) & (at < b + margin), np.minimum(top, slow * pace), top
+            )
         most, limit = top, ""
         for _ in range(_BOUND_ROUNDS):
-            bounds = Bounds(most, self.limits.max_acceleration, self.limits.max_deceleration, self.jerk)
+            bounds = Bounds(
+                most, self.limits.max_acceleration, self.limits.max_deceleration, self.jerk
+            )
             mean = mean_speed(spline, target, motion, bounds)
             if mean is None:
                 longest = f"{clock.time[-1]:.1f} s"
-                return f"cannot drive {self.path.length:.1f} m{limit} in {longest} within the limits"
-            sideways = np.clip(self._own_sideways(at) / self.limits.max_lateral_acceleration, _CURVE_MARGIN, _OWN_MARGIN)
-            allowed = self._bend_speed(spline.driven(at) @ mean, sideways * self.limits.max_lateral_acceleration)
+                return (
+                    f"cannot drive {self.path.length:.1f} m{limit} in {longest} within the limits"
+                )
+            sideways = np.clip(
+                self._own_sideways(at) / self.limits.max_lateral_acceleration,
+                _CURVE_MARGIN,
+                _OWN_MARGIN,
+            )
+            allowed = self._bend_speed(
+                spline.driven(at) @ mean, sideways * self.limits.max_lateral_acceleration
+            )
             if (mean <= allowed * pace * 1.01 + 1e-6)[1:-1].all():
                 return mean, motion, bounds
             most, limit = np.minimum(most, allowed * pace), " through its curves"
@@ -121,8 +167,14 @@ class RoutedVehicle:
     def blamed(self, clock: Clock) -> str:
         """Return which of its limits, were it alone not there, would leave it a mean speed on this clock; "" if none would."""
         names = (entry.name for entry in fields(self.limits))
-        freed = ((name, replace(self, limits=replace(self.limits, **{name: 1e6}))) for name in names)
-        found = [f"limits.{self.vehicle.type}.{name}" for name, routed in freed if not isinstance(routed.mean(clock), str)]
+        freed = (
+            (name, replace(self, limits=replace(self.limits, **{name: 1e6}))) for name in names
+        )
+        found = [
+            f"limits.{self.vehicle.type}.{name}"
+            for name, routed in freed
+            if not isinstance(routed.mean(clock), str)
+        ]
         return f" (more of {' or of '.join(found)} would do)" if found else ""
 
     def largest_shift(self, mean: Floats) -> float:
@@ -136,9 +188,14 @@ class RoutedVehicle:
         if len(self.path.node) == 1:
             return np.ones(len(grid))
         there = (grid >= self.times[0]) & (grid <= self.times[-1])
-        s, v = ((rows @ mean) for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there])))
+        s, v = (
+            (rows @ mean)
+            for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there]))
+        )
         slowdown = np.ones(len(grid))
-        slowdown[there] = v / self._bend_speed(s, np.maximum(self._own_sideways(grid[there]), self.bend))
+        slowdown[there] = v / self._bend_speed(
+            s, np.maximum(self._own_sideways(grid[there]), self.bend)
+        )
         return slowdown
 
     def _own_sideways(self, at: Floats) -> Floats:
@@ -149,10 +206,14 @@ class RoutedVehicle:
         """Speed [m/s] that the route's bends allow at arc lengths (q,) [m], by limits (q,) [m/s²]."""
         if len(self.path.node) == 1:
             return np.full(len(s), np.inf)
-        return np.asarray(np.sqrt(limit / np.maximum(np.interp(s, self.path.arc, _bends(self.path)), 1e-6)))
+        return np.asarray(
+            np.sqrt(limit / np.maximum(np.interp(s, self.path.arc, _bends(self.path)), 1e-6))
+        )
 
 
-def routed_vehicle(n: int, plan: Plan, times: Floats, waits: Sequence[Wait], config: SamplingConfig) -> RoutedVehicle:
+def routed_vehicle(
+    n: int, plan: Plan, times: Floats, waits: Sequence[Wait], config: SamplingConfig
+) -> RoutedVehicle:
     """Return vehicle n on its route, with changepoints at times (K,) [s]; one without length stands, whatever is requested."""
     encounter, route, requested = plan.encounter, plan.routes[n], plan.requested
     vehicle = encounter.vehicles[n]
@@ -160,11 +221,20 @@ def routed_vehicle(n: int, plan: Plan, times: Floats, waits: Sequence[Wait], con
     first, last = encounter.present[n].tolist()
     here = slice(first, last + 1)
     time, speed = encounter.time[here], encounter.speed[n, here]
-    own = np.concatenate([[0], 1 + np.flatnonzero((times[1:-1] > time[0]) & (times[1:-1] < time[-1])), [len(times) - 1]])
+    own = np.concatenate(
+        [
+            [0],
+            1 + np.flatnonzero((times[1:-1] > time[0]) & (times[1:-1] < time[-1])),
+            [len(times) - 1],
+        ]
+    )
     anchor, times = route.anchor[own], np.concatenate([time[:1], times[own[1:-1]], time[-1:]])
     dwells = anchor[:-1] == anchor[1:]
     path = BasePath.of(route)
-    stands, moves_slowly = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
+    stands, moves_slowly = (
+        lengthened(n, waits, creeping=False),
+        lengthened(n, waits, creeping=True),
+    )
     ends = (float(requested.start[n, 3]), float(requested.end[n, 3]))
     if dwells.all():
         ends = (0.0, 0.0)
@@ -173,10 +243,16 @@ def routed_vehicle(n: int, plan: Plan, times: Floats, waits: Sequence[Wait], con
     if not dwells.all():
         stands, dwells = standing_within(times, dwells, stands, time, speed)
     knots = speed_knots(times, dwells, stands, time, speed, ends, 0.0, moves_slowly)
-    standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, knots.still[[0, -1]], strict=True)]
+    standing = [
+        v if v > STAND or not still else 0.0
+        for v, still in zip(ends, knots.still[[0, -1]], strict=True)
+    ]
     rests = _at_rest(knots, times)
     spline = SpeedSpline.over(float(times[0]), float(times[-1]), rests)
-    recorded = [0.0 if still else scale * float(speed[k]) for k, still in zip((0, -1), knots.still[[0, -1]], strict=True)]
+    recorded = [
+        0.0 if still else scale * float(speed[k])
+        for k, still in zip((0, -1), knots.still[[0, -1]], strict=True)
+    ]
     lines = rounded_lines(spline, knots, time, scale * speed, (recorded[0], recorded[1]))
     jerk, sideways = _largest_jerk(scale * speed, encounter.dt), _largest_sideways(encounter, n)
     track = clean_tracks(encounter)[n]
@@ -193,10 +269,13 @@ def routed_vehicle(n: int, plan: Plan, times: Floats, waits: Sequence[Wait], con
         (recorded[0], recorded[1]),
         config.max_jerk or max(_JERK_SHARE * jerk, _LEAST_JERK),
         min(
-            config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * limits.max_lateral_acceleration
+            config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND),
+            _CURVE_MARGIN * limits.max_lateral_acceleration,
         ),
         _sideways(track, encounter.speed[n])[here],
-        Steering.of(time, np.unwrap(encounter.heading[n, here]), encounter.speed[n, here], path.length),
+        Steering.of(
+            time, np.unwrap(encounter.heading[n, here]), encounter.speed[n, here], path.length
+        ),
         rests,
         limits,
     )
@@ -216,7 +295,11 @@ def _bends(path: BasePath) -> Floats:
     """(G,) the sharpest curvature [1/m] near each node."""
     reach = 2 * int(np.ceil(_CURVE_REACH / path.spacing)) + 1
     return np.asarray(
-        ndimage.maximum_filter1d(ndimage.uniform_filter1d(np.abs(path.curvature), 3, mode="nearest"), reach, mode="nearest")
+        ndimage.maximum_filter1d(
+            ndimage.uniform_filter1d(np.abs(path.curvature), 3, mode="nearest"),
+            reach,
+            mode="nearest",
+        )
     )
 
 

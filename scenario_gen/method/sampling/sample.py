@@ -22,13 +22,24 @@ from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, ENOUGH, LEVELS, place_of, Sampler
 from scenario_gen.method.sampling.usual import FEW, PILOT, pilot, Usual
-from scenario_gen.types import Cause, EgoSlot, Measures, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
+from scenario_gen.types import (
+    Cause,
+    EgoSlot,
+    Measures,
+    NOT_KEPT,
+    Reached,
+    Request,
+    Scenario,
+    ScenarioSet,
+)
 
 KEPT = 1000  # scenarios up to which a set stays in memory
 LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried
 EXAMPLES = 3  # refused candidates of each cause that are kept to be looked at
 DIRECTED_BUDGET = 10  # times the budget of a request without a target
-HOPELESS = 20 * BLOCK  # candidates of a proposal after which it is given up if none of them is valid and in the range
+HOPELESS = (
+    20 * BLOCK
+)  # candidates of a proposal after which it is given up if none of them is valid and in the range
 
 
 def draw_scenarios(
@@ -67,16 +78,40 @@ def draw_scenarios(
     """
     encounter, ego = plan.encounter, request.ego_of(plan.encounter)
     prepared = prepare(plan, config, request.order)
-    slot = None if ego is None else EgoSlot(encounter.vehicles[ego], plan.requested.start[ego], plan.requested.end[ego])
+    slot = (
+        None
+        if ego is None
+        else EgoSlot(encounter.vehicles[ego], plan.requested.start[ego], plan.requested.end[ego])
+    )
     if prepared.model is None:
-        drawn = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
+        drawn = ScenarioSet(
+            count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot
+        )
     else:
         aim = aim_of(encounter, request, measures)
-        sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(encounter, request, aim, measures))
+        sampler = Sampler(
+            prepared.model,
+            seed,
+            plan.road.frame_id,
+            ego,
+            label=label_of(encounter, request, aim, measures),
+        )
         judge = Judge.of(sampler, check, _enough(config, request))
-        kept = tuple(edge for edge in prepared.model.reactions.edges if (edge.who, edge.whom) not in judge.lost)
-        sampler = replace(sampler, label=label_of(encounter, request, aim, measures, kept, judge.lost))
-        loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.requested, slot))
+        kept = tuple(
+            edge
+            for edge in prepared.model.reactions.edges
+            if (edge.who, edge.whom) not in judge.lost
+        )
+        sampler = replace(
+            sampler, label=label_of(encounter, request, aim, measures, kept, judge.lost)
+        )
+        loop = _Loop(
+            sampler,
+            judge,
+            count,
+            callbacks,
+            lambda scenario: callbacks.found(scenario, plan.requested, slot),
+        )
         loop.aim, loop.measures = aim, measures
         if measures is not None and measures.rarity is not None:
             loop.usual = Usual.among(measures.rarity, pilot(sampler, judge, FEW)[1])
@@ -88,9 +123,13 @@ def draw_scenarios(
             examples=tuple(loop.examples),
         )  # fmt: skip
     if request.moves and not drawn.scenarios and not callbacks.cancelled():
-        causes = ", ".join(f"{number} × {cause.value}" for cause, number in drawn.refused.most_common())
+        causes = ", ".join(
+            f"{number} × {cause.value}" for cause, number in drawn.refused.most_common()
+        )
         more = f"; {'; '.join(drawn.adaptations)}" if drawn.adaptations else ""
-        raise RefusedError(f"none of {drawn.candidates} candidate(s) with the requested states is valid ({causes}{more})")
+        raise RefusedError(
+            f"none of {drawn.candidates} candidate(s) with the requested states is valid ({causes}{more})"
+        )
     return drawn
 
 
@@ -115,11 +154,19 @@ def regenerate(
     if prepared.model is None:
         return None
     ego, aim = request.ego_of(plan.encounter), aim_of(plan.encounter, request, measures)
-    sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(plan.encounter, request, aim, measures))
+    sampler = Sampler(
+        prepared.model,
+        seed,
+        plan.road.frame_id,
+        ego,
+        label=label_of(plan.encounter, request, aim, measures),
+    )
     if place_of(index)[0] == DIRECTED:
         if aim is None or check is None:
             raise InputError(f"index {index} is of a proposal, but no target was requested")
-        sampler = adapted(sampler, Judge.of(sampler, check, _enough(config, request)), aim, lambda: False).sampler
+        sampler = adapted(
+            sampler, Judge.of(sampler, check, _enough(config, request)), aim, lambda: False
+        ).sampler
     return sampler.scenario(index)
 
 
@@ -226,14 +273,18 @@ class _Loop:
         share, low, high = estimated(np.array(weights), self.candidates)
         if self.candidates:
             directed = self.sampler.proposal is not None
-            self.reached = Reached(aim.targets, result.stages, result.candidates, share, low, high, directed)
+            self.reached = Reached(
+                aim.targets, result.stages, result.candidates, share, low, high, directed
+            )
             self.adaptations.append(self.reached.sentence())
             if self.sampler.base:
                 self._describe(self.sampler.base, 2)
         if len(self.index) < self.count and not self.callbacks.cancelled():
             message = f"target {'; '.join(map(str, aim.targets))}: "
             drawn = f"{result.candidates} candidates of {1 + result.stages} stage(s) and {self.candidates} more"
-            message += f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, result.seen)}"
+            message += (
+                f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, result.seen)}"
+            )
             if not self.index:
                 raise TargetError(message)
             self.adaptations.append(message)
@@ -245,7 +296,9 @@ class _Loop:
                 break
             self.candidates += 1
             if scenario is None or cause is not None or not self._in_range(scenario):
-                self.refused[cause or (Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE)] += 1
+                self.refused[
+                    cause or (Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE)
+                ] += 1
             elif not self.usual(scenario):
                 self.refused[Cause.UNUSUAL] += 1
             else:
@@ -272,24 +325,38 @@ class _Loop:
         return LazyScenarios(self.sampler.redraw, np.array(self.index, dtype=np.int64), BLOCK)
 
     def _done(self, budget: int) -> bool:
-        return len(self.index) >= self.count or self.candidates >= budget or self.callbacks.cancelled()
+        return (
+            len(self.index) >= self.count
+            or self.candidates >= budget
+            or self.callbacks.cancelled()
+        )
 
     def _blocks(self, level: int) -> Iterator[tuple[list[int], list[Scenario | None]]]:
         for number in itertools.count():
             yield self.sampler.block(level, number)
 
-    def _spend(self, blocks: Iterator[tuple[list[int], list[Scenario | None]]], most: int) -> tuple[int, int]:
+    def _spend(
+        self, blocks: Iterator[tuple[list[int], list[Scenario | None]]], most: int
+    ) -> tuple[int, int]:
         """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many were valid, usual or not."""
         seen = good = 0
         while seen < most and len(self.index) < self.count and not self.callbacks.cancelled():
             index, drawn = next(blocks)
             aimed = [scenario is not None and self._in_range(scenario) for scenario in drawn]
-            causes = iter(self.judge([s for s, ok in zip(drawn, aimed, strict=True) if ok and s is not None]))
+            causes = iter(
+                self.judge([s for s, ok in zip(drawn, aimed, strict=True) if ok and s is not None])
+            )
             for number, scenario, ok in zip(index, drawn, aimed, strict=True):
                 if seen == most or len(self.index) == self.count or self.callbacks.cancelled():
                     break
                 seen += 1
-                cause = next(causes) if ok else Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE
+                cause = (
+                    next(causes)
+                    if ok
+                    else Cause.SPEED_PROFILE
+                    if scenario is None
+                    else Cause.OUT_OF_RANGE
+                )
                 if scenario is not None and cause is None:
                     good += 1
                     cause = None if self.usual(scenario) else Cause.UNUSUAL
@@ -297,7 +364,11 @@ class _Loop:
                     self._take(number, scenario)
                 else:
                     self.refused[cause or Cause.SPEED_PROFILE] += 1
-                    if scenario is not None and cause is not None and self.refused[cause] <= EXAMPLES:
+                    if (
+                        scenario is not None
+                        and cause is not None
+                        and self.refused[cause] <= EXAMPLES
+                    ):
                         self.examples.append((cause, scenario))
             self.callbacks.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
@@ -309,7 +380,9 @@ class _Loop:
     def _describe(self, best: int, tried: int) -> None:
         """Put what was adapted into sentences."""
         if tried > 1 and best == 0:
-            self.adaptations.append("few candidates were valid, and smaller standard deviations did not help")
+            self.adaptations.append(
+                "few candidates were valid, and smaller standard deviations did not help"
+            )
         elif tried > 1:
             s = LEVELS[best]
             own = f", {s.own:g} of each vehicle's own clock" if self.sampler.free else ""

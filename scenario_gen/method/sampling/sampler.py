@@ -30,7 +30,10 @@ LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next L
 BLOCK = 32  # candidates whose random numbers are drawn together
 DIRECTED, STAGED = 5, 6  # slots of the candidates of a proposal, and of those by which it is found
 SEARCHED = 7  # slot of scenarios whose numbers a search chose
-ENOUGH = {"narrow": 0.3, "wide": 0.1}  # share of valid candidates below which the next level is tried
+ENOUGH = {
+    "narrow": 0.3,
+    "wide": 0.1,
+}  # share of valid candidates below which the next level is tried
 
 
 def index_of(level: int, candidate: int) -> int:
@@ -42,7 +45,9 @@ def index_of(level: int, candidate: int) -> int:
 def searched_index(numbers: Floats) -> int:
     """Return the index of a scenario whose numbers (d,) a search chose: made of their SHA-256, to a millionth as on any CPU."""
     rounded = np.round(numbers * 1e6).astype(np.int64)
-    page, within = divmod(int.from_bytes(hashlib.sha256(rounded.tobytes()).digest()[:5]), LEVEL_SIZE)
+    page, within = divmod(
+        int.from_bytes(hashlib.sha256(rounded.tobytes()).digest()[:5]), LEVEL_SIZE
+    )
     return (page * LEVEL_SLOTS + SEARCHED) * LEVEL_SIZE + within
 
 
@@ -66,7 +71,9 @@ class Sampler:
     model: CandidateModel
     seed: int
     frame_id: str
-    ego: int | None = None  # of the vehicle that is left out of what is published, and is its witness
+    ego: int | None = (
+        None  # of the vehicle that is left out of what is published, and is its witness
+    )
     base: int = 0  # level whose standard deviations the candidates of a proposal have
     proposal: Proposal | None = None
     label: Label = lambda _: {}  # facts of a candidate of all vehicles
@@ -96,13 +103,19 @@ class Sampler:
         """The drive without deviations; None where nothing is free and nobody reacts, or it has no speed profile."""
         if not self.free and not self.model.reactions.edges:
             return None
-        return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(self.seed, [0], self.frame_id)[0]
+        return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(
+            self.seed, [0], self.frame_id
+        )[0]
 
     def redraw(self, index: Sequence[int]) -> list[Scenario]:
         """The scenarios of indices that are of one block, to rounding as in a whole set."""
         level, candidate = place_of(index[0])
         own, drawn = self.block(level, candidate // BLOCK)
-        return [self.published(whole) for whole in (drawn[number - own[0]] for number in index) if whole is not None]
+        return [
+            self.published(whole)
+            for whole in (drawn[number - own[0]] for number in index)
+            if whole is not None
+        ]
 
     def published(self, whole: Scenario) -> Scenario:
         """A candidate of all vehicles as it is published: with its facts, the ego's motion apart, as witness."""
@@ -136,6 +149,8 @@ class Sampler:
         The mean of a set is then the drive without deviations, to first order, however few samples the set has (antithetic
         variates, Hammersley and Morton 1956).
         """
-        generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, level, number])))
+        generator = np.random.Generator(
+            np.random.PCG64(np.random.SeedSequence([self.seed, level, number]))
+        )
         z = generator.standard_normal((BLOCK // 2, size))
         return np.stack([z, -z], axis=1).reshape(BLOCK, -1)

@@ -19,7 +19,10 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT2
 
 DT = 0.1  # s, the grid of published scenarios
-LONGEST_SHARE, SHORTEST_SHARE = 1.35, 0.75  # slowest and fastest that a clock may run, as a share of the nominal one
+LONGEST_SHARE, SHORTEST_SHARE = (
+    1.35,
+    0.75,
+)  # slowest and fastest that a clock may run, as a share of the nominal one
 _LENGTH_SHARE = 0.75
 """Length scale of the warp's deviation as a share of the encounter's duration: a sample is quicker or slower as a whole.
 With slope zero at both ends a longer one leaves nothing to draw; a shorter one squeezes single primitives, whose speeds then are
@@ -49,7 +52,10 @@ class Clock:
         p, q = h * self.rate[cell], h * self.rate[cell + 1]
         two, three = 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q
         value = a + x * (p + x * (two + x * three))
-        rate, slope = (p + x * (2.0 * two + 3.0 * three * x)) / h, (2.0 * two + 6.0 * three * x) / (h * h)
+        rate, slope = (
+            (p + x * (2.0 * two + 3.0 * three * x)) / h,
+            (2.0 * two + 6.0 * three * x) / (h * h),
+        )
         return value, rate, slope, 6.0 * three / (h * h * h)
 
 
@@ -59,7 +65,9 @@ class TimeWarp:
     The end's deviation is drawn first, from its Gaussian truncated to the duration tolerance, the rest given the end.
     """
 
-    def __init__(self, nominal: Clock, config: SamplingConfig, least_share: Floats | None = None) -> None:
+    def __init__(
+        self, nominal: Clock, config: SamplingConfig, least_share: Floats | None = None
+    ) -> None:
         """Prepare.
 
         Args:
@@ -69,7 +77,9 @@ class TimeWarp:
         """
         self.nominal = nominal
         grid = nominal.grid
-        self._least_share = np.full(len(grid), SHORTEST_SHARE) if least_share is None else least_share
+        self._least_share = (
+            np.full(len(grid), SHORTEST_SHARE) if least_share is None else least_share
+        )
         start, end = float(grid[0]), float(nominal.time[-1])
         self._shortest = np.ceil(end * (1.0 - config.duration_tolerance) / DT - 1e-6)
         self._longest = np.floor(end * (1.0 + config.duration_tolerance) / DT + 1e-6)
@@ -79,12 +89,20 @@ class TimeWarp:
         features = Features(start, float(grid[-1]), sigma, length)
         x = np.array([start, start, grid[-1], grid[-1]])
         none = np.zeros(4)
-        free = Regression(features, Observations(x[:3], none[:3], none[:3], (0, 1, 1))).predict(grid[-1:])
-        regression = Regression(features, Observations(x, np.array([0.0, 0.0, 0.0, 1.0]), none, (0, 1, 1, 0)))
+        free = Regression(features, Observations(x[:3], none[:3], none[:3], (0, 1, 1))).predict(
+            grid[-1:]
+        )
+        regression = Regression(
+            features, Observations(x, np.array([0.0, 0.0, 0.0, 1.0]), none, (0, 1, 1, 0))
+        )
         value, slope = regression.predict(grid), regression.predict(grid, 1)
         self._share, self._share_rate = value.mean, slope.mean
         if config.time_sigma == 0.0:
-            self._end_sigma, self._factor, self._rates = 0.0, np.zeros((len(grid), 0)), np.zeros((len(grid), 0))
+            self._end_sigma, self._factor, self._rates = (
+                0.0,
+                np.zeros((len(grid), 0)),
+                np.zeros((len(grid), 0)),
+            )
             return
         self._end_sigma = float(np.sqrt(np.square(free.factor).sum()))
         both = principal(np.vstack([value.factor, slope.factor]), 1e-9)
@@ -104,14 +122,19 @@ class TimeWarp:
         room = np.where(rate < 0.0, 1.0 - self._least_share, LONGEST_SHARE - 1.0) * nominal.rate
         damped = np.minimum(1.0, (room / np.maximum(np.abs(rate), 1e-9)).min(axis=1))[:, None]
         ends = nominal.time[-1] + damped[:, 0] * delta[:, -1]
-        missing = (np.clip(np.round(ends / DT), self._shortest, self._longest) * DT - ends)[:, None]
+        missing = (np.clip(np.round(ends / DT), self._shortest, self._longest) * DT - ends)[
+            :, None
+        ]
         time = nominal.time + damped * delta + missing * self._share
         time[:, -1] = np.round(time[:, -1] / DT) * DT
         return Clock(nominal.grid, time, nominal.rate + damped * rate + missing * self._share_rate)
 
     def _end(self, z: Floats) -> Floats:
         """Truncated Gaussian deviations of the end [s] from standard normal ones."""
-        low, high = self._shortest * DT - self.nominal.time[-1], self._longest * DT - self.nominal.time[-1]
+        low, high = (
+            self._shortest * DT - self.nominal.time[-1],
+            self._longest * DT - self.nominal.time[-1],
+        )
         if self._end_sigma < 1e-9 or high - low < 1e-9:
             return np.zeros_like(z)
         a, b = special.ndtr(low / self._end_sigma), special.ndtr(high / self._end_sigma)
@@ -120,7 +143,14 @@ class TimeWarp:
 
 @kernel(F1, F2, F2, F2, I1, OUT2, OUT2, OUT2)
 def template_times(
-    grid: Floats, time: Floats, rate: Floats, at: Floats, count: Ints, tau: Floats, pace: Floats, slope: Floats
+    grid: Floats,
+    time: Floats,
+    rate: Floats,
+    at: Floats,
+    count: Ints,
+    tau: Floats,
+    pace: Floats,
+    slope: Floats,
 ) -> None:
     """Template times of scenario times, with the clock's rate and its slope there.
 
@@ -147,7 +177,9 @@ def template_times(
             two, three = 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q
             x = (t - a) / (b - a)
             for _ in range(4):
-                x -= (a + x * (p + x * (two + x * three)) - t) / (p + x * (2.0 * two + 3.0 * three * x))
+                x -= (a + x * (p + x * (two + x * three)) - t) / (
+                    p + x * (2.0 * two + 3.0 * three * x)
+                )
             x = min(max(x, 0.0), 1.0)
             tau[s, k] = grid[j] + h * x
             pace[s, k] = (p + x * (2.0 * two + 3.0 * three * x)) / h

@@ -36,7 +36,9 @@ class Usual:
     def among(cls, rarity: Callable[[Scenario], float], valid: Sequence[Scenario]) -> "Usual":
         """Find the bound by the first valid candidates."""
         rarities = sorted(map(rarity, valid))
-        return cls(rarity, max(1.0, rarities[int(LEAST_RARE * len(rarities))]) if rarities else math.inf)
+        return cls(
+            rarity, max(1.0, rarities[int(LEAST_RARE * len(rarities))]) if rarities else math.inf
+        )
 
     def __call__(self, scenario: Scenario) -> bool:
         """Whether it is."""
@@ -52,8 +54,12 @@ class Usual:
         if self.rarity is None or self.most <= 1.0:
             return ()
         if math.isinf(self.most):
-            return ("vehicles share no area, so nothing is known of such encounters: whatever is valid counts as usual",)
-        return (f"the recording is unusual among recorded encounters (rarity 1): scenarios up to {self.most:.2f} are kept",)
+            return (
+                "vehicles share no area, so nothing is known of such encounters: whatever is valid counts as usual",
+            )
+        return (
+            f"the recording is unusual among recorded encounters (rarity 1): scenarios up to {self.most:.2f} are kept",
+        )
 
 
 def pilot(sampler: Sampler, judge: Judge, few: int = 0) -> tuple[int, list[Scenario]]:
@@ -63,8 +69,17 @@ def pilot(sampler: Sampler, judge: Judge, few: int = 0) -> tuple[int, list[Scena
     """
 
     def valid(level: int, blocks: range) -> list[Scenario]:
-        drawn = [scenario for k in blocks for scenario in sampler.block(level, k)[1] if scenario is not None]
-        return [scenario for scenario, cause in zip(drawn, judge(drawn) if drawn else [], strict=True) if cause is None]
+        drawn = [
+            scenario
+            for k in blocks
+            for scenario in sampler.block(level, k)[1]
+            if scenario is not None
+        ]
+        return [
+            scenario
+            for scenario, cause in zip(drawn, judge(drawn) if drawn else [], strict=True)
+            if cause is None
+        ]
 
     found: dict[int, list[Scenario]] = {}
     for level in range(len(LEVELS)):

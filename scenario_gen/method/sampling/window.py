@@ -58,7 +58,9 @@ def window_of(encounter: Encounter, share: float, tied: Bools) -> Window | None:
     if not conflicts or share == 0.0 or tied.all():
         return None
     first = min(conflict.entry_first for conflict in conflicts)
-    last = AFTER_S + max(_over([conflict.entry_second, conflict.exit_first]) for conflict in conflicts)
+    last = AFTER_S + max(
+        _over([conflict.entry_second, conflict.exit_first]) for conflict in conflicts
+    )
     between = np.array([first, max(last, first + LEAST_S)])
     return Window(between, np.where(tied, 0.0, share))
 

@@ -3,13 +3,27 @@
 
 """Encounter -> primitives and changepoints, with their posterior (paper II-B)."""
 
-from scenario_gen.method.segmentation.estimator import SegmentationWarning, StickyHDPHMM, USUAL_R_HAT
+from scenario_gen.method.segmentation.estimator import (
+    SegmentationWarning,
+    StickyHDPHMM,
+    USUAL_R_HAT,
+)
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.method.segmentation.library import assign, Assignment, build_library, PrimitiveLibrary
+from scenario_gen.method.segmentation.library import (
+    assign,
+    Assignment,
+    build_library,
+    PrimitiveLibrary,
+)
 from scenario_gen.method.segmentation.live import LiveSegmenter
 from scenario_gen.method.segmentation.online import OnlineConfig, OnlineSegmenter
 from scenario_gen.method.segmentation.posterior import Posterior
-from scenario_gen.method.segmentation.segmenter import DEFAULT, segment, segment_track, SegmentationConfig
+from scenario_gen.method.segmentation.segmenter import (
+    DEFAULT,
+    segment,
+    segment_track,
+    SegmentationConfig,
+)
 from scenario_gen.method.segmentation.series import segment_series
 
 __all__ = [

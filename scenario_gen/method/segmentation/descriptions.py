@@ -19,7 +19,9 @@ def describe_motion(speed: Floats, heading: Floats, dt: float, kind: VehicleType
     """Describe speed [m/s] and heading [rad], both (n,), of one vehicle of a type in one primitive."""
     n, slow = len(speed), kind.waits_below
     line = np.column_stack([np.arange(n) * dt, np.ones(n)])
-    slope, level = np.linalg.lstsq(line, speed, rcond=None)[0].tolist() if n > 1 else (0.0, float(speed[0]))
+    slope, level = (
+        np.linalg.lstsq(line, speed, rcond=None)[0].tolist() if n > 1 else (0.0, float(speed[0]))
+    )
     first, last = max(level, 0.0), max(level + slope * (n - 1) * dt, 0.0)
     if np.median(speed) < slow and max(first, last) < 2.0 * slow:
         return "stands"
@@ -40,7 +42,10 @@ def describe_segments(encounter: Tracks, changepoints: Ints) -> tuple[str, ...]:
     """One sentence per segment between changepoints (K,), naming every vehicle by its id."""
     edges = [0, *(int(c) for c in changepoints), encounter.speed.shape[1]]
     return tuple(
-        ", ".join(f"vehicle {vehicle.id} {_in_segment(encounter, i, a, b)}" for i, vehicle in enumerate(encounter.vehicles))
+        ", ".join(
+            f"vehicle {vehicle.id} {_in_segment(encounter, i, a, b)}"
+            for i, vehicle in enumerate(encounter.vehicles)
+        )
         for a, b in pairwise(edges)
     )
 
@@ -53,7 +58,12 @@ def _in_segment(encounter: Tracks, i: int, a: int, b: int) -> str:
     if first >= b - 1:
         return "is not there yet"
     own = slice(max(a, first), min(b, last + 1))
-    motion = describe_motion(encounter.speed[i, own], encounter.heading[i, own], encounter.dt, encounter.vehicles[i].kind)
+    motion = describe_motion(
+        encounter.speed[i, own],
+        encounter.heading[i, own],
+        encounter.dt,
+        encounter.vehicles[i].kind,
+    )
     comes = f"arrives after {(first - a) * encounter.dt:.1f} s and " if first > a else ""
     goes = f", leaves after {(last - a) * encounter.dt:.1f} s" if last < b - 1 else ""
     return f"{comes}{motion}{goes}"
@@ -67,8 +77,14 @@ def describe_accelerations(mean: Floats) -> str:
             parts.append(f"vehicle {i} stands")
             continue
         pace = (
-            "drives steadily" if abs(along) < STEADY else f"{'accelerates' if along > 0.0 else 'brakes'} at {abs(along):.1f} m/s²"
+            "drives steadily"
+            if abs(along) < STEADY
+            else f"{'accelerates' if along > 0.0 else 'brakes'} at {abs(along):.1f} m/s²"
         )
-        bend = "" if abs(across) < LEANING else f", turning {'left' if across > 0.0 else 'right'} at {abs(across):.1f} m/s²"
+        bend = (
+            ""
+            if abs(across) < LEANING
+            else f", turning {'left' if across > 0.0 else 'right'} at {abs(across):.1f} m/s²"
+        )
         parts.append(f"vehicle {i} {pace}{bend}")
     return ", ".join(parts)

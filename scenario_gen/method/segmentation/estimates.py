@@ -26,7 +26,9 @@ def regressed(x: Floats, ends: Ints, config: SamplerConfig) -> tuple[Problem, In
     """
     problem = Problem.build(x, ends, config, np.zeros(x.shape[1]))
     starts = np.concatenate([[0], ends[:-1]])
-    return problem, np.concatenate([np.arange(a + problem.lead, b) for a, b in zip(starts, ends, strict=True)])
+    return problem, np.concatenate(
+        [np.arange(a + problem.lead, b) for a, b in zip(starts, ends, strict=True)]
+    )
 
 
 def hidden_channels(problem: Problem) -> Bools:
@@ -52,7 +54,9 @@ class Emissions:
     covariance: Floats
 
 
-def estimate(x: Floats, ends: Ints, posterior: Posterior, config: SamplerConfig) -> tuple[Floats, Floats, Floats]:
+def estimate(
+    x: Floats, ends: Ints, posterior: Posterior, config: SamplerConfig
+) -> tuple[Floats, Floats, Floats]:
     """Posterior means of each state's parameters, given how often each sample was in it (Fox et al. 2011).
 
     With r_t the share of the posterior's draws in which sample t is in the state, w the weight of a sample, u_t the mass of
@@ -78,7 +82,9 @@ def estimate(x: Floats, ends: Ints, posterior: Posterior, config: SamplerConfig)
     absent = np.isnan(x).all(axis=0)
     seen = np.where(absent, 0.0, x)
     centre, spread = np.nanmean(seen, axis=0), np.nanstd(seen, axis=0)
-    unit = np.where(spread > 1e-9 * np.maximum(np.nanmax(np.abs(seen), axis=0), 1e-300), spread, 1.0)
+    unit = np.where(
+        spread > 1e-9 * np.maximum(np.nanmax(np.abs(seen), axis=0), 1e-300), spread, 1.0
+    )
     problem, rows = regressed((seen - centre) / unit, ends, config)
     states = int(posterior.labels.max()) + 1
     share = np.stack([(posterior.samples == k).mean(axis=0) for k in range(states)])
@@ -87,7 +93,9 @@ def estimate(x: Floats, ends: Ints, posterior: Posterior, config: SamplerConfig)
     p = problem.regressors
     if p > 1:
         regression[:, :, 1:] /= np.tile(unit, problem.lead)
-    regression[:, :, 0] += centre - (regression[:, :, 1:] * np.tile(centre, problem.lead)).sum(axis=2)
+    regression[:, :, 0] += centre - (regression[:, :, 1:] * np.tile(centre, problem.lead)).sum(
+        axis=2
+    )
     covariance = settled.covariance * unit[:, None] * unit
     means = regression[:, :, 0].copy()
     if p > 1:
@@ -95,7 +103,9 @@ def estimate(x: Floats, ends: Ints, posterior: Posterior, config: SamplerConfig)
         total = counts.sum(axis=1)
         sums = (counts * np.nan_to_num(seen)).sum(axis=1)
         means = np.where(total > 0.0, sums / np.maximum(total, 1e-300), centre)
-    means[:, absent] = regression[:, absent] = covariance[:, absent] = covariance[:, :, absent] = np.nan
+    means[:, absent] = regression[:, absent] = covariance[:, absent] = covariance[:, :, absent] = (
+        np.nan
+    )
     return means, covariance, regression
 
 
@@ -109,7 +119,9 @@ def settle_emissions(problem: Problem, share: Floats, posterior: Posterior) -> E
     weight, freedom = posterior.weight, posterior.extra - 1.0
     mean, precision = problem.mean, problem.precision * posterior.worth
     total = share.sum(axis=1)
-    now = Emissions(np.repeat(mean[None], states, axis=0), np.repeat(np.eye(d)[None], states, axis=0))
+    now = Emissions(
+        np.repeat(mean[None], states, axis=0), np.repeat(np.eye(d)[None], states, axis=0)
+    )
     if p == 1:
         now.regression[:, :, 0] = (share @ problem.y) / np.maximum(total, 1e-300)[:, None]
     outer, sums = np.empty((p + d, p + d)), np.empty(2)
@@ -127,9 +139,17 @@ def settle_emissions(problem: Problem, share: Floats, posterior: Posterior) -> E
         samples = float(total.sum())
         within = scatter.sum(axis=0) / max(samples - p * states, 0.5 * samples, 1.0)
         shift = regression - mean
-        covariance = freedom * within + weight * scatter + shift @ precision @ shift.transpose(0, 2, 1)
-        before, now = now, Emissions(regression, covariance / (freedom + weight * total)[:, None, None])
-        moved = max(np.abs(now.regression - before.regression).max(), np.abs(now.covariance - before.covariance).max())
+        covariance = (
+            freedom * within + weight * scatter + shift @ precision @ shift.transpose(0, 2, 1)
+        )
+        before, now = (
+            now,
+            Emissions(regression, covariance / (freedom + weight * total)[:, None, None]),
+        )
+        moved = max(
+            np.abs(now.regression - before.regression).max(),
+            np.abs(now.covariance - before.covariance).max(),
+        )
         if moved < SETTLED:
             break
     return now
@@ -147,7 +167,9 @@ def mean_transitions(posterior: Posterior, states: int) -> tuple[Floats, Floats]
     samples, size = posterior.samples, max(int(posterior.samples.max()) + 1, states)
     starts = np.concatenate([[0], posterior.ends[:-1]])
     inside = np.setdiff1d(np.arange(1, samples.shape[1]), starts)
-    pairs = np.bincount((samples[:, inside - 1] * size + samples[:, inside]).ravel(), minlength=size * size).reshape(size, size)
+    pairs = np.bincount(
+        (samples[:, inside - 1] * size + samples[:, inside]).ravel(), minlength=size * size
+    ).reshape(size, size)
     first = np.bincount(samples[:, starts].ravel(), minlength=size)
     counts, begun = pairs / len(samples), first / len(samples)
     kept = [trace for trace, keep in zip(posterior.trace, posterior.kept, strict=True) if keep]

@@ -13,11 +13,21 @@ import numpy as np
 import numpy.typing as npt
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.segmentation.estimates import estimate, hidden_channels, mean_transitions, regressed, whitened
+from scenario_gen.method.segmentation.estimates import (
+    estimate,
+    hidden_channels,
+    mean_transitions,
+    regressed,
+    whitened,
+)
 from scenario_gen.method.segmentation.hdp_hmm.chain import TRACE
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.smoother import log_densities, smooth
-from scenario_gen.method.segmentation.series import segment_visible, usual_distances, without_outliers
+from scenario_gen.method.segmentation.series import (
+    segment_visible,
+    usual_distances,
+    without_outliers,
+)
 from scenario_gen.numerics import Floats, Ints
 
 Data = Any  # an array (T, D) or what becomes one, or a list of them
@@ -120,8 +130,14 @@ class StickyHDPHMM:
         x, ends = stacked(X, lengths)
         config = self._config()
         if len(x) < LEAST_SAMPLES:
-            raise EstimatorError(f"X has n_samples = {len(x)}; at least {LEAST_SAMPLES} are needed")
-        seed = int(np.random.default_rng().integers(2**62)) if self.random_state is None else int(self.random_state)
+            raise EstimatorError(
+                f"X has n_samples = {len(x)}; at least {LEAST_SAMPLES} are needed"
+            )
+        seed = (
+            int(np.random.default_rng().integers(2**62))
+            if self.random_state is None
+            else int(self.random_state)
+        )
         self._usual = usual_distances(x, ends)
         visible = without_outliers(x, self._usual, ends)
         with as_value_error():
@@ -184,14 +200,28 @@ class StickyHDPHMM:
         try:
             import arviz
         except ImportError:
-            raise ImportError("to_arviz needs arviz, which is not installed: pip install arviz") from None
+            raise ImportError(
+                "to_arviz needs arviz, which is not installed: pip install arviz"
+            ) from None
         posterior = self.posterior_
-        draws = np.array(posterior.trace if posterior.trace else np.zeros((1, len(posterior.samples), len(TRACE))))
+        draws = np.array(
+            posterior.trace
+            if posterior.trace
+            else np.zeros((1, len(posterior.samples), len(TRACE)))
+        )
         labels = np.full((len(draws), draws.shape[1], len(posterior.labels)), -1, np.int64)
         for chain in np.unique(posterior.chain):
             labels[chain] = posterior.samples[posterior.chain == chain]
-        groups: dict[str, Any] = {"posterior": {**{name: draws[:, :, i] for i, name in enumerate(TRACE)}, "labels": labels}}
-        options: dict[str, Any] = {"dims": {"labels": ["time"]}, "coords": {"time": np.arange(len(posterior.labels))}}
+        groups: dict[str, Any] = {
+            "posterior": {
+                **{name: draws[:, :, i] for i, name in enumerate(TRACE)},
+                "labels": labels,
+            }
+        }
+        options: dict[str, Any] = {
+            "dims": {"labels": ["time"]},
+            "coords": {"time": np.arange(len(posterior.labels))},
+        }
         if int(arviz.__version__.split(".")[0]) > 0:  # from 1.0 on the groups are one argument
             return arviz.from_dict(groups, **options)
         return arviz.from_dict(**groups, **options)
@@ -208,27 +238,42 @@ class StickyHDPHMM:
         """
         for name, value in params.items():
             if name not in _parameters():
-                raise EstimatorError(f"StickyHDPHMM has no parameter {name!r}; it has {', '.join(_parameters())}")
+                raise EstimatorError(
+                    f"StickyHDPHMM has no parameter {name!r}; it has {', '.join(_parameters())}"
+                )
             setattr(self, name, value)
         return self
 
     def __repr__(self) -> str:
-        changed = {n: v for n, v in self.get_params().items() if v is not _parameters()[n] and v != _parameters()[n]}
+        changed = {
+            n: v
+            for n, v in self.get_params().items()
+            if v is not _parameters()[n] and v != _parameters()[n]
+        }
         return f"StickyHDPHMM({', '.join(f'{name}={value!r}' for name, value in changed.items())})"
 
     def __sklearn_tags__(self) -> Any:
         """Return what scikit-learn asks its estimators: NaN is allowed, and no fit equals the one before."""
         from sklearn.utils import InputTags, Tags, TargetTags
 
-        return Tags("density_estimator", TargetTags(required=False), input_tags=InputTags(allow_nan=True))
+        return Tags(
+            "density_estimator", TargetTags(required=False), input_tags=InputTags(allow_nan=True)
+        )
 
     def _config(self) -> SamplerConfig:
         """Check the parameters."""
         values = self.get_params()
         seed = values.pop("random_state")
-        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
-            raise EstimatorError(f"random_state is {seed!r}; it must be a whole number >= 0, or None")
-        plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
+        if seed is not None and (
+            isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0
+        ):
+            raise EstimatorError(
+                f"random_state is {seed!r}; it must be a whole number >= 0, or None"
+            )
+        plain = {
+            name: value.item() if isinstance(value, np.generic) else value
+            for name, value in values.items()
+        }
         with as_value_error():
             return SamplerConfig(**plain)
 
@@ -240,7 +285,9 @@ class StickyHDPHMM:
                 NotFitted = NotFittedError
             raise NotFitted("This StickyHDPHMM instance is not fitted yet: call fit first")
 
-    def _smooth(self, X: Data, lengths: npt.ArrayLike | None, weight: float | None) -> tuple[Floats, float]:
+    def _smooth(
+        self, X: Data, lengths: npt.ArrayLike | None, weight: float | None
+    ) -> tuple[Floats, float]:
         """(T, K) smoothed probabilities and the log-likelihood, samples counting for `weight` (None: as in the fit)."""
         self._check_fitted()
         x, ends = stacked(X, lengths)
@@ -254,11 +301,15 @@ class StickyHDPHMM:
         with as_value_error():
             problem, rows = regressed(visible, ends, self._config())
         hidden = hidden_channels(problem)[:, used]
-        v = np.hstack([problem.v[:, : problem.regressors], problem.v[:, problem.regressors + used]])
+        v = np.hstack(
+            [problem.v[:, : problem.regressors], problem.v[:, problem.regressors + used]]
+        )
         density = np.zeros((len(rows), self.n_states_))
         if len(used):
             states = zip(self.coefficients_, self.covariances_, strict=True)
-            coef = np.stack([whitened(a[used], covariance[np.ix_(used, used)]) for a, covariance in states])
+            coef = np.stack(
+                [whitened(a[used], covariance[np.ix_(used, used)]) for a, covariance in states]
+            )
             counts = self.posterior_.weight if weight is None else weight
             log_densities(v, hidden, coef, counts, self.posterior_.dof, density)
         every = np.zeros((len(x), self.n_states_))
@@ -271,7 +322,9 @@ class StickyHDPHMM:
         """What a user should know of the fit."""
         concerns = []
         if not self.converged_:
-            far = ", ".join(f"{name} {value:.2f}" for name, value in self.r_hat_.items() if value > requested)
+            far = ", ".join(
+                f"{name} {value:.2f}" for name, value in self.r_hat_.items() if value > requested
+            )
             ran, chains = len(self.posterior_.trace[0]) * 2, len(self.posterior_.trace)
             concerns.append(
                 f"R-hat is above {requested:g} after {ran} sweeps of {chains} chain(s): {far}. What was sampled "
@@ -280,17 +333,26 @@ class StickyHDPHMM:
         if self.posterior_.full:
             concerns.append(
                 f"all L = {self.posterior_.states} states were in use in more than a few samples: more may be needed; "
-                + ("raise `states`, or set it to 0" if self.states else "the series may have no states that recur")
+                + (
+                    "raise `states`, or set it to 0"
+                    if self.states
+                    else "the series may have no states that recur"
+                )
             )
         left = sorted(set(range(x.shape[1])) - set(self.posterior_.channels.tolist()))
         if left:
             concerns.append(
-                "channels that say nothing of their own are left out: " + ", ".join(f"{i} ({why(x[:, i])})" for i in left)
+                "channels that say nothing of their own are left out: "
+                + ", ".join(f"{i} ({why(x[:, i])})" for i in left)
             )
         hidden = np.argwhere(np.isnan(visible) & ~np.isnan(x))
         if len(hidden):
-            at = ", ".join(f"sample {t} of channel {i}" for t, i in hidden[:3]) + (", ..." if len(hidden) > 3 else "")
-            concerns.append(f"{len(hidden)} values far from those before and after them are taken for not measured: {at}")
+            at = ", ".join(f"sample {t} of channel {i}" for t, i in hidden[:3]) + (
+                ", ..." if len(hidden) > 3 else ""
+            )
+            concerns.append(
+                f"{len(hidden)} values far from those before and after them are taken for not measured: {at}"
+            )
         return concerns
 
 
@@ -305,7 +367,11 @@ def why(column: Floats) -> str:
     seen = column[~np.isnan(column)]
     if len(seen) < 2:
         return "not measured"
-    return "does not vary" if np.ptp(seen) <= 1e-9 * np.abs(seen).max() else "follows from those before it"
+    return (
+        "does not vary"
+        if np.ptp(seen) <= 1e-9 * np.abs(seen).max()
+        else "follows from those before it"
+    )
 
 
 def stacked(X: Data, lengths: npt.ArrayLike | None) -> tuple[Floats, Ints]:
@@ -321,14 +387,25 @@ def stacked(X: Data, lengths: npt.ArrayLike | None) -> tuple[Floats, Ints]:
             raise EstimatorError("X is a list of sequences, so `lengths` is not needed")
         parts = [matrix(part) for part in X]
         if len({part.shape[1] for part in parts}) > 1:
-            raise EstimatorError(f"the sequences differ in their channels: {[part.shape[1] for part in parts]}")
+            raise EstimatorError(
+                f"the sequences differ in their channels: {[part.shape[1] for part in parts]}"
+            )
         return np.vstack(parts), np.cumsum([len(part) for part in parts])
     x = matrix(X)
     sizes = np.array([len(x)]) if lengths is None else np.asarray(lengths)
-    if sizes.shape[:1] == (len(x),) and not (sizes.ndim == 1 and np.array_equal(sizes, np.ones(len(x)))):
+    if sizes.shape[:1] == (len(x),) and not (
+        sizes.ndim == 1 and np.array_equal(sizes, np.ones(len(x)))
+    ):
         sizes = np.array([len(x)])  # as long as X: no lengths, but a target
-    if sizes.ndim != 1 or sizes.dtype.kind not in "iu" or (sizes < 1).any() or sizes.sum() != len(x):
-        raise EstimatorError(f"lengths must be whole numbers >= 1 that add up to {len(x)} samples; they are {sizes.tolist()}")
+    if (
+        sizes.ndim != 1
+        or sizes.dtype.kind not in "iu"
+        or (sizes < 1).any()
+        or sizes.sum() != len(x)
+    ):
+        raise EstimatorError(
+            f"lengths must be whole numbers >= 1 that add up to {len(x)} samples; they are {sizes.tolist()}"
+        )
     return x, np.cumsum(sizes).astype(np.int64)
 
 
@@ -347,8 +424,12 @@ def matrix(X: npt.ArrayLike) -> Floats:
             f"X must be 2D (samples, channels), not of shape {x.shape}. Reshape your data, e.g. X.reshape(-1, 1)"
         )
     if x.shape[1] == 0:
-        raise EstimatorError(f"found 0 feature(s) (shape={x.shape}) while a minimum of 1 is required.")
+        raise EstimatorError(
+            f"found 0 feature(s) (shape={x.shape}) while a minimum of 1 is required."
+        )
     if np.isinf(x).any():
         row, column = np.argwhere(np.isinf(x))[0]
-        raise EstimatorError(f"X holds {x[row, column]} at sample {row}, channel {column}; put NaN where nothing was measured")
+        raise EstimatorError(
+            f"X holds {x[row, column]} at sample {row}, channel {column}; put NaN where nothing was measured"
+        )
     return x

@@ -27,7 +27,9 @@ POSITION_FLOOR, SPEED_FLOOR = 0.5, 0.5
 SPIKE_ROUNDS = 4
 
 
-def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Callable[[list[Floats]], Floats]) -> Floats:
+def _best_window(
+    signals: Sequence[Floats], width: int, degree: int, value: Callable[[list[Floats]], Floats]
+) -> Floats:
     """Fit polynomials over every window of `width` samples; per sample, `value` of the window around it with the least misfit.
 
     Args:
@@ -72,7 +74,9 @@ def without_spikes(values: Floats, floor: float) -> Floats:
         if not new.any():
             break
         spikes |= new
-        values = np.column_stack([np.interp(t, t[~spikes], column[~spikes]) for column in values.T])
+        values = np.column_stack(
+            [np.interp(t, t[~spikes], column[~spikes]) for column in values.T]
+        )
     return values
 
 
@@ -110,7 +114,11 @@ def moving(speed: Floats, dt: float, slow: float) -> Floats:
 
 
 def driving_features(
-    encounter: Tracks, speed_window: float, turn_window: float, speed_noise: float, turn_noise: float
+    encounter: Tracks,
+    speed_window: float,
+    turn_window: float,
+    speed_noise: float,
+    turn_noise: float,
 ) -> tuple[Floats, Floats]:
     """Features (T, 3N) of an encounter, vehicle by vehicle, and the (3N,) spreads below which they mean nothing.
 
@@ -121,7 +129,9 @@ def driving_features(
         speed_noise: m/s², differences in longitudinal acceleration that are noise.
         turn_noise: m/s², the same for the lateral one.
     """
-    features = np.full((encounter.speed.shape[1], len(encounter.vehicles), 3), np.nan)  # NaN: not measured, where it is not there
+    features = np.full(
+        (encounter.speed.shape[1], len(encounter.vehicles), 3), np.nan
+    )  # NaN: not measured, where it is not there
     for i, (first, last) in enumerate(encounter.present.tolist()):
         own = slice(first, last + 1)
         position, speed = encounter.position[i, own], encounter.speed[i, own]
@@ -129,7 +139,9 @@ def driving_features(
         features[own, i, 0] = longitudinal_acceleration(speed, encounter.dt, speed_window)
         features[own, i, 1] = lateral_acceleration(position, encounter.dt, turn_window) * moves
         features[own, i, 2] = moves
-    return features.reshape(len(features), -1), np.tile([speed_noise, turn_noise, STAND_BLUR], len(encounter.vehicles))
+    return features.reshape(len(features), -1), np.tile(
+        [speed_noise, turn_noise, STAND_BLUR], len(encounter.vehicles)
+    )
 
 
 def paper_features(encounter: Tracks) -> Floats:

@@ -19,14 +19,28 @@ from scenario_gen.method.segmentation.estimates import whitened
 from scenario_gen.method.segmentation.features import driving_features
 from scenario_gen.method.segmentation.hdp_hmm.smoother import log_densities, smooth
 from scenario_gen.method.segmentation.posterior import in_order
-from scenario_gen.method.segmentation.segmenter import cut, DEFAULT, on_trends, relabel, SegmentationConfig
+from scenario_gen.method.segmentation.segmenter import (
+    cut,
+    DEFAULT,
+    on_trends,
+    relabel,
+    SegmentationConfig,
+)
 from scenario_gen.method.segmentation.series import segment_series
 from scenario_gen.numerics import Floats, frozen, frozen_ints, Ints
 from scenario_gen.types import Encounter, Segmentation
 
 FORMAT = "scenario_gen primitive library 1"
-_ROW = {"type": "array", "minItems": 1, "items": {**NUMBER, "minimum": -1e9, "maximum": 1e9}}  # of accelerations, speeds, seconds
-_SHARES = {"type": "array", "minItems": 1, "items": {"type": "number", "minimum": 0.0, "maximum": 1.0}}
+_ROW = {
+    "type": "array",
+    "minItems": 1,
+    "items": {**NUMBER, "minimum": -1e9, "maximum": 1e9},
+}  # of accelerations, speeds, seconds
+_SHARES = {
+    "type": "array",
+    "minItems": 1,
+    "items": {"type": "number", "minimum": 0.0, "maximum": 1.0},
+}
 SCHEMA: dict[str, Any] = {
     "type": "object",
     "properties": {
@@ -93,7 +107,9 @@ class PrimitiveLibrary:
         """
         if len(encounter.vehicles) != self.vehicles:
             count = len(encounter.vehicles)
-            raise InputError(f"encounter {encounter.name!r} has {count} vehicles; the primitive library is for {self.vehicles}")
+            raise InputError(
+                f"encounter {encounter.name!r} has {count} vehicles; the primitive library is for {self.vehicles}"
+            )
         return driving_features(encounter, *(float(w) for w in self.windows))[0]
 
     def save(self, path: Path) -> None:
@@ -125,8 +141,12 @@ class PrimitiveLibrary:
         for name, part in (("transition", "row"), ("initial", "list")):
             sums = np.sum(values[name], axis=-1)
             if (np.abs(sums - 1.0) > 1e-6).any():
-                raise InputError(f"{what}: {name} holds probabilities; each {part} must sum to 1, not {np.ravel(sums)[0]:g}")
-        with guarded(f"{what}: covariances", remedy="each must be symmetric and positive definite"):
+                raise InputError(
+                    f"{what}: {name} holds probabilities; each {part} must sum to 1, not {np.ravel(sums)[0]:g}"
+                )
+        with guarded(
+            f"{what}: covariances", remedy="each must be symmetric and positive definite"
+        ):
             covariances = np.array(values["covariances"])
             for covariance in covariances:
                 np.linalg.cholesky(covariance)
@@ -159,7 +179,9 @@ def build_library(
     """
     kinds = {(len(e.vehicles), e.dt_ns) for e in encounters}
     if len(kinds) != 1:
-        raise InputError("a primitive library needs encounters with one number of vehicles and one sampling period, at least one")
+        raise InputError(
+            "a primitive library needs encounters with one number of vehicles and one sampling period, at least one"
+        )
     windows = (config.speed_window, config.turn_window, config.speed_noise, config.turn_noise)
     parts = [driving_features(e, *windows) for e in encounters]
     x, blur = np.vstack([features for features, _ in parts]), parts[0][1]
@@ -173,9 +195,13 @@ def build_library(
         labels[start:stop] = relabel(posterior.labels[start:stop], changepoints, fresh=False)
         points.append(np.flatnonzero(np.diff(labels[start:stop])) + 1)
     labels = in_order(labels)
-    library = _summarise(x, labels, ends, encounters[0], windows, config.sampler.weight or 1.0, blur)
+    library = _summarise(
+        x, labels, ends, encounters[0], windows, config.sampler.weight or 1.0, blur
+    )
     assignments = []
-    for encounter, start, stop, own_points in zip(encounters, (0, *ends[:-1]), ends, points, strict=True):
+    for encounter, start, stop, own_points in zip(
+        encounters, (0, *ends[:-1]), ends, points, strict=True
+    ):
         own_labels = labels[start:stop]
         segmentation = Segmentation(
             in_order(own_labels),
@@ -217,7 +243,9 @@ def _summarise(
     prior = 3.0 * x.shape[1]
     for j in range(k):
         rest = x[labels == j] - means[j]
-        covariances[j] = (prior * pooled + rest.T @ rest + len(rest) * np.diag(np.square(blur))) / (prior + len(rest))
+        covariances[j] = (
+            prior * pooled + rest.T @ rest + len(rest) * np.diag(np.square(blur))
+        ) / (prior + len(rest))
     return PrimitiveLibrary(
         vehicles=len(example.vehicles),
         means=means,
@@ -232,7 +260,9 @@ def _summarise(
     )
 
 
-def assign(encounter: Encounter, library: PrimitiveLibrary, config: SegmentationConfig = DEFAULT) -> Assignment:
+def assign(
+    encounter: Encounter, library: PrimitiveLibrary, config: SegmentationConfig = DEFAULT
+) -> Assignment:
     """Cut a new encounter into the primitives of a library, without fitting anything (forward-backward smoothing).
 
     Raises:
@@ -248,13 +278,19 @@ def assign(encounter: Encounter, library: PrimitiveLibrary, config: Segmentation
         points = np.delete(points, min(near, len(points) - 1))
     result = relabel(labels, points, fresh=False)
     points = np.flatnonzero(np.diff(result)) + 1
-    segmentation = Segmentation(in_order(result), points, changed, describe_segments(encounter, points))
+    segmentation = Segmentation(
+        in_order(result), points, changed, describe_segments(encounter, points)
+    )
     return Assignment(segmentation, frozen_ints(result[[0, *points]]))
 
 
 def _smooth(library: PrimitiveLibrary, x: Floats) -> tuple[Floats, Floats]:
     """(T, K) probability of each primitive and (T,) of a change, at each sample of x (T, D); NaN: not measured."""
-    density, smoothed, changed = np.empty((len(x), len(library.means))), np.empty((len(x), len(library.means))), np.empty(len(x))
+    density, smoothed, changed = (
+        np.empty((len(x), len(library.means))),
+        np.empty((len(x), len(library.means))),
+        np.empty(len(x)),
+    )
     states = zip(library.means, library.covariances, strict=True)
     coef = np.stack([whitened(mean[:, None], covariance) for mean, covariance in states])
     rows = np.column_stack([np.ones(len(x)), np.nan_to_num(x)])

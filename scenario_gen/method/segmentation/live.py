@@ -39,13 +39,18 @@ class LiveSegmenter:
         return sample.stamp_ns == last.stamp_ns + self._dt_ns and sample.vehicles == last.vehicles
 
     def _states(self, changepoints: Sequence[Changepoint]) -> LiveChangepoints:
-        time_ns = np.array([changepoint.sample for changepoint in changepoints], dtype=np.int64) * self._dt_ns
+        time_ns = (
+            np.array([changepoint.sample for changepoint in changepoints], dtype=np.int64)
+            * self._dt_ns
+        )
         at = (self._start_ns + time_ns - self._past[0].stamp_ns) // self._dt_ns
         position = np.stack([sample.position for sample in self._past], axis=1)
         speed = np.stack([sample.speed for sample in self._past], axis=1)
         vehicles = self._past[-1].vehicles
         rows = zip(position, speed, vehicles, strict=True)
-        heading = np.array([course(xy, v, self._dt_ns * 1e-9, of.kind.least_course)[0] for xy, v, of in rows])
+        heading = np.array(
+            [course(xy, v, self._dt_ns * 1e-9, of.kind.least_course)[0] for xy, v, of in rows]
+        )
         return LiveChangepoints(
             self._start_ns,
             vehicles,

@@ -29,13 +29,19 @@ class OnlineConfig(Parameters):
     """How the online segmenter decides."""
 
     window: float = parameter(30.0, "past that is kept at most", unit="s", low=5.0, high=600.0)
-    delay: float = parameter(1.0, "least age at which a changepoint is confirmed", unit="s", low=0.3, high=10.0)
-    look_back: float = parameter(6.0, "age beyond which no changepoint is looked for any more", unit="s", low=1.0, high=60.0)
+    delay: float = parameter(
+        1.0, "least age at which a changepoint is confirmed", unit="s", low=0.3, high=10.0
+    )
+    look_back: float = parameter(
+        6.0, "age beyond which no changepoint is looked for any more", unit="s", low=1.0, high=60.0
+    )
     every: int = parameter(2, "samples between two looks", low=1, high=100)
     significance_level: float = parameter(
         1e-6, "probability with which noise alone looks like a changepoint", low=1e-12, high=0.5
     )
-    min_segment: float = parameter(0.5, "least distance between changepoints", unit="s", low=0.2, high=10.0)
+    min_segment: float = parameter(
+        0.5, "least distance between changepoints", unit="s", low=0.2, high=10.0
+    )
 
 
 @dataclass(frozen=True)
@@ -56,11 +62,15 @@ class Changepoint:
 class OnlineSegmenter:
     """Extends a segmentation sample by sample; memory and time per sample do not grow with the samples seen."""
 
-    def __init__(self, vehicles: int | Sequence[Vehicle], dt: float, config: OnlineConfig = OnlineConfig()) -> None:
+    def __init__(
+        self, vehicles: int | Sequence[Vehicle], dt: float, config: OnlineConfig = OnlineConfig()
+    ) -> None:
         """Start with no samples of so many cars, or of these vehicles, `dt` seconds apart."""
         self._config = config
         self._dt = dt
-        self._vehicles = [Vehicle(str(n)) for n in range(vehicles)] if isinstance(vehicles, int) else vehicles
+        self._vehicles = (
+            [Vehicle(str(n)) for n in range(vehicles)] if isinstance(vehicles, int) else vehicles
+        )
         self._samples: deque[Floats] = deque(maxlen=round(config.window / dt))
         self._count = 0
         self._confirmed: deque[int] = deque(maxlen=2)
@@ -82,7 +92,10 @@ class OnlineSegmenter:
             )
         self._samples.append(row)
         self._count += 1
-        if self._count % self._config.every or len(self._samples) < 2.0 * self._config.delay / self._dt:
+        if (
+            self._count % self._config.every
+            or len(self._samples) < 2.0 * self._config.delay / self._dt
+        ):
             return []
         return self._look()
 
@@ -97,7 +110,10 @@ class OnlineSegmenter:
         least = trends.threshold(config.significance_level)
         gap = max(2, round(config.min_segment / self._dt))
         fixed = [c - first for c in self._confirmed if c - first >= gap]
-        start = max((fixed[-1] if fixed else 0) + gap, len(self._samples) - round(config.look_back / self._dt))
+        start = max(
+            (fixed[-1] if fixed else 0) + gap,
+            len(self._samples) - round(config.look_back / self._dt),
+        )
         free = np.arange(start, trends.samples - gap)
         points = trends.add(fixed, free, least, gap)
         points = fixed + trends.settle(points, gap, gap)[len(fixed) :]
@@ -105,9 +121,17 @@ class OnlineSegmenter:
         changepoints = []
         for i, c in enumerate(points):
             if start <= c <= ripe and (gain := trends.gain(points, i)) > least:
-                changepoints.append(Changepoint(first + c, self._count - 1, chance_of_knot(gain, trends, points, i)))
+                changepoints.append(
+                    Changepoint(
+                        first + c, self._count - 1, chance_of_knot(gain, trends, points, i)
+                    )
+                )
         self._confirmed.extend(c.sample for c in changepoints)
-        while len(self._confirmed) == 2 and len(self._samples) > 1 and first < self._confirmed[0] - gap:
+        while (
+            len(self._confirmed) == 2
+            and len(self._samples) > 1
+            and first < self._confirmed[0] - gap
+        ):
             self._samples.popleft()
             first += 1
         return changepoints

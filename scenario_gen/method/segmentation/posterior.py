@@ -59,13 +59,27 @@ class Posterior:
     def constant(cls, ends: Ints) -> "Posterior":
         """The posterior of sequences that do not vary: one primitive, with certainty; they end before the samples `ends` (Q,)."""
         zeros = np.zeros(int(ends[-1]), np.int64)
-        return cls(zeros, zeros[None], np.zeros(len(zeros)), ends, np.zeros(1, np.int64), (), np.zeros(0, np.bool_))
+        return cls(
+            zeros,
+            zeros[None],
+            np.zeros(len(zeros)),
+            ends,
+            np.zeros(1, np.int64),
+            (),
+            np.zeros(0, np.bool_),
+        )
 
     def part(self, start: int, stop: int) -> "Posterior":
         """Return the posterior of the samples start..stop alone."""
         ends = np.array([stop - start])
         labels, samples = in_order(self.labels[start:stop]), self.samples[:, start:stop]
-        return replace(self, labels=labels, samples=samples, probability=self.probability[start:stop], ends=ends)
+        return replace(
+            self,
+            labels=labels,
+            samples=samples,
+            probability=self.probability[start:stop],
+            ends=ends,
+        )
 
     @property
     def changepoints(self) -> Ints:
@@ -94,7 +108,10 @@ class Posterior:
                 if len(sampled):
                     samples[k].append(int(sampled[np.argmin(np.abs(sampled - centre))]))
         return np.array(
-            [np.quantile(f, [low, high], method="inverted_cdf") if f else [c, c] for f, c in zip(samples, centres, strict=True)]
+            [
+                np.quantile(f, [low, high], method="inverted_cdf") if f else [c, c]
+                for f, c in zip(samples, centres, strict=True)
+            ]
         ).reshape(-1, 2)
 
     def primitives(self) -> Floats:
@@ -130,9 +147,14 @@ def in_order(labels: Ints) -> Ints:
 
 def matched_labels(samples: Ints, reference: Ints, size: int) -> Ints:
     """Rename each row's labels (S, T), below `size`, to agree with `reference` (T,) in as many samples as possible."""
-    overlaps = [np.bincount(row * size + reference, minlength=size * size).reshape(size, size) for row in samples]
+    overlaps = [
+        np.bincount(row * size + reference, minlength=size * size).reshape(size, size)
+        for row in samples
+    ]
     partners = [linear_sum_assignment(overlap, maximize=True)[1] for overlap in overlaps]
-    return np.stack([partner[row] for partner, row in zip(partners, samples, strict=True)]).astype(np.int64)
+    return np.stack([partner[row] for partner, row in zip(partners, samples, strict=True)]).astype(
+        np.int64
+    )
 
 
 def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Posterior:
@@ -151,9 +173,17 @@ def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Po
     means = np.array([trace[:, 0].mean() for trace in traces])
     best = int(np.argmax(means))
     kept = means >= means[best] - max(10.0, 3.0 * float(traces[best][:, 0].std()))
-    every = max(1, -(-sum(len(s) for s, keep in zip(samples, kept, strict=True) if keep) // MOST_SAMPLES))
+    every = max(
+        1, -(-sum(len(s) for s, keep in zip(samples, kept, strict=True) if keep) // MOST_SAMPLES)
+    )
     stack = np.vstack([s[::every] for s, keep in zip(samples, kept, strict=True) if keep])
-    chain = np.concatenate([np.full(len(s[::every]), k) for k, (s, keep) in enumerate(zip(samples, kept, strict=True)) if keep])
+    chain = np.concatenate(
+        [
+            np.full(len(s[::every]), k)
+            for k, (s, keep) in enumerate(zip(samples, kept, strict=True))
+            if keep
+        ]
+    )
     scores = np.concatenate([t[::every, 0] for t, keep in zip(traces, kept, strict=True) if keep])
     estimate = stack[int(np.argmax(scores))]
     size = int(stack.max()) + 1

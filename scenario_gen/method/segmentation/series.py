@@ -13,7 +13,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import new_top, Place, Problem
-from scenario_gen.method.segmentation.hdp_hmm.start import FAR_QUANTILE, find_start, MOST_STATES, other_start, Start
+from scenario_gen.method.segmentation.hdp_hmm.start import (
+    FAR_QUANTILE,
+    find_start,
+    MOST_STATES,
+    other_start,
+    Start,
+)
 from scenario_gen.method.segmentation.posterior import pool, Posterior, r_hat
 from scenario_gen.numerics import Floats, Ints
 
@@ -49,7 +55,9 @@ def segment_series(
     if x.ndim == 1:
         x = x[:, None]
     if x.ndim != 2 or x.shape[0] < 4:
-        raise InputError(f"a series to segment needs at least 4 samples in (T, D), not an array of shape {x.shape}")
+        raise InputError(
+            f"a series to segment needs at least 4 samples in (T, D), not an array of shape {x.shape}"
+        )
     if np.isinf(x).any():
         row, column = np.argwhere(np.isinf(x))[0]
         raise InputError(
@@ -57,12 +65,18 @@ def segment_series(
         )
     stops = np.array([len(x)] if ends is None else ends, dtype=np.int64)
     if stops[-1] != len(x) or (np.diff(np.concatenate([[0], stops])) < 1).any():
-        raise InputError(f"the ends of the sequences must rise to the number of samples, {len(x)}; they are {stops.tolist()}")
+        raise InputError(
+            f"the ends of the sequences must rise to the number of samples, {len(x)}; they are {stops.tolist()}"
+        )
     error = np.zeros(x.shape[1]) if blur is None else np.asarray(blur)
-    return segment_visible(without_outliers(x, usual_distances(x, stops), stops), config, seed, stops, error)
+    return segment_visible(
+        without_outliers(x, usual_distances(x, stops), stops), config, seed, stops, error
+    )
 
 
-def segment_visible(x: Floats, config: SamplerConfig, seed: int, ends: Ints, error: Floats) -> Posterior:
+def segment_visible(
+    x: Floats, config: SamplerConfig, seed: int, ends: Ints, error: Floats
+) -> Posterior:
     """`segment_series` of x (T, D), finite or NaN, whose outliers are NaN already; `error` (D,) of each channel.
 
     Raises:
@@ -93,7 +107,9 @@ def standardised(x: Floats, error: Floats) -> tuple[Floats, Floats, Ints]:
     inner = inner_spread(filled)
     varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(filled), axis=0), 1e-300)
     unit = np.where(inner > 0.1 * spread, inner, spread)
-    unit = np.maximum(unit, error)  # a channel of noise alone must not be scaled up to look like the others
+    unit = np.maximum(
+        unit, error
+    )  # a channel of noise alone must not be scaled up to look like the others
     channels = np.flatnonzero(varies)
     scaled = (filled[:, channels] - centre[channels]) / unit[channels]
     complete = scaled[~np.isnan(scaled).any(axis=1)]
@@ -122,7 +138,9 @@ def usual_distances(x: Floats, ends: Ints) -> Floats:
     x = without_rare_channels(x)
     before, _ = _from_medians(x, ends)
     with np.errstate(all="ignore"):
-        return np.asarray(np.fmax(1.4826 * np.nanmedian(np.abs(before), axis=0), 0.1 * inner_spread(x)))
+        return np.asarray(
+            np.fmax(1.4826 * np.nanmedian(np.abs(before), axis=0), 0.1 * inner_spread(x))
+        )
 
 
 def without_outliers(x: Floats, usual: Floats, ends: Ints) -> Floats:
@@ -149,7 +167,9 @@ def _from_medians(x: Floats, ends: Ints) -> tuple[Floats, Floats]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of windows that hold NaN alone
         median = np.nanmedian(sliding_window_view(separated, SIDE, axis=0), axis=-1)
-    at = np.arange(len(x)) + SIDE * np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))  # its row among the gaps
+    at = np.arange(len(x)) + SIDE * np.repeat(
+        np.arange(len(ends)), np.diff(ends, prepend=0)
+    )  # its row among the gaps
     return x - median[at], x - median[at + SIDE + 1]
 
 
@@ -164,7 +184,9 @@ def independent(x: Floats) -> Ints:
     return np.array(kept, dtype=np.int64)
 
 
-def sample(problem: Problem, config: SamplerConfig, seed: int, ends: Ints, channels: Ints) -> Posterior:
+def sample(
+    problem: Problem, config: SamplerConfig, seed: int, ends: Ints, channels: Ints
+) -> Posterior:
     """Run the chains until they agree or `config.sweeps` is reached; start again with more states where all were used.
 
     Args:
@@ -177,21 +199,31 @@ def sample(problem: Problem, config: SamplerConfig, seed: int, ends: Ints, chann
     first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
     start = find_start(problem, config, np.random.Generator(np.random.PCG64(first)))
     streams = [np.random.Generator(np.random.PCG64(stream)) for stream in seeds]
-    places = [start.place] + [other_start(start, config, index, streams[index]) for index in range(1, config.chains)]
+    places = [start.place] + [
+        other_start(start, config, index, streams[index]) for index in range(1, config.chains)
+    ]
     states = config.states or start.states + SPARE_STATES
     places = [Place(np.minimum(place.labels, states - 1), place.mass) for place in places]
     while True:
-        chains = [Chain(start, config, place, states, rng) for place, rng in zip(places, streams, strict=True)]
+        chains = [
+            Chain(start, config, place, states, rng)
+            for place, rng in zip(places, streams, strict=True)
+        ]
         for sweeps in schedule(config.sweeps):
             for chain in chains:
                 chain.extend_to(sweeps)
-            if config.r_hat > 1.0 and float(r_hat([chain.trace for chain in chains]).max()) <= config.r_hat:
+            if (
+                config.r_hat > 1.0
+                and float(r_hat([chain.trace for chain in chains]).max()) <= config.r_hat
+            ):
                 break
         full = max(float(np.mean(chain.trace[:, 1] == states)) for chain in chains) > MOST_FULL
         if not full or config.states or states >= MOST_STATES:
             break
         places, states = [chain.place for chain in chains], min(2 * states, MOST_STATES)
-    posterior = pool([chain.samples for chain in chains], [chain.trace for chain in chains], ends, problem.lead)
+    posterior = pool(
+        [chain.samples for chain in chains], [chain.trace for chain in chains], ends, problem.lead
+    )
     drawn = np.log(np.array([[chain.prior.extra, chain.prior.worth] for chain in chains]))
     extra, worth = np.exp(drawn.mean(axis=0)).tolist()
     return replace(
@@ -219,7 +251,14 @@ def schedule(sweeps: int) -> Iterator[int]:
 class Chain:
     """A chain that can be continued; the first half of its sweeps is burn-in and not kept."""
 
-    def __init__(self, start: Start, config: SamplerConfig, place: Place, states: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        start: Start,
+        config: SamplerConfig,
+        place: Place,
+        states: int,
+        rng: np.random.Generator,
+    ) -> None:
         """Start at `place` with weak-limit truncation L = `states`."""
         self._start, self._config, self._rng = start, config, rng
         self._samples: list[Ints] = []
@@ -234,7 +273,9 @@ class Chain:
         more = sweeps - self._ran
         seed = int(self._rng.integers(2**62))
         problem = self._start.problem
-        self.place, self.prior, samples, trace = problem.run(self._config, self.prior, self.place, self._top, 0, more, seed)
+        self.place, self.prior, samples, trace = problem.run(
+            self._config, self.prior, self.place, self._top, 0, more, seed
+        )
         self._samples.append(samples)
         self._traces.append(trace)
         self._ran = sweeps

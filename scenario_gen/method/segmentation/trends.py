@@ -27,7 +27,9 @@ COURSE_WINDOW = 0.9
 
 
 @kernel(F2, F2, I1, I, I1, OUT1)
-def knot_misfits(signals: Floats, weights: Floats, knots: Ints, moved: int, places: Ints, out: Floats) -> None:
+def knot_misfits(
+    signals: Floats, weights: Floats, knots: Ints, moved: int, places: Ints, out: Floats
+) -> None:
     """Weighted squared misfit of continuous piecewise-linear functions, for each place of one knot.
 
     The hat functions' normal equations are tridiagonal: accumulated and eliminated in one pass.
@@ -85,7 +87,14 @@ class Trends:
     _cache: dict[tuple[int, ...], tuple[float, int]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, position: Floats, speed: Floats, dt: float, vehicles: Sequence[Vehicle], present: Ints = ALWAYS) -> "Trends":
+    def of(
+        cls,
+        position: Floats,
+        speed: Floats,
+        dt: float,
+        vehicles: Sequence[Vehicle],
+        present: Ints = ALWAYS,
+    ) -> "Trends":
         """Take the trends of N vehicles; noise is at least that of its type in speed, and 0.3 m/s across the course.
 
         Args:
@@ -97,11 +106,20 @@ class Trends:
         """
         signals, weights = [], []
         samples = speed.shape[1]
-        for i, (first, last) in enumerate(canonical_presence(present, len(speed), samples, "trends").tolist()):
-            xy, v, kind = position[i, first : last + 1], speed[i, first : last + 1], vehicles[i].kind
+        for i, (first, last) in enumerate(
+            canonical_presence(present, len(speed), samples, "trends").tolist()
+        ):
+            xy, v, kind = (
+                position[i, first : last + 1],
+                speed[i, first : last + 1],
+                vehicles[i].kind,
+            )
             beyond = (first, samples - 1 - last)
             bend = np.diff(v, 2)
-            noise = max(kind.speed_noise, 1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0)
+            noise = max(
+                kind.speed_noise,
+                1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0,
+            )
             signals.append(np.pad(v, beyond, mode="edge"))
             weights.append(np.pad(np.full(len(v), 1.0 / noise), beyond))
             angle, pace = course(xy, v, dt, kind.least_course)
@@ -111,7 +129,9 @@ class Trends:
             sure[:edge] = sure[len(sure) - edge :] = 0.0  # half a window has three times the noise
             weights.append(np.pad(sure, beyond))
         stack = np.array(signals)
-        return cls(np.ascontiguousarray(stack - stack.mean(axis=1, keepdims=True)), np.array(weights))
+        return cls(
+            np.ascontiguousarray(stack - stack.mean(axis=1, keepdims=True)), np.array(weights)
+        )
 
     def threshold(self, chance: float) -> float:
         """Return the gain that noise alone exceeds with probability `chance`: a quantile of χ² with one degree per signal."""
@@ -125,7 +145,9 @@ class Trends:
     def misfits(self, knots: list[int], moved: int, places: Ints) -> Floats:
         """(P,) misfit for each place of knot number `moved` (-1: the misfit as it is)."""
         out = np.empty(len(places))
-        knot_misfits(self.signals, self.weights, np.array(knots, dtype=np.int64), moved, places, out)
+        knot_misfits(
+            self.signals, self.weights, np.array(knots, dtype=np.int64), moved, places, out
+        )
         return out
 
     def gain(self, points: list[int], i: int) -> float:
@@ -182,7 +204,9 @@ class Trends:
             every = [0, *points, self.samples - 1]
             best = (least_gain, 0, 0)
             for i in range(len(points) + 1):
-                places = candidates[(candidates >= every[i] + gap) & (candidates <= every[i + 1] - gap)]
+                places = candidates[
+                    (candidates >= every[i] + gap) & (candidates <= every[i + 1] - gap)
+                ]
                 if len(places):
                     low = max(i - 1, 0)
                     gain, place = self._best(every[low : i + 3], i + 1 - low, places)
@@ -192,7 +216,9 @@ class Trends:
             points.insert(best[2], best[1])
 
 
-def course(position: Floats, speed: Floats, dt: float, least: float = 1.0) -> tuple[Floats, Floats]:
+def course(
+    position: Floats, speed: Floats, dt: float, least: float = 1.0
+) -> tuple[Floats, Floats]:
     """Course over ground [rad], unwrapped and held where it is slower than `least` [m/s], and smoothed speed [m/s], each (T,)."""
     half = max(1, min(round(COURSE_WINDOW / dt) // 2, (len(speed) - 1) // 2))
     steps = np.arange(-half, half + 1)

@@ -20,7 +20,14 @@ from scenario_gen.method.validity.reactions import broken_reactions, LaneGaps, t
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import drives_against, ground_for, RuleCheck
-from scenario_gen.template import Conflict, conflict_of, conflicts_in, lane_gaps, required_orders, Wait
+from scenario_gen.template import (
+    Conflict,
+    conflict_of,
+    conflicts_in,
+    lane_gaps,
+    required_orders,
+    Wait,
+)
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
@@ -70,15 +77,23 @@ class Checker:
     lane_gaps: LaneGaps | None = None
 
     def __post_init__(self) -> None:
-        self._first = tuple(conflict.first for conflict in self.conflicts or ()) if self.first is None else tuple(self.first)
+        self._first = (
+            tuple(conflict.first for conflict in self.conflicts or ())
+            if self.first is None
+            else tuple(self.first)
+        )
         self._limits = self.limits or Limits()
         self._dynamics_limits: dict[str, Floats] = {}
         if self.road is not None:
             self._grounds: dict[frozenset[str], inside.Ground] = {}
         lanes = self.road.lanes if self.road is not None else None
         swapped = self._first != tuple(conflict.first for conflict in self.conflicts or ())
-        against = lanes is not None and lanes.drawn and swapped  # the signs of a drawn road say who went first in the template
-        self._rules = RuleCheck(lanes) if lanes is not None and lanes.rules and not against else None
+        against = (
+            lanes is not None and lanes.drawn and swapped
+        )  # the signs of a drawn road say who went first in the template
+        self._rules = (
+            RuleCheck(lanes) if lanes is not None and lanes.rules and not against else None
+        )
 
     @classmethod
     def of_template(
@@ -109,7 +124,15 @@ class Checker:
         own = (limits or Limits()).for_template(encounter)
         ends = at_ends(encounter.present, len(encounter.time))
         return cls(
-            road, requested, conflicts, waits, own, required_orders(conflicts, order), reactions, ends, lane_gaps(encounter)
+            road,
+            requested,
+            conflicts,
+            waits,
+            own,
+            required_orders(conflicts, order),
+            reactions,
+            ends,
+            lane_gaps(encounter),
         )
 
     @property
@@ -155,7 +178,10 @@ class Checker:
             *self._broken_rules(scenario),
             *self._waits(scenario),
         ]
-        conflicts = [conflict_of(scenario, conflict.first, conflict.second) for conflict in self.conflicts or ()]
+        conflicts = [
+            conflict_of(scenario, conflict.first, conflict.second)
+            for conflict in self.conflicts or ()
+        ]
         wrong, present, absent = self._passing_orders(conflicts)
         reactions = [*broken_reactions(scenario, conflicts, self.reactions, self._limits)]
         if self.lane_gaps is not None:
@@ -167,18 +193,35 @@ class Checker:
         t = scenario.time.shape[0]
         shapes = (scenario.heading.shape, scenario.speed.shape, scenario.acceleration.shape)
         if scenario.position.shape != (n, t, 2) or any(shape != (n, t) for shape in shapes):
-            raise InputError(f"{where}: arrays disagree in shape with {n} vehicle(s) and {t} sample(s)")
+            raise InputError(
+                f"{where}: arrays disagree in shape with {n} vehicle(s) and {t} sample(s)"
+            )
         if n == 0 or t < 2:
-            raise InputError(f"{where} has {n} vehicle(s) and {t} sample(s); at least 1 and 2 are needed")
+            raise InputError(
+                f"{where} has {n} vehicle(s) and {t} sample(s); at least 1 and 2 are needed"
+            )
         if not all(vehicle.length > 0.0 and vehicle.width > 0.0 for vehicle in scenario.vehicles):
             raise InputError(f"{where}: a vehicle's length or width is not positive")
         if self.road is not None and scenario.frame_id != self.road.frame_id:
-            raise InputError(f"{where} is in frame {scenario.frame_id!r}, its road in {self.road.frame_id!r}")
-        known = () if self.requested is None else (self.requested.start, self.requested.end, self.requested.relaxed)
-        counts = sorted({len(states) for states in (*known, *(() if self.ends is None else (self.ends,)))} - {n})
+            raise InputError(
+                f"{where} is in frame {scenario.frame_id!r}, its road in {self.road.frame_id!r}"
+            )
+        known = (
+            ()
+            if self.requested is None
+            else (self.requested.start, self.requested.end, self.requested.relaxed)
+        )
+        counts = sorted(
+            {len(states) for states in (*known, *(() if self.ends is None else (self.ends,)))}
+            - {n}
+        )
         if counts:
-            raise InputError(f"{where} has {n} vehicle(s), but states were requested for {counts[0]}")
-        indices = [i for c in self.conflicts or () for i in (c.first, c.second)] + [w.vehicle for w in self.waits or ()]
+            raise InputError(
+                f"{where} has {n} vehicle(s), but states were requested for {counts[0]}"
+            )
+        indices = [i for c in self.conflicts or () for i in (c.first, c.second)] + [
+            w.vehicle for w in self.waits or ()
+        ]
         indices += [i for edge in self.reactions for i in (edge.who, edge.whom)]
         strangers = [i for i in indices if not 0 <= i < n]
         if strangers:
@@ -193,7 +236,9 @@ class Checker:
         """
         if self.ends is None or scenario.all_present:
             return
-        for i, k in np.argwhere(self.ends & ~at_ends(scenario.present, len(scenario.time))).tolist():
+        for i, k in np.argwhere(
+            self.ends & ~at_ends(scenario.present, len(scenario.time))
+        ).tolist():
             what, where = ("goes", "to its end") if k else ("comes", "from its start on")
             time = float(scenario.time[scenario.present[i, k]])
             message = f"vehicle {i}: {what} at {time:.3f} s; the recording has it {where}"
@@ -209,16 +254,36 @@ class Checker:
             ("end", -1, self.requested.end),
         ):  # too few numbers for arrays
             # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
-            ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), states.tolist(), strict=True)
-            for i, ((x, y), speed, (x_requested, y_requested, _, speed_requested)) in enumerate(ends):
-                distance, difference = np.hypot(x - x_requested, y - y_requested), abs(speed - speed_requested)
+            ends = zip(
+                scenario.position[:, k].tolist(),
+                scenario.speed[:, k].tolist(),
+                states.tolist(),
+                strict=True,
+            )
+            for i, ((x, y), speed, (x_requested, y_requested, _, speed_requested)) in enumerate(
+                ends
+            ):
+                distance, difference = (
+                    np.hypot(x - x_requested, y - y_requested),
+                    abs(speed - speed_requested),
+                )
                 far, off = self._within_a_step(scenario, i, k)
                 free, faster = relaxed[i][k]
-                far, off = far + free + limits.position_tolerance, off + faster + limits.speed_tolerance
+                far, off = (
+                    far + free + limits.position_tolerance,
+                    off + faster + limits.speed_tolerance,
+                )
                 if not (distance <= far + 1e-9 and difference <= off + 1e-9):  # NaN is not near
-                    bounds = f" (free are {free:.3f} m and {faster:.3f} m/s)" if free or faster else ""
+                    bounds = (
+                        f" (free are {free:.3f} m and {faster:.3f} m/s)" if free or faster else ""
+                    )
                     message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from the request{bounds}"
-                    yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[scenario.present[i, k]]), (i,), message)
+                    yield Violation(
+                        Cause.BOUNDARY_STATE,
+                        float(scenario.time[scenario.present[i, k]]),
+                        (i,),
+                        message,
+                    )
 
     @staticmethod
     def _within_a_step(scenario: Scenario, i: int, k: int) -> tuple[float, float]:
@@ -229,32 +294,51 @@ class Checker:
         at = int(scenario.present[i, k])
         if at in {0, len(scenario.time) - 1}:
             return 0.0, 0.0
-        step = float(scenario.time[at + 1] - scenario.time[at]) if k else float(scenario.time[at] - scenario.time[at - 1])
+        step = (
+            float(scenario.time[at + 1] - scenario.time[at])
+            if k
+            else float(scenario.time[at] - scenario.time[at - 1])
+        )
         return step * float(scenario.speed[i, at]), step * abs(float(scenario.acceleration[i, at]))
 
     def _dynamics(self, scenario: Scenario) -> Iterator[Violation]:
         out = np.full((len(scenario.vehicles), len(dynamics.Check), 4), np.nan)
         names = ("position", "heading", "speed", "acceleration")
         for rows, at in spans(scenario):
-            position, heading, speed, acceleration = (np.ascontiguousarray(getattr(scenario, name)[rows, at]) for name in names)
+            position, heading, speed, acceleration = (
+                np.ascontiguousarray(getattr(scenario, name)[rows, at]) for name in names
+            )
             limits = self._limits_of(scenario.vehicles[rows.start].type)
-            dynamics.worst_excess(scenario.time[at], position, heading, speed, acceleration, limits, out[rows])
-        for i, row in zip(*(index.tolist() for index in np.nonzero(~(out[..., 0] <= 0.0))), strict=True):  # NaN, too
+            dynamics.worst_excess(
+                scenario.time[at], position, heading, speed, acceleration, limits, out[rows]
+            )
+        for i, row in zip(
+            *(index.tolist() for index in np.nonzero(~(out[..., 0] <= 0.0))), strict=True
+        ):  # NaN, too
             _, value, limit, time = out[i, row].tolist()
             cause, sentence = dynamics.MESSAGES[dynamics.Check(row)]
             named = dynamics.parameter_of(dynamics.Check(row), scenario.vehicles[i].type)
-            yield Violation(cause, time, (i,), f"vehicle {i}: {sentence.format(value=value, limit=limit)}{named}")
+            yield Violation(
+                cause,
+                time,
+                (i,),
+                f"vehicle {i}: {sentence.format(value=value, limit=limit)}{named}",
+            )
 
     def _limits_of(self, name: str) -> Floats:
         """Return the limits of a type as `worst_excess` takes them."""
         if name not in self._dynamics_limits:
             own = [getattr(self._limits.of(name), each) for each in dynamics.OF_TYPE]
-            self._dynamics_limits[name] = np.array([*own, *(getattr(self._limits, each) for each in dynamics.OF_ALL)])
+            self._dynamics_limits[name] = np.array(
+                [*own, *(getattr(self._limits, each) for each in dynamics.OF_ALL)]
+            )
         return self._dynamics_limits[name]
 
     def _contacts(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         n, limits = len(half), self._limits
-        out = np.full((n * (n - 1) // 2, 3), np.nan)  # NaN is no proof: a pair that nothing looks at is refused
+        out = np.full(
+            (n * (n - 1) // 2, 3), np.nan
+        )  # NaN is no proof: a pair that nothing looks at is refused
         bounds = (limits.clearance, limits.time_resolution)
         if scenario.all_present:
             apart.first_contacts(scenario.time, control, scenario.heading, half, *bounds, out)
@@ -273,7 +357,9 @@ class Checker:
                     what = f"overlap by {-gap:.3f} m"
                 else:
                     what = f"come within {gap:.3f} m; {limits.clearance:g} m must be exceeded"
-                message = f"vehicles {pair[0]} and {pair[1]}: footprints {what} at {time:.3f} s{beyond}"
+                message = (
+                    f"vehicles {pair[0]} and {pair[1]}: footprints {what} at {time:.3f} s{beyond}"
+                )
                 yield Violation(Cause.OVERLAP, float(np.nan_to_num(time)), pair, message)
 
     def _contacts_of_those_there(self, scenario: Scenario, half: Floats, out: Floats) -> None:
@@ -286,10 +372,24 @@ class Checker:
             at, two, row = together(present, a, b), [a, b], out[k : k + 1]
             if at.stop - at.start >= 2:
                 curves = np.ascontiguousarray(control[two, at.start : at.stop - 1])
-                apart.first_contacts(time[at], curves, np.ascontiguousarray(heading[two, at]), half[two], *bounds, row)
+                apart.first_contacts(
+                    time[at],
+                    curves,
+                    np.ascontiguousarray(heading[two, at]),
+                    half[two],
+                    *bounds,
+                    row,
+                )
             elif at.stop - at.start == 1:  # one instant: both stand still for a second
                 still = np.repeat(position[two, at], 4, axis=1)[:, None]
-                apart.first_contacts(np.array([0.0, 1.0]), still, np.repeat(heading[two, at], 2, axis=1), half[two], *bounds, row)
+                apart.first_contacts(
+                    np.array([0.0, 1.0]),
+                    still,
+                    np.repeat(heading[two, at], 2, axis=1),
+                    half[two],
+                    *bounds,
+                    row,
+                )
                 row[0, 1] = time[at.start]
             else:  # never there together
                 row[0, 0] = apart.PROVEN
@@ -317,10 +417,20 @@ class Checker:
             )
         for i, (status, time) in enumerate(out.tolist()):
             if status != inside.PROVEN:
-                what = "leaves drivable space" if status == inside.FOUND else "cannot be proven inside drivable space"
-                x, y = (float(np.interp(time, scenario.time, scenario.position[i, :, axis])) for axis in range(2))
+                what = (
+                    "leaves drivable space"
+                    if status == inside.FOUND
+                    else "cannot be proven inside drivable space"
+                )
+                x, y = (
+                    float(np.interp(time, scenario.time, scenario.position[i, :, axis]))
+                    for axis in range(2)
+                )
                 yield Violation(
-                    Cause.OFF_ROAD, time, (i,), f"vehicle {i}: footprint {what} at {time:.3f} s near ({x:.2f}, {y:.2f})"
+                    Cause.OFF_ROAD,
+                    time,
+                    (i,),
+                    f"vehicle {i}: footprint {what} at {time:.3f} s near ({x:.2f}, {y:.2f})",
                 )
 
     def _ground_of(self, vehicle: Vehicle) -> inside.Ground:
@@ -339,7 +449,10 @@ class Checker:
             if vehicle.kind.walks:
                 continue
             ground = ground_for(self.road, vehicle)
-            against = drives_against(ground, scenario.position[i], scenario.heading[i]) & scenario.there[i]
+            against = (
+                drives_against(ground, scenario.position[i], scenario.heading[i])
+                & scenario.there[i]
+            )
             if not against.any():
                 continue
             k = int(np.argmax(against))
@@ -355,10 +468,14 @@ class Checker:
             message = f"vehicle {scenario.vehicles[breach.vehicles[0]].id}: {breach.message}"
             yield Violation(Cause.TRAFFIC_RULE, breach.time, breach.vehicles, message)
 
-    def _passing_orders(self, conflicts: Sequence[Conflict | None]) -> tuple[list[Violation], int, int]:
+    def _passing_orders(
+        self, conflicts: Sequence[Conflict | None]
+    ) -> tuple[list[Violation], int, int]:
         """Violations, and how many of the template's conflicts are present and absent in the scenario, which has `conflicts`."""
         wrong, present = [], 0
-        for recorded, first, conflict in zip(self.conflicts or (), self._first, conflicts, strict=True):
+        for recorded, first, conflict in zip(
+            self.conflicts or (), self._first, conflicts, strict=True
+        ):
             a, b = sorted((recorded.first, recorded.second))
             present += conflict is not None
             swapped = first == recorded.second
@@ -368,9 +485,18 @@ class Checker:
                     f"vehicle {conflict.first} goes first ({conflict.entry_first:.2f} s, vehicle {conflict.second} "
                     f"{conflict.entry_second:.2f} s); {expected} vehicle {first} does"
                 )
-                wrong.append(Violation(Cause.PASSING_ORDER, conflict.entry_first, (conflict.first, conflict.second), message))
+                wrong.append(
+                    Violation(
+                        Cause.PASSING_ORDER,
+                        conflict.entry_first,
+                        (conflict.first, conflict.second),
+                        message,
+                    )
+                )
             elif conflict is None and swapped:
-                message = f"vehicles {a} and {b} do not meet; {expected} vehicle {first} goes first"
+                message = (
+                    f"vehicles {a} and {b} do not meet; {expected} vehicle {first} goes first"
+                )
                 wrong.append(Violation(Cause.PASSING_ORDER, 0.0, (a, b), message))
         return wrong, present, len(self.conflicts or ()) - present
 
@@ -393,14 +519,24 @@ class Checker:
                 (recorded, self._limits.creep_speed, "waits"),
             ):
                 # a stand serves as many consecutive waits as it is long: the template's may be parted by a short twitch
-                lengths = [float(scenario.time[b] - scenario.time[a]) for a, b in self._slow(scenario, i, limit)]
-                served = sum(int((length + 1e-9) / self._limits.stand_duration) for length in lengths)
+                lengths = [
+                    float(scenario.time[b] - scenario.time[a])
+                    for a, b in self._slow(scenario, i, limit)
+                ]
+                served = sum(
+                    int((length + 1e-9) / self._limits.stand_duration) for length in lengths
+                )
                 if served < len(required):
                     message = (
                         f"vehicle {i}: {verb} {len(required)} time(s) in the recording; is below {limit:g} m/s for "
                         f"{', '.join(f'{length:.1f} s' for length in lengths) or 'less than two samples'}"
                     )
-                    yield Violation(Cause.STOP_NOT_KEPT, required[min(served, len(required) - 1)].start, (i,), message)
+                    yield Violation(
+                        Cause.STOP_NOT_KEPT,
+                        required[min(served, len(required) - 1)].start,
+                        (i,),
+                        message,
+                    )
                     break
 
     def _slow(self, scenario: Scenario, i: int, limit: float) -> list[tuple[int, int]]:
@@ -421,7 +557,9 @@ class Checker:
 
 def spans(scenario: Scenario) -> Iterator[tuple[slice, slice]]:
     """Yield rows of neighbouring vehicles of one type that come and go together, and the instants at which they are there."""
-    alike = zip(scenario.present.tolist(), (vehicle.type for vehicle in scenario.vehicles), strict=True)
+    alike = zip(
+        scenario.present.tolist(), (vehicle.type for vehicle in scenario.vehicles), strict=True
+    )
     row = 0
     for ((first, last), _), group in groupby(alike):
         count = len(list(group))
@@ -441,12 +579,24 @@ def _not_finite(scenario: Scenario) -> Violation | None:
             where = np.argwhere(~usable)[0]
             vehicles = () if name == "time" else (int(where[0]),)
             k = int(where[0]) if name == "time" else int(where[1])
-            what = f"beyond {dynamics.LARGEST:g}" if np.isfinite(values[tuple(where)]) else "not finite"
+            what = (
+                f"beyond {dynamics.LARGEST:g}"
+                if np.isfinite(values[tuple(where)])
+                else "not finite"
+            )
             return Violation(
-                Cause.NOT_FINITE, float(np.nan_to_num(scenario.time[k])), vehicles, f"{name} is {what} at sample {k}"
+                Cause.NOT_FINITE,
+                float(np.nan_to_num(scenario.time[k])),
+                vehicles,
+                f"{name} is {what} at sample {k}",
             )
     steps = np.diff(scenario.time)
     if (steps <= 0.0).any():
         k = int(np.argmax(steps <= 0.0))
-        return Violation(Cause.NOT_FINITE, float(scenario.time[k]), (), f"time does not increase after sample {k}")
+        return Violation(
+            Cause.NOT_FINITE,
+            float(scenario.time[k]),
+            (),
+            f"time does not increase after sample {k}",
+        )
     return None

@@ -22,7 +22,15 @@ PROVEN, FOUND, UNPROVEN = 0.0, 1.0, 2.0
 
 
 @kernel(inline=True)
-def _gap(d: Floats, yaw_a: float, yaw_b: float, half_a: Floats, half_b: Floats, turn_a: float, turn_b: float) -> float:
+def _gap(
+    d: Floats,
+    yaw_a: float,
+    yaw_b: float,
+    half_a: Floats,
+    half_b: Floats,
+    turn_a: float,
+    turn_b: float,
+) -> float:
     """Largest separation [m] along the four box axes that holds for all relative positions d (4, 2) and all headings.
 
     The headings are within turn_a and turn_b of yaw_a and yaw_b. A box's extent along its own axis l grows by at most
@@ -31,7 +39,12 @@ def _gap(d: Floats, yaw_a: float, yaw_b: float, half_a: Floats, half_b: Floats, 
     a = Box(0.0, 0.0, np.cos(yaw_a), np.sin(yaw_a), half_a[0], half_a[1])
     b = Box(0.0, 0.0, np.cos(yaw_b), np.sin(yaw_b), half_b[0], half_b[1])
     by_a, by_b = np.hypot(a.length, a.width) * turn_a, np.hypot(b.length, b.width) * turn_b
-    grown = a.width * turn_a + by_b, a.length * turn_a + by_b, b.width * turn_b + by_a, b.length * turn_b + by_a
+    grown = (
+        a.width * turn_a + by_b,
+        a.length * turn_a + by_b,
+        b.width * turn_b + by_a,
+        b.length * turn_b + by_a,
+    )
     axis, reach = axes(a, b), reaches(a, b)
     best = -np.inf
     for k in range(4):
@@ -52,7 +65,14 @@ def _from_origin(low_x: float, high_x: float, low_y: float, high_y: float) -> fl
 
 @kernel(inline=True)
 def _first_contact(
-    d: Floats, h: float, yaw_a: Floats, yaw_b: Floats, half_a: Floats, half_b: Floats, clearance: float, resolution: float
+    d: Floats,
+    h: float,
+    yaw_a: Floats,
+    yaw_b: Floats,
+    half_a: Floats,
+    half_b: Floats,
+    clearance: float,
+    resolution: float,
 ) -> tuple[float, float, float]:
     """(status, u, gap) of one interval: relative control points d (4, 2), start and change of both headings (2,)."""
     part = np.empty((4, 2))
@@ -95,7 +115,13 @@ def _block_bounds(control: Floats) -> Floats:
 
 @kernel(F1, F4, F2, F2, F, F, OUT2)
 def first_contacts(
-    time: Floats, control: Floats, heading: Floats, half: Floats, clearance: float, resolution: float, out: Floats
+    time: Floats,
+    control: Floats,
+    heading: Floats,
+    half: Floats,
+    clearance: float,
+    resolution: float,
+    out: Floats,
 ) -> None:
     """Fill `out` (N (N - 1) / 2, 3) with status, time [s] and gap [m] of the first contact of each pair i < j.
 
@@ -116,7 +142,12 @@ def first_contacts(
         for j in range(i + 1, n):
             pair += 1
             out[pair, 0] = PROVEN
-            reach = np.hypot(half[i, 0], half[i, 1]) + np.hypot(half[j, 0], half[j, 1]) + clearance + ROUNDING
+            reach = (
+                np.hypot(half[i, 0], half[i, 1])
+                + np.hypot(half[j, 0], half[j, 1])
+                + clearance
+                + ROUNDING
+            )
             for b in range(bounds.shape[1]):
                 if out[pair, 0] != PROVEN:
                     break
@@ -135,7 +166,9 @@ def first_contacts(
                     h = time[k + 1] - time[k]
                     yaw_i[0], yaw_i[1] = heading[i, k], heading[i, k + 1] - heading[i, k]
                     yaw_j[0], yaw_j[1] = heading[j, k], heading[j, k + 1] - heading[j, k]
-                    status, u, gap = _first_contact(d, h, yaw_i, yaw_j, half[i], half[j], clearance, resolution)
+                    status, u, gap = _first_contact(
+                        d, h, yaw_i, yaw_j, half[i], half[j], clearance, resolution
+                    )
                     if status != PROVEN:
                         out[pair, 0], out[pair, 1], out[pair, 2] = status, time[k] + u * h, gap
                         break

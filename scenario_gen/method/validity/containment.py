@@ -24,21 +24,29 @@ PROVEN, FOUND, UNPROVEN = 0.0, 1.0, 2.0
 
 
 @kernel(inline=True)
-def _rectangle_drivable(blocked: Counts, x: float, y: float, c: float, s: float, length: float, width: float) -> bool:
+def _rectangle_drivable(
+    blocked: Counts, x: float, y: float, c: float, s: float, length: float, width: float
+) -> bool:
     """Whether the rectangle centred at (x, y), half sizes length and width, all in cells, covers drivable cells only."""
     a, b = length, width
     if c < 0.0:  # half a turn changes nothing
         c, s = -c, -s
     if s < 0.0:  # a quarter turn exchanges length and width
         a, b, c, s = b, a, -s, c
-    top, right = a * s + b * c, a * c + b * s  # the highest and the rightmost corner, seen from the centre
+    top, right = (
+        a * s + b * c,
+        a * c + b * s,
+    )  # the highest and the rightmost corner, seen from the centre
     turn = a * s - b * c  # height of the rightmost corner; the leftmost is at -turn
     rows, columns = blocked.shape[0], blocked.shape[1] - 1
     first, last = int(np.floor(y - top + CONTACT)), int(np.ceil(y + top - CONTACT)) - 1
     if first < 0 or last >= rows or x - right < -CONTACT or x + right > columns + CONTACT:
         return False
     for row in range(first, last + 1):
-        low, high = max(row - y, -top), min(row + 1 - y, top)  # the rectangle's part in this row of cells
+        low, high = (
+            max(row - y, -top),
+            min(row + 1 - y, top),
+        )  # the rectangle's part in this row of cells
         to = from_ = right
         if low > turn:  # above the rightmost corner: the front edge
             to = (a - low * s) / c
@@ -56,7 +64,16 @@ def _rectangle_drivable(blocked: Counts, x: float, y: float, c: float, s: float,
 
 
 @kernel(inline=True)
-def _discs_drivable(clearance: Floats, x: float, y: float, c: float, s: float, length: float, width: float, moved: float) -> bool:
+def _discs_drivable(
+    clearance: Floats,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    length: float,
+    width: float,
+    moved: float,
+) -> bool:
     """Whether covering discs prove a footprint that moves by at most `moved` drivable; all in cells."""
     rows, columns = clearance.shape
     count = max(1, int(np.ceil(1.5 * length / width)))
@@ -76,7 +93,13 @@ def _discs_drivable(clearance: Floats, x: float, y: float, c: float, s: float, l
 
 @kernel(inline=True)
 def _first_exit(
-    b: Floats, h: float, yaw: Floats, half: Floats, clearance: Floats, blocked: Counts, resolution: float
+    b: Floats,
+    h: float,
+    yaw: Floats,
+    half: Floats,
+    clearance: Floats,
+    blocked: Counts,
+    resolution: float,
 ) -> tuple[float, float]:
     """(status, u) of one interval: control points b (4, 2), start and change of heading (2,), half sizes, in cells."""
     length, width = half
@@ -93,8 +116,17 @@ def _first_exit(
             dx, dy = part[i, 0] - x, part[i, 1] - y
             ahead, aside = max(ahead, abs(c * dx + s * dy)), max(aside, abs(c * dy - s * dx))
         if _discs_drivable(
-            clearance, x, y, c, s, length, width, np.sqrt(ahead * ahead + aside * aside) + length * turn
-        ) or _rectangle_drivable(blocked, x, y, c, s, length + ahead + width * turn, width + aside + length * turn):
+            clearance,
+            x,
+            y,
+            c,
+            s,
+            length,
+            width,
+            np.sqrt(ahead * ahead + aside * aside) + length * turn,
+        ) or _rectangle_drivable(
+            blocked, x, y, c, s, length + ahead + width * turn, width + aside + length * turn
+        ):
             u += step
             step = min(2.0 * step, 1.0 - u)
             continue
@@ -126,12 +158,24 @@ class Ground(NamedTuple):
     @classmethod
     def of(cls, road: Road) -> "Ground":
         """Read a road."""
-        return cls(clearance_in_cells(road), blocked_before(road), road.origin[0], road.origin[1], road.resolution)
+        return cls(
+            clearance_in_cells(road),
+            blocked_before(road),
+            road.origin[0],
+            road.origin[1],
+            road.resolution,
+        )
 
 
 @kernel(F1, F4, F2, F2, named(Ground, F2, N2, F, F, F), F, OUT2)
 def first_exits(
-    time: Floats, control: Floats, heading: Floats, half: Floats, ground: Ground, resolution: float, out: Floats
+    time: Floats,
+    control: Floats,
+    heading: Floats,
+    half: Floats,
+    ground: Ground,
+    resolution: float,
+    out: Floats,
 ) -> None:
     """Fill `out` (N, 2) with status and time [s] at which each vehicle first leaves drivable cells.
 
@@ -152,13 +196,18 @@ def first_exits(
         for k in range(control.shape[1]):
             stands = k > 0 and heading[i, k + 1] == heading[i, k]
             for c in range(4):
-                b[c, 0], b[c, 1] = (control[i, k, c, 0] - ground.x) / size, (control[i, k, c, 1] - ground.y) / size
+                b[c, 0], b[c, 1] = (
+                    (control[i, k, c, 0] - ground.x) / size,
+                    (control[i, k, c, 1] - ground.y) / size,
+                )
                 stands = stands and b[c, 0] == b[0, 0] and b[c, 1] == b[0, 1]
             if stands:  # where it stood at the end of the interval before
                 continue
             h = time[k + 1] - time[k]
             yaw[0], yaw[1] = heading[i, k], heading[i, k + 1] - heading[i, k]
-            status, u = _first_exit(b, h, yaw, extent, ground.clearance, ground.blocked, resolution)
+            status, u = _first_exit(
+                b, h, yaw, extent, ground.clearance, ground.blocked, resolution
+            )
             if status != PROVEN:
                 out[i, 0], out[i, 1] = status, time[k] + u * h
                 break

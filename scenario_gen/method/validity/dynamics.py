@@ -15,7 +15,9 @@ LARGEST = 1e8  # m, s, m/s, …: a coordinate is rounded by some 10 nm here, and
 
 
 @kernel(F1, F3, F2, F2, F2)
-def is_motion(time: Floats, position: Floats, heading: Floats, speed: Floats, acceleration: Floats) -> bool:
+def is_motion(
+    time: Floats, position: Floats, heading: Floats, speed: Floats, acceleration: Floats
+) -> bool:
     """Whether all are within LARGEST and time (T,) [s] increases; position (N, T, 2) [m], the others (N, T) in SI units."""
     n, t = heading.shape
     for k in range(t):
@@ -23,7 +25,11 @@ def is_motion(time: Floats, position: Floats, heading: Floats, speed: Floats, ac
             return False
     for i in range(n):
         for k in range(t):
-            if not (abs(position[i, k, 0]) <= LARGEST and abs(position[i, k, 1]) <= LARGEST and abs(heading[i, k]) <= LARGEST):
+            if not (
+                abs(position[i, k, 0]) <= LARGEST
+                and abs(position[i, k, 1]) <= LARGEST
+                and abs(heading[i, k]) <= LARGEST
+            ):
                 return False
             if not (abs(speed[i, k]) <= LARGEST and abs(acceleration[i, k]) <= LARGEST):
                 return False
@@ -31,17 +37,28 @@ def is_motion(time: Floats, position: Floats, heading: Floats, speed: Floats, ac
 
 
 @kernel(F1, F3, F2, F2, OUT4)
-def control_points(time: Floats, position: Floats, heading: Floats, speed: Floats, out: Floats) -> None:
+def control_points(
+    time: Floats, position: Floats, heading: Floats, speed: Floats, out: Floats
+) -> None:
     """Fill `out` (N, T - 1, 4, 2) with the control points [m] of every vehicle in every interval."""
     n, t = heading.shape
     for i in range(n):
         vx, vy = speed[i, 0] * np.cos(heading[i, 0]), speed[i, 0] * np.sin(heading[i, 0])
         for k in range(t - 1):
             third = (time[k + 1] - time[k]) / 3.0
-            wx, wy = speed[i, k + 1] * np.cos(heading[i, k + 1]), speed[i, k + 1] * np.sin(heading[i, k + 1])
+            wx, wy = (
+                speed[i, k + 1] * np.cos(heading[i, k + 1]),
+                speed[i, k + 1] * np.sin(heading[i, k + 1]),
+            )
             out[i, k, 0, 0], out[i, k, 0, 1] = position[i, k, 0], position[i, k, 1]
-            out[i, k, 1, 0], out[i, k, 1, 1] = position[i, k, 0] + third * vx, position[i, k, 1] + third * vy
-            out[i, k, 2, 0], out[i, k, 2, 1] = position[i, k + 1, 0] - third * wx, position[i, k + 1, 1] - third * wy
+            out[i, k, 1, 0], out[i, k, 1, 1] = (
+                position[i, k, 0] + third * vx,
+                position[i, k, 1] + third * vy,
+            )
+            out[i, k, 2, 0], out[i, k, 2, 1] = (
+                position[i, k + 1, 0] - third * wx,
+                position[i, k + 1, 1] - third * wy,
+            )
             out[i, k, 3, 0], out[i, k, 3, 1] = position[i, k + 1, 0], position[i, k + 1, 1]
             vx, vy = wx, wy
 
@@ -52,7 +69,11 @@ def blossom(b: Floats, c: int, r: float, s: float, t: float) -> float:
 
     Source: Ramshaw 1989.
     """
-    d0, d1, d2 = b[0, c] + (b[1, c] - b[0, c]) * r, b[1, c] + (b[2, c] - b[1, c]) * r, b[2, c] + (b[3, c] - b[2, c]) * r
+    d0, d1, d2 = (
+        b[0, c] + (b[1, c] - b[0, c]) * r,
+        b[1, c] + (b[2, c] - b[1, c]) * r,
+        b[2, c] + (b[3, c] - b[2, c]) * r,
+    )
     e0, e1 = d0 + (d1 - d0) * s, d1 + (d2 - d1) * s
     return float(e0 + (e1 - e0) * t)
 
@@ -70,10 +91,18 @@ def stretch(b: Floats, u0: float, u1: float, out: Floats) -> None:
         out[3, c] = blossom(b, c, u1, u1, u1)
 
 
-TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show in a step without having moved
+TURN_ROUNDING = (
+    1e-4  # rad, change of heading that a vehicle may show in a step without having moved
+)
 TURN_DRIFT = 1e-3  # rad/s, and as a rate: many short steps would make a turn of it
 SLACK = 1e-6  # rounding of a value that keeps exactly to its limit
-OF_TYPE = ("max_speed", "max_acceleration", "max_deceleration", "max_lateral_acceleration", "sharpest")
+OF_TYPE = (
+    "max_speed",
+    "max_acceleration",
+    "max_deceleration",
+    "max_lateral_acceleration",
+    "sharpest",
+)
 OF_ALL = ("slip", "slip_share", "acceleration_tolerance")
 """Of a type's `Dynamics`, and of `Limits`, those that `worst_excess` takes."""
 
@@ -97,22 +126,46 @@ class Check(IntEnum):
 _ALONG, _ASIDE = Cause.LONGITUDINAL_ACCELERATION, Cause.LATERAL_ACCELERATION
 MESSAGES: dict[Check, tuple[Cause, str]] = {
     Check.NEGATIVE_SPEED: (Cause.SPEED, "speed falls to {value:.3f} m/s, below zero"),
-    Check.MAX_SPEED: (Cause.SPEED, "speed reaches {value:.3f} m/s, above the limit of {limit:.3f} m/s"),
-    Check.ACCELERATION: (_ALONG, "acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²"),
-    Check.DECELERATION: (_ALONG, "braking reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²"),
+    Check.MAX_SPEED: (
+        Cause.SPEED,
+        "speed reaches {value:.3f} m/s, above the limit of {limit:.3f} m/s",
+    ),
+    Check.ACCELERATION: (
+        _ALONG,
+        "acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
+    ),
+    Check.DECELERATION: (
+        _ALONG,
+        "braking reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
+    ),
     Check.SPEED_CHANGE: (
         _ALONG,
         "speed changes at a rate {value:.3f} m/s² outside the published accelerations; {limit:.3f} m/s² are tolerated",
     ),
-    Check.LATERAL: (_ASIDE, "lateral acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²"),
-    Check.CURVATURE: (Cause.CURVATURE, "curvature reaches {value:.3f} 1/m, above the limit of {limit:.3f} 1/m"),
-    Check.DISPLACEMENT: (Cause.SPEED, "position advances {value:.3f} m/s off the published speed; {limit:.3f} m/s are tolerated"),
+    Check.LATERAL: (
+        _ASIDE,
+        "lateral acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
+    ),
+    Check.CURVATURE: (
+        Cause.CURVATURE,
+        "curvature reaches {value:.3f} 1/m, above the limit of {limit:.3f} 1/m",
+    ),
+    Check.DISPLACEMENT: (
+        Cause.SPEED,
+        "position advances {value:.3f} m/s off the published speed; {limit:.3f} m/s are tolerated",
+    ),
     Check.SLIP: (
         Cause.CURVATURE,
         "slides sideways at {value:.3f} m/s against the published heading; {limit:.3f} m/s are tolerated",
     ),
-    Check.PATH_LONGITUDINAL: (_ALONG, "positions speed up or brake at {value:.3f} m/s²; {limit:.3f} m/s² are allowed"),
-    Check.PATH_LATERAL: (_ASIDE, "positions accelerate sideways at {value:.3f} m/s²; {limit:.3f} m/s² are allowed"),
+    Check.PATH_LONGITUDINAL: (
+        _ALONG,
+        "positions speed up or brake at {value:.3f} m/s²; {limit:.3f} m/s² are allowed",
+    ),
+    Check.PATH_LATERAL: (
+        _ASIDE,
+        "positions accelerate sideways at {value:.3f} m/s²; {limit:.3f} m/s² are allowed",
+    ),
 }
 _PARAMETERS = {
     Check.MAX_SPEED: "max_speed",
@@ -148,15 +201,31 @@ def _of_path(time: Floats, position: Floats, k: int, yaw: float) -> tuple[float,
 
     Their second difference is a mean of the acceleration over the two steps around k.
     """
-    before, after, half = time[k] - time[k - 1], time[k + 1] - time[k], 0.5 * (time[k + 1] - time[k - 1])
-    x = ((position[k + 1, 0] - position[k, 0]) / after - (position[k, 0] - position[k - 1, 0]) / before) / half
-    y = ((position[k + 1, 1] - position[k, 1]) / after - (position[k, 1] - position[k - 1, 1]) / before) / half
+    before, after, half = (
+        time[k] - time[k - 1],
+        time[k + 1] - time[k],
+        0.5 * (time[k + 1] - time[k - 1]),
+    )
+    x = (
+        (position[k + 1, 0] - position[k, 0]) / after
+        - (position[k, 0] - position[k - 1, 0]) / before
+    ) / half
+    y = (
+        (position[k + 1, 1] - position[k, 1]) / after
+        - (position[k, 1] - position[k - 1, 1]) / before
+    ) / half
     return _in_body(yaw, x, y)
 
 
 @kernel(F1, F3, F2, F2, F2, F1, OUT3)
 def worst_excess(
-    time: Floats, position: Floats, heading: Floats, speed: Floats, acceleration: Floats, limits: Floats, out: Floats
+    time: Floats,
+    position: Floats,
+    heading: Floats,
+    speed: Floats,
+    acceleration: Floats,
+    limits: Floats,
+    out: Floats,
 ) -> None:
     """Fill `out` (N, len(Check), 4): how far the worst instant exceeds each limit (<= 0: kept), value, limit, time [s].
 
@@ -169,7 +238,13 @@ def worst_excess(
         limits: those that OF_TYPE and OF_ALL name, in that order.
         out: one row per `Check`.
     """
-    top, speeding, braking, lateral, curvature = limits[0], limits[1], limits[2], limits[3], limits[4]
+    top, speeding, braking, lateral, curvature = (
+        limits[0],
+        limits[1],
+        limits[2],
+        limits[3],
+        limits[4],
+    )
     slip, share, tolerance = limits[5], limits[6], limits[7]
     n, t = speed.shape
     for i in range(n):
@@ -197,9 +272,14 @@ def worst_excess(
             _note(out[i], 4, off - tolerance - SLACK, off, tolerance, now)
             turn, fast = abs(heading[i, k + 1] - heading[i, k]), max(v, w)
             _note(out[i], 5, fast * turn / h - lateral - SLACK, fast * turn / h, lateral, now)
-            dx, dy = position[i, k + 1, 0] - position[i, k, 0], position[i, k + 1, 1] - position[i, k, 1]
+            dx, dy = (
+                position[i, k + 1, 0] - position[i, k, 0],
+                position[i, k + 1, 1] - position[i, k, 1],
+            )
             moved = np.sqrt(dx * dx + dy * dy)
-            if turn > min(TURN_ROUNDING, TURN_DRIFT * h + 1e-8) + curvature * moved:  # headings are rounded to 1 nrad
+            if (
+                turn > min(TURN_ROUNDING, TURN_DRIFT * h + 1e-8) + curvature * moved
+            ):  # headings are rounded to 1 nrad
                 bend = turn / moved
                 _note(out[i], 6, bend - curvature, bend, curvature, now)
             vx, vy = v * np.cos(heading[i, k]), v * np.sin(heading[i, k])

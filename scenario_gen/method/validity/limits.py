@@ -19,13 +19,24 @@ class Limits(TypeLimits):
     Speed and heading are linear between samples, position is the cubic of `Scenario`.
     """
 
-    position_tolerance: float = parameter(0.1, "start and end positions are this near to the request", unit="m", low=0.0)
-    speed_tolerance: float = parameter(0.1, "start and end speeds are this near to the request", unit="m/s", low=0.0)
-    stand_speed: float = parameter(0.1, "a vehicle that stands in the recording is slower than this", unit="m/s", low=0.0)
-    creep_speed: float = parameter(
-        0.5, "a vehicle that waits in the recording, but moves slowly, is slower than this", unit="m/s", low=0.0
+    position_tolerance: float = parameter(
+        0.1, "start and end positions are this near to the request", unit="m", low=0.0
     )
-    stand_duration: float = parameter(1.0, "shortest stand or creep that counts as a wait", unit="s", low=0.01)
+    speed_tolerance: float = parameter(
+        0.1, "start and end speeds are this near to the request", unit="m/s", low=0.0
+    )
+    stand_speed: float = parameter(
+        0.1, "a vehicle that stands in the recording is slower than this", unit="m/s", low=0.0
+    )
+    creep_speed: float = parameter(
+        0.5,
+        "a vehicle that waits in the recording, but moves slowly, is slower than this",
+        unit="m/s",
+        low=0.0,
+    )
+    stand_duration: float = parameter(
+        1.0, "shortest stand or creep that counts as a wait", unit="s", low=0.01
+    )
     min_clearance: float = parameter(
         -1.0,
         "smallest gap between two footprints, by their best separating axis; a gap of 0 (touching) is an overlap; -1: half the "
@@ -34,7 +45,10 @@ class Limits(TypeLimits):
         low=-1.0,
     )
     slip: float = parameter(
-        0.2, "displacement over time may differ from speed along heading by this, ahead and sideways", unit="m/s", low=0.0
+        0.2,
+        "displacement over time may differ from speed along heading by this, ahead and sideways",
+        unit="m/s",
+        low=0.0,
     )
     slip_share: float = parameter(0.03, "and by this share of the speed", low=0.0)
     acceleration_tolerance: float = parameter(
@@ -53,7 +67,9 @@ class Limits(TypeLimits):
         high=10.0,
     )
     gap_share: float = parameter(
-        0.5, "who passes second does so with the recording's gap behind the other's clearing, more or less by this share", low=0.0
+        0.5,
+        "who passes second does so with the recording's gap behind the other's clearing, more or less by this share",
+        low=0.0,
     )
     anticipation: float = parameter(
         0.5,
@@ -64,7 +80,10 @@ class Limits(TypeLimits):
     )
     patience: float = parameter(1.0, "and later by this", unit="s", low=0.0)
     headway_share: float = parameter(
-        0.5, "a follower's median time gap is at most the recording's greatest, and greater by this share", low=0.0, high=10.0
+        0.5,
+        "a follower's median time gap is at most the recording's greatest, and greater by this share",
+        low=0.0,
+        high=10.0,
     )
     floor_share: float = parameter(
         0.8,
@@ -74,10 +93,18 @@ class Limits(TypeLimits):
         high=1.0,
     )
     least_headway: float = parameter(
-        0.5, "and above 3 m/s no nearer than this time gap, unless it does in the recording", unit="s", low=0.0, high=5.0
+        0.5,
+        "and above 3 m/s no nearer than this time gap, unless it does in the recording",
+        unit="s",
+        low=0.0,
+        high=5.0,
     )
     time_resolution: float = parameter(
-        1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
+        1e-6,
+        "what cannot be proven over an interval this short is refused",
+        unit="s",
+        low=1e-9,
+        high=1.0,
     )
 
     @property
@@ -89,4 +116,7 @@ class Limits(TypeLimits):
         """Return the limits of scenarios of a template, whose own least gap says how near vehicles may come to one another."""
         if self.min_clearance >= 0.0:
             return self
-        return replace(self, min_clearance=min(max(_SHARE_OF_GAP * least_gap(encounter), 0.0), _MOST_CLEARANCE))
+        return replace(
+            self,
+            min_clearance=min(max(_SHARE_OF_GAP * least_gap(encounter), 0.0), _MOST_CLEARANCE),
+        )

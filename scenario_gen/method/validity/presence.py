@@ -23,9 +23,15 @@ def driven_on(scenario: Scenario, margin: float) -> tuple[Floats, Floats, Floats
         margin: seconds by which each presence is widened at least at either end, up to an instant of the scenario, if it has one.
     """
     time, present = scenario.time, scenario.present.copy()
-    position, heading, speed = scenario.position.copy(), scenario.heading.copy(), scenario.speed.copy()
+    position, heading, speed = (
+        scenario.position.copy(),
+        scenario.heading.copy(),
+        scenario.speed.copy(),
+    )
     for i, (first, last) in enumerate(scenario.present.tolist()):
-        present[i, 0] = max(np.searchsorted(time, time[first] - margin + SAME, side="right") - 1, 0)
+        present[i, 0] = max(
+            np.searchsorted(time, time[first] - margin + SAME, side="right") - 1, 0
+        )
         present[i, 1] = min(np.searchsorted(time, time[last] + margin - SAME), len(time) - 1)
         for end, inner, beyond in (
             (first, first + 1, slice(present[i, 0], first)),
@@ -34,7 +40,11 @@ def driven_on(scenario: Scenario, margin: float) -> tuple[Floats, Floats, Floats
             rate = (heading[i, inner] - heading[i, end]) / (time[inner] - time[end])
             since = time[beyond] - time[end]
             half = 0.5 * rate * since
-            chord = speed[i, end] * since * np.where(half == 0.0, 1.0, np.sin(half) / np.where(half == 0.0, 1.0, half))
+            chord = (
+                speed[i, end]
+                * since
+                * np.where(half == 0.0, 1.0, np.sin(half) / np.where(half == 0.0, 1.0, half))
+            )
             middle = heading[i, end] + half
             position[i, beyond] = position[i, end] + chord[:, None] * unit(middle)
             heading[i, beyond] = heading[i, end] + rate * since

@@ -14,7 +14,10 @@ from scenario_gen.template import Conflict, departure, lane_gaps, passing, time_
 from scenario_gen.types import Cause, FOLLOW, Reaction, Scenario, Violation
 
 _ROUNDED = 0.1  # s, by which an entry or a clearing is known between samples
-_SUCH_A_SPEED, _QUICK = 2.0, 3.0  # m/s, by which two speeds are alike; above which a time gap counts
+_SUCH_A_SPEED, _QUICK = (
+    2.0,
+    3.0,
+)  # m/s, by which two speeds are alike; above which a time gap counts
 _NEAR_ENOUGH = 0.05  # m
 _ENOUGH = 4.0, 1.5  # m and s, of a gap that nobody keeps because it is needed
 
@@ -22,12 +25,23 @@ LaneGaps = Mapping[tuple[int, int], tuple[Floats, Floats]]  # as of `lane_gaps`
 
 
 def broken_reactions(
-    scenario: Scenario, conflicts: Sequence[Conflict | None], edges: Sequence[Reaction], limits: Limits
+    scenario: Scenario,
+    conflicts: Sequence[Conflict | None],
+    edges: Sequence[Reaction],
+    limits: Limits,
 ) -> Iterator[Violation]:
     """Yield those who enter or leave too early or too late, or follow too far behind, in a scenario with `conflicts`."""
-    met = {(conflict.second, conflict.first): conflict for conflict in conflicts if conflict is not None}
+    met = {
+        (conflict.second, conflict.first): conflict
+        for conflict in conflicts
+        if conflict is not None
+    }
     for edge in edges:
-        pair, who, whom = (edge.who, edge.whom), scenario.vehicles[edge.who].id, scenario.vehicles[edge.whom].id
+        pair, who, whom = (
+            (edge.who, edge.whom),
+            scenario.vehicles[edge.who].id,
+            scenario.vehicles[edge.whom].id,
+        )
         conflict = met.get(pair)
         if edge.kind == FOLLOW:
             gaps, high = time_gaps(scenario, *pair), (1.0 + limits.headway_share) * edge.headway[2]
@@ -43,7 +57,9 @@ def broken_reactions(
             yield from _enters(scenario, conflict, edge, limits)
 
 
-def _enters(scenario: Scenario, conflict: Conflict, edge: Reaction, limits: Limits) -> Iterator[Violation]:
+def _enters(
+    scenario: Scenario, conflict: Conflict, edge: Reaction, limits: Limits
+) -> Iterator[Violation]:
     who, whom = scenario.vehicles[edge.who].id, scenario.vehicles[edge.whom].id
     clears, enters = passing(scenario, conflict, merges=edge.merges)
     low = min(edge.gap, max((1.0 - limits.gap_share) * edge.gap - limits.anticipation, 0.0))
@@ -52,7 +68,10 @@ def _enters(scenario: Scenario, conflict: Conflict, edge: Reaction, limits: Limi
     if not low - _ROUNDED <= enters - clears <= high:
         message = f"enters {enters - clears:.2f} s after vehicle {whom} has cleared; allowed are {low:.2f} to {high:.2f} s"
     if edge.stands:
-        before, most = clears - departure(scenario, edge.who, enters), max(-edge.lag, 0.0) + limits.anticipation
+        before, most = (
+            clears - departure(scenario, edge.who, enters),
+            max(-edge.lag, 0.0) + limits.anticipation,
+        )
         if before > most:
             message = f"leaves {before:.2f} s before vehicle {whom} has cleared; allowed are {most:.2f} s"
     if message:

@@ -8,7 +8,14 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
+from scenario_gen.bags.recordings.read import (
+    INFO,
+    Namespace,
+    read_recording,
+    ScenarioEntry,
+    SCENARIOS,
+    WITNESS,
+)
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, RefusedError
@@ -121,7 +128,9 @@ def read_cases(
     namespaces = read_recording(bag, config, TOPICS).namespaces
     spaces = [entry for entry in namespaces.values() if SCENARIOS in entry.messages]
     if not spaces:
-        raise InputError(f"{bag}: no topic `{SCENARIOS}` in any namespace; there is nothing to export")
+        raise InputError(
+            f"{bag}: no topic `{SCENARIOS}` in any namespace; there is nothing to export"
+        )
     if namespace is not None:
         full_name = namespace if not namespace or namespace.startswith("/") else f"/{namespace}"
         spaces = [entry for entry in spaces if entry.name == full_name]
@@ -131,11 +140,15 @@ def read_cases(
             )
     with within(bag):
         groups = [(space, group) for space in spaces for group in _groups(space, export)]
-        cases = [_case(k + 1, space, group, export, indices) for k, (space, group) in enumerate(groups)]
+        cases = [
+            _case(k + 1, space, group, export, indices) for k, (space, group) in enumerate(groups)
+        ]
     cases = [case for case in cases if case.scenarios]
     if not cases:
         known = sorted({entry.index for _, group in groups for entry in group.scenarios})
-        raise InputError(f"{bag}: no scenario {', '.join(map(str, sorted(indices)))}; there are {known[0]} to {known[-1]}")
+        raise InputError(
+            f"{bag}: no scenario {', '.join(map(str, sorted(indices)))}; there are {known[0]} to {known[-1]}"
+        )
     return tuple(cases)
 
 
@@ -149,7 +162,9 @@ def _groups(space: Namespace, export: ExportConfig) -> Iterator[_Group]:
         key = (stamp, entry and entry.template_hash, entry and entry.map_hash)
         group = groups.setdefault(key, _Group(stamp, entry, []))
         others, ego, driven = _with_ego(space, entry, scenario, export.ego)
-        group.scenarios.append(Exported(scenario.index, scenario.seed, sha256, others, ego, driven))
+        group.scenarios.append(
+            Exported(scenario.index, scenario.seed, sha256, others, ego, driven)
+        )
     yield from groups.values()
 
 
@@ -166,22 +181,32 @@ def _with_ego(
     where = f"{space.where(SCENARIOS)}, scenario {scenario.index}"
     if slot:
         if requested not in ("", slot):
-            raise InputError(f"{where} was made for ego {slot!r}; leave --ego out, or name that one")
+            raise InputError(
+                f"{where} was made for ego {slot!r}; leave --ego out, or name that one"
+            )
         track = scenario.reference_drive
         if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
-            raise InputError(f"{where} was made for ego {slot!r}, whose track is not on {space.where(WITNESS)}")
+            raise InputError(
+                f"{where} was made for ego {slot!r}, whose track is not on {space.where(WITNESS)}"
+            )
         return replace(scenario, reference_drive=None), track, True
     if not requested:
         return scenario, None, False
     if requested not in ids:
-        raise InputError(f"{where} has no vehicle {requested!r} to be the ego; there are: {', '.join(ids)}")
+        raise InputError(
+            f"{where} has no vehicle {requested!r} to be the ego; there are: {', '.join(ids)}"
+        )
     if len(ids) == 1:
-        raise InputError(f"{where} has no vehicle but {requested!r}: there would be nobody around the ego")
+        raise InputError(
+            f"{where} has no vehicle but {requested!r}: there would be nobody around the ego"
+        )
     others, ego = split_off(scenario, ids.index(requested))
     return others, ego, True
 
 
-def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, indices: Collection[int]) -> Case:
+def _case(
+    number: int, space: Namespace, group: _Group, export: ExportConfig, indices: Collection[int]
+) -> Case:
     """Return a case with its lanes.
 
     Raises:
@@ -191,17 +216,28 @@ def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, in
     if road is None and space.data("map"):
         road = space.road
     width = RoadConfig.lane_width
-    values = next((s.values for s in reversed(space.summaries) if group.entry and s.request == group.entry.request), {})
+    values = next(
+        (
+            s.values
+            for s in reversed(space.summaries)
+            if group.entry and s.request == group.entry.request
+        ),
+        {},
+    )
     with suppress(InputError):  # a bag of others says nothing of our parameters
         width = read_parameters(RoadConfig(), values, "road.", "export").lane_width
-    everybody: Sequence[Scenario] = [s for exported in group.scenarios for s in (exported.others, exported.ego) if s is not None]
+    everybody: Sequence[Scenario] = [
+        s for exported in group.scenarios for s in (exported.others, exported.ego) if s is not None
+    ]
     name = group.entry.road if group.entry else ""
     return Case(
         number=number,
         namespace=space.name,
         road_name=name or "road",
         start_ns=group.stamp,
-        scenarios=tuple(exported for exported in group.scenarios if not indices or exported.index in indices),
+        scenarios=tuple(
+            exported for exported in group.scenarios if not indices or exported.index in indices
+        ),
         lane_map=lane_map_of(road, everybody, width, export.run_out),
         origin=road.lanes.origin if road and road.lanes else (),
     )

@@ -24,11 +24,19 @@ from scenario_gen.output.exchange.motion import at_even_steps, even_step
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
 from scenario_gen.types import DRIVERS, Lane, LaneNetwork, Scenario
 
-OBSTACLES, PROBLEM, INTERSECTION, SIGNS = 100_000, 200_000, 300_000, 400_000  # ids from here on; lanelets count from 1
+OBSTACLES, PROBLEM, INTERSECTION, SIGNS = (
+    100_000,
+    200_000,
+    300_000,
+    400_000,
+)  # ids from here on; lanelets count from 1
 MAX_SPEED = "274"
 GOAL_TURN = 0.3  # rad by which an ego may be turned at its goal
 AUTHOR = "scenario_gen"
-_FOR_ONE = {"bicycleLane": frozenset(("bicycle",)), "busLane": frozenset(("bus",))}  # types of lanelets of one type of users
+_FOR_ONE = {
+    "bicycleLane": frozenset(("bicycle",)),
+    "busLane": frozenset(("bus",)),
+}  # types of lanelets of one type of users
 
 
 def benchmark_id(case: Case, exported: Exported) -> str:
@@ -38,7 +46,9 @@ def benchmark_id(case: Case, exported: Exported) -> str:
     return f"ZAM_{name}-{case.number}_{exported.index + 1}_T-1"
 
 
-def write_commonroad(case: Case, exported: Exported, export: ExportConfig = ExportConfig()) -> tuple[bytes, tuple[str, ...]]:
+def write_commonroad(
+    case: Case, exported: Exported, export: ExportConfig = ExportConfig()
+) -> tuple[bytes, tuple[str, ...]]:
     """Return a scenario as the bytes of a CommonRoad file, and sentences on what was changed for it.
 
     Raises:
@@ -46,7 +56,11 @@ def write_commonroad(case: Case, exported: Exported, export: ExportConfig = Expo
     """
     exported.refuse_late_ego()
     scenario, notes = _even(exported.others, export)
-    late = [v.id for v, (first, _) in zip(scenario.vehicles, scenario.present.tolist(), strict=True) if first > 0]
+    late = [
+        v.id
+        for v, (first, _) in zip(scenario.vehicles, scenario.present.tolist(), strict=True)
+        if first > 0
+    ]
     if late and export.late == "refused":
         raise RefusedError(
             f"scenario {exported.index}: vehicle {', '.join(late)} arrives late, and CommonRoad's schema has obstacles "
@@ -54,7 +68,9 @@ def write_commonroad(case: Case, exported: Exported, export: ExportConfig = Expo
             "reads; or export it to openscenario or autoware"
         )
     if late:
-        notes += (f"vehicle {', '.join(late)} arrives late: its initial time step is not 0, which the schema does not allow",)
+        notes += (
+            f"vehicle {', '.join(late)} arrives late: its initial time step is not 0, which the schema does not allow",
+        )
     step = even_step(scenario) or export.step
     root = Element(
         "commonRoad",
@@ -88,7 +104,10 @@ def write_commonroad(case: Case, exported: Exported, export: ExportConfig = Expo
         comment(root, f"vehicle {vehicle.id}")
         _obstacle(root, scenario, n)
     if exported.ego is None:
-        comment(root, "a placeholder: nobody is left out of this scenario, and the format demands a planning problem")
+        comment(
+            root,
+            "a placeholder: nobody is left out of this scenario, and the format demands a planning problem",
+        )
         _placeholder(root, lane_map.network.lanes[0], len(scenario.time))
     else:
         comment(root, f"vehicle {exported.ego.vehicles[0].id}")
@@ -101,7 +120,9 @@ def _even(scenario: Scenario, export: ExportConfig) -> tuple[Scenario, tuple[str
         return scenario, ()
     result = at_even_steps(scenario, export.step)
     lost = float(scenario.time[-1] - result.time[-1])
-    return result, (f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are left out",)
+    return result, (
+        f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are left out",
+    )
 
 
 def _points(parent: Element, tag: str, points: Floats) -> None:
@@ -138,9 +159,18 @@ def _signs(network: LaneNetwork) -> list[_Sign]:
     for k, lane in enumerate(network.lanes):
         if lane.speed_limit > 0.0:
             limits.setdefault(lane.speed_limit, set()).add(k)
-    found = [(frozenset(rule.lanes), SIGN_IDS.get(rule.kind, ""), "", rule.line) for rule in network.rules]
-    found += [(frozenset(lanes), MAX_SPEED, number(limit), np.zeros((0, 2))) for limit, lanes in limits.items()]
-    return sorted((_Sign(SIGNS + k, *sign) for k, sign in enumerate(found, 1)), key=lambda sign: not sign.number)
+    found = [
+        (frozenset(rule.lanes), SIGN_IDS.get(rule.kind, ""), "", rule.line)
+        for rule in network.rules
+    ]
+    found += [
+        (frozenset(lanes), MAX_SPEED, number(limit), np.zeros((0, 2)))
+        for limit, lanes in limits.items()
+    ]
+    return sorted(
+        (_Sign(SIGNS + k, *sign) for k, sign in enumerate(found, 1)),
+        key=lambda sign: not sign.number,
+    )
 
 
 def _sign(root: Element, sign: _Sign) -> None:
@@ -166,7 +196,12 @@ def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -
     for other in sorted(lane.successors):
         add(lanelet, "successor", ref=other + 1)
     for side, (other, same) in sorted(lane_map.neighbours(k).items()):
-        add(lanelet, f"adjacent{side.title()}", ref=other + 1, drivingDir="same" if same else "opposite")
+        add(
+            lanelet,
+            f"adjacent{side.title()}",
+            ref=other + 1,
+            drivingDir="same" if same else "opposite",
+        )
     at_line = [sign for sign in signs if len(sign.line)]
     if at_line:
         stop = add(lanelet, "stopLine")
@@ -186,14 +221,22 @@ def _lanelet_type(lane: Lane) -> str:
     """Return the type of a lanelet, by its users."""
     if not lane.open_to(DRIVERS):
         return "crosswalk" if lane.crossing else "sidewalk"
-    own = [kind for kind, users in _FOR_ONE.items() if lane.users and not lane.open_to(DRIVERS - users)]
+    own = [
+        kind
+        for kind, users in _FOR_ONE.items()
+        if lane.users and not lane.open_to(DRIVERS - users)
+    ]
     return own[0] if own else "urban"
 
 
 def _intersection(root: Element, lane_map: LaneMap) -> None:
     """Say of every strip that leads into the junction where one can go from it."""
     lanes, turn = lane_map.network.lanes, lane_map.turn
-    arms = [[k for k in side if any(map(turn, lanes[k].successors))] for strip in lane_map.strips for side in strip]
+    arms = [
+        [k for k in side if any(map(turn, lanes[k].successors))]
+        for strip in lane_map.strips
+        for side in strip
+    ]
     arms = [incoming for incoming in arms if incoming]
     if not arms:
         return
@@ -203,7 +246,12 @@ def _intersection(root: Element, lane_map: LaneMap) -> None:
         for k in incoming:
             add(element, "incomingLanelet", ref=k + 1)
         for way in ("right", "straight", "left"):
-            for other in (other for k in incoming for other in sorted(lanes[k].successors) if turn(other) == way):
+            for other in (
+                other
+                for k in incoming
+                for other in sorted(lanes[k].successors)
+                if turn(other) == way
+            ):
                 add(element, f"successors{way.title()}", ref=other + 1)
 
 
@@ -255,7 +303,9 @@ def _problem(root: Element, ego: Scenario, step: float, export: ExportConfig) ->
     _goal(problem, (x, y, yaw), (export.goal_length, export.goal_width), last)
 
 
-def _goal(problem: Element, pose: tuple[float, float, float], size: tuple[float, float], last: int) -> None:
+def _goal(
+    problem: Element, pose: tuple[float, float, float], size: tuple[float, float], last: int
+) -> None:
     goal = add(problem, "goalState")
     time = add(goal, "time")
     add(time, "intervalStart", 1)
@@ -279,7 +329,12 @@ def _placeholder(root: Element, lane: Lane, steps: int) -> None:
     problem = add(root, "planningProblem", id=PROBLEM)
     state = add(problem, "initialState")
     _point(add(state, "position"), x, y)
-    for tag, value in (("velocity", 0.0), ("orientation", yaw), ("yawRate", 0.0), ("slipAngle", 0.0)):
+    for tag, value in (
+        ("velocity", 0.0),
+        ("orientation", yaw),
+        ("yawRate", 0.0),
+        ("slipAngle", 0.0),
+    ):
         _exact(state, tag, value)
     add(add(state, "time"), "exact", 0)
     _goal(problem, (x, y, yaw), (1.0, 1.0), max(steps - 1, 1))

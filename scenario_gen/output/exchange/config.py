@@ -14,7 +14,8 @@ class ExportConfig(Parameters):
 
     ego: str = parameter("", "id of a vehicle that becomes the ego: of a set without an ego slot")
     map: str = parameter(
-        "", "OpenSCENARIO: the map that the scenarios were made on (.xodr, .osm); it is copied and named as their road"
+        "",
+        "OpenSCENARIO: the map that the scenarios were made on (.xodr, .osm); it is copied and named as their road",
     )
     projection: str = parameter(
         "mgrs",
@@ -22,7 +23,9 @@ class ExportConfig(Parameters):
         "square, UTM, or metres about its middle",
         choices=("mgrs", "utm", "local"),
     )
-    projection_origin: str = parameter("", "latitude, longitude that are 0, 0 of projection utm or local")
+    projection_origin: str = parameter(
+        "", "latitude, longitude that are 0, 0 of projection utm or local"
+    )
     run_out: float = parameter(
         50.0,
         "how far lanes are continued straight on beyond the road, so that a planner sees road ahead",
@@ -30,11 +33,24 @@ class ExportConfig(Parameters):
         low=0.0,
         high=1000.0,
     )
-    step: float = parameter(0.1, "time step of a CommonRoad file whose scenario has uneven ones", unit="s", low=0.01, high=1.0)
-    goal_length: float = parameter(6.0, "length of an ego's goal region", unit="m", low=0.5, high=50.0)
-    goal_width: float = parameter(3.5, "width of an ego's goal region", unit="m", low=0.5, high=20.0)
+    step: float = parameter(
+        0.1,
+        "time step of a CommonRoad file whose scenario has uneven ones",
+        unit="s",
+        low=0.01,
+        high=1.0,
+    )
+    goal_length: float = parameter(
+        6.0, "length of an ego's goal region", unit="m", low=0.5, high=50.0
+    )
+    goal_width: float = parameter(
+        3.5, "width of an ego's goal region", unit="m", low=0.5, high=20.0
+    )
     goal_late: float = parameter(
-        2.0, "until when an ego may reach its goal, in durations of its track; from the first step on it may", low=1.0, high=10.0
+        2.0,
+        "until when an ego may reach its goal, in durations of its track; from the first step on it may",
+        low=1.0,
+        high=10.0,
     )
     late: str = parameter(
         "refused",

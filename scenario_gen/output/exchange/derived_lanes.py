@@ -22,12 +22,16 @@ APART = 0.5  # metres between points of a path that it is laid through
 MARGIN = 0.1  # metres between a footprint and its lane's edge
 AROUND = 0.5  # metres by which a lane goes on beyond its footprints at least
 ACROSS = 0.6  # rad by which a vehicle in a lane may be turned in it
-SEAM_M = 0.1  # half of what may be open between two lanes of a map that follow or adjoin each other
+SEAM_M = (
+    0.1  # half of what may be open between two lanes of a map that follow or adjoin each other
+)
 CUT = 5.0  # metres of a path that may lie across all lanes, as where a corner is cut
 NEAR = 3  # points of a lane on both sides over which it keeps its widest
 
 
-def lane_map_of(road: Road | None, scenarios: Sequence[Scenario], lane_width: float, run_out: float) -> LaneMap:
+def lane_map_of(
+    road: Road | None, scenarios: Sequence[Scenario], lane_width: float, run_out: float
+) -> LaneMap:
     """Return the lanes of a road, and derived ones for those who do not keep to them; derived ones alone where it has none.
 
     A vehicle does not where a footprint leaves them in some scenario, or where no lane has its direction, as of one that turns
@@ -44,14 +48,19 @@ def lane_map_of(road: Road | None, scenarios: Sequence[Scenario], lane_width: fl
     drawn = road.lanes.drawn
     network = with_run_out(road.lanes.whole, run_out) if drawn else road.lanes.whole
     missing = _not_kept(network, scenarios)
-    added = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
+    added = [
+        _lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0)
+        for name, path in missing.items()
+    ]
     origin = f"the true lanes of {network.name}" if drawn else f"the lanes of map {network.name}"
     if missing:
         origin += f", and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
     return LaneMap(replace(network, lanes=(*network.lanes, *added)), len(added), origin)
 
 
-def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float) -> LaneMap:
+def derived_lanes(
+    scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float
+) -> LaneMap:
     """Return one lane along each path that is driven, continued straight on at both ends.
 
     Args:
@@ -65,11 +74,23 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
         for n, vehicle in enumerate(scenario.vehicles):
             paths.setdefault(vehicle.id, driven_path(scenario, n))
     derived = [
-        _lane(f"along vehicle {name}", paths[name], set(members), scenarios, road, lane_width, run_out)
+        _lane(
+            f"along vehicle {name}",
+            paths[name],
+            set(members),
+            scenarios,
+            road,
+            lane_width,
+            run_out,
+        )
         for name, members in sharing_lanes(paths).items()
     ]
     known = road is not None and road.lanes is not None
-    why = "--map writes those of the road's map" if known else "the road itself is a grid without lanes"
+    why = (
+        "--map writes those of the road's map"
+        if known
+        else "the road itself is a grid without lanes"
+    )
     origin = f"derived: one lane along each path that the scenarios drive; {why}"
     return LaneMap(LaneNetwork("derived", tuple(derived)), len(derived), origin)
 
@@ -93,7 +114,10 @@ def _not_kept(network: LaneNetwork, scenarios: Sequence[Scenario]) -> dict[str, 
         for n, vehicle in enumerate(scenario.vehicles):
             if vehicle.id not in missing:
                 path = driven_path(scenario, n)
-                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, network, outlines) > CUT:
+                if (
+                    not covers(area, polygons(footprints(scenario, n))).all()
+                    or _unled(path, network, outlines) > CUT
+                ):
                     missing[vehicle.id] = path
     return missing
 
@@ -113,7 +137,11 @@ def _unled(path: Curve, network: LaneNetwork, outlines: Sequence[Polygon]) -> fl
 def footprints(scenario: Scenario, n: int) -> Floats:
     """Return the corners (T, 4, 2) [m] of a vehicle's footprint at every instant at which it is there."""
     there, vehicle = together(scenario.present, n, n), scenario.vehicles[n]
-    return corners(np.column_stack((scenario.position[n, there], scenario.heading[n, there])), vehicle.length, vehicle.width)
+    return corners(
+        np.column_stack((scenario.position[n, there], scenario.heading[n, there])),
+        vehicle.length,
+        vehicle.width,
+    )
 
 
 def driven_path(scenario: Scenario, n: int) -> Curve:
@@ -127,23 +155,37 @@ def driven_path(scenario: Scenario, n: int) -> Curve:
     if len(kept) < 3:
         (x, y), yaw = xy[0].tolist(), float(scenario.heading[n, first])
         ahead = np.array([0.0, 1.0])
-        return Curve(np.column_stack((x + ahead * np.cos(yaw), y + ahead * np.sin(yaw), np.full(2, yaw))))
+        return Curve(
+            np.column_stack((x + ahead * np.cos(yaw), y + ahead * np.sin(yaw), np.full(2, yaw)))
+        )
     return Curve.through(np.array(kept))
 
 
 def _lane(
-    name: str, path: Curve, members: set[str], scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float
+    name: str,
+    path: Curve,
+    members: set[str],
+    scenarios: Sequence[Scenario],
+    road: Road | None,
+    lane_width: float,
+    run_out: float,
 ) -> Lane:
     """Return a lane that holds every footprint of its members.
 
     Its edges lie as far from the path on both sides, so that the lane's middle, which planners follow, is as smooth as the path.
     """
-    corners = np.concatenate([outline(scenario, n) for scenario in scenarios for n in _rows(scenario, members)])
+    corners = np.concatenate(
+        [outline(scenario, n) for scenario in scenarios for n in _rows(scenario, members)]
+    )
     station, offset = path.project(corners)
     more = max(run_out, AROUND)
     reference = path.cut(float(station.min()) - more, float(station.max()) + more, STEP)
-    room = np.minimum(*(_room(reference, sign, road, lane_width / 2.0, more) for sign in (1.0, -1.0)))
-    half = np.maximum(room, _widest_near(reference, station - station.min() + more, np.abs(offset) + MARGIN))
+    room = np.minimum(
+        *(_room(reference, sign, road, lane_width / 2.0, more) for sign in (1.0, -1.0))
+    )
+    half = np.maximum(
+        room, _widest_near(reference, station - station.min() + more, np.abs(offset) + MARGIN)
+    )
     return lane_along(name, reference, half)
 
 
@@ -164,7 +206,9 @@ def _rows(scenario: Scenario, members: set[str]) -> list[int]:
 def outline(scenario: Scenario, n: int) -> Floats:
     """Return points (P, 2) [m] of the outline of a vehicle's footprint at every instant: corners and middles of sides."""
     around = footprints(scenario, n)
-    return np.concatenate([around, 0.5 * (around[:, [1, 3]] + around[:, [0, 2]])], axis=1).reshape(-1, 2)
+    return np.concatenate([around, 0.5 * (around[:, [1, 3]] + around[:, [0, 2]])], axis=1).reshape(
+        -1, 2
+    )
 
 
 def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out: float) -> Floats:
@@ -172,4 +216,8 @@ def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out
     if road is None:
         return np.full(len(reference.points), most)
     on_run_out = (reference.station < run_out) | (reference.station > reference.length - run_out)
-    return np.where(on_run_out, most, drivable_beside(road.drivable_at, reference, sign, most, road.resolution / 2.0))
+    return np.where(
+        on_run_out,
+        most,
+        drivable_beside(road.drivable_at, reference, sign, most, road.resolution / 2.0),
+    )

@@ -32,7 +32,10 @@ from scenario_gen.roads import read_network
 
 EXPORTED = Kind("exported")
 MANIFEST = "export.json"
-MAPS = (".xodr", ".osm")  # endings of the names of maps that OpenSCENARIO can name: OpenDRIVE, Lanelet2
+MAPS = (
+    ".xodr",
+    ".osm",
+)  # endings of the names of maps that OpenSCENARIO can name: OpenDRIVE, Lanelet2
 ON_LANES = 0.9  # share of positions that lie on lanes of the map on which they were made, at least
 
 
@@ -124,14 +127,20 @@ def export_bag(
                 except RefusedError as error:
                     notes.append(f"{about}: left out: {error}")
                     continue
-                notes += [f"{about}, scenario {exported.index}: {sentence}" for sentence in written.notes]
+                notes += [
+                    f"{about}, scenario {exported.index}: {sentence}" for sentence in written.notes
+                ]
                 entries.append(_entry(case, exported, written.names, export))
                 contents.append((written.names[0], written.content))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
         for name, data in to.closing(contents).items():
             (folder / name).write_bytes(data)
-        digests = {str(p.relative_to(folder)): sha256_of(p) for p in sorted(folder.rglob("*")) if p.is_file()}
+        digests = {
+            str(p.relative_to(folder)): sha256_of(p)
+            for p in sorted(folder.rglob("*"))
+            if p.is_file()
+        }
         document = {"format": target, "notes": notes, "scenarios": entries, "sha256": digests}
         write_text(folder / MANIFEST, json.dumps(document, indent=2) + "\n")
     return Export(len(entries), tuple(notes))
@@ -145,7 +154,9 @@ def _format(target: str, road: str) -> ExportFormat:
     """
     to = EXPORTS[target]
     if road and not to.takes_map:
-        raise InputError(f"map: --to {target} writes lanes of its own; a map can be given with --to openscenario or osi")
+        raise InputError(
+            f"map: --to {target} writes lanes of its own; a map can be given with --to openscenario or osi"
+        )
     if road and Path(road).suffix.lower() not in to.maps:
         known = "OpenDRIVE (.xodr)" + (" or Lanelet2 (.osm)" if ".osm" in to.maps else "")
         raise InputError(f"map {road}: --to {target} takes a road of {known}")
@@ -154,11 +165,15 @@ def _format(target: str, road: str) -> ExportFormat:
 
 def _origin(case: Case, export: ExportConfig) -> str:
     if export.map:
-        return "; ".join((f"the lanes of {Path(export.map).name}", *read_network(Path(export.map)).notes))
+        return "; ".join(
+            (f"the lanes of {Path(export.map).name}", *read_network(Path(export.map)).notes)
+        )
     return case.lane_map.origin
 
 
-def _entry(case: Case, exported: Exported, names: tuple[str, ...], export: ExportConfig) -> dict[str, object]:
+def _entry(
+    case: Case, exported: Exported, names: tuple[str, ...], export: ExportConfig
+) -> dict[str, object]:
     """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
     return {
         "files": list(names),
@@ -184,9 +199,13 @@ def _road_file(case: Case, export: ExportConfig) -> str:
     return Path(export.map).name if export.map else f"case_{case.number}.xodr"
 
 
-def _to_openscenario(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
+def _to_openscenario(
+    folder: Path, case: Case, exported: Exported, export: ExportConfig
+) -> Written:
     name = f"case_{case.number}_{exported.index}.xosc"
-    (folder / name).write_bytes(write_openscenario(case, exported, _road_file(case, export), export))
+    (folder / name).write_bytes(
+        write_openscenario(case, exported, _road_file(case, export), export)
+    )
     return Written((name, _road_file(case, export)))
 
 
@@ -199,7 +218,11 @@ def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) 
     name = f"case_{case.number}_{exported.index}"
     with BagWriter(folder / name) as bag:
         add_autoware(bag, exported.others, exported.ego, case.start_ns)
-    notes = () if exported.ego is not None else ("there is no ego, so no /localization/kinematic_state; name one with --ego",)
+    notes = (
+        ()
+        if exported.ego is not None
+        else ("there is no ego, so no /localization/kinematic_state; name one with --ego",)
+    )
     return Written((name,), notes)
 
 
@@ -214,7 +237,9 @@ def _roads(case: Case, export: ExportConfig) -> Mapping[str, bytes]:
     if export.map:
         refuse_other_map(case, Path(export.map))
         return {_road_file(case, export): Path(export.map).read_bytes()}
-    return {_road_file(case, export): write_opendrive(case.lane_map, case.road_name, case.start_ns)}
+    return {
+        _road_file(case, export): write_opendrive(case.lane_map, case.road_name, case.start_ns)
+    }
 
 
 def _origin_of_map(_: Case, export: ExportConfig) -> tuple[float, ...]:

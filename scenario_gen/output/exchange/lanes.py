@@ -12,7 +12,11 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.types import CARS, DRIVERS, LaneNetwork, RuleKind
 
-SIGN_IDS = {RuleKind.STOP: "206", RuleKind.GIVE_WAY: "205", RuleKind.PRIORITY: "301"}  # German numbers
+SIGN_IDS = {
+    RuleKind.STOP: "206",
+    RuleKind.GIVE_WAY: "205",
+    RuleKind.PRIORITY: "301",
+}  # German numbers
 STRAIGHT_ON = 0.52  # rad, 30°: a way through a junction that turns by less goes straight on
 
 
@@ -65,7 +69,9 @@ class LaneMap:
             if inward:
                 strips[inward[0]] = inward, tuple(k for k in arm if k not in inward)
         taken = {k for strip in strips.values() for side in strip for k in side}
-        strips |= {k: ((k,), ()) for k in range(len(lanes)) if k not in taken and not lanes[k].crossing}
+        strips |= {
+            k: ((k,), ()) for k in range(len(lanes)) if k not in taken and not lanes[k].crossing
+        }
         return tuple(strips[k] for k in sorted(strips))
 
     @cached_property
@@ -92,13 +98,19 @@ def with_run_out(network: LaneNetwork, metres: float) -> LaneNetwork:
     if metres <= 0.0:
         return network
     lanes = list(network.lanes)
-    entries, exits = ([k for k in ends if lanes[k].open_to(DRIVERS)] for ends in (network.entries, network.exits))
+    entries, exits = (
+        [k for k in ends if lanes[k].open_to(DRIVERS)] for ends in (network.entries, network.exits)
+    )
     for k in entries:
         lanes[k] = replace(
-            lanes[k], left=_longer(lanes[k].left[::-1], metres)[::-1], right=_longer(lanes[k].right[::-1], metres)[::-1]
+            lanes[k],
+            left=_longer(lanes[k].left[::-1], metres)[::-1],
+            right=_longer(lanes[k].right[::-1], metres)[::-1],
         )
     for k in exits:
-        lanes[k] = replace(lanes[k], left=_longer(lanes[k].left, metres), right=_longer(lanes[k].right, metres))
+        lanes[k] = replace(
+            lanes[k], left=_longer(lanes[k].left, metres), right=_longer(lanes[k].right, metres)
+        )
     return replace(network, lanes=tuple(lanes))
 
 

@@ -86,12 +86,25 @@ class _Strip:
             line = Curve.through(first.centre[apart]).points
             width = np.abs(((first.left - first.right)[apart] * unit_left(line[:, 2])).sum(axis=1))
             offset = (0.5 if right else -0.5) * width
-            return cls(named, line, offset, dict(zip(order, (width[None], np.zeros((0, len(width)))), strict=True)))
+            return cls(
+                named,
+                line,
+                offset,
+                dict(zip(order, (width[None], np.zeros((0, len(width)))), strict=True)),
+            )
         across = first.left - first.right
         yaw = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
-        widths = [np.stack([_width(lanes[k]) for k in side]) if side else np.zeros((0, len(yaw))) for side in (along, against)]
+        widths = [
+            np.stack([_width(lanes[k]) for k in side]) if side else np.zeros((0, len(yaw)))
+            for side in (along, against)
+        ]
         reference = np.column_stack((first.left if right else first.right, yaw))
-        return cls(named, reference, np.zeros(len(yaw)), dict(zip(order, (widths[0], widths[1][:, ::-1]), strict=True)))
+        return cls(
+            named,
+            reference,
+            np.zeros(len(yaw)),
+            dict(zip(order, (widths[0], widths[1][:, ::-1]), strict=True)),
+        )
 
 
 def _width(lane: Lane) -> Floats:
@@ -104,14 +117,21 @@ def connecting(network: LaneNetwork) -> dict[int, str]:
     Each joins one lane to one other, and all that part or meet with it are such lanes of the same junction.
     """
     before, lanes = network.predecessors, network.lanes
-    ways = {k: lane.junction for k, lane in enumerate(lanes) if lane.junction and len(before[k]) == len(lane.successors) == 1}
+    ways = {
+        k: lane.junction
+        for k, lane in enumerate(lanes)
+        if lane.junction and len(before[k]) == len(lane.successors) == 1
+    }
     while True:
         mixed = [
             k
             for k, junction in ways.items()
             if before[k][0] in ways
             or lanes[k].successors[0] in ways
-            or any(ways.get(n) != junction for n in (*lanes[before[k][0]].successors, *before[lanes[k].successors[0]]))
+            or any(
+                ways.get(n) != junction
+                for n in (*lanes[before[k][0]].successors, *before[lanes[k].successors[0]])
+            )
         ]
         if not mixed:
             return ways
@@ -121,9 +141,16 @@ def connecting(network: LaneNetwork) -> dict[int, str]:
 
 def _with_crossings_alone(network: LaneNetwork) -> LaneNetwork:
     """Return a network in which crossings, that are objects beside the lanes, lead nowhere and nothing leads there."""
-    links = [() if lane.crossing else [k for k in lane.successors if not network.lanes[k].crossing] for lane in network.lanes]
+    links = [
+        () if lane.crossing else [k for k in lane.successors if not network.lanes[k].crossing]
+        for lane in network.lanes
+    ]
     return replace(
-        network, lanes=tuple(replace(lane, successors=tuple(own)) for lane, own in zip(network.lanes, links, strict=True))
+        network,
+        lanes=tuple(
+            replace(lane, successors=tuple(own))
+            for lane, own in zip(network.lanes, links, strict=True)
+        ),
     )
 
 
@@ -156,15 +183,22 @@ class _Network:
         for k, lane in enumerate(network.lanes):
             if lane.crossing:
                 middle = lane.outline.mean(axis=0)
-                away = [float(np.hypot(*(strip.reference[:, :2] - middle).T).min()) for strip in self.strips]
+                away = [
+                    float(np.hypot(*(strip.reference[:, :2] - middle).T).min())
+                    for strip in self.strips
+                ]
                 self.crossings[int(np.argmin(away))].append(k)
         self.ways = connecting(network)
         self.ends: dict[tuple[int, str], dict[str, str | float]] = {}
         self.beyond: dict[tuple[int, bool], int] = {}
         self.connections: dict[int, list[tuple[int, int, str]]] = {}
-        self.numbers = {name: JUNCTION + n for n, name in enumerate(dict.fromkeys(self.ways.values()))}
+        self.numbers = {
+            name: JUNCTION + n for n, name in enumerate(dict.fromkeys(self.ways.values()))
+        }
         direct = []
-        for k, goal in [(k, goal) for k, lane in enumerate(network.lanes) for goal in lane.successors]:
+        for k, goal in [
+            (k, goal) for k, lane in enumerate(network.lanes) for goal in lane.successors
+        ]:
             if goal in self.ways:
                 self._connect(k, goal, self.numbers[self.ways[goal]], "connectingRoad")
             elif k in self.ways:
@@ -176,8 +210,14 @@ class _Network:
             else:
                 direct.append((k, goal))
         if direct:
-            count, ends = len(network.lanes), np.array(direct).T + np.array([[0], [len(network.lanes)]])
-            _, part = connected_components(coo_array((np.ones(len(direct)), tuple(ends)), (2 * count, 2 * count)), directed=False)
+            count, ends = (
+                len(network.lanes),
+                np.array(direct).T + np.array([[0], [len(network.lanes)]]),
+            )
+            _, part = connected_components(
+                coo_array((np.ones(len(direct)), tuple(ends)), (2 * count, 2 * count)),
+                directed=False,
+            )
             for k, goal in direct:
                 number = JUNCTION + len(self.numbers) + int(part[k])
                 self._connect(k, goal, number, "linkedRoad")
@@ -194,7 +234,10 @@ class _Network:
     def _lead(self, k: int, number: int, *, end: bool) -> None:
         """Note that a lane's end, or its begin, lies at a junction."""
         place = self.places[k]
-        self.ends[place.road, place.contact(end=end)] = {"elementType": "junction", "elementId": number}
+        self.ends[place.road, place.contact(end=end)] = {
+            "elementType": "junction",
+            "elementId": number,
+        }
 
     def _join(self, k: int, other: int, *, end: bool = True) -> None:
         """Note that a lane's end, or its begin, lies at another one's begin or end."""
@@ -218,8 +261,23 @@ def write_opendrive(lane_map: LaneMap, name: str, start_ns: int) -> bytes:
     """
     root = Element("OpenDRIVE")
     (west, south), (east, north) = lane_map.network.box.tolist()
-    about = {"revMajor": "1", "revMinor": "7", "name": name, "version": "1.00", "date": date_of(start_ns)}
-    add(root, "header", **about, north=north, south=south, east=east, west=west, vendor="scenario_gen")
+    about = {
+        "revMajor": "1",
+        "revMinor": "7",
+        "name": name,
+        "version": "1.00",
+        "date": date_of(start_ns),
+    }
+    add(
+        root,
+        "header",
+        **about,
+        north=north,
+        south=south,
+        east=east,
+        west=west,
+        vendor="scenario_gen",
+    )
     comment(root, f"lanes: {lane_map.origin}")
     network = _Network(lane_map)
     for n in range(len(network.strips)):
@@ -237,13 +295,23 @@ def _road(root: Element, lane_map: LaneMap, network: _Network, n: int) -> None:
     junction = next((network.numbers[network.ways[k]] for k in members if k in network.ways), -1)
     rule = "RHT" if lane_map.side == "right" else "LHT"
     name = ", ".join(lanes[k].id for k in members)
-    road = add(root, "road", name=name, length=float(station[-1]), id=ROADS + n, junction=junction, rule=rule)
+    road = add(
+        root,
+        "road",
+        name=name,
+        length=float(station[-1]),
+        id=ROADS + n,
+        junction=junction,
+        rule=rule,
+    )
     link = add(road, "link")
     for tag, contact in (("predecessor", "start"), ("successor", "end")):
         if (n, contact) in network.ends:
             add(link, tag, **network.ends[n, contact])
     limit = max(lanes[k].speed_limit for k in members)
-    speed: dict[str, str | float] = {"max": "no limit"} if math.isnan(limit) else {"max": limit, "unit": "m/s"}
+    speed: dict[str, str | float] = (
+        {"max": "no limit"} if math.isnan(limit) else {"max": limit, "unit": "m/s"}
+    )
     add(add(road, "type", s=0.0, type="town"), "speed", **speed)
     view = add(road, "planView")
     for s, x, y, yaw, length, curve in _merged(strip.reference, pieces, station):
@@ -252,7 +320,9 @@ def _road(root: Element, lane_map: LaneMap, network: _Network, n: int) -> None:
             add(geometry, "line")
         else:
             names = ("aU", "bU", "cU", "dU", "aV", "bV", "cV", "dV")
-            add(geometry, "paramPoly3", **dict(zip(names, curve, strict=True)), pRange="normalized")
+            add(
+                geometry, "paramPoly3", **dict(zip(names, curve, strict=True)), pRange="normalized"
+            )
     group = add(road, "lanes")
     for s, value, slope in _linear(station, strip.offset):
         add(group, "laneOffset", s=s, a=value, b=slope, c=0.0, d=0.0)
@@ -263,13 +333,19 @@ def _road(root: Element, lane_map: LaneMap, network: _Network, n: int) -> None:
         elif len(strip.lanes[side]):
             parent, order = add(section, side), range(len(strip.lanes[side]))
             for m in order if side == "right" else order[::-1]:  # from left to right
-                _lane(parent, network, strip.lanes[side][m], _linear(station, strip.widths[side][m]))
+                _lane(
+                    parent, network, strip.lanes[side][m], _linear(station, strip.widths[side][m])
+                )
     if network.crossings[n]:
-        _crosswalks(add(road, "objects"), lane_map.network, strip.reference, station, network.crossings[n])
+        _crosswalks(
+            add(road, "objects"), lane_map.network, strip.reference, station, network.crossings[n]
+        )
     _signals(road, lane_map.network, strip, station, network.places)
 
 
-def _lane(parent: Element, network: _Network, k: int, widths: Iterable[tuple[float, float, float]]) -> None:
+def _lane(
+    parent: Element, network: _Network, k: int, widths: Iterable[tuple[float, float, float]]
+) -> None:
     place = network.places[k]
     users = network.users[k] or DRIVERS
     lane = add(parent, "lane", id=place.lane_id, type=_lane_type(users), level="false")
@@ -281,7 +357,13 @@ def _lane(parent: Element, network: _Network, k: int, widths: Iterable[tuple[flo
         add(lane, "width", sOffset=s, a=value, b=slope, c=0.0, d=0.0)
     if _lane_type(users) == "driving":
         for user in sorted(DRIVERS - users if users >= CARS else users):
-            add(lane, "access", sOffset=0.0, rule="deny" if users >= CARS else "allow", restriction=_RESTRICTIONS.get(user, user))
+            add(
+                lane,
+                "access",
+                sOffset=0.0,
+                rule="deny" if users >= CARS else "allow",
+                restriction=_RESTRICTIONS.get(user, user),
+            )
 
 
 def _lane_type(users: frozenset[str]) -> str:
@@ -289,7 +371,9 @@ def _lane_type(users: frozenset[str]) -> str:
     return next((kind for kind, own in _LANE_TYPES.items() if users & DRIVERS <= own), "driving")
 
 
-def _crosswalks(road: Element, network: LaneNetwork, reference: Floats, station: Floats, own: Sequence[int]) -> None:
+def _crosswalks(
+    road: Element, network: LaneNetwork, reference: Floats, station: Floats, own: Sequence[int]
+) -> None:
     """Append the crossings that lie at a road, as objects with an outline in their own frame."""
     for k in own:
         lane = network.lanes[k]
@@ -305,7 +389,13 @@ def _crosswalks(road: Element, network: LaneNetwork, reference: Floats, station:
             add(outline, "cornerLocal", u=u, v=v, z=0.0, height=0.0)
 
 
-def _signals(road: Element, network: LaneNetwork, strip: _Strip, station: Floats, places: Mapping[int, _Place]) -> None:
+def _signals(
+    road: Element,
+    network: LaneNetwork,
+    strip: _Strip,
+    station: Floats,
+    places: Mapping[int, _Place],
+) -> None:
     """Append the signs for the traffic of a road, where their stop lines are, or at its end."""
     members, group = [k for side in strip.lanes.values() for k in side], None
     for n, rule in enumerate(network.rules, 1):
@@ -313,16 +403,28 @@ def _signals(road: Element, network: LaneNetwork, strip: _Strip, station: Floats
         if not own or rule.kind not in SIGN_IDS:
             continue
         group = add(road, "signals") if group is None else group
-        at = rule.line.mean(axis=0) if len(rule.line) else strip.reference[-1 if own[0].along else 0, :2]
+        at = (
+            rule.line.mean(axis=0)
+            if len(rule.line)
+            else strip.reference[-1 if own[0].along else 0, :2]
+        )
         s = float(station[int(np.argmin(np.hypot(*(strip.reference[:, :2] - at).T)))])
-        sign = {"type": SIGN_IDS[rule.kind], "subtype": "-1", "country": "DE", "name": rule.id, "dynamic": "no"}
+        sign = {
+            "type": SIGN_IDS[rule.kind],
+            "subtype": "-1",
+            "country": "DE",
+            "name": rule.id,
+            "dynamic": "no",
+        }
         heading = {"orientation": "+" if own[0].along else "-", "zOffset": 2.0}
         signal = add(group, "signal", id=f"{n}.{own[0].road}", s=s, t=0.0, **sign, **heading)
         numbers = [place.lane_id for place in own]
         add(signal, "validity", fromLane=min(numbers), toLane=max(numbers))
 
 
-def _junction(root: Element, network: _Network, number: int, connections: Sequence[tuple[int, int, str]]) -> None:
+def _junction(
+    root: Element, network: _Network, number: int, connections: Sequence[tuple[int, int, str]]
+) -> None:
     kind = "default" if connections[0][2] == "connectingRoad" else "direct"
     junction = add(root, "junction", name=f"junction {number}", id=number, type=kind)
     for n, (k, goal, tag) in enumerate(connections):
@@ -347,7 +449,9 @@ def _pieces(reference: Floats) -> Iterator[tuple[float, Curve3 | None]]:
             yield chord, None
             continue
         half = turn / 2.0
-        reach = chord if abs(half) < 1e-6 else chord * half / float(np.sin(half))  # that of a circle's arc
+        reach = (
+            chord if abs(half) < 1e-6 else chord * half / float(np.sin(half))
+        )  # that of a circle's arc
         end_u, end_v = reach * float(np.cos(turn)), reach * float(np.sin(turn))
         curve = (
             0.0, reach, 3.0 * u - 2.0 * reach - end_u, -2.0 * u + reach + end_u,
@@ -386,10 +490,15 @@ def _merged(
 def _linear(station: Floats, values: Floats) -> Iterator[tuple[float, float, float]]:
     """Yield station, value and slope of each piece of a piecewise linear function; one that goes on as the last is part of it."""
     last = None
-    for (s, end), (value, goal) in zip(pairwise(station.tolist()), pairwise(values.tolist()), strict=True):
+    for (s, end), (value, goal) in zip(
+        pairwise(station.tolist()), pairwise(values.tolist()), strict=True
+    ):
         if last is not None:
             begin, first, slope = last
-            if all(abs(first + slope * (at - begin) - true) < GOES_ON for at, true in ((s, value), (end, goal))):
+            if all(
+                abs(first + slope * (at - begin) - true) < GOES_ON
+                for at, true in ((s, value), (end, goal))
+            ):
                 continue
         last = s, value, (goal - value) / (end - s)
         yield last

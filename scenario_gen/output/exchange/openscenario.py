@@ -18,12 +18,18 @@ from scenario_gen.types import height, rear_axle, Scenario, shifted, token, Vehi
 
 EGO = "Ego"
 WHEEL = 0.65  # metres of diameter
-LIMITS = {"maxSpeed": 70.0, "maxAcceleration": 10.0, "maxDeceleration": 10.0}  # beyond what any published scenario does
+LIMITS = {
+    "maxSpeed": 70.0,
+    "maxAcceleration": 10.0,
+    "maxDeceleration": 10.0,
+}  # beyond what any published scenario does
 STEERING = 0.7  # rad
 MASS_KG = 75.0  # of who walks
 
 
-def write_openscenario(case: Case, exported: Exported, road_file: str, export: ExportConfig = ExportConfig()) -> bytes:
+def write_openscenario(
+    case: Case, exported: Exported, road_file: str, export: ExportConfig = ExportConfig()
+) -> bytes:
     """Return a scenario as the bytes of an OpenSCENARIO file; `road_file` names its OpenDRIVE file, beside it.
 
     Raises:
@@ -77,7 +83,14 @@ def _speeds(scenario: Scenario, n: int) -> str:
 def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None:
     kind, entity = vehicle.kind.openscenario, add(entities, "ScenarioObject", name=name)
     if vehicle.kind.walks:
-        element = add(entity, "Pedestrian", name=vehicle.type, mass=MASS_KG, model=vehicle.type, pedestrianCategory=kind)
+        element = add(
+            entity,
+            "Pedestrian",
+            name=vehicle.type,
+            mass=MASS_KG,
+            model=vehicle.type,
+            pedestrianCategory=kind,
+        )
     else:
         element = add(entity, "Vehicle", name=vehicle.type, vehicleCategory=kind)
     add(element, "ParameterDeclarations")
@@ -88,8 +101,19 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
         add(element, "Performance", **LIMITS)
         axles = add(element, "Axles")
         track = 0.85 * vehicle.width
-        for tag, x, steering in (("FrontAxle", WHEELBASE * vehicle.length, STEERING), ("RearAxle", 0.0, 0.0)):
-            add(axles, tag, maxSteering=steering, wheelDiameter=WHEEL, trackWidth=track, positionX=x, positionZ=WHEEL / 2.0)
+        for tag, x, steering in (
+            ("FrontAxle", WHEELBASE * vehicle.length, STEERING),
+            ("RearAxle", 0.0, 0.0),
+        ):
+            add(
+                axles,
+                tag,
+                maxSteering=steering,
+                wheelDiameter=WHEEL,
+                trackWidth=track,
+                positionX=x,
+                positionZ=WHEEL / 2.0,
+            )
     properties = add(element, "Properties")
     if speeds:
         add(properties, "Property", name=OPENSCENARIO_SPEEDS, value=speeds)
@@ -97,8 +121,16 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
 
 def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:
     """Append where the reference point of vehicle `n` is at instant `k`; without z, the player puts it onto the road."""
-    axle = shifted(scenario.position[n, k], scenario.heading[n, k], -rear_axle(scenario.vehicles[n]))
-    add(add(parent, "Position"), "WorldPosition", x=float(axle[0]), y=float(axle[1]), h=float(scenario.heading[n, k]))
+    axle = shifted(
+        scenario.position[n, k], scenario.heading[n, k], -rear_axle(scenario.vehicles[n])
+    )
+    add(
+        add(parent, "Position"),
+        "WorldPosition",
+        x=float(axle[0]),
+        y=float(axle[1]),
+        h=float(scenario.heading[n, k]),
+    )
 
 
 def _placed(actions: Element, name: str, scenario: Scenario, n: int) -> Element:
@@ -149,12 +181,20 @@ def _follow(act: Element, scenario: Scenario, n: int, mode: str) -> None:
     if first > 0:
         event = add(maneuver, "Event", name=f"{name}_arrives", priority="parallel")
         action = add(add(event, "Action", name=f"{name}_added"), "GlobalAction")
-        _pose(add(add(action, "EntityAction", entityRef=name), "AddEntityAction"), scenario, n, first)
+        _pose(
+            add(add(action, "EntityAction", entityRef=name), "AddEntityAction"), scenario, n, first
+        )
         _at(add(event, "StartTrigger"), f"{name}_arrival", begin, "greaterOrEqual")
-    event = add(maneuver, "Event", name=f"{name}_drives", priority="parallel" if first > 0 else "override")
-    routing = add(add(add(event, "Action", name=f"{name}_follows"), "PrivateAction"), "RoutingAction")
+    event = add(
+        maneuver, "Event", name=f"{name}_drives", priority="parallel" if first > 0 else "override"
+    )
+    routing = add(
+        add(add(event, "Action", name=f"{name}_follows"), "PrivateAction"), "RoutingAction"
+    )
     follow = add(routing, "FollowTrajectoryAction")
-    trajectory = add(add(follow, "TrajectoryRef"), "Trajectory", name=f"{name}_trajectory", closed="false")
+    trajectory = add(
+        add(follow, "TrajectoryRef"), "Trajectory", name=f"{name}_trajectory", closed="false"
+    )
     add(trajectory, "ParameterDeclarations")
     polyline = add(add(trajectory, "Shape"), "Polyline")
     for k in range(first, last + 1):

@@ -70,12 +70,22 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
     host = numbers[-1] if exported.ego is not None else numbers[0]
     text, frame = _text(road), _frame(road)
     about = f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}"
-    metadata = {"creation_time": f"{date_of(case.start_ns)}Z", "description": about, "authors": "scenario_gen"}
-    with betterosi.Writer(path, metadata=metadata, library="scenario_gen", descriptor_set=_definitions()) as trace:
+    metadata = {
+        "creation_time": f"{date_of(case.start_ns)}Z",
+        "description": about,
+        "authors": "scenario_gen",
+    }
+    with betterosi.Writer(
+        path, metadata=metadata, library="scenario_gen", descriptor_set=_definitions()
+    ) as trace:
         drawn = betterosi.MapAsamOpenDrive(map_reference=road.name, open_drive_xml_content=text)
         trace.add(drawn, topic=MAP, log_time=0)
         for k, stamp in enumerate(np.round(motion.time * NS).astype(np.int64).tolist()):
-            trace.add(_ground_truth(moving, k, stamp, host, road.name, frame), topic=OBJECTS, log_time=stamp)
+            trace.add(
+                _ground_truth(moving, k, stamp, host, road.name, frame),
+                topic=OBJECTS,
+                log_time=stamp,
+            )
     return notes
 
 
@@ -85,7 +95,10 @@ def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]
     OSI's ids are numbers: if one id is none, the vehicles are numbered from 1.
     """
     ids = [vehicle.id for vehicle in exported.everybody.vehicles]
-    if all(name.isascii() and name.isdigit() and str(int(name)) == name and int(name) <= LARGEST_ID for name in ids):
+    if all(
+        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) <= LARGEST_ID
+        for name in ids
+    ):
         return tuple(int(name) for name in ids), ()
     numbers = tuple(range(1, len(ids) + 1))
     listed = ", ".join(f"{name} is {number}" for name, number in zip(ids, numbers, strict=True))
@@ -102,7 +115,9 @@ def _yaw_rates(motion: Scenario) -> Floats:
     return rates
 
 
-def _ground_truth(moving: _Moving, k: int, stamp: int, host: int, road_file: str, frame: Frame) -> Any:
+def _ground_truth(
+    moving: _Moving, k: int, stamp: int, host: int, road_file: str, frame: Frame
+) -> Any:
     """Return the message of instant `k`; the host is named while it is there."""
     import betterosi as osi
 
@@ -114,7 +129,9 @@ def _ground_truth(moving: _Moving, k: int, stamp: int, host: int, road_file: str
         x, y, z, yaw = frame.offset
         offset = osi.GroundTruth.ProjFrameOffset(position=osi.Vector3d(x=x, y=y, z=z), yaw=yaw)
     return osi.GroundTruth(
-        version=osi.InterfaceVersion(version_major=major, version_minor=minor, version_patch=patch),
+        version=osi.InterfaceVersion(
+            version_major=major, version_minor=minor, version_patch=patch
+        ),
         timestamp=osi.Timestamp(seconds=stamp // NS, nanos=stamp % NS),
         host_vehicle_id=osi.Identifier(value=host) if there else None,
         moving_object=objects,
@@ -132,18 +149,27 @@ def _objects(moving: _Moving, k: int) -> Iterator[Any]:
     for n in np.flatnonzero(motion.there[:, k]).tolist():
         vehicle, heading = motion.vehicles[n], motion.heading[n, k]
         cos, sin = float(np.cos(heading)), float(np.sin(heading))
-        speed, along, rate = (float(values[n, k]) for values in (motion.speed, motion.acceleration, moving.yaw_rate))
+        speed, along, rate = (
+            float(values[n, k]) for values in (motion.speed, motion.acceleration, moving.yaw_rate)
+        )
         x, y = motion.position[n, k].tolist()
         across = speed * rate
         base = osi.BaseMoving(
-            dimension=osi.Dimension3d(length=vehicle.length, width=vehicle.width, height=height(vehicle)),
+            dimension=osi.Dimension3d(
+                length=vehicle.length, width=vehicle.width, height=height(vehicle)
+            ),
             position=osi.Vector3d(x=x, y=y, z=height(vehicle) / 2.0),
             orientation=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=_wrapped(heading)),
             velocity=osi.Vector3d(x=speed * cos, y=speed * sin, z=0.0),
-            acceleration=osi.Vector3d(x=along * cos - across * sin, y=along * sin + across * cos, z=0.0),
+            acceleration=osi.Vector3d(
+                x=along * cos - across * sin, y=along * sin + across * cos, z=0.0
+            ),
             orientation_rate=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=rate),
         )
-        number, classes = osi.Identifier(value=moving.numbers[n]), osi.MovingObject.VehicleClassification
+        number, classes = (
+            osi.Identifier(value=moving.numbers[n]),
+            osi.MovingObject.VehicleClassification,
+        )
         if vehicle.kind.walks:
             yield osi.MovingObject(id=number, type=osi.MovingObject.Type.PEDESTRIAN, base=base)
             continue
@@ -151,7 +177,9 @@ def _objects(moving: _Moving, k: int) -> Iterator[Any]:
             id=number,
             type=osi.MovingObject.Type.VEHICLE,
             base=base,
-            vehicle_classification=classes(type=classes.Type[vehicle.kind.osi], role=classes.Role.CIVIL),
+            vehicle_classification=classes(
+                type=classes.Type[vehicle.kind.osi], role=classes.Role.CIVIL
+            ),
             vehicle_attributes=_attributes(vehicle),
         )
 
@@ -189,7 +217,12 @@ def _frame(road: Path) -> Frame:
     offset = header.first("offset") if header is not None else None
     moved = None
     if offset is not None:
-        moved = (offset.number("x", 0.0), offset.number("y", 0.0), offset.number("z", 0.0), offset.number("hdg", 0.0))
+        moved = (
+            offset.number("x", 0.0),
+            offset.number("y", 0.0),
+            offset.number("z", 0.0),
+            offset.number("hdg", 0.0),
+        )
     return Frame(" ".join(reference.text.split()) if reference is not None else "", moved)
 
 

@@ -21,7 +21,9 @@ from scenario_gen.types import Scenario
 SQUARE_M = 100_000.0  # of MGRS
 
 
-def projection_of(origin: tuple[float, ...], export: ExportConfig) -> tuple[str, Callable[[Scenario], Scenario]]:
+def projection_of(
+    origin: tuple[float, ...], export: ExportConfig
+) -> tuple[str, Callable[[Scenario], Scenario]]:
     """Return the name of the frame that an export asks for, "" if positions stay, and what moves a scenario into it.
 
     Args:
@@ -31,9 +33,15 @@ def projection_of(origin: tuple[float, ...], export: ExportConfig) -> tuple[str,
     Raises:
         InputError: MGRS has no origin of one's own, or the origin is no latitude and longitude.
     """
-    about = parse_origin(export.projection_origin, "projection_origin") if export.projection_origin else None
+    about = (
+        parse_origin(export.projection_origin, "projection_origin")
+        if export.projection_origin
+        else None
+    )
     if about is not None and export.projection == "mgrs":
-        raise InputError("projection_origin: the squares of MGRS lie where they lie; take it with --set projection=utm or local")
+        raise InputError(
+            "projection_origin: the squares of MGRS lie where they lie; take it with --set projection=utm or local"
+        )
     if not origin or (export.projection == "local" and about is None):
         return "", lambda scenario: scenario
     middle = origin[0], origin[1]

@@ -73,7 +73,9 @@ def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
     steps = len(motion.time)
 
     def masked(values: Any) -> Any:
-        return np.where(there if np.ndim(values) == 1 else there[:, None], values, 0.0).astype(np.float32)
+        return np.where(there if np.ndim(values) == 1 else there[:, None], values, 0.0).astype(
+            np.float32
+        )
 
     heading, speed = motion.heading[n], motion.speed[n]
     velocity = speed[:, None] * unit(heading)
@@ -108,7 +110,11 @@ def _summary(track: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def _numbers(tracks: Mapping[str, Any]) -> dict[str, Any]:
-    moving = Counter(track["type"] for name, track in tracks.items() if _summary(track, name)["moving_distance"] > MOVES)
+    moving = Counter(
+        track["type"]
+        for name, track in tracks.items()
+        if _summary(track, name)["moving_distance"] > MOVES
+    )
     each = Counter(track["type"] for track in tracks.values())
     return {
         "num_moving_objects": moving.total(),
@@ -128,9 +134,14 @@ def _lane(lane_map: LaneMap, k: int) -> dict[str, Any]:
     lane = network.lanes[k]
     beside = {side: [str(other + 1)] for side, (other, same) in sides.items() if same}
     if not lane.open_to(DRIVERS):
-        return {"type": "CROSSWALK" if lane.crossing else "SIDEWALK", "polygon": lane.outline.astype(np.float32)}
+        return {
+            "type": "CROSSWALK" if lane.crossing else "SIDEWALK",
+            "polygon": lane.outline.astype(np.float32),
+        }
     return {
-        "type": "LANE_BIKE_LANE" if lane.users and not lane.open_to(DRIVERS - {"bicycle"}) else "LANE_SURFACE_STREET",
+        "type": "LANE_BIKE_LANE"
+        if lane.users and not lane.open_to(DRIVERS - {"bicycle"})
+        else "LANE_SURFACE_STREET",
         "polyline": lane.centre.astype(np.float32),
         "polygon": lane.outline.astype(np.float32),
         "entry_lanes": [str(other + 1) for other in sorted(network.predecessors[k])],
@@ -156,7 +167,9 @@ def pickled(value: Any) -> bytes:
     """Return a value as a pickle that any NumPy reads."""
     stream = io.BytesIO()
     pickler = _Pickler(stream, protocol=4)
-    pickler.fast = True  # no references to what was written before: they depend on which texts are one object
+    pickler.fast = (
+        True  # no references to what was written before: they depend on which texts are one object
+    )
     pickler.dump(value)
     return stream.getvalue()
 
@@ -167,5 +180,9 @@ class _Pickler(pickle.Pickler):
     def reducer_override(self, value: Any) -> Any:
         """Return how an array is made; anything else is written as usual."""
         if isinstance(value, np.ndarray):
-            return np.ndarray, (value.shape, value.dtype.str, bytearray(np.ascontiguousarray(value).tobytes()))
+            return np.ndarray, (
+                value.shape,
+                value.dtype.str,
+                bytearray(np.ascontiguousarray(value).tobytes()),
+            )
         return NotImplemented

@@ -21,12 +21,16 @@ def number(value: float) -> str:
         InputError: it is not finite.
     """
     if not np.isfinite(value):
-        raise InputError(f"{value} cannot be exported: a number that is not finite has no decimal form")
+        raise InputError(
+            f"{value} cannot be exported: a number that is not finite has no decimal form"
+        )
     text = f"{float(value):.{DECIMALS}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
-def add(parent: Element, tag: str, text: str | float | None = None, **attributes: str | float) -> Element:
+def add(
+    parent: Element, tag: str, text: str | float | None = None, **attributes: str | float
+) -> Element:
     """Append an element with attributes and text, and return it; numbers are written by `number`."""
     element = ET.SubElement(parent, tag, {key: _text(value) for key, value in attributes.items()})
     if text is not None:

@@ -29,26 +29,49 @@ from scenario_gen.types.markings import markings
 
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""
-MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS, MAX_LINES = 240, 900, 72, 10, 200, 400
+MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS, MAX_LINES = (
+    240,
+    900,
+    72,
+    10,
+    200,
+    400,
+)
 MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
 """Speed and accelerations over time are stored more finely than the animation, of fewer samples."""
 
 
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     """Return all that one case draws, ready for JSON; at most `samples` scenarios of each arm."""
-    sets = {"with": case.generated, "without": case.references.get(WITHOUT), "uniform": case.references.get(UNIFORM)}
-    arms = {name: tuple(result.scenarios[:samples]) for name, result in sets.items() if result is not None}
+    sets = {
+        "with": case.generated,
+        "without": case.references.get(WITHOUT),
+        "uniform": case.references.get(UNIFORM),
+    }
+    arms = {
+        name: tuple(result.scenarios[:samples])
+        for name, result in sets.items()
+        if result is not None
+    }
     covered = case.coverage
     if covered is not None:  # the scenarios that stand out are always drawn
         shown = {scenario.index for scenario in arms["with"]}
         extra = {index for index in covered.picks.values() if index not in shown}
         arms["with"] += (
-            tuple(scenario for scenario in case.generated.scenarios[samples:] if scenario.index in extra) if extra else ()
+            tuple(
+                scenario
+                for scenario in case.generated.scenarios[samples:]
+                if scenario.index in extra
+            )
+            if extra
+            else ()
         )
     ids = [vehicle.id for vehicle in case.encounter.vehicles]
     if case.replay is not None:
         arms["replay"] = (case.replay,)
-    longest = max([case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)])
+    longest = max(
+        [case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)]
+    )
     refused = case.generated.examples
     if refused:
         arms["refused"] = tuple(scenario for _, scenario in refused)
@@ -56,7 +79,8 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     return {
         "row": case.row_name,
         "vehicles": [
-            {"id": v.id, "type": v.type, "length": _short(v.length), "width": _short(v.width)} for v in case.encounter.vehicles
+            {"id": v.id, "type": v.type, "length": _short(v.length), "width": _short(v.width)}
+            for v in case.encounter.vehicles
         ],
         "left_out": [n for n, known in enumerate(ids) if known not in case.evaluation.vehicles],
         "road": road_data(case.road) if case.road else None,
@@ -69,7 +93,9 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
         "coverage": None if covered is None else covered.document(),
         "features": _features(
-            case.encounter, {name: group for name, group in arms.items() if name != "refused"}, case.evaluation.vehicles
+            case.encounter,
+            {name: group for name, group in arms.items() if name != "refused"},
+            case.evaluation.vehicles,
         ),
     }
 
@@ -108,7 +134,12 @@ def road_data(road: Road) -> dict[str, Any]:
     factor = max(1, -(-max(road.drivable.shape) // MAX_CELLS))
     height, width = (-(-side // factor) for side in road.drivable.shape)
     padded = np.zeros((height * factor, width * factor))
-    others = cells_of(road, (lane for lane in road.lanes.others if lane.open_to(DRIVERS)) if road.lanes is not None else ())
+    others = cells_of(
+        road,
+        (lane for lane in road.lanes.others if lane.open_to(DRIVERS))
+        if road.lanes is not None
+        else (),
+    )
     padded[: road.drivable.shape[0], : road.drivable.shape[1]] = road.drivable | others
     coarse = padded.reshape(height, factor, width, factor).mean(axis=(1, 3)) >= 0.5
     return {
@@ -126,7 +157,10 @@ def _markings(road: Road) -> dict[str, list[list[float]]]:
     drawn = {}
     for kind, lines in (markings(road.lanes) if road.lanes is not None else {}).items():
         some = lines[:: max(1, -(-len(lines) // MAX_LINES))]
-        kept = [line[np.linspace(0, len(line) - 1, min(len(line), 25)).round().astype(np.int64)] for line in some]
+        kept = [
+            line[np.linspace(0, len(line) - 1, min(len(line), 25)).round().astype(np.int64)]
+            for line in some
+        ]
         drawn[kind.value] = [np.round(line.ravel(), 2).tolist() for line in kept]
     return drawn
 
@@ -135,17 +169,26 @@ def _turn(encounter: Encounter, fit: Fit | None) -> float:
     """Return the angle [rad] that turns the record as it lies on the road: the mean over its vehicles' first headings."""
     if fit is None or not fit.fitted:
         return 0.0
-    turned = np.array([fitted.anchors[0, 2] - heading[0] for fitted, heading in zip(fit.fitted, encounter.heading, strict=True)])
+    turned = np.array(
+        [
+            fitted.anchors[0, 2] - heading[0]
+            for fitted, heading in zip(fit.fitted, encounter.heading, strict=True)
+        ]
+    )
     return _short(float(np.arctan2(np.sin(turned).sum(), np.cos(turned).sum())))
 
 
 def states(source: Encounter | Scenario, frames: int) -> Floats:
     """Return (N, frames, 4) x, y [m], yaw [rad], speed [m/s] at instants spread evenly from start to end."""
     motion = at_count(source, frames)
-    return np.concatenate([motion.position, motion.heading[..., None], motion.speed[..., None]], axis=-1)
+    return np.concatenate(
+        [motion.position, motion.heading[..., None], motion.speed[..., None]], axis=-1
+    )
 
 
-def _trajectories(scenarios: Sequence[Scenario], frames: int, ids: Sequence[str]) -> dict[str, Any]:
+def _trajectories(
+    scenarios: Sequence[Scenario], frames: int, ids: Sequence[str]
+) -> dict[str, Any]:
     return {
         "states": pack(np.stack([_whole(scenario, frames, ids) for scenario in scenarios])),
         "there": [_there(scenario, ids) for scenario in scenarios],
@@ -158,7 +201,10 @@ def _there(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[float]
     """Return from which to which share of the duration each vehicle is there; one that is left out, throughout."""
     own = [vehicle.id for vehicle in source.vehicles]
     shares = source.time[source.present] / source.time[-1]
-    return [[_short(v, 5) for v in shares[own.index(known)]] if known in own else [0.0, 1.0] for known in ids]
+    return [
+        [_short(v, 5) for v in shares[own.index(known)]] if known in own else [0.0, 1.0]
+        for known in ids
+    ]
 
 
 def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
@@ -166,8 +212,15 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
 
     Without a witness it is drawn where the first vehicle is, underneath it.
     """
-    own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)}
-    track = next(iter(own.values())) if scenario.reference_drive is None else states(scenario.reference_drive, frames)[0]
+    own = {
+        vehicle.id: state
+        for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)
+    }
+    track = (
+        next(iter(own.values()))
+        if scenario.reference_drive is None
+        else states(scenario.reference_drive, frames)[0]
+    )
     return np.stack([own.get(known, track) for known in ids])
 
 
@@ -175,7 +228,9 @@ def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[st
     """Return for each vehicle speed, acceleration and lateral acceleration of the template and of the scenarios that have it."""
     motions = []
     for n, vehicle in enumerate(encounter.vehicles):
-        rows = [(s, k) for s in scenarios for k, own in enumerate(s.vehicles) if own.id == vehicle.id]
+        rows = [
+            (s, k) for s in scenarios for k, own in enumerate(s.vehicles) if own.id == vehicle.id
+        ]
         samples = [_over_time(scenario, k) for scenario, k in rows]
         index = [scenario.index for scenario, _ in rows]
         motions.append({"template": _over_time(encounter, n), "samples": samples, "index": index})
@@ -187,9 +242,15 @@ def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
     first, last = source.time[source.present[n]].tolist()
     frames = min(MAX_MOTION_FRAMES, max(3, round((last - first) / MOTION_PERIOD) + 1))
     time = np.linspace(first, last, frames)
-    speed, heading = (np.interp(time, source.time, values[n]) for values in (source.speed, source.heading))
+    speed, heading = (
+        np.interp(time, source.time, values[n]) for values in (source.speed, source.heading)
+    )
     rates = np.gradient(np.stack([speed, heading]), time, axis=1)
-    return {"from": _short(first), "to": _short(last), "values": pack(np.column_stack([speed, rates[0], speed * rates[1]]))}
+    return {
+        "from": _short(first),
+        "to": _short(last),
+        "values": pack(np.column_stack([speed, rates[0], speed * rates[1]])),
+    }
 
 
 def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> dict[str, Any]:
@@ -211,11 +272,17 @@ def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> 
 def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
     vehicles = []
     for fitted, route in zip(fit.fitted, routes, strict=True):
-        keep = np.linspace(0, len(route.points) - 1, min(len(route.points), MAX_ROUTE_POINTS)).round().astype(np.int64)
+        keep = (
+            np.linspace(0, len(route.points) - 1, min(len(route.points), MAX_ROUTE_POINTS))
+            .round()
+            .astype(np.int64)
+        )
         vehicles.append(
             {
                 "route": [[_short(x, 2), _short(y, 2)] for x, y, _ in route.points[keep]],
-                "anchors": [[_short(x, 2), _short(y, 2), _short(yaw)] for x, y, yaw in fitted.anchors],
+                "anchors": [
+                    [_short(x, 2), _short(y, 2), _short(yaw)] for x, y, yaw in fitted.anchors
+                ],
                 "moved": [_short(value, 2) for value in fitted.moved],
             }
         )
@@ -226,12 +293,20 @@ def _reactions(case: GenerationResult) -> list[dict[str, Any]]:
     """Return who reacts to whom, as indices of vehicles, and from which to which share of the recording."""
     duration = case.encounter.duration
     return [
-        {"who": e.who, "whom": e.whom, "kind": e.kind, "from": _short(e.since / duration), "to": _short(e.until / duration)}
+        {
+            "who": e.who,
+            "whom": e.whom,
+            "kind": e.kind,
+            "from": _short(e.since / duration),
+            "to": _short(e.until / duration),
+        }
         for e in (case.generated.graph.edges if case.generated.graph is not None else ())
     ]
 
 
-def _features(encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shared: Sequence[str]) -> list[dict[str, Any]]:
+def _features(
+    encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shared: Sequence[str]
+) -> list[dict[str, Any]]:
     """Return the paper's figure 5 for each pair of the `shared` vehicles: matrices of MATRIX_SIZE² bytes, 255 = 1."""
     groups: dict[str, Sequence[Encounter | Scenario]] = {"template": [encounter], **arms}
     pairs = []
@@ -244,7 +319,9 @@ def _features(encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shar
             motions = [motion for motion in common if motion is not None]
             if not motions:
                 continue
-            place = [np.ascontiguousarray(np.stack([m.position[k].T for m in motions])) for k in (0, 1)]
+            place = [
+                np.ascontiguousarray(np.stack([m.position[k].T for m in motions])) for k in (0, 1)
+            ]
             pace = [np.stack([m.speed[k][None] for m in motions]) for k in (0, 1)]
             entry["position"][name] = _bytes(mean_feature(place[0], place[1], "euclidean"))
             entry["speed"][name] = _bytes(mean_feature(pace[0], pace[1], "manhattan"))

@@ -23,7 +23,13 @@ from scenario_gen.types import formatted
 
 
 def render_page(
-    template: str, scripts: Sequence[str], data: Any, *, libraries: Sequence[str] = (), folder: Path | None = None, **values: Any
+    template: str,
+    scripts: Sequence[str],
+    data: Any,
+    *,
+    libraries: Sequence[str] = (),
+    folder: Path | None = None,
+    **values: Any,
 ) -> str:
     """Return a page as text; the same input gives the same bytes.
 
@@ -39,7 +45,9 @@ def render_page(
 
     def asset(name: str) -> str:
         own = folder / name if folder is not None else None
-        return (own if own is not None and own.is_file() else assets / name).read_text(encoding="utf-8")
+        return (own if own is not None and own.is_file() else assets / name).read_text(
+            encoding="utf-8"
+        )
 
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(asset),
@@ -48,13 +56,17 @@ def render_page(
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters["estimate"] = lambda value, unit="", bounds=True, cap=None: formatted(value, unit, bounds=bounds, cap=cap)
+    environment.filters["estimate"] = lambda value, unit="", bounds=True, cap=None: formatted(
+        value, unit, bounds=bounds, cap=cap
+    )
     texts = [*libraries, *map(asset, scripts)]
     return environment.get_template(template).render(
         css=Markup(asset("report.css")),
         policy=Markup(content_policy(texts)),
         scripts=[Markup(text) for text in texts],
-        data=Markup(json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")),
+        data=Markup(
+            json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+        ),
         **values,
     )
 
@@ -64,7 +76,10 @@ def content_policy(scripts: Sequence[str]) -> str:
 
     Styles stay free ('unsafe-inline'): widths of bars and colours of vehicles are style attributes.
     """
-    hashes = " ".join(f"'sha256-{b64encode(sha256(text.encode('utf-8')).digest()).decode('ascii')}'" for text in scripts)
+    hashes = " ".join(
+        f"'sha256-{b64encode(sha256(text.encode('utf-8')).digest()).decode('ascii')}'"
+        for text in scripts
+    )
     return (
         f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
         "base-uri 'none'; form-action 'none'"

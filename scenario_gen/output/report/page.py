@@ -29,7 +29,9 @@ from scenario_gen.types import (
 
 SIGNIFICANT = 0.03
 """Below this, E without changepoints leaves nothing to gain and the case is not counted."""
-UNCOMPARED = "sets to compare with were not requested; `scenario-gen generate --compare` draws them"
+UNCOMPARED = (
+    "sets to compare with were not requested; `scenario-gen generate --compare` draws them"
+)
 MAX_SAMPLES = 50
 """Scenarios of each arm that a page draws; the figures count all."""
 
@@ -71,7 +73,9 @@ def render(report: ReportInput) -> str:
         bag=shlex.quote(report.bag) if report.bag else "",
         significant=SIGNIFICANT,
         compared=any(case.references for case in report.cases),
-        uncompared=next((why for case in report.cases for why in case.refusals.values()), UNCOMPARED),
+        uncompared=next(
+            (why for case in report.cases for why in case.refusals.values()), UNCOMPARED
+        ),
         facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
         parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
     )
@@ -84,19 +88,31 @@ def _is_parameter(name: str) -> bool:
 
 def _view(index: int, case: GenerationResult) -> dict[str, Any]:
     """Return what the page's tables say about one case."""
-    arms = [(case.row_name, case.generated), *((name, case.references.get(name)) for name in (WITHOUT, UNIFORM))]
+    arms = [
+        (case.row_name, case.generated),
+        *((name, case.references.get(name)) for name in (WITHOUT, UNIFORM)),
+    ]
     evaluation = case.evaluation
     duration = case.encounter.duration
-    bounds = [*(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)), duration]
+    bounds = [
+        *(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)),
+        duration,
+    ]
     routes: Sequence[Route | None] = case.routes or [None] * len(case.encounter.vehicles)
-    vehicles = zip(case.encounter.vehicles, case.fit.fitted, routes, strict=True) if case.fit else ()
+    vehicles = (
+        zip(case.encounter.vehicles, case.fit.fitted, routes, strict=True) if case.fit else ()
+    )
     return {
         "index": index,
         "case": case,
         "title": case.title,
         "without": case.references.get(WITHOUT),
         "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
-        "arms": [(name, result, causes_in_words(result.refused)) for name, result in arms if result is not None],
+        "arms": [
+            (name, result, causes_in_words(result.refused))
+            for name, result in arms
+            if result is not None
+        ],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
         "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
@@ -110,9 +126,18 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "not_kept": case.lost_reactions,
         "nearer": case.similarity()["said"],
         "segments": [
-            {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
+            {
+                "from": bounds[k],
+                "to": bounds[k + 1],
+                "label": int(case.segmentation.labels[start]),
+                "text": text,
+            }
             for k, (start, text) in enumerate(
-                zip((0, *case.segmentation.changepoints), case.segmentation.descriptions, strict=True)
+                zip(
+                    (0, *case.segmentation.changepoints),
+                    case.segmentation.descriptions,
+                    strict=True,
+                )
             )
         ],
         "vehicles": [
@@ -161,21 +186,33 @@ def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
     """E of the delivered set, and what stands below it: each with its words and whether it is the best of what is compared."""
     best = case.best(metric)
     words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", REPLAY: "replay"}
-    errors = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
+    errors = {
+        row: formatted(Interval(case.evaluation.value(row, metric)), "")
+        for row in words
+        if case.evaluation.row(row)
+    }
     return {
         "own": formatted(Interval(case.evaluation.value(case.row_name, metric)), ""),
         "kind": "" if not best else "good" if best == case.row_name else "bad",
-        "beside": [(f"{value} {words[row]}", row == best) for row, value in errors.items() if value != "–"],
+        "beside": [
+            (f"{value} {words[row]}", row == best) for row, value in errors.items() if value != "–"
+        ],
     }
 
 
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the page's first sentences in figures: how many were accepted, and where E is below what it is compared with."""
     better: dict[str, dict[str, tuple[int, int]]] = {}
-    for row, words in ((WITHOUT, "without changepoints"), (UNIFORM, "with as many evenly spaced ones")):
+    for row, words in (
+        (WITHOUT, "without changepoints"),
+        (UNIFORM, "with as many evenly spaced ones"),
+    ):
         cases = [view["case"] for view in views if row in view["case"].compared]
         for key, what in ERRORS.items():
-            pairs = [(case.evaluation.value(case.row_name, key), case.evaluation.value(row, key)) for case in cases]
+            pairs = [
+                (case.evaluation.value(case.row_name, key), case.evaluation.value(row, key))
+                for case in cases
+            ]
             known = [value < other for value, other in pairs if other >= SIGNIFICANT]
             if known:
                 better.setdefault(words, {})[what] = (sum(known), len(known))

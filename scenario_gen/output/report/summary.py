@@ -32,8 +32,14 @@ COMPARED = (
     "; after | of sets drawn likewise, without changepoints and with K evenly spaced; in brackets, not compared: preset "
     "narrow, replay of the recording"
 )
-UNCOMPARED = "; in brackets, not compared: replay of the recording. --compare draws sets to compare with"
-VARIED = ("pet", "gap", "speed")  # figures whose range is said: PET, or where nobody crosses the least gap, and the speed
+UNCOMPARED = (
+    "; in brackets, not compared: replay of the recording. --compare draws sets to compare with"
+)
+VARIED = (
+    "pet",
+    "gap",
+    "speed",
+)  # figures whose range is said: PET, or where nobody crosses the least gap, and the speed
 FAILED = "yellow"
 
 
@@ -65,10 +71,15 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
     table = Table.grid(padding=(0, 1))
     types = sorted({vehicle.type for vehicle in recorded.vehicles})
     users = "vehicles" if types == [CAR] else f"road users ({', '.join(types)})"
-    table.add_row("", "recording", f"{len(recorded.vehicles)} {users} for {recorded.duration:.1f} s")
+    table.add_row(
+        "", "recording", f"{len(recorded.vehicles)} {users} for {recorded.duration:.1f} s"
+    )
     for sentence in case.reacting["sentences"]:
         table.add_row("", "reaction", printable(sentence))
-    valid = Text.assemble((f"{len(result)} of {result.requested} scenarios", "green" if complete else "red"), f"; {tried}")
+    valid = Text.assemble(
+        (f"{len(result)} of {result.requested} scenarios", "green" if complete else "red"),
+        f"; {tried}",
+    )
     table.add_row("", "valid", valid)
     if varied := _variety(case):
         table.add_row("", "variety", varied)
@@ -94,13 +105,17 @@ def _variety(case: GenerationResult) -> str:
         values = [value for value in spread.values if math.isfinite(value)]
         own = f" (recorded {spread.template:.1f})" if math.isfinite(spread.template) else ""
         if values and (own or spread is spreads["speed"]):
-            ranges.append(f"{spread.label} {min(values):.1f} to {max(values):.1f} {spread.unit}{own}")
+            ranges.append(
+                f"{spread.label} {min(values):.1f} to {max(values):.1f} {spread.unit}{own}"
+            )
     return ", ".join(ranges)
 
 
 def _vanished(values: Mapping[str, Interval]) -> list[str]:
     """Say how many of the recording's conflicts the scenarios have not."""
-    vanished, conflicts = (values.get(key, Interval(math.nan)).value for key in ("vanished_conflicts", "conflicts"))
+    vanished, conflicts = (
+        values.get(key, Interval(math.nan)).value for key in ("vanished_conflicts", "conflicts")
+    )
     words = f"{vanished:.3g} of the recording's {vanished + conflicts:.0f} conflict(s) vanish, mean over scenarios"
     return [words] if vanished > 0.0 else []
 
@@ -114,20 +129,30 @@ def _details(case: GenerationResult, row: Row | None) -> list[Text]:
     if planned := routes_in_words(case.routes):
         figures += f"  routes: {planned}"
     similar = [_errors(case, metric) for metric in ERRORS if row and metric in row.values]
-    return [Text(figures), *similar, *(Text(f"  {printable(line)}", style=FAILED) for line in case.similarity()["said"])]
+    return [
+        Text(figures),
+        *similar,
+        *(Text(f"  {printable(line)}", style=FAILED) for line in case.similarity()["said"]),
+    ]
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:
     """E of the delivered set, of those it is compared with and of those beside it; the best of the compared is green."""
     compared, best, value = case.compared, case.best(metric), case.evaluation.value
     text = Text(f"  E {ERRORS[metric]} ")
-    text.append(_figure(value(case.row_name, metric)), style="bold green" if best == case.row_name else "bold")
+    text.append(
+        _figure(value(case.row_name, metric)),
+        style="bold green" if best == case.row_name else "bold",
+    )
     for k, row in enumerate(compared[1:]):
         text.append(" | " if k == 0 else ", ").append(f"{SHORT[row]} ")
         text.append(_figure(value(row, metric)), style="green" if best == row else "")
     beside = [row for row in SHORT if row not in compared and case.evaluation.row(row) is not None]
     if beside:
-        text.append(f" ({', '.join(f'{SHORT[row]} {_figure(value(row, metric))}' for row in beside)})", style="dim")
+        text.append(
+            f" ({', '.join(f'{SHORT[row]} {_figure(value(row, metric))}' for row in beside)})",
+            style="dim",
+        )
     return text
 
 

@@ -21,7 +21,15 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.output.results import EVALUATED, write_evaluation
 from scenario_gen.output.review.validation import Checkers, kept_reactions
 from scenario_gen.template import reactions_of
-from scenario_gen.types import CheckCounts, EgoSlot, GenerationResult, join_ego, ScenarioSet, Verdict, WITHOUT
+from scenario_gen.types import (
+    CheckCounts,
+    EgoSlot,
+    GenerationResult,
+    join_ego,
+    ScenarioSet,
+    Verdict,
+    WITHOUT,
+)
 
 
 def bag_results(
@@ -43,19 +51,28 @@ def bag_results(
         InputError: the bag is missing or damaged, or no namespace has both topics.
     """
     namespaces = read_recording(path, bag).namespaces.values()
-    complete = [namespace for namespace in namespaces if {"tracks", SCENARIOS} <= namespace.messages.keys()]
+    complete = [
+        namespace for namespace in namespaces if {"tracks", SCENARIOS} <= namespace.messages.keys()
+    ]
     if not complete:
-        raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
+        raise InputError(
+            f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare"
+        )
     with within(path):
         total, done = sum(len(namespace.hashes) for namespace in complete), count(1)
 
         def tick() -> None:
             progress(next(done), total)
 
-        return tuple(_result(namespace, config or EvaluationConfig(), limits, seed, tick) for namespace in complete)
+        return tuple(
+            _result(namespace, config or EvaluationConfig(), limits, seed, tick)
+            for namespace in complete
+        )
 
 
-def write_page(bag: Path, folder: Path, *, progress: Callable[[int, int], None] = lambda *_: None) -> None:
+def write_page(
+    bag: Path, folder: Path, *, progress: Callable[[int, int], None] = lambda *_: None
+) -> None:
     """Write the report of a bag; `progress` as of `bag_results`.
 
     Raises:
@@ -66,7 +83,11 @@ def write_page(bag: Path, folder: Path, *, progress: Callable[[int, int], None] 
 
 
 def _result(
-    namespace: Namespace, config: EvaluationConfig, limits: Limits | None, seed: int, tick: Callable[[], None]
+    namespace: Namespace,
+    config: EvaluationConfig,
+    limits: Limits | None,
+    seed: int,
+    tick: Callable[[], None],
 ) -> GenerationResult:
     encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
     fit, routes = namespace.fit
@@ -92,12 +113,25 @@ def _result(
     lost = sum(entry is None for entry in namespace.unknown.values())
     if lost:
         notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {NO_ENTRY}")
-    rows = [replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row for row in evaluation.rows]
+    rows = [
+        replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row
+        for row in evaluation.rows
+    ]
     evaluation = replace(evaluation, rows=tuple(rows))
     ego = None
-    witness = next((scenario.reference_drive for scenario in scenarios if scenario.reference_drive is not None), None)
+    witness = next(
+        (
+            scenario.reference_drive
+            for scenario in scenarios
+            if scenario.reference_drive is not None
+        ),
+        None,
+    )
     if witness is not None:
-        first, last = (np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]]) for k in (0, -1))
+        first, last = (
+            np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]])
+            for k in (0, -1)
+        )
         ego = EgoSlot(witness.vehicles[0], first, last)
     held = [kept_reactions(encounter, namespace.entry(k)) for k in range(len(scenarios))]
     generated = ScenarioSet(
@@ -121,9 +155,13 @@ def _result(
 
 def _left_out(namespace: Namespace) -> tuple[str, ...]:
     """Say what the bag has not, and what follows from it; and what its requests say they came to."""
-    messages = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not checked"]
+    messages = [
+        "all scenarios of the bag are shown and measured, valid or not; start and end states were not checked"
+    ]
     if "map" not in namespace.messages:
         messages.append("the bag has no map: whether vehicles leave the road was not checked")
     if "changepoints" not in namespace.messages:
-        messages.append("the bag has no changepoints: the recording counts as one primitive, and its waits were not checked")
+        messages.append(
+            "the bag has no changepoints: the recording counts as one primitive, and its waits were not checked"
+        )
     return (*messages, *(summary.sentence() for summary in namespace.summaries))

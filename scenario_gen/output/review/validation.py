@@ -17,13 +17,28 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 
-from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
+from scenario_gen.bags.recordings.read import (
+    INFO,
+    Namespace,
+    read_recording,
+    ScenarioEntry,
+    SCENARIOS,
+    WITNESS,
+)
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, LaneGaps, Limits
 from scenario_gen.numerics import Bools
-from scenario_gen.template import Conflict, conflicts_in, find_waits, lane_gaps, reactions_of, required_orders, Wait
+from scenario_gen.template import (
+    Conflict,
+    conflicts_in,
+    find_waits,
+    lane_gaps,
+    reactions_of,
+    required_orders,
+    Wait,
+)
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
@@ -70,7 +85,9 @@ class Validation:
     missing: tuple[str, ...] = ()
     proven: Counter[str] = field(default_factory=Counter)
 
-    def add(self, index: int, violations: Sequence[tuple[str, str]], left_out: Collection[str]) -> None:
+    def add(
+        self, index: int, violations: Sequence[tuple[str, str]], left_out: Collection[str]
+    ) -> None:
         """Count one scenario with its violations (cause, sentence)."""
         self.scenarios += 1
         self.invalid += bool(violations)
@@ -101,7 +118,11 @@ class Reference:
 
     @classmethod
     def of(
-        cls, encounter: Encounter, segmentation: Segmentation | None, road: Road | None, entry: ScenarioEntry | None
+        cls,
+        encounter: Encounter,
+        segmentation: Segmentation | None,
+        road: Road | None,
+        entry: ScenarioEntry | None,
     ) -> "Reference":
         """Return what a scenario with this entry is held against; without a segmentation its waits are not known."""
         conflicts = conflicts_in(encounter)
@@ -119,20 +140,39 @@ class Reference:
             kept_gaps(encounter, entry),
         )
 
-    def checker(self, scenario: Scenario, limits: Limits | None, requested: BoundaryStates | None) -> Checker:
+    def checker(
+        self, scenario: Scenario, limits: Limits | None, requested: BoundaryStates | None
+    ) -> Checker:
         """Return the checker of scenarios with the same vehicles as this one, which must meet the states `requested`."""
         ids = tokens(vehicle.id for vehicle in scenario.vehicles)
         if self.template is None or not set(ids) <= set(self.template):
             return Checker(self.road, requested, None, None, limits)
         at = {self.template.index(name): k for k, name in enumerate(ids)}
         known = [k for k, c in enumerate(self.conflicts) if {c.first, c.second} <= set(at)]
-        conflicts = [replace(c, first=at[c.first], second=at[c.second]) for c in (self.conflicts[k] for k in known)]
+        conflicts = [
+            replace(c, first=at[c.first], second=at[c.second])
+            for c in (self.conflicts[k] for k in known)
+        ]
         required_first = self.first or tuple(c.first for c in self.conflicts)
-        first = [None if leader is None else at[leader] for leader in (required_first[k] for k in known)]
-        waits = None if self.waits is None else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
-        edges = [replace(e, who=at[e.who], whom=at[e.whom]) for e in self.reactions if {e.who, e.whom} <= set(at)]
+        first = [
+            None if leader is None else at[leader] for leader in (required_first[k] for k in known)
+        ]
+        waits = (
+            None
+            if self.waits is None
+            else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
+        )
+        edges = [
+            replace(e, who=at[e.who], whom=at[e.whom])
+            for e in self.reactions
+            if {e.who, e.whom} <= set(at)
+        ]
         ends = None if self.ends is None else self.ends[list(at)]
-        gaps = {(at[who], at[whom]): found for (who, whom), found in self.lane_gaps.items() if {who, whom} <= set(at)}
+        gaps = {
+            (at[who], at[whom]): found
+            for (who, whom), found in self.lane_gaps.items()
+            if {who, whom} <= set(at)
+        }
         return Checker(self.road, requested, conflicts, waits, limits, first, edges, ends, gaps)
 
 
@@ -155,15 +195,22 @@ def validate_bag(
         InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
     """
     namespaces = read_recording(
-        path, config, ("tracks", "changepoints", "map", "road/lanes", "fit", "fit/info", SCENARIOS, INFO)
+        path,
+        config,
+        ("tracks", "changepoints", "map", "road/lanes", "fit", "fit/info", SCENARIOS, INFO),
     ).namespaces.values()
     checked = [namespace for namespace in namespaces if SCENARIOS in namespace.messages]
     if not checked:
-        raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
+        raise InputError(
+            f"{path}: no topic `scenarios` in any namespace; there is nothing to check"
+        )
     with within(path):
         total = sum(len(namespace.hashes) for namespace in checked)
         done = count(1)
-        return tuple(_validate(namespace, limits, lambda: progress(next(done), total)) for namespace in checked)
+        return tuple(
+            _validate(namespace, limits, lambda: progress(next(done), total))
+            for namespace in checked
+        )
 
 
 class Checkers:
@@ -182,8 +229,19 @@ class Checkers:
         """
         entry = self._namespace.entry(k) or self._namespace.unknown.get(k)
         is_lost = k in self._namespace.unknown and entry is None
-        kept = () if entry is None else tuple(text for key, text in entry.facts.items() if key.startswith("reactions"))
-        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order, kept)
+        kept = (
+            ()
+            if entry is None
+            else tuple(text for key, text in entry.facts.items() if key.startswith("reactions"))
+        )
+        place = (
+            stamp,
+            is_lost,
+            entry and entry.template_hash,
+            entry and entry.map_hash,
+            entry and entry.order,
+            kept,
+        )
         of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
         key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
         if key not in self._checkers:
@@ -209,7 +267,12 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
         silent = message
         if entry is not None and namespace.without_witness(entry):
             if namespace.strange_witnesses:
-                wrong.append((ALTERED, f"the ego's reference drive is not what was published for scenario {entry.index}"))
+                wrong.append(
+                    (
+                        ALTERED,
+                        f"the ego's reference drive is not what was published for scenario {entry.index}",
+                    )
+                )
             silent = (*message, NO_WITNESS)
         try:
             stamp, scenario = namespace.scenario(k)
@@ -218,7 +281,9 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
             continue
         states = None
         if entry is not None:
-            states = entry.asked(namespace.where(INFO), witness=scenario.reference_drive is not None)
+            states = entry.asked(
+                namespace.where(INFO), witness=scenario.reference_drive is not None
+            )
         scenario = join_ego(scenario)
         checker = checkers.of(k, stamp, scenario, states)
         try:
@@ -228,7 +293,11 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
             continue
         wrong += [(violation.cause.value, violation.message) for violation in verdict.violations]
         result.add(k, wrong, (*silent, *checker.not_applicable))
-        broken = {violation.vehicles for violation in verdict.violations if violation.cause == Cause.REACTION}
+        broken = {
+            violation.vehicles
+            for violation in verdict.violations
+            if violation.cause == Cause.REACTION
+        }
         for edge in checker.reactions:
             result.proven[edge.words(scenario.vehicles)] += (edge.who, edge.whom) not in broken
     return result
@@ -238,23 +307,34 @@ def kept_reactions(encounter: Encounter, entry: ScenarioEntry | None) -> tuple[R
     """Return the reactions of a template that an entry says its scenario keeps."""
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
     kept = split_pieces(entry.facts.get("reactions", "")) if entry else []
-    return tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if kept else ()
+    return (
+        tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept)
+        if kept
+        else ()
+    )
 
 
 def kept_gaps(encounter: Encounter, entry: ScenarioEntry | None) -> LaneGaps:
     """Return the template's gaps in a lane; zeros for the pairs that an entry says its scenario is not held to."""
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
     lost = lost_pairs(entry.facts, names) if entry else ()
-    return {pair: (speed, 0.0 * gap if pair in lost else gap) for pair, (speed, gap) in lane_gaps(encounter).items()}
+    return {
+        pair: (speed, 0.0 * gap if pair in lost else gap)
+        for pair, (speed, gap) in lane_gaps(encounter).items()
+    }
 
 
 def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:
     """Return the sentence for a message that stands where another one was published."""
-    published = f"scenario {entry.index} of request {entry.request} was published as {entry.sha256[:12]}…"
+    published = (
+        f"scenario {entry.index} of request {entry.request} was published as {entry.sha256[:12]}…"
+    )
     return f"message {k} has SHA-256 {sha256[:12]}…, which {INFO} does not know; {published}"
 
 
-def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is_lost: bool) -> Reference:
+def _reference(
+    namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is_lost: bool
+) -> Reference:
     """Return what a scenario of the stamp and entry is held against; if its entry is lost, only what is beyond doubt.
 
     Raises:

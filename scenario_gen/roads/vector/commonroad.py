@@ -16,20 +16,41 @@ from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
 from scenario_gen.numerics import Floats
-from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_many_lanes, speed_of
+from scenario_gen.roads.vector.network import (
+    by_id,
+    Draft,
+    Faults,
+    MapLanes,
+    refuse_too_many_lanes,
+    speed_of,
+)
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
 from scenario_gen.types import CARS, DRIVERS, LANE_USERS, RuleKind
 
 SKIPPED = frozenset(
-    ("obstacle", "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem", "scenarioTags")
+    (
+        "obstacle",
+        "staticObstacle",
+        "dynamicObstacle",
+        "environmentObstacle",
+        "phantomObstacle",
+        "planningProblem",
+        "scenarioTags",
+    )
 )
 _BY_TYPE = {  # of a lanelet: who may use it, whatever users it names
     "sidewalk": frozenset(("pedestrian",)), "crosswalk": frozenset(("pedestrian",)), "bicycleLane": frozenset(("bicycle",)),
     "busLane": frozenset(("bus",)),
     **dict.fromkeys(("shoulder", "parking", "border", "railway", "restricted"), frozenset[str]()),
 }  # fmt: skip
-_USERS = {"vehicle": DRIVERS, "car": DRIVERS, **{name: frozenset((name,)) for name in LANE_USERS - CARS}}
-_MOTORWAYS = frozenset(("interstate", "highway"))  # types of lanelets on which nobody rides a bicycle
+_USERS = {
+    "vehicle": DRIVERS,
+    "car": DRIVERS,
+    **{name: frozenset((name,)) for name in LANE_USERS - CARS},
+}
+_MOTORWAYS = frozenset(
+    ("interstate", "highway")
+)  # types of lanelets on which nobody rides a bicycle
 _MAX_SPEED = ("274", "274.1", "R2-1", "maxSpeed")  # names and national numbers of the sign
 
 
@@ -45,7 +66,10 @@ def lanes_of(root: Element) -> MapLanes:
     limits = _speed_signs(root, faults)
     junctions = _junctions(root, set(lanelets), faults)
     users = {name: own for name, lanelet in lanelets.items() if (own := _users(lanelet))}
-    back = {name: own & _named(_texts(lanelets[name], "userBidirectional")) & DRIVERS for name, own in users.items()}
+    back = {
+        name: own & _named(_texts(lanelets[name], "userBidirectional")) & DRIVERS
+        for name, own in users.items()
+    }
     both_ways = {name for name, own in back.items() if own}
     drafts = []
     for name, lanelet in ((name, lanelets[name]) for name in users):
@@ -62,15 +86,42 @@ def lanes_of(root: Element) -> MapLanes:
                 if side.attributes.get("drivingDir") == "same"
             )
             limit, junction = _speed_limit(lanelet, limits), junctions.get(name, "")
-            draft = Draft(name, left, right, successors, beside, limit, junction, lanelet.place, users=users[name])
+            draft = Draft(
+                name,
+                left,
+                right,
+                successors,
+                beside,
+                limit,
+                junction,
+                lanelet.place,
+                users=users[name],
+            )
             drafts.append(replace(draft, crossing="crosswalk" in _texts(lanelet, "laneletType")))
             if name in both_ways:
-                before = tuple(f"{other.get('ref')}r" for other in lanelet.all("predecessor") if other.get("ref") in both_ways)
+                before = tuple(
+                    f"{other.get('ref')}r"
+                    for other in lanelet.all("predecessor")
+                    if other.get("ref") in both_ways
+                )
                 borders = right[::-1], left[::-1]
-                drafts.append(Draft(f"{name}r", *borders, before, (), limit, junction, lanelet.place, users=back[name]))
+                drafts.append(
+                    Draft(
+                        f"{name}r",
+                        *borders,
+                        before,
+                        (),
+                        limit,
+                        junction,
+                        lanelet.place,
+                        users=back[name],
+                    )
+                )
     version = root.attributes.get("commonRoadVersion", "?")
     notes = (f"CommonRoad {version}: coordinates as they stand, in metres", *_georeference(root))
-    rules = list(_rules(root, {name: lanelets[name] for name, own in users.items() if own & CARS}, faults))
+    rules = list(
+        _rules(root, {name: lanelets[name] for name, own in users.items() if own & CARS}, faults)
+    )
     others = [sign for sign in root.all("trafficSign") if not any(map(_means, _sign_names(sign)))]
     return MapLanes(drafts, notes, len(lanelets) - len(users), faults, rules, len(others))
 
@@ -88,7 +139,10 @@ def _named(names: set[str]) -> frozenset[str]:
 
 def _users(lanelet: Element) -> frozenset[str]:
     """Who may use a lanelet: as its type says, else who is named; all that drive where nobody is, or only who has priority."""
-    kinds, names = _texts(lanelet, "laneletType"), _texts(lanelet, "userOneWay") | _texts(lanelet, "userBidirectional")
+    kinds, names = (
+        _texts(lanelet, "laneletType"),
+        _texts(lanelet, "userOneWay") | _texts(lanelet, "userBidirectional"),
+    )
     typed = [_BY_TYPE[kind] for kind in kinds if kind in _BY_TYPE]
     if typed:
         return frozenset.intersection(*typed)
@@ -119,8 +173,17 @@ def _rules(root: Element, lanelets: dict[str, Element], faults: Faults) -> Itera
         with faults.leaving_out("stop line", name):
             stop = lanelet.first("stopLine")
             holders = [lanelet] if stop is None else [lanelet, stop]
-            line = _points(stop)[:, :2] if stop is not None and len(stop.all("point")) > 1 else np.zeros((0, 2))
-            refs = dict.fromkeys((tag, ref.get("ref")) for tag, _ in kinds for holder in holders for ref in holder.all(tag))
+            line = (
+                _points(stop)[:, :2]
+                if stop is not None and len(stop.all("point")) > 1
+                else np.zeros((0, 2))
+            )
+            refs = dict.fromkeys(
+                (tag, ref.get("ref"))
+                for tag, _ in kinds
+                for holder in holders
+                for ref in holder.all(tag)
+            )
             for ref in refs:
                 if ref in kinds:
                     yield DraftRule(ref[1], kinds[ref], (name,), line=line)
@@ -128,13 +191,20 @@ def _rules(root: Element, lanelets: dict[str, Element], faults: Faults) -> Itera
 
 def _georeference(root: Element) -> list[str]:
     reference = root.first("location", "geoTransformation", "geoReference")
-    return [f"geoReference {' '.join(reference.text.split())} is stated, not applied"] if reference is not None else []
+    return (
+        [f"geoReference {' '.join(reference.text.split())} is stated, not applied"]
+        if reference is not None
+        else []
+    )
 
 
 def _points(bound: Element) -> Floats:
     """Points (P, 3) [m] of a bound or a line, with their height, NaN where it is not given."""
     heights = [(point, point.first("z")) for point in bound.all("point")]
-    points = [(p.one("x").value(), p.one("y").value(), math.nan if z is None else z.value()) for p, z in heights]
+    points = [
+        (p.one("x").value(), p.one("y").value(), math.nan if z is None else z.value())
+        for p, z in heights
+    ]
     return np.array(points, dtype=np.float64).reshape(-1, 3)
 
 
@@ -148,7 +218,9 @@ def _speed_signs(root: Element, faults: Faults) -> dict[str, float]:
                 with faults.leaving_out("speed sign", sign.attributes.get("id", "?")):
                     limit = speed_of(value.text, "m/s")
                     if math.isnan(limit):
-                        raise InputError(f"{value.place}: {shown(value.text.strip(), 40)!r} is no speed")
+                        raise InputError(
+                            f"{value.place}: {shown(value.text.strip(), 40)!r} is no speed"
+                        )
                     limits[sign.get("id")] = limit
     return limits
 
@@ -158,7 +230,12 @@ def _speed_limit(lanelet: Element, signs: dict[str, float]) -> float:
     if own is not None:
         return own.value()
     return min(
-        (signs[ref.get("ref")] for ref in lanelet.all("trafficSignRef") if ref.attributes.get("ref") in signs), default=math.nan
+        (
+            signs[ref.get("ref")]
+            for ref in lanelet.all("trafficSignRef")
+            if ref.attributes.get("ref") in signs
+        ),
+        default=math.nan,
     )
 
 
@@ -169,7 +246,9 @@ def _junctions(root: Element, known: set[str], faults: Faults) -> dict[str, str]
         for incoming in intersection.all("incoming"):
             for tag in ("successorsLeft", "successorsRight", "successorsStraight"):
                 for ref in incoming.all(tag):
-                    with faults.leaving_out("link of an intersection", ref.attributes.get("ref", "?")):
+                    with faults.leaving_out(
+                        "link of an intersection", ref.attributes.get("ref", "?")
+                    ):
                         if ref.get("ref") not in known:
                             raise InputError(f"{ref.place}: lanelet {ref.get('ref')} is not there")
                         junctions[ref.get("ref")] = intersection.get("id")

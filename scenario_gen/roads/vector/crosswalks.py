@@ -27,16 +27,24 @@ _LEAST_AREA = 0.1  # m²
 def crosswalks(road: OpenDriveRoad, faults: Faults) -> Iterator[Draft]:
     """Yield the crosswalks of a road, from its right to its left, named crosswalk road.object."""
     objects = (element for group in road.element.all("objects") for element in group.all("object"))
-    for element in (element for element in objects if element.attributes.get("type") == "crosswalk"):
+    for element in (
+        element for element in objects if element.attributes.get("type") == "crosswalk"
+    ):
         name = f"crosswalk {road.id}.{element.attributes.get('id', '?')}"
         with faults.leaving_out("crosswalk", name):
             (pose,) = _poses(road, np.array([[element.number("s"), element.number("t")]]))
             ring = _outline(road, element, pose)
             ring = ring[:-1] if np.allclose(ring[0], ring[-1]) else ring
             if len(ring) < 4 or shapely.Polygon(ring).area < _LEAST_AREA:
-                raise InputError(f"{element.place}: {name} has no area; an outline of 4 corners, or length and width, are needed")
-            left, right = (border + pose[:2] for border in _borders(ring - pose[:2], float(pose[2])))
-            yield Draft(name, left, right, (), (), math.nan, "", element.place, users=_USERS, crossing=True)
+                raise InputError(
+                    f"{element.place}: {name} has no area; an outline of 4 corners, or length and width, are needed"
+                )
+            left, right = (
+                border + pose[:2] for border in _borders(ring - pose[:2], float(pose[2]))
+            )
+            yield Draft(
+                name, left, right, (), (), math.nan, "", element.place, users=_USERS, crossing=True
+            )
 
 
 def _borders(ring: Floats, yaw: float) -> list[Floats]:
@@ -63,10 +71,19 @@ def _poses(road: OpenDriveRoad, places: Floats) -> Floats:
 def _outline(road: OpenDriveRoad, element: Element, pose: Floats) -> Floats:
     """The corners (P, 2) [m] of an object, whose place has a pose (3,) along the road."""
     own = pose + np.array([0.0, 0.0, element.number("hdg", 0.0)])
-    outline = next((outline for holder in (element, *element.all("outlines")) for outline in holder.all("outline")), None)
+    outline = next(
+        (
+            outline
+            for holder in (element, *element.all("outlines"))
+            for outline in holder.all("outline")
+        ),
+        None,
+    )
     if outline is None:
         return np.asarray(corners(own[None], element.number("length"), element.number("width"))[0])
-    local = np.array([(corner.number("u"), corner.number("v")) for corner in outline.all("cornerLocal")])
+    local = np.array(
+        [(corner.number("u"), corner.number("v")) for corner in outline.all("cornerLocal")]
+    )
     if len(local):
         return np.asarray(place(own, local[:, 0], local[:, 1]))
     places = [(corner.number("s"), corner.number("t")) for corner in outline.all("cornerRoad")]

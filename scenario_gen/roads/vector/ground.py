@@ -47,7 +47,9 @@ def _cells(road: Road, lane: Lane) -> tuple[npt.NDArray[np.int64], npt.NDArray[n
     return rows + corner[1], columns + corner[0]
 
 
-def _bits(road: Road, lane: Lane, rows: npt.NDArray[np.int64], columns: npt.NDArray[np.int64]) -> npt.NDArray[np.uint16]:
+def _bits(
+    road: Road, lane: Lane, rows: npt.NDArray[np.int64], columns: npt.NDArray[np.int64]
+) -> npt.NDArray[np.uint16]:
     """The directions that a lane allows in its cells, by the section that is nearest to each."""
     k = np.arange(_BINS)
     near = np.abs(wrap_angle(2.0 * np.pi * k / _BINS - lane.yaw[:, None])) <= _ALLOWED
@@ -57,7 +59,9 @@ def _bits(road: Road, lane: Lane, rows: npt.NDArray[np.int64], columns: npt.NDAr
     nearest = np.empty(len(points), dtype=np.int64)
     for part in range(0, len(points), _AT_ONCE):
         some = points[part : part + _AT_ONCE]
-        away = np.square(some[:, None, 0] - middle[:, 0]) + np.square(some[:, None, 1] - middle[:, 1])
+        away = np.square(some[:, None, 0] - middle[:, 0]) + np.square(
+            some[:, None, 1] - middle[:, 1]
+        )
         nearest[part : part + _AT_ONCE] = np.argmin(away, axis=1)
     return np.asarray(allowed[nearest])
 
@@ -66,7 +70,9 @@ def drives_against(road: Road, position: Floats, heading: Floats) -> Bools:
     """Return whether poses, (..., 2) [m] and (...) [rad], are driven against all lanes that lie there."""
     row, column, inside = road.cells(position)
     turn = np.round(heading / (2.0 * np.pi / _BINS)).astype(np.int64) % _BINS
-    return np.asarray(inside & ((directions(road)[row, column] >> turn.astype(np.uint16)) & 1 == 0))
+    return np.asarray(
+        inside & ((directions(road)[row, column] >> turn.astype(np.uint16)) & 1 == 0)
+    )
 
 
 def ground_for(road: Road, vehicle: Vehicle) -> Road:
@@ -93,7 +99,9 @@ def _open_to(road: Road, users: frozenset[str]) -> Road | None:
     if network is road.lanes:
         return None
     if not network.lanes:
-        raise RefusedError(f"all lanes of road {road.name} are closed to a {', '.join(users)}; choose another road")
+        raise RefusedError(
+            f"all lanes of road {road.name} are closed to a {', '.join(users)}; choose another road"
+        )
     closed = cells_of(road, [lane for lane in road.lanes.lanes if not lane.open_to(users)])
     drivable = without_slits((road.drivable & ~closed) | cells_of(road, network.lanes))
     blocked = np.zeros_like(drivable) if road.obstructed is None else road.obstructed
@@ -111,7 +119,11 @@ def cells_of(road: Road, lanes: Iterable[Lane]) -> Bools:
 @once_per_object
 def _walkable(road: Road) -> Road:
     """A road on which all cells but those of obstacles are drivable, without lanes."""
-    blocked = np.zeros(road.drivable.shape, dtype=np.bool_) if road.obstructed is None else road.obstructed
+    blocked = (
+        np.zeros(road.drivable.shape, dtype=np.bool_)
+        if road.obstructed is None
+        else road.obstructed
+    )
     return replace(road, drivable=~blocked, lanes=None)
 
 
@@ -131,7 +143,11 @@ def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
     cells = cells_of(road, (lanes[k] for k in sorted(own)))
     if not cells.any():
         return road
-    away = clearance_field(replace(road, drivable=~cells, lanes=None)) if not cells.all() else np.zeros(cells.shape)
+    away = (
+        clearance_field(replace(road, drivable=~cells, lanes=None))
+        if not cells.all()
+        else np.zeros(cells.shape)
+    )
     part = replace(road, drivable=road.drivable & (cells | (away <= _KERB)))
     ends = path[[0, -1]]
     return part if footprint_fits(part, ends, vehicle.length, vehicle.width).all() else road

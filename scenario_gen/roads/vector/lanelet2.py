@@ -20,7 +20,15 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite
 from scenario_gen.logs import local_frame, middle_of
 from scenario_gen.numerics import Floats
-from scenario_gen.roads.vector.network import by_id, Draft, Faults, MapLanes, refuse_too_long, refuse_too_many_lanes, speed_of
+from scenario_gen.roads.vector.network import (
+    by_id,
+    Draft,
+    Faults,
+    MapLanes,
+    refuse_too_long,
+    refuse_too_many_lanes,
+    speed_of,
+)
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
 from scenario_gen.types import CARS, DRIVERS, LANE_USERS, RuleKind
 
@@ -39,7 +47,11 @@ _LIMITS = {  # m/s by subtype and location, where no sign says: Lanelet2's Germa
     ("play_street", "urban"): 7.0 * _KMH,
 }
 _FARTHEST = 50_000.0  # metres from the middle of a map in latitude and longitude, as far as the local frame is exact
-_CHANGE = {"dashed": (True, True), "dashed_solid": (True, False), "solid_dashed": (False, True)}  # from its left, from its right
+_CHANGE = {
+    "dashed": (True, True),
+    "dashed_solid": (True, False),
+    "solid_dashed": (False, True),
+}  # from its left, from its right
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +69,9 @@ class _Border:
         return self.way.get("id"), self.forth
 
     def turned(self) -> "_Border":
-        return replace(self, nodes=self.nodes[::-1], points=self.points[::-1], forth=not self.forth)
+        return replace(
+            self, nodes=self.nodes[::-1], points=self.points[::-1], forth=not self.forth
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +84,9 @@ class _Lanelet:
 
     def turned(self) -> "_Lanelet":
         """The same lanelet driven the other way."""
-        return replace(self, name=f"{self.name}r", left=self.right.turned(), right=self.left.turned())
+        return replace(
+            self, name=f"{self.name}r", left=self.right.turned(), right=self.left.turned()
+        )
 
 
 def lanes_of(root: Element) -> MapLanes:
@@ -84,7 +100,10 @@ def lanes_of(root: Element) -> MapLanes:
     """
     faults = Faults()
     nodes, ways, relations = (  # without what editors have marked as deleted
-        by_id((element for element in root.all(tag) if element.attributes.get("action") != "delete"), faults)
+        by_id(
+            (element for element in root.all(tag) if element.attributes.get("action") != "delete"),
+            faults,
+        )
         for tag in ("node", "way", "relation")
     )
     tagged = [(relation, _tags(relation)) for relation in relations.values()]
@@ -109,15 +128,21 @@ def lanes_of(root: Element) -> MapLanes:
         with faults.leaving_out("stop line", ref):
             lines[ref] = _nodes(ways[ref], nodes)
     of_cars = {ref for relation, _ in for_cars for ref in sides.get(relation.get("id"), ())}
-    about = dict.fromkeys(chain(*(own for ref, own in names.items() if ref in of_cars), *lines.values()))
+    about = dict.fromkeys(
+        chain(*(own for ref, own in names.items() if ref in of_cars), *lines.values())
+    )
     all_names = about | dict.fromkeys(chain(*names.values()))
-    positions, note, origin = _positions([nodes[name] for name in all_names], len(about), root.file, faults)
+    positions, note, origin = _positions(
+        [nodes[name] for name in all_names], len(about), root.file, faults
+    )
     drawn = []
     for relation, tags in used_by:
         if relation.get("id") not in sides:
             continue
         with faults.leaving_out("lanelet", relation.get("id")):
-            borders = [_border(ways[ref], names[ref], positions) for ref in sides[relation.get("id")]]
+            borders = [
+                _border(ways[ref], names[ref], positions) for ref in sides[relation.get("id")]
+            ]
             lanelet = _lanelet(relation, tags, borders)
             drawn.append(lanelet)
             if _is_for_both_ways(tags):
@@ -128,11 +153,29 @@ def lanes_of(root: Element) -> MapLanes:
         for ref, own in lines.items()
         if all(name in positions for name in own)
     }
-    rules = [replace(rule, line=line) for rule, refs in signed for line in [at[ref] for ref in refs if ref in at] or [rule.line]]
-    elements = [(relation, tags) for relation, tags in tagged if tags.get("type") == "regulatory_element"]
-    others = [relation for relation, tags in elements if tags.get("subtype") != "speed_limit" and not _kind(relation, tags, ways)]
+    rules = [
+        replace(rule, line=line)
+        for rule, refs in signed
+        for line in [at[ref] for ref in refs if ref in at] or [rule.line]
+    ]
+    elements = [
+        (relation, tags) for relation, tags in tagged if tags.get("type") == "regulatory_element"
+    ]
+    others = [
+        relation
+        for relation, tags in elements
+        if tags.get("subtype") != "speed_limit" and not _kind(relation, tags, ways)
+    ]
     left_out = len(lanelets) - len(used_by)
-    return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), left_out, faults, rules, len(others), origin)
+    return MapLanes(
+        list(_drafts(drawn, limits)),
+        (f"Lanelet2: {note}",),
+        left_out,
+        faults,
+        rules,
+        len(others),
+        origin,
+    )
 
 
 def _regulations(
@@ -166,7 +209,9 @@ def _kind(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> 
         return None
     referred = [_tags(ways[ref]) for ref in _members(relation, "refers") if ref in ways]
     signs = [own.get("subtype", "") for own in referred]
-    kinds = [kind for kind in map(kind_of_sign, (tags.get("sign_type", ""), *signs)) if kind is not None]
+    kinds = [
+        kind for kind in map(kind_of_sign, (tags.get("sign_type", ""), *signs)) if kind is not None
+    ]
     match tags.get("subtype"):
         case "traffic_light":
             return RuleKind.TRAFFIC_LIGHT
@@ -176,7 +221,9 @@ def _kind(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> 
             return RuleKind.STOP if RuleKind.STOP in kinds else RuleKind.GIVE_WAY
         case "traffic_sign":
             return kinds[0] if kinds else None
-        case "road_marking" if any(own.get("type") == "stop_line" for own in referred):  # Autoware's
+        case "road_marking" if any(
+            own.get("type") == "stop_line" for own in referred
+        ):  # Autoware's
             return RuleKind.STOP
     return None
 
@@ -189,7 +236,9 @@ def _border(way: Element, names: Sequence[str], positions: Mapping[str, Floats])
     """
     for name in names:
         if name not in positions:
-            raise InputError(f"{way.place}: way {way.get('id')} goes through node {name}, whose position is faulty")
+            raise InputError(
+                f"{way.place}: way {way.get('id')} goes through node {name}, whose position is faulty"
+            )
     return _Border(way, tuple(names), np.array([positions[name] for name in names]))
 
 
@@ -211,9 +260,13 @@ def _users(tags: dict[str, str]) -> frozenset[str]:
     if not any(key.startswith("participant:") for key in tags):
         return usual
     keys: dict[str, tuple[str, ...]] = {
-        user: (f"participant:vehicle:{'car' if user == 'van' else user}", "participant:vehicle") for user in DRIVERS
+        user: (f"participant:vehicle:{'car' if user == 'van' else user}", "participant:vehicle")
+        for user in DRIVERS
     }
-    keys["bicycle"] = ("participant:bicycle", *(("participant:vehicle",) if "bicycle" in usual else ()))
+    keys["bicycle"] = (
+        "participant:bicycle",
+        *(("participant:vehicle",) if "bicycle" in usual else ()),
+    )
     keys["pedestrian"] = ("participant:pedestrian",)
     return frozenset(user for user, own in keys.items() if _first(tags, own) in ("yes", "true"))
 
@@ -233,7 +286,9 @@ def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
     """
     refs = []
     for role in ("left", "right"):
-        members = [member for member in relation.all("member") if member.attributes.get("role") == role]
+        members = [
+            member for member in relation.all("member") if member.attributes.get("role") == role
+        ]
         if len(members) != 1:
             raise InputError(
                 f"{relation.place}: lanelet {relation.get('id')} has {len(members)} members with role {role}; one is needed"
@@ -249,13 +304,19 @@ def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
     refs = [nd.get("ref") for nd in way.all("nd")]
     for ref in refs:
         if ref not in nodes:
-            raise InputError(f"{way.place}: way {way.get('id')} goes through node {ref}, which is not in the map")
+            raise InputError(
+                f"{way.place}: way {way.get('id')} goes through node {ref}, which is not in the map"
+            )
     if len(refs) < 2:
-        raise InputError(f"{way.place}: way {way.get('id')} has {len(refs)} node(s); two are needed")
+        raise InputError(
+            f"{way.place}: way {way.get('id')} has {len(refs)} node(s); two are needed"
+        )
     return refs
 
 
-def _positions(nodes: list[Element], count: int, file: str, faults: Faults) -> tuple[dict[str, Floats], str, tuple[float, ...]]:
+def _positions(
+    nodes: list[Element], count: int, file: str, faults: Faults
+) -> tuple[dict[str, Floats], str, tuple[float, ...]]:
     """Metres (3,) of each node by its id, x, y and its height; a sentence on how they were found; the origin in degrees.
 
     Local coordinates are taken if most of the first `count` nodes have them, about whose middle the local frame lies else; nodes
@@ -276,12 +337,18 @@ def _positions(nodes: list[Element], count: int, file: str, faults: Faults) -> t
                     "have; two frames cannot be mixed"
                 )
             if local:
-                place = [finite(own[key], f"{node.place}, tag {key}") for key in ("local_x", "local_y")]
+                place = [
+                    finite(own[key], f"{node.place}, tag {key}") for key in ("local_x", "local_y")
+                ]
             else:
-                place = [_degrees(node, key, most) for key, most in (("lat", 90.0), ("lon", 180.0))]
+                place = [
+                    _degrees(node, key, most) for key, most in (("lat", 90.0), ("lon", 180.0))
+                ]
             found[name] = np.array([*place, _height(own)])
     if not found:
-        raise InputError(faults.found[0][2] if faults.found else f"{file}: no lanelet for cars has borders")
+        raise InputError(
+            faults.found[0][2] if faults.found else f"{file}: no lanelet for cars has borders"
+        )
     if local:
         return found, "coordinates are the tags local_x and local_y, in metres", ()
     degrees = np.array(list(found.values()))
@@ -296,7 +363,11 @@ def _positions(nodes: list[Element], count: int, file: str, faults: Faults) -> t
             f"{file}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read"
         )
     note = f"latitude and longitude in metres east and north of {latitude:.7f}, {longitude:.7f} (azimuthal equidistant, WGS84)"
-    return dict(zip(found, np.column_stack((metres, degrees[:, 2])), strict=True)), note, (latitude, longitude)
+    return (
+        dict(zip(found, np.column_stack((metres, degrees[:, 2])), strict=True)),
+        note,
+        (latitude, longitude),
+    )
 
 
 def _height(tags: dict[str, str]) -> float:
@@ -310,7 +381,9 @@ def _height(tags: dict[str, str]) -> float:
 def _degrees(node: Element, key: str, most: float) -> float:
     """A node's latitude or longitude."""
     if not node.attributes.get(key, ""):
-        raise InputError(f"{node.place}: node {node.get('id')} has neither tags local_x and local_y nor lat and lon")
+        raise InputError(
+            f"{node.place}: node {node.get('id')} has neither tags local_x and local_y nor lat and lon"
+        )
     value = node.number(key)
     if abs(value) > most:
         raise InputError(
@@ -332,7 +405,9 @@ def _lanelet(relation: Element, tags: dict[str, str], borders: Sequence[_Border]
         right = right.turned()
     ring = np.concatenate((left.points, right.points[::-1]))
     after = np.roll(ring, -1, axis=0)
-    if float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum()) > 0.0:  # counter-clockwise: left lies on the right
+    if (
+        float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum()) > 0.0
+    ):  # counter-clockwise: left lies on the right
         left, right = left.turned(), right.turned()
     return _Lanelet(relation.get("id"), relation, tags, left, right)
 
@@ -340,7 +415,9 @@ def _lanelet(relation: Element, tags: dict[str, str], borders: Sequence[_Border]
 def _drafts(lanelets: list[_Lanelet], limits: dict[str, float]) -> Iterator[Draft]:
     """Lanelets with what the routing graph says: a lane follows where both borders go on, from the same two nodes."""
     begins: dict[tuple[str, str], list[str]] = defaultdict(list)
-    on_left: dict[tuple[str, bool], list[str]] = defaultdict(list)  # border -> lanelets that have it on their left
+    on_left: dict[tuple[str, bool], list[str]] = defaultdict(
+        list
+    )  # border -> lanelets that have it on their left
     on_right: dict[tuple[str, bool], list[str]] = defaultdict(list)
     for lanelet in lanelets:
         begins[lanelet.left.nodes[0], lanelet.right.nodes[0]].append(lanelet.name)
@@ -388,7 +465,11 @@ def _sign_limit(relation: Element, tags: dict[str, str], ways: dict[str, Element
     if tags.get("type") != "regulatory_element" or tags.get("subtype") != "speed_limit":
         return math.nan
     texts = [tags.get("sign_type", ""), tags.get("speed_limit", "")]
-    signs = [ways[member.get("ref")] for member in relation.all("member") if member.attributes.get("ref") in ways]
+    signs = [
+        ways[member.get("ref")]
+        for member in relation.all("member")
+        if member.attributes.get("ref") in ways
+    ]
     for text in (*texts, *(_tags(sign).get("subtype", "") for sign in signs)):
         sign = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
         speed = float(sign[1]) * _KMH if sign else speed_of(text, "km/h")
@@ -403,5 +484,7 @@ def _speed_limit(lanelet: _Lanelet, limits: dict[str, float]) -> float:
         return own
     members = [member.attributes.get("ref", "") for member in lanelet.relation.all("member")]
     signed = [limits[ref] for ref in members if not math.isnan(limits.get(ref, math.nan))]
-    usual = _LIMITS.get((lanelet.tags.get("subtype", "road"), lanelet.tags.get("location", "urban")), math.nan)
+    usual = _LIMITS.get(
+        (lanelet.tags.get("subtype", "road"), lanelet.tags.get("location", "urban")), math.nan
+    )
     return min(signed, default=usual)

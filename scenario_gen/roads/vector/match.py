@@ -52,20 +52,36 @@ _PRIOR, _CROSSED, _MET, _BEYOND, _FOLLOWED = (
     0.25,
     2.0,
 )  # weights: the place; crossings driven, or beyond the ends; gaps
-_STOPPED, _TURNED = 4.0, 20.0  # weights of a stop before a line, and of a begin from which a vehicle turns as it does
-_OTHERWISE = math.radians(12.0)  # that a vehicle turns more or less on a course, for which another begin is looked for
-_BEFORE, _PASSED = 0.7, 6.0  # metres before a stop line where one stops; beyond it, where a stop is taken for one at it
+_STOPPED, _TURNED = (
+    4.0,
+    20.0,
+)  # weights of a stop before a line, and of a begin from which a vehicle turns as it does
+_OTHERWISE = math.radians(
+    12.0
+)  # that a vehicle turns more or less on a course, for which another begin is looked for
+_BEFORE, _PASSED = (
+    0.7,
+    6.0,
+)  # metres before a stop line where one stops; beyond it, where a stop is taken for one at it
 _WORTH = 1.5  # m² that a change of lanes must gain
-_TURN = math.radians(40.0)  # a chain may turn by this much more or less than the vehicle in the template
+_TURN = math.radians(
+    40.0
+)  # a chain may turn by this much more or less than the vehicle in the template
 _CROSS = math.radians(15.0)  # least angle of a crossing
 _SAME = 2.0  # metres sideways within which two vehicles follow each other
 _ROOM = 1.0  # metres between a footprint and the end of the lanes
 _BLEND = 5.7735  # largest second derivative of x³(10 − 15x + 6x²)
 _SHIFT = 0.02  # 1/m, curvature of a change of lanes
 _FORTH = 25.0  # metres of lanes before and after what is driven
-_LOST, _LOST_DRIVEN = 6.0, 18.0  # m² of a crossing that is none on the lanes: beyond the recorded ends; one that is driven
+_LOST, _LOST_DRIVEN = (
+    6.0,
+    18.0,
+)  # m² of a crossing that is none on the lanes: beyond the recorded ends; one that is driven
 _SPEEDING = 0.1  # m² per (m/s)² beyond the speed limit
-_BRAKED, _PULLED = 4.0, 2.5  # m/s² with which a vehicle slows down for a bend, and speeds up after it
+_BRAKED, _PULLED = (
+    4.0,
+    2.5,
+)  # m/s² with which a vehicle slows down for a bend, and speeds up after it
 _ASIDE = 3.0  # m/s² across, beyond which a bend counts against a place,
 _BENDING = 1.0  # m² per m/s² beyond, and
 _MOST_ASIDE = 10.0  # the most that counts
@@ -128,14 +144,18 @@ class Chains:
         self.points = np.concatenate([lane.centre[:-1] for lane in network.lanes])
         self.yaws = np.concatenate([lane.yaw for lane in network.lanes])
         self.height = np.concatenate([lane.height[:-1] for lane in network.lanes])
-        self.owner = np.repeat(np.arange(len(network.lanes)), [len(lane.yaw) for lane in network.lanes])
+        self.owner = np.repeat(
+            np.arange(len(network.lanes)), [len(lane.yaw) for lane in network.lanes]
+        )
         self._curves: dict[tuple[int, ...], Curve] = {}
         self._by_users: dict[frozenset[str], tuple[frozenset[int], frozenset[int]]] = {}
 
     def curve(self, chain: tuple[int, ...]) -> Curve:
         """The middle of a chain."""
         if chain not in self._curves:
-            self._curves[chain] = middle(np.concatenate([self.network.lanes[k].centre for k in chain]))
+            self._curves[chain] = middle(
+                np.concatenate([self.network.lanes[k].centre for k in chain])
+            )
         return self._curves[chain]
 
     def after(self, chain: Sequence[int]) -> list[int]:
@@ -152,15 +172,22 @@ class Chains:
 
     def _closed_and_own(self, users: frozenset[str]) -> tuple[frozenset[int], frozenset[int]]:
         if users not in self._by_users:
-            closed = frozenset(k for k, lane in enumerate(self.network.lanes) if not lane.open_to(users))
-            not_for_cars = frozenset(k for k, lane in enumerate(self.network.lanes) if not lane.open_to(CARS))
+            closed = frozenset(
+                k for k, lane in enumerate(self.network.lanes) if not lane.open_to(users)
+            )
+            not_for_cars = frozenset(
+                k for k, lane in enumerate(self.network.lanes) if not lane.open_to(CARS)
+            )
             self._by_users[users] = closed, not_for_cars - closed
         return self._by_users[users]
 
     def off_own(self, courses: Sequence[Course], tracks: Sequence[Track]) -> float:
         """What it counts [m²] that vehicles do not drive on lanes of their own."""
         own = map(self.own_of, tracks)
-        off = [bool(lanes) and lanes.isdisjoint(course.lanes) for lanes, course in zip(own, courses, strict=True)]
+        off = [
+            bool(lanes) and lanes.isdisjoint(course.lanes)
+            for lanes, course in zip(own, courses, strict=True)
+        ]
         return _OWN_LANE * sum(off) / len(tracks)
 
     def near(self, pose: Floats) -> list[int]:
@@ -173,11 +200,15 @@ class Chains:
             nearest[owner] = min(nearest.get(owner, math.inf), round(float(away[k]), 6))
         return sorted(nearest, key=lambda lane: (nearest[lane], lane))
 
-    def from_lane(self, first: int, travelled: float, closed: Collection[int] = ()) -> Iterator[tuple[int, ...]]:
+    def from_lane(
+        self, first: int, travelled: float, closed: Collection[int] = ()
+    ) -> Iterator[tuple[int, ...]]:
         """Chains that begin before a lane and go on for what is travelled from it, or until the lanes that are not closed end."""
         before: tuple[int, ...] = ()
         reach, lane = 0.0, first
-        while reach < _FORTH and (back := [k for k in self.network.predecessors[lane] if k not in closed]):
+        while reach < _FORTH and (
+            back := [k for k in self.network.predecessors[lane] if k not in closed]
+        ):
             lane = back[0]
             if lane in before or lane == first:
                 break
@@ -199,7 +230,9 @@ def middle(points: Floats) -> Curve:
     rough = Curve.through(points)
     even = rough.cut(0.0, rough.length, _STEP).points[:, :2]
     index = np.arange(len(even))
-    room = np.minimum(index, index[::-1])[:, None]  # at the ends the window shrinks, on both sides alike
+    room = np.minimum(index, index[::-1])[
+        :, None
+    ]  # at the ends the window shrinks, on both sides alike
     offset = np.arange(-_SMOOTHED, _SMOOTHED + 1)
     return Curve.through(even[index[:, None] + np.clip(offset, -room, room)].mean(axis=1))
 
@@ -227,13 +260,21 @@ def match(
     """
     courses = []
     for track, named in zip(tracks, ends or [_ANY] * len(tracks), strict=True):
-        by = _ANY if own and chains.own_of(track) else named  # other lanes than those by which cars come and go
+        by = (
+            _ANY if own and chains.own_of(track) else named
+        )  # other lanes than those by which cars come and go
         course = _course(chains, track, _placed(track, spot), scale, by, own=own)
         if course is None:
-            yield Match((), math.inf, f"no lanes lead along the path of vehicle {track.vehicle.id}, from its start to its end")
+            yield Match(
+                (),
+                math.inf,
+                f"no lanes lead along the path of vehicle {track.vehicle.id}, from its start to its end",
+            )
             return
         courses.append(course)
-    yield judged(chains, _tied(chains.network, courses, tracks, scale, [None] * len(courses)), tracks, spot)
+    yield judged(
+        chains, _tied(chains.network, courses, tracks, scale, [None] * len(courses)), tracks, spot
+    )
     begins = [_start_to_turn(course, track) for course, track in zip(courses, tracks, strict=True)]
     if any(begin is not None for begin in begins):
         yield judged(chains, _tied(chains.network, courses, tracks, scale, begins), tracks, spot)
@@ -245,28 +286,52 @@ def _placed(track: Track, spot: Spot) -> Floats:
     return np.column_stack((spot.moved(poses[:, :2]), poses[:, 2] + spot.yaw))
 
 
-def _course(chains: Chains, track: Track, poses: Floats, scale: float, ends: tuple[str, str], *, own: bool) -> Course | None:
+def _course(
+    chains: Chains, track: Track, poses: Floats, scale: float, ends: tuple[str, str], *, own: bool
+) -> Course | None:
     """The chain of lanes that resembles a vehicle's path (K, 3) most, of those that come and go by lanes that are named."""
-    lanes, closed, favoured = chains.network.lanes, chains.closed_to(track), chains.own_of(track) if own else frozenset[int]()
+    lanes, closed, favoured = (
+        chains.network.lanes,
+        chains.closed_to(track),
+        chains.own_of(track) if own else frozenset[int](),
+    )
     exits = {k for k, lane in enumerate(lanes) if not ends[1] or lane.id == ends[1]}
-    firsts = [k for k, lane in enumerate(lanes) if lane.id == ends[0]] or [k for k in chains.near(poses[0]) if k not in closed]
+    firsts = [k for k, lane in enumerate(lanes) if lane.id == ends[0]] or [
+        k for k in chains.near(poses[0]) if k not in closed
+    ]
     driven = scale * track.travelled
     tried: dict[tuple[int, ...], tuple[float, Curve, Floats]] = {}
-    candidates = (chain for first in firsts for chain in chains.from_lane(first, driven, closed) if exits.intersection(chain))
+    candidates = (
+        chain
+        for first in firsts
+        for chain in chains.from_lane(first, driven, closed)
+        if exits.intersection(chain)
+    )
     for chain in dict.fromkeys(islice(candidates, _MOST_TRIED)):
         curve = _around(chains.curve(chain), poses, driven)
         misses = _misses(curve, poses)
         tried[chain] = (float(misses.mean()) + _turn_cost(curve, poses), curve, misses)
     length = chains.length
-    on_own = {used: sum(length[k] for k in used if k in favoured) / sum(length[k] for k in used) for used in tried}
-    ranked = sorted(tried, key=lambda chain: (round(tried[chain][0] - _OWN_LANE * on_own[chain], 6), chain))
+    on_own = {
+        used: sum(length[k] for k in used if k in favoured) / sum(length[k] for k in used)
+        for used in tried
+    }
+    ranked = sorted(
+        tried, key=lambda chain: (round(tried[chain][0] - _OWN_LANE * on_own[chain], 6), chain)
+    )
     if not ranked:
         return None
     cost, curve, _ = tried[ranked[0]]
     used = ranked[0]
-    for before, after in product(ranked[:_CHANGING], repeat=2) if not track.still and not on_own[used] else ():
+    for before, after in (
+        product(ranked[:_CHANGING], repeat=2) if not track.still and not on_own[used] else ()
+    ):
         change = _change(tried[before][2], tried[after][2])
-        if change is not None and change[1] < cost - _WORTH and _beside(chains.network, before, after):
+        if (
+            change is not None
+            and change[1] < cost - _WORTH
+            and _beside(chains.network, before, after)
+        ):
             changed = changed_curve(tried[before][1], tried[after][1], poses[change[0], :2])
             if changed is not None:
                 cost, curve, used = change[1], changed, tuple(dict.fromkeys((*before, *after)))
@@ -278,7 +343,10 @@ def _course(chains: Chains, track: Track, poses: Floats, scale: float, ends: tup
 def _around(curve: Curve, poses: Floats, driven: float) -> Curve:
     """The part of a chain around a path (K, 3), with what lies before and after it."""
     station, _ = curve.project(poses[:1, :2])
-    low, high = max(float(station[0]) - _FORTH, 0.0), min(float(station[0]) + 1.1 * driven + 2.0 * _FORTH, curve.length)
+    low, high = (
+        max(float(station[0]) - _FORTH, 0.0),
+        min(float(station[0]) + 1.1 * driven + 2.0 * _FORTH, curve.length),
+    )
     return curve.cut(low, high) if high - low > _STEP else curve
 
 
@@ -294,7 +362,9 @@ def _misses(curve: Curve, poses: Floats) -> Floats:
     station, offset = curve.project(poses[:, :2])
     off = poses[:, 2] - curve.at(station)[:, 2]
     beyond = np.maximum(-station, 0.0) + np.maximum(station - curve.length, 0.0)
-    return np.asarray(np.minimum(np.square(offset) + np.square(beyond), _CAPPED) + _YAW * (1.0 - np.cos(off)))
+    return np.asarray(
+        np.minimum(np.square(offset) + np.square(beyond), _CAPPED) + _YAW * (1.0 - np.cos(off))
+    )
 
 
 def _change(before: Floats, after: Floats) -> tuple[int, float] | None:
@@ -327,7 +397,11 @@ def changed_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
 
 
 def _tied(
-    network: LaneNetwork, courses: list[Course], tracks: Sequence[Track], scale: float, begins: Sequence[float | None]
+    network: LaneNetwork,
+    courses: list[Course],
+    tracks: Sequence[Track],
+    scale: float,
+    begins: Sequence[float | None],
 ) -> list[Course]:
     """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares).
 
@@ -340,32 +414,65 @@ def _tied(
     for a in range(len(tracks)):
         for b in range(a):
             crossing = crossing_of.get((a, b))
-            crossing_points = crossings(courses[a].curve, courses[b].curve, _CROSS) if crossing else ()
+            crossing_points = (
+                crossings(courses[a].curve, courses[b].curve, _CROSS) if crossing else ()
+            )
             if crossing and len(crossing_points):
                 along = scale * np.array([crossing.first, crossing.second])
                 target = np.array([courses[a].start, courses[b].start]) + along
-                at = crossing_points[int(np.argmin(np.abs(crossing_points - target).sum(axis=1)))] - along
-                weight = _CROSSED if crossing.driven else _MET if (b, a) in met and not met[b, a].following else _BEYOND
-                known += [Equation(((i, 1.0),), float(station), weight) for i, station in zip((a, b), at, strict=True)]
+                at = (
+                    crossing_points[int(np.argmin(np.abs(crossing_points - target).sum(axis=1)))]
+                    - along
+                )
+                weight = (
+                    _CROSSED
+                    if crossing.driven
+                    else _MET
+                    if (b, a) in met and not met[b, a].following
+                    else _BEYOND
+                )
+                known += [
+                    Equation(((i, 1.0),), float(station), weight)
+                    for i, station in zip((a, b), at, strict=True)
+                ]
             for first, second in ((a, b), (b, a)):
                 gap = _follows(tracks[first], tracks[second])
                 if gap is None:
                     continue
-                station, offset = courses[second].curve.project(courses[first].curve.at(np.array([courses[first].start]))[:, :2])
-                if abs(float(offset[0])) < _SAME:  # of `first`, its start lies so far along the course of `second`
+                station, offset = courses[second].curve.project(
+                    courses[first].curve.at(np.array([courses[first].start]))[:, :2]
+                )
+                if (
+                    abs(float(offset[0])) < _SAME
+                ):  # of `first`, its start lies so far along the course of `second`
                     shift = float(station[0]) - courses[first].start
-                    known.append(Equation(((first, 1.0), (second, -1.0)), scale * gap - shift, _FOLLOWED))
+                    known.append(
+                        Equation(((first, 1.0), (second, -1.0)), scale * gap - shift, _FOLLOWED)
+                    )
     for i, (course, track, begin) in enumerate(zip(courses, tracks, begins, strict=True)):
         known += [] if begin is None else [Equation(((i, 1.0),), begin, _TURNED)]
-        known += [Equation(((i, 1.0),), start, _STOPPED) for start in _starts_to_stop(network, course, track, scale)]
+        known += [
+            Equation(((i, 1.0),), start, _STOPPED)
+            for start in _starts_to_stop(network, course, track, scale)
+        ]
     starts = solve_starts(range(len(courses)), known)
     return [replace(course, start=starts[i]) for i, course in enumerate(courses)]
 
 
-def _starts_to_stop(network: LaneNetwork, course: Course, track: Track, scale: float) -> Iterator[float]:
+def _starts_to_stop(
+    network: LaneNetwork, course: Course, track: Track, scale: float
+) -> Iterator[float]:
     """Begins [m] of a course from which a vehicle stops before a stop line that it passes a little before it stops."""
-    rules = [rule for rule in network.rules if rule.kind == RuleKind.STOP and set(rule.lanes) & set(course.lanes)]
-    first = [a for a, _ in runs((track.speed < WAIT_SPEED) & track.there)] if rules and not track.still else []
+    rules = [
+        rule
+        for rule in network.rules
+        if rule.kind == RuleKind.STOP and set(rule.lanes) & set(course.lanes)
+    ]
+    first = (
+        [a for a, _ in runs((track.speed < WAIT_SPEED) & track.there)]
+        if rules and not track.still
+        else []
+    )
     for rule in rules:
         station, offset = course.curve.project(rule.line.mean(axis=0)[None])
         if abs(float(offset[0])) > _SAME:
@@ -393,24 +500,37 @@ def _follows(track: Track, leader: Track) -> float | None:
     start = track.curve.at(0.0)
     station, offset = leader.curve.project(start[None, :2])
     turned = abs(angle_between(leader.curve.at(float(station[0]))[2], start[2]))
-    on = abs(float(offset[0])) < _SAME and turned < math.radians(30.0) and 0.0 <= station[0] <= leader.travelled
+    on = (
+        abs(float(offset[0])) < _SAME
+        and turned < math.radians(30.0)
+        and 0.0 <= station[0] <= leader.travelled
+    )
     return float(station[0]) if on else None
 
 
-def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], spot: Spot) -> Match:
+def judged(
+    chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], spot: Spot
+) -> Match:
     """Say how well courses resemble the template, and what is lost."""
     cost, reason = 0.0, ""
     for course, track in zip(courses, tracks, strict=True):
         half = track.vehicle.length / 2.0 + _ROOM
         short = max(half - course.start, course.end + half - course.curve.length)
         if short > 0.0:
-            reason = reason or f"the lanes of vehicle {track.vehicle.id} end {short:.1f} m too soon"
+            reason = (
+                reason or f"the lanes of vehicle {track.vehicle.id} end {short:.1f} m too soon"
+            )
         if abs(course.turn - turn_of(track)) > _TURN:
             there = in_words(course.turn)
-            reason = reason or f"vehicle {track.vehicle.id} {in_words(turn_of(track))} in the recording, {there} there"
+            reason = (
+                reason
+                or f"vehicle {track.vehicle.id} {in_words(turn_of(track))} in the recording, {there} there"
+            )
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
-        miss = np.minimum(np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED)
+        miss = np.minimum(
+            np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED
+        )
         turned = 1.0 - np.cos(fitted[:, 2] - poses[:, 2])
         cost += float(miss.mean() + _YAW * turned.mean()) / len(tracks)
     for a, b, crossing in pair_crossings(tracks):
@@ -419,9 +539,17 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
     for (_, forced), track in zip(aside, tracks, strict=True):
         if forced > _NO_GRIP:
-            reason = reason or f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
+            reason = (
+                reason or f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
+            )
     cost += speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
-    return Match(tuple(courses), cost, reason, max(forced for _, forced in aside), chains.off_own(courses, tracks))
+    return Match(
+        tuple(courses),
+        cost,
+        reason,
+        max(forced for _, forced in aside),
+        chains.off_own(courses, tracks),
+    )
 
 
 def pressed_aside(course: Course, track: Track) -> tuple[float, float]:
@@ -440,7 +568,9 @@ def pressed_aside(course: Course, track: Track) -> tuple[float, float]:
     speed = track.speed * (driven / float(track.progress[-1]))
     squared = np.square(np.interp(middle_at, course.progress, speed))
     first, last = float(np.square(speed[0])), float(np.square(speed[-1]))
-    least = np.maximum(first - 2.0 * _BRAKED * middle_at, last - 2.0 * _PULLED * (driven - middle_at)).clip(min=0.0)
+    least = np.maximum(
+        first - 2.0 * _BRAKED * middle_at, last - 2.0 * _PULLED * (driven - middle_at)
+    ).clip(min=0.0)
     return float((curvature * squared).max()), float((curvature * least).max())
 
 

@@ -68,8 +68,12 @@ class Faults:
         sentences = []
         for kind in kinds:
             own = [(name, reason) for each, name, reason in self.found if each == kind]
-            names = ", ".join(name for name, _ in own[:_NAMED]) + (", …" if len(own) > _NAMED else "")
-            sentences.append(f"{len(own)} {FAULTY} {kind}{'s' if len(own) > 1 else ''} left out ({names}), first: {own[0][1]}")
+            names = ", ".join(name for name, _ in own[:_NAMED]) + (
+                ", …" if len(own) > _NAMED else ""
+            )
+            sentences.append(
+                f"{len(own)} {FAULTY} {kind}{'s' if len(own) > 1 else ''} left out ({names}), first: {own[0][1]}"
+            )
         return tuple(sentences)
 
 
@@ -105,7 +109,9 @@ class Draft:
     def __post_init__(self) -> None:
         for names, what in ((self.successors, "follow it"), (self.beside, "lie beside it")):
             if len(names) > MOST_LINKS:
-                raise TooLargeError(f"{self.place}: lane {self.id}: {len(names)} lanes {what}; at most {MOST_LINKS} are read")
+                raise TooLargeError(
+                    f"{self.place}: lane {self.id}: {len(names)} lanes {what}; at most {MOST_LINKS} are read"
+                )
 
 
 @dataclass(frozen=True)
@@ -168,7 +174,14 @@ def refuse_too_long(sections: int, place: str) -> None:
         )
 
 
-_UNITS = {"km/h": 1.0 / 3.6, "kmh": 1.0 / 3.6, "kph": 1.0 / 3.6, "mph": 0.44704, "m/s": 1.0, "mps": 1.0}
+_UNITS = {
+    "km/h": 1.0 / 3.6,
+    "kmh": 1.0 / 3.6,
+    "kph": 1.0 / 3.6,
+    "mph": 0.44704,
+    "m/s": 1.0,
+    "mps": 1.0,
+}
 
 
 def speed_of(text: str, unit: str) -> float:
@@ -194,8 +207,14 @@ def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
     for draft in draft_lanes.drafts:
         with faults.leaving_out("lane", draft.id):
             if draft.id in drawn:
-                raise InputError(f"{draft.place}: lane {draft.id} is there twice, first at {drawn[draft.id][0].place}")
-            left, right = (draft.left, draft.right) if draft.paired else cross_sections(draft.left, draft.right, draft.place)
+                raise InputError(
+                    f"{draft.place}: lane {draft.id} is there twice, first at {drawn[draft.id][0].place}"
+                )
+            left, right = (
+                (draft.left, draft.right)
+                if draft.paired
+                else cross_sections(draft.left, draft.right, draft.place)
+            )
             longest = max(float(edge_lengths(border[:, :2]).sum()) for border in (left, right))
             if not longest <= MOST_SECTIONS * _SECTION:  # nor is it NaN
                 raise InputError(
@@ -205,26 +224,48 @@ def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
             refuse_too_long(total, f"map {name}")
             drawn[draft.id] = draft, left, right
     if not any((draft.users or DRIVERS) & CARS for draft, *_ in drawn.values()):
-        raise InputError(faults.found[0][2] if faults.found else f"map {name}: no lane that cars may use")
+        raise InputError(
+            faults.found[0][2] if faults.found else f"map {name}: no lane that cars may use"
+        )
     index = {name: k for k, name in enumerate(drawn)}
     lanes = []
     for draft, left, right in drawn.values():
         after, beside = (
-            tuple(dict.fromkeys(index[other] for other in names if other in index)) for names in (draft.successors, draft.beside)
+            tuple(dict.fromkeys(index[other] for other in names if other in index))
+            for names in (draft.successors, draft.beside)
         )
-        height = (left[:, 2] + right[:, 2]) / 2.0 if left.shape[1] == right.shape[1] == 3 else np.full(len(left), np.nan)
+        height = (
+            (left[:, 2] + right[:, 2]) / 2.0
+            if left.shape[1] == right.shape[1] == 3
+            else np.full(len(left), np.nan)
+        )
         borders = left[:, :2], right[:, :2]
         allowed = draft.users, draft.crossing
-        lanes.append(Lane(draft.id, *borders, after, beside, draft.speed_limit, draft.junction, height, *allowed))
+        lanes.append(
+            Lane(
+                draft.id,
+                *borders,
+                after,
+                beside,
+                draft.speed_limit,
+                draft.junction,
+                height,
+                *allowed,
+            )
+        )
     network = LaneNetwork(name, (), origin=draft_lanes.origin).with_lanes(lanes)
     if network.others:
         counts = Counter(user for lane in network.others for user in lane.users)
         words = ", ".join(f"{user} {count}" for user, count in sorted(counts.items()))
         notes += (f"{len(network.others)} lanes are for others than cars: {words}",)
     if draft_lanes.left_out:
-        notes += (f"{draft_lanes.left_out} lanes are for none of the types of road users and were left out",)
+        notes += (
+            f"{draft_lanes.left_out} lanes are for none of the types of road users and were left out",
+        )
     if draft_lanes.other_signs:
-        notes += (f"{draft_lanes.other_signs} signs of other kinds than stop, give way, priority and speed limit are not read",)
+        notes += (
+            f"{draft_lanes.other_signs} signs of other kinds than stop, give way, priority and speed limit are not read",
+        )
     notes += faults.notes()
     network = replace(network, notes=notes)
     named = any(lane.junction for lane in network.lanes)
@@ -241,10 +282,16 @@ def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Flo
     """
     borders, shares, longest = [], [], 0.0
     for name, border in (("left", left), ("right", right)):
-        points = border[np.concatenate(([True], edge_lengths(border[:, :2]) > 1e-6))] if len(border) else border
+        points = (
+            border[np.concatenate(([True], edge_lengths(border[:, :2]) > 1e-6))]
+            if len(border)
+            else border
+        )
         length = np.concatenate(([0.0], np.cumsum(edge_lengths(points[:, :2]))))
         if length[-1] < _SHORTEST:
-            raise InputError(f"{where}: the {name} border has {len(border)} point(s) and no length; a line is needed")
+            raise InputError(
+                f"{where}: the {name} border has {len(border)} point(s) and no length; a line is needed"
+            )
         borders.append(points)
         shares.append(length / length[-1])
         longest = max(longest, float(length[-1]))
@@ -268,16 +315,23 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
     """
     pairs = list(crossing_lanes(network))
     crossing = {k for pair in pairs for k in pair}
-    for before in network.lanes:  # who parts from a lane that crosses others turns at the same junction
+    for (
+        before
+    ) in network.lanes:  # who parts from a lane that crosses others turns at the same junction
         inner = [k for k in before.successors if k in crossing]
         pairs += [(inner[0], k) for k in before.successors if inner and k not in crossing]
     joined = {k for pair in pairs for k in pair}
     ends = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
     count = len(network.lanes)
-    _, part = connected_components(coo_array((np.ones(len(pairs)), tuple(ends)), (count, count)), directed=False)
+    _, part = connected_components(
+        coo_array((np.ones(len(pairs)), tuple(ends)), (count, count)), directed=False
+    )
     first: dict[int, str] = {}
     named = [
-        replace(lane, junction=first.setdefault(int(part[k]), str(len(first) + 1)) if k in joined else "")
+        replace(
+            lane,
+            junction=first.setdefault(int(part[k]), str(len(first) + 1)) if k in joined else "",
+        )
         for k, lane in enumerate(network.every_lane[:count])
     ]
     return network.with_lanes((*named, *network.others))
@@ -304,12 +358,18 @@ def crossing_lanes(network: LaneNetwork) -> Iterator[tuple[int, int]]:
         shapely.prepare(lines[first])
         crossing = shapely.crosses(lines[first], lines[second])
         pairs = zip(first[crossing].tolist(), second[crossing].tolist(), strict=True)
-        yield from (pair for pair in pairs if not network.has_levels or _on_one_level(*(network.lanes[k] for k in pair)))
+        yield from (
+            pair
+            for pair in pairs
+            if not network.has_levels or _on_one_level(*(network.lanes[k] for k in pair))
+        )
 
 
 def _on_one_level(one: Lane, other: Lane) -> bool:
     """Whether two lanes are at one height where their middles are nearest, or a height is not known."""
-    a, b = np.unravel_index(distance.cdist(one.centre, other.centre).argmin(), (len(one.centre), len(other.centre)))
+    a, b = np.unravel_index(
+        distance.cdist(one.centre, other.centre).argmin(), (len(one.centre), len(other.centre))
+    )
     return not abs(one.height[a] - other.height[b]) > LEVEL
 
 
@@ -319,7 +379,9 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
     Raises:
         InputError: no lane for cars is in the box.
     """
-    pieces: list[tuple[int, Floats, bool]] = []  # lane, its borders and height, whether its end is there
+    pieces: list[
+        tuple[int, Floats, bool]
+    ] = []  # lane, its borders and height, whether its end is there
     begins: dict[int, int] = {}
     for k, lane in enumerate(network.every_lane):
         last = len(lane.left) - 1
@@ -328,9 +390,13 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
             high = min(stop - 1 + _cut(lane.centre, stop - 1, stop, box), float(last))
             if high - low < 1e-6:
                 continue
-            at = np.unique(np.concatenate(([low], np.arange(math.ceil(low), math.floor(high) + 1), [high])))
+            at = np.unique(
+                np.concatenate(([low], np.arange(math.ceil(low), math.floor(high) + 1), [high]))
+            )
             columns = np.column_stack((lane.left, lane.right, lane.height)).T
-            cut = np.column_stack([np.interp(at, np.arange(last + 1), column) for column in columns])
+            cut = np.column_stack(
+                [np.interp(at, np.arange(last + 1), column) for column in columns]
+            )
             if low == 0.0:
                 begins[k] = len(pieces)
             pieces.append((k, cut, high == last))
@@ -344,12 +410,18 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
     lanes = []
     for k, cut, has_end in pieces:
         lane = network.every_lane[k]
-        after = tuple(begins[other] for other in lane.successors if other in begins) if has_end else ()
+        after = (
+            tuple(begins[other] for other in lane.successors if other in begins) if has_end else ()
+        )
         beside = tuple(of_lane[other][0] for other in lane.beside if other in of_lane)
         left, right, height = cut[:, :2], cut[:, 2:4], cut[:, 4]
-        lanes.append(replace(lane, left=left, right=right, height=height, successors=after, beside=beside))
+        lanes.append(
+            replace(lane, left=left, right=right, height=height, successors=after, beside=beside)
+        )
     part = replace(network, rules=()).with_lanes(lanes)
-    return replace(part, notes=(*network.notes, note), rules=rules_of_pieces(network.rules, of_lane))
+    return replace(
+        part, notes=(*network.notes, note), rules=rules_of_pieces(network.rules, of_lane)
+    )
 
 
 def extent(network: LaneNetwork) -> str:
@@ -368,7 +440,11 @@ def _cut(points: Floats, inner: int, outer: int, box: Floats) -> float:
         return 0.0
     step = points[outer] - points[inner]
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(step > 0.0, (box[1] - points[inner]) / step, np.where(step < 0.0, (box[0] - points[inner]) / step, 1.0))
+        share = np.where(
+            step > 0.0,
+            (box[1] - points[inner]) / step,
+            np.where(step < 0.0, (box[0] - points[inner]) / step, 1.0),
+        )
     return float(np.clip(share.min(), 0.0, 1.0))
 
 

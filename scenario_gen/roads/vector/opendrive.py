@@ -30,7 +30,15 @@ from scenario_gen.roads.vector.network import (
     TooLargeError,
 )
 from scenario_gen.roads.vector.plan_view import reference_line
-from scenario_gen.roads.vector.sections import FOR_CARS, Key, LaneSection, OpenDriveRoad, road_of_sections, SectionLane, STEP
+from scenario_gen.roads.vector.sections import (
+    FOR_CARS,
+    Key,
+    LaneSection,
+    OpenDriveRoad,
+    road_of_sections,
+    SectionLane,
+    STEP,
+)
 from scenario_gen.roads.vector.signs import DraftRule, is_speed_limit, kind_of_sign
 from scenario_gen.types import DRIVERS, RuleKind
 
@@ -40,7 +48,13 @@ _READ = ("1000002", "1000003")  # lights and crossings of pedestrians
 _STOP_LINE = "294"  # type of a signal that is a line on the ground
 _LIGHTS = ("1000001", "1000009", "1000010", "1000011", "1000012")  # for vehicles
 _SIGNED = 15.0  # metres between a sign and its stop line, at most
-_MARKED = ("solid", "solid solid", "curb", "grass", "botts dots")  # road marks that are not crossed
+_MARKED = (
+    "solid",
+    "solid solid",
+    "curb",
+    "grass",
+    "botts dots",
+)  # road marks that are not crossed
 
 End = tuple[Key, int]  # a lane and 0 for its end at lower s, 1 for that at higher s
 
@@ -61,13 +75,17 @@ def lanes_of(root: Element) -> MapLanes:
             line = reference_line(element)
             total += line.length
             if total > MOST_SECTIONS * STEP:
-                raise TooLargeError(f"{element.place}: roads of more than {MOST_SECTIONS * STEP / 1000.0:g} km; cut the map")
+                raise TooLargeError(
+                    f"{element.place}: roads of more than {MOST_SECTIONS * STEP / 1000.0:g} km; cut the map"
+                )
             roads[name] = road_of_sections(element, name, line)
         if name not in roads:
             continue
         lanes += sum(len(section.lanes) for section in roads[name].sections)
         refuse_too_many_lanes(lanes, root.file)
-        points += sum(len(lane.s) for section in roads[name].sections for lane in section.lanes.values())
+        points += sum(
+            len(lane.s) for section in roads[name].sections for lane in section.lanes.values()
+        )
         refuse_too_long(points, root.file)
     if not roads:
         raise InputError(faults.found[0][2] if faults.found else f"{root.file}: no <road>")
@@ -78,11 +96,24 @@ def lanes_of(root: Element) -> MapLanes:
         joints.through(junction)
     notes = (f"OpenDRIVE {version}: {_projection(header)}", *joints.notes())
     rules = [*_signal_rules(roads, faults), *_priorities(root, roads)]
-    signals = [signal for road in roads.values() for group in road.element.all("signals") for signal in group.all("signal")]
+    signals = [
+        signal
+        for road in roads.values()
+        for group in road.element.all("signals")
+        for signal in group.all("signal")
+    ]
     others = [signal for signal in signals if not (_is_read(signal) or _kind_of_signal(signal))]
-    lanes_found = [lane for road in roads.values() for section in road.sections for lane in section.lanes.values()]
+    lanes_found = [
+        lane
+        for road in roads.values()
+        for section in road.sections
+        for lane in section.lanes.values()
+    ]
     barred = [lane for lane in lanes_found if lane.kind in FOR_CARS and not lane.users]
-    drafts = [*_drafts(roads, joints), *(draft for road in roads.values() for draft in crosswalks(road, faults))]
+    drafts = [
+        *_drafts(roads, joints),
+        *(draft for road in roads.values() for draft in crosswalks(road, faults)),
+    ]
     refuse_too_many_lanes(len(drafts), root.file)
     return MapLanes(drafts, notes, len(barred), faults, rules, len(others))
 
@@ -93,14 +124,20 @@ def _signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[D
     placed: list[tuple[OpenDriveRoad, Element]] = []
     for road in roads.values():
         for group in road.element.all("signals"):
-            placed += [(road, element) for tag in ("signal", "signalReference") for element in group.all(tag)]
+            placed += [
+                (road, element)
+                for tag in ("signal", "signalReference")
+                for element in group.all(tag)
+            ]
     for _, signal in placed:
         kind = _kind_of_signal(signal)
         if signal.tag == "signal" and kind is not None:
             kinds[signal.attributes.get("id", "?")] = kind
     stop_lines = [(road, element) for road, element in placed if _is_stop_line(element)]
     for road in roads.values():
-        objects = (element for group in road.element.all("objects") for element in group.all("object"))
+        objects = (
+            element for group in road.element.all("objects") for element in group.all("object")
+        )
         stop_lines += [(road, element) for element in objects if _is_stop_line(element)]
     for road, element in placed:
         name = element.attributes.get("id", "?")
@@ -108,7 +145,11 @@ def _signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[D
             continue
         with faults.leaving_out("signal", name):
             s = element.number("s")
-            lines = [other.number("s") for own, other in stop_lines if own is road and _same_way(element, other)]
+            lines = [
+                other.number("s")
+                for own, other in stop_lines
+                if own is road and _same_way(element, other)
+            ]
             nearest = min(lines, key=lambda at: abs(at - s), default=math.inf)
             if abs(nearest - s) <= _SIGNED:
                 s = nearest
@@ -124,7 +165,9 @@ def _kind_of_signal(signal: Element) -> RuleKind | None:
 
 def _sign(signal: Element) -> tuple[str, str, str]:
     """The number of a signal's sign, the subtype behind it, and the country whose number it is."""
-    number, subtype, country = (signal.attributes.get(name, "") for name in ("type", "subtype", "country"))
+    number, subtype, country = (
+        signal.attributes.get(name, "") for name in ("type", "subtype", "country")
+    )
     return number, subtype, country
 
 
@@ -136,12 +179,19 @@ def _is_stop_line(element: Element) -> bool:
 
 def _is_read(signal: Element) -> bool:
     """Whether a signal is read that is no rule: a line, a speed limit, what is for pedestrians."""
-    return signal.attributes.get("type") in _READ or _is_stop_line(signal) or is_speed_limit(*_sign(signal))
+    return (
+        signal.attributes.get("type") in _READ
+        or _is_stop_line(signal)
+        or is_speed_limit(*_sign(signal))
+    )
 
 
 def _same_way(a: Element, b: Element) -> bool:
     """Whether two signals are for traffic of the same direction."""
-    return "none" in (ways := {signal.attributes.get("orientation", "none") for signal in (a, b)}) or len(ways) == 1
+    return (
+        "none" in (ways := {signal.attributes.get("orientation", "none") for signal in (a, b)})
+        or len(ways) == 1
+    )
 
 
 def _lanes_under(road: OpenDriveRoad, signal: Element, s: float) -> Iterator[SectionLane]:
@@ -151,7 +201,10 @@ def _lanes_under(road: OpenDriveRoad, signal: Element, s: float) -> Iterator[Sec
     way = signal.attributes.get("orientation", "none")
     for lane in (lane for section in road.sections for lane in section.lanes.values()):
         _, section, number = lane.key
-        if not lane.s[0] - 1e-6 <= s <= lane.s[-1] + 1e-6 or first.setdefault(number > 0, section) != section:
+        if (
+            not lane.s[0] - 1e-6 <= s <= lane.s[-1] + 1e-6
+            or first.setdefault(number > 0, section) != section
+        ):
             continue
         valid = not bounds or any(min(pair) <= number <= max(pair) for pair in bounds)
         if valid and lane.kind in FOR_CARS and (way == "none" or lane.forth == (way == "+")):
@@ -160,7 +213,12 @@ def _lanes_under(road: OpenDriveRoad, signal: Element, s: float) -> Iterator[Sec
 
 def _across(lane: SectionLane, s: float) -> Floats:
     """(2, 2) [m] the cross-section of a lane at s."""
-    return np.array([[np.interp(s, lane.s, border[:, axis]) for axis in (0, 1)] for border in (lane.inner, lane.outer)])
+    return np.array(
+        [
+            [np.interp(s, lane.s, border[:, axis]) for axis in (0, 1)]
+            for border in (lane.inner, lane.outer)
+        ]
+    )
 
 
 def _priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[DraftRule]:
@@ -170,9 +228,17 @@ def _priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[Draf
             high, low = (roads.get(priority.attributes.get(name, "")) for name in ("high", "low"))
             if high is not None and low is not None:
                 first, last = (
-                    tuple(lane.name for section in road.sections for lane in section.lanes.values()) for road in (high, low)
+                    tuple(
+                        lane.name for section in road.sections for lane in section.lanes.values()
+                    )
+                    for road in (high, low)
                 )
-                yield DraftRule(f"junction {junction.attributes.get('id', '?')}", RuleKind.GIVE_WAY, last, first)
+                yield DraftRule(
+                    f"junction {junction.attributes.get('id', '?')}",
+                    RuleKind.GIVE_WAY,
+                    last,
+                    first,
+                )
 
 
 def _projection(header: Element) -> str:
@@ -180,7 +246,11 @@ def _projection(header: Element) -> str:
     text = " ".join(reference.text.split()) if reference is not None else ""
     stated = f"geoReference {text} is stated, not applied" if text else "no geoReference"
     offset = header.first("offset")
-    moved = "" if offset is None else f", offset x {offset.number('x', 0.0):g}, y {offset.number('y', 0.0):g} not applied"
+    moved = (
+        ""
+        if offset is None
+        else f", offset x {offset.number('x', 0.0):g}, y {offset.number('y', 0.0):g} not applied"
+    )
     return f"coordinates as they stand, in metres; {stated}{moved}"
 
 
@@ -219,7 +289,9 @@ class _Joints:
             if other not in self.of[end]:
                 self.of[end].append(other)
                 if len(self.of[end]) > MOST_LINKS:
-                    raise TooLargeError(f"{place}: more than {MOST_LINKS} lanes are joined to lane {lane.name}")
+                    raise TooLargeError(
+                        f"{place}: more than {MOST_LINKS} lanes are joined to lane {lane.name}"
+                    )
 
     def along(self, road: OpenDriveRoad) -> None:
         """Join a road's sections, and it to the roads before and after it."""
@@ -227,11 +299,15 @@ class _Joints:
             for lane in section.lanes.values():
                 for tag, at in (("predecessor", 0), ("successor", 1)):
                     beyond = road.beyond(k, 1 if at else -1, lane.key[2])
-                    for link in [child for group in lane.element.all("link") for child in group.all(tag)]:
+                    for link in [
+                        child for group in lane.element.all("link") for child in group.all(tag)
+                    ]:
                         with self.faults.leaving_out("link", f"{tag} of lane {lane.name}"):
                             other = int(link.number("id"))
                             if beyond is not None:
-                                self.join((lane.key, at), ((road.id, beyond, other), 1 - at), link.place)
+                                self.join(
+                                    (lane.key, at), ((road.id, beyond, other), 1 - at), link.place
+                                )
                             else:
                                 self._to_road(road, (lane.key, at), tag, other)
 
@@ -240,7 +316,9 @@ class _Joints:
         if link is None or link.attributes.get("elementType") != "road":
             return
         other = self.road(link, "elementId")
-        self.join(end, self.end_of(other, link.attributes.get("contactPoint", "start"), lane), link.place)
+        self.join(
+            end, self.end_of(other, link.attributes.get("contactPoint", "start"), lane), link.place
+        )
 
     def road(self, link: Element, name: str) -> OpenDriveRoad:
         """The road that an attribute names.
@@ -281,7 +359,9 @@ class _Joints:
                 source = self.end_of(incoming, side, int(link.number("from")))
                 lane = self.lane(source[0])
                 if lane is not None:
-                    distance[source] = float(np.hypot(*(lane.middle(source[1]) - goal.middle(target[1]))))
+                    distance[source] = float(
+                        np.hypot(*(lane.middle(source[1]) - goal.middle(target[1])))
+                    )
             if distance:
                 self.join(min(distance, key=distance.__getitem__), target, link.place)
 
@@ -298,7 +378,9 @@ def _drafts(roads: dict[str, OpenDriveRoad], joints: _Joints) -> Iterator[Draft]
                     yield _draft(road, section, lane, joints, along=not lane.forth)
 
 
-def _draft(road: OpenDriveRoad, section: LaneSection, lane: SectionLane, joints: _Joints, *, along: bool) -> Draft:
+def _draft(
+    road: OpenDriveRoad, section: LaneSection, lane: SectionLane, joints: _Joints, *, along: bool
+) -> Draft:
     """A lane driven along s or against it; against its own direction its name ends with "r"."""
     number = lane.key[2]
     height = road.elevation.at(lane.s, float(lane.s[-1]))
@@ -317,7 +399,11 @@ def _draft(road: OpenDriveRoad, section: LaneSection, lane: SectionLane, joints:
     for other in (number - 1, number + 1):
         neighbour = section.lanes.get(other)
         outwards = abs(other) > abs(number)
-        if neighbour is not None and neighbour.forth == along and _may_cross(lane if outwards else neighbour, outwards=outwards):
+        if (
+            neighbour is not None
+            and neighbour.forth == along
+            and _may_cross(lane if outwards else neighbour, outwards=outwards)
+        ):
             beside.append(neighbour.name)
     limit = math.nan
     with joints.faults.leaving_out("speed limit", lane.name):
@@ -339,9 +425,15 @@ def _draft(road: OpenDriveRoad, section: LaneSection, lane: SectionLane, joints:
 def _may_cross(lane: SectionLane, *, outwards: bool) -> bool:
     """Whether traffic may cross a lane's outer mark, from the lane outwards or into it."""
     against = "decrease" if outwards == (lane.key[2] > 0) else "increase"
-    not_crossed = (*_MARKED, "solid broken" if outwards else "broken solid")  # its inner line is named first
+    not_crossed = (
+        *_MARKED,
+        "solid broken" if outwards else "broken solid",
+    )  # its inner line is named first
     marks = [mark.attributes for mark in lane.element.all("roadMark")]
-    return not any(mark.get("laneChange") in ("none", against) or mark.get("type") in not_crossed for mark in marks)
+    return not any(
+        mark.get("laneChange") in ("none", against) or mark.get("type") in not_crossed
+        for mark in marks
+    )
 
 
 def _speed_limit(road: OpenDriveRoad, lane: Element, s: float) -> float:
@@ -354,6 +446,8 @@ def _speed_limit(road: OpenDriveRoad, lane: Element, s: float) -> float:
         return math.nan
     unit = records[0].attributes.get("unit", "m/s")
     if unit not in _SPEEDS:
-        raise InputError(f"{records[0].place}: unit {unit[:20]!r}; one of {', '.join(_SPEEDS)} is needed")
+        raise InputError(
+            f"{records[0].place}: unit {unit[:20]!r}; one of {', '.join(_SPEEDS)} is needed"
+        )
     limit = records[0].number("max")
     return limit * _SPEEDS[unit] if limit > 0.0 else math.nan

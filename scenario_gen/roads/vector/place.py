@@ -32,7 +32,10 @@ _WORST = 40.0  # m²: what resembles the template less is no place for it
 _PRESSED = 4.2  # m/s² across, a little less than scenarios may have: where more is forced, another scale is tried first
 _BESIDE = 12.0  # metres of the map around what is driven, and
 _FORTH = 20.0  # metres of the lanes before and after it
-_LOOK, _OVER = 2.0, 5.0  # metres between places at which heights are compared; between two of which one may lie above the other
+_LOOK, _OVER = (
+    2.0,
+    5.0,
+)  # metres between places at which heights are compared; between two of which one may lie above the other
 _SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
 
 
@@ -40,14 +43,19 @@ class NoPlaceError(RefusedError):
     """A map has no place for a template."""
 
 
-@lru_cache(maxsize=4)  # `once_per_object` would keep a network for good, for its chains refer to it
+@lru_cache(
+    maxsize=4
+)  # `once_per_object` would keep a network for good, for its chains refer to it
 def chains_of(network: LaneNetwork) -> Chains:
     """Return the chains of a network, the same for the same network."""
     return Chains(network)
 
 
 def placements(
-    network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None, scales: Sequence[float] = _SCALES
+    network: LaneNetwork,
+    tracks: tuple[Track, ...],
+    lanes: Sequence[int] | None = None,
+    scales: Sequence[float] = _SCALES,
 ) -> Iterator[tuple[Match, float]]:
     """Yield the ways of laying a template on lanes, with their scales: at home first, then those that resemble it most.
 
@@ -68,10 +76,18 @@ def placements(
     home = spot_at(network, tracks, np.zeros(3))
     judged = _Judged(network, tracks)
     drawn_for = network.drawn_for
-    sized = None if drawn_for is None or len(drawn_for.lanes) != len(tracks) else spot_at(network, tracks, drawn_for.frame)
-    search = _Search(chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ())
+    sized = (
+        None
+        if drawn_for is None or len(drawn_for.lanes) != len(tracks)
+        else spot_at(network, tracks, drawn_for.frame)
+    )
+    search = _Search(
+        chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ()
+    )
     found, recorded = False, ""
-    owns = any(map(chains.own_of, tracks))  # who has lanes of its own on a drawn road is not at home on those of cars
+    owns = any(
+        map(chains.own_of, tracks)
+    )  # who has lanes of its own on a drawn road is not at home on those of cars
     if lanes is None and home.cost <= _HOME and not (network.drawn and owns):
         own = next(match(chains, tracks, home))
         broken = own.reason or judged.broken(own)
@@ -82,7 +98,9 @@ def placements(
     spots = find_spots(network, tracks, lanes)
     crossed = crossing_spots(network, tracks) if lanes is None else []
     streets = along_streets(chains, tracks, lanes)
-    for k in range(0, max(len(spots), len(crossed), 1), _SPOTS):  # where nobody takes the first ones, the next are looked at
+    for k in range(
+        0, max(len(spots), len(crossed), 1), _SPOTS
+    ):  # where nobody takes the first ones, the next are looked at
         if k and not found:
             break
         first = [sized] if sized is not None and k == 0 else []
@@ -93,7 +111,9 @@ def placements(
     if not found:
         what, why = ("road", network.notes) if network.drawn else ("map", ())
         *_, reason = min(search.failures, default=("it has no lanes of its directions",))
-        raise NoPlaceError(f"the recording fits no place on {what} {network.name}: {'; '.join((recorded + reason, *why))}")
+        raise NoPlaceError(
+            f"the recording fits no place on {what} {network.name}: {'; '.join((recorded + reason, *why))}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,25 +143,43 @@ class _Search:
             matches = list(along) if scale == 1.0 else []
             for spot in spots:
                 stop_if_cancelled()
-                ends, owns = self.ends if spot is self.sized else (), any(map(self.chains.own_of, self.tracks))
-                variants = (match(self.chains, self.tracks, spot, scale, ends, own=own) for own in (True, False)[not owns :])
+                ends, owns = (
+                    self.ends if spot is self.sized else (),
+                    any(map(self.chains.own_of, self.tracks)),
+                )
+                variants = (
+                    match(self.chains, self.tracks, spot, scale, ends, own=own)
+                    for own in (True, False)[not owns :]
+                )
                 for placement in chain.from_iterable(variants):
                     far = placement.cost > _WORST and spot is not self.sized
                     if placement.reason or far:
-                        reason = placement.reason or "vehicles would be too far from where they are"
+                        reason = (
+                            placement.reason or "vehicles would be too far from where they are"
+                        )
                         self.failures.append((True, placement.cost, reason))
                     else:
                         matches.append(placement)
             broken_by = [self.judged.broken(placement) for placement in matches]
-            self.failures.extend((False, p.cost, broken) for p, broken in zip(matches, broken_by, strict=True) if broken)
-            matches = [placement for placement, broken in zip(matches, broken_by, strict=True) if not broken]
+            self.failures.extend(
+                (False, p.cost, broken)
+                for p, broken in zip(matches, broken_by, strict=True)
+                if broken
+            )
+            matches = [
+                placement
+                for placement, broken in zip(matches, broken_by, strict=True)
+                if not broken
+            ]
             matches.sort(key=self._order)
             placed = [p for p in matches if p.aside <= _PRESSED and self.judged.rank(p)[0] == 0]
             others += [(p, scale) for p in matches if p not in placed]
             yield from ((placement, scale) for placement in placed)
             if placed:
                 break
-        yield from sorted(others, key=lambda other: (other[0].aside > _PRESSED, self.judged.rank(other[0])[0]))
+        yield from sorted(
+            others, key=lambda other: (other[0].aside > _PRESSED, self.judged.rank(other[0])[0])
+        )
 
     def _order(self, placement: Match) -> tuple[float, ...]:
         """What comes first: meetings kept, on a drawn road lanes of one's own, right of way given, resemblance."""
@@ -179,7 +217,9 @@ class _Judged:
             count = max(math.ceil((course.end - course.start) / _LOOK), 1) + 1
             places = course.curve.at(np.linspace(course.start, course.end, count))[:, :2]
             middles = KDTree(np.concatenate([lanes[k].centre for k in course.lanes]))
-            height = np.concatenate([lanes[k].height for k in course.lanes])[middles.query(places)[1]]
+            height = np.concatenate([lanes[k].height for k in course.lanes])[
+                middles.query(places)[1]
+            ]
             driven.append((places, height))
         for (i, (one, low)), (j, (other, high)) in combinations(enumerate(driven), 2):
             apart = np.abs(low[:, None] - high) > LEVEL
@@ -221,7 +261,14 @@ def tracks_on(placement: Match, tracks: Sequence[Track]) -> tuple[Track, ...]:
         driven = float(course.progress[-1])
         curve = course.curve.cut(course.start, course.start + max(driven, 1.0), 0.25)
         progress = course.progress * (curve.length / driven if driven > 1.0 else 1.0)
-        placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length)), lane=course.curve))
+        placed.append(
+            replace(
+                track,
+                curve=curve,
+                progress=frozen(np.minimum(progress, curve.length)),
+                lane=course.curve,
+            )
+        )
     return tuple(placed)
 
 
@@ -247,7 +294,9 @@ class Place:
         return f"#box={','.join(f'{value:g}' for value in self.box.ravel())}"
 
 
-def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> Iterator[Place]:
+def places(
+    network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
+) -> Iterator[Place]:
     """Yield the places of a template on a map, the best first; arguments as of `placements`.
 
     Raises:
@@ -262,10 +311,15 @@ def places(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int]
             reason = reason or str(error)
             continue
         found = True
-        paths = tuple(c.curve.at(np.linspace(c.start - _FORTH, c.end + _FORTH, 200))[:, :2] for c in placement.courses)
+        paths = tuple(
+            c.curve.at(np.linspace(c.start - _FORTH, c.end + _FORTH, 200))[:, :2]
+            for c in placement.courses
+        )
         points = np.concatenate(paths)
         box = np.round(np.stack((points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE)))
-        names = dict.fromkeys(network.lanes[k].junction for course in placement.courses for k in course.lanes)
+        names = dict.fromkeys(
+            network.lanes[k].junction for course in placement.courses for k in course.lanes
+        )
         first = network.lanes[placement.courses[0].lanes[0]]
         where = ", ".join(f"junction {name}" for name in names if name) or f"lane {first.id}"
         yield Place(frozen(box), where, placement.cost, paths)
@@ -278,11 +332,16 @@ def users_of(tracks: Sequence[Track]) -> frozenset[str]:
     return frozenset().union(*(track.vehicle.kind.lane_user for track in tracks))
 
 
-def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> tuple[Floats, str]:
+def best_part(
+    network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
+) -> tuple[Floats, str]:
     """Return the box (2, 2) [m] around the best place of a template on a map, and a sentence that names it.
 
     Raises:
         NoPlaceError: there is no place for it.
     """
     best = next(places(network, tracks, lanes))
-    return best.box, f"the best place for the recording is at {best.where}: {best.part} (cost {best.cost:.1f} m²)"
+    return (
+        best.box,
+        f"the best place for the recording is at {best.where}: {best.part} (cost {best.cost:.1f} m²)",
+    )

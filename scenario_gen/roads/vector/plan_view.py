@@ -19,7 +19,15 @@ from scenario_gen.numerics.plane import place
 _STEP = 1.0  # metres of a spiral that one rule of Gauss integrates
 _GAUSS = (  # five points on [0, 1], exact for degree 9
     np.array([0.046910077030668, 0.230765344947158, 0.5, 0.769234655052842, 0.953089922969332]),
-    np.array([0.118463442528095, 0.239314335249683, 0.284444444444444, 0.239314335249683, 0.118463442528095]),
+    np.array(
+        [
+            0.118463442528095,
+            0.239314335249683,
+            0.284444444444444,
+            0.239314335249683,
+            0.118463442528095,
+        ]
+    ),
 )
 _SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
 MOST_LENGTH = 1_000_000.0  # metres of a road
@@ -57,7 +65,9 @@ class Cubics:
 
 def cubics(records: list[Element], offset: str) -> Cubics:
     """Read records with attributes a, b, c, d and the beginning `offset` (s or sOffset); none is zero everywhere."""
-    rows = sorted((record.number(offset), *(record.number(name) for name in "abcd")) for record in records) or [(0.0,) * 5]
+    rows = sorted(
+        (record.number(offset), *(record.number(name) for name in "abcd")) for record in records
+    ) or [(0.0,) * 5]
     table = np.array(rows)
     return Cubics(table[:, 0], table[:, 1:])
 
@@ -81,7 +91,9 @@ class ReferenceLine:
         which = _piece_at(self.begin, s, end)
         poses = np.empty((len(s), 3))
         for k in np.unique(which).tolist():
-            poses[which == k] = _piece(self.pieces[k], np.maximum(s[which == k] - self.begin[k], 0.0))
+            poses[which == k] = _piece(
+                self.pieces[k], np.maximum(s[which == k] - self.begin[k], 0.0)
+            )
         return poses
 
 
@@ -101,10 +113,14 @@ def reference_line(road: Element) -> ReferenceLine:
             raise InputError(f"{piece.place}: length {length:g} m; 0 to {MOST_LENGTH:g} are read")
         for name in ("curvature", "curvStart", "curvEnd"):
             if abs(shape.number(name, 0.0)) > _SHARPEST:
-                raise InputError(f"{shape.place}: {name} is {shape.number(name):g} 1/m; at most {_SHARPEST:g} is read")
+                raise InputError(
+                    f"{shape.place}: {name} is {shape.number(name):g} 1/m; at most {_SHARPEST:g} is read"
+                )
     length, drawn = road.number("length"), sum(piece.number("length") for piece in pieces)
     if not 0.0 <= length <= MOST_LENGTH or (length == 0.0 and drawn > 0.0):
-        raise InputError(f"{road.place}: length {length:g} m; more than 0 and at most {MOST_LENGTH:g} are read")
+        raise InputError(
+            f"{road.place}: length {length:g} m; more than 0 and at most {MOST_LENGTH:g} are read"
+        )
     return ReferenceLine(np.array([piece.number("s") for piece in pieces]), tuple(pieces), length)
 
 
@@ -140,11 +156,18 @@ def _spiral(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, 
     """A clothoid: its curvature grows evenly; the position is the integral of its heading's cosine and sine."""
     first, last = shape.number("curvStart"), shape.number("curvEnd")
     rate = (last - first) / length if length > 0.0 else 0.0
-    knots = np.unique(np.concatenate(([0.0], np.arange(1, math.ceil(float(ds.max(initial=0.0)) / _STEP) + 1) * _STEP, ds)))
+    knots = np.unique(
+        np.concatenate(
+            ([0.0], np.arange(1, math.ceil(float(ds.max(initial=0.0)) / _STEP) + 1) * _STEP, ds)
+        )
+    )
     step = np.diff(knots)
     at = knots[:-1, None] + step[:, None] * _GAUSS[0]
     heading = at * (first + 0.5 * rate * at)
-    parts = [(step[:, None] * _GAUSS[1] * function(heading)).sum(axis=1) for function in (np.cos, np.sin)]
+    parts = [
+        (step[:, None] * _GAUSS[1] * function(heading)).sum(axis=1)
+        for function in (np.cos, np.sin)
+    ]
     u, v = (np.concatenate(([0.0], np.cumsum(part)))[np.searchsorted(knots, ds)] for part in parts)
     return u, v, ds * (first + 0.5 * rate * ds)
 
@@ -177,4 +200,10 @@ def _is_normalized(shape: Element, length: float) -> bool:
     return abs(speed - length) <= abs(speed - 1.0)
 
 
-_SHAPE = {"line": _line, "arc": _arc, "spiral": _spiral, "poly3": _poly3, "paramPoly3": _param_poly3}
+_SHAPE = {
+    "line": _line,
+    "arc": _arc,
+    "spiral": _spiral,
+    "poly3": _poly3,
+    "paramPoly3": _param_poly3,
+}

@@ -15,7 +15,9 @@ from scenario_gen.types import LaneNetwork, Road
 _VERGE = 2.0  # metres of kerb drawn around a whole map
 
 
-def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig, paved: BaseGeometry | None = None) -> Road:
+def road_of(
+    network: LaneNetwork, box: Floats | None, config: RoadConfig, paved: BaseGeometry | None = None
+) -> Road:
     """Draw the part of a network that lies in a box.
 
     Args:
@@ -29,7 +31,10 @@ def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig, paved:
     """
     cell = float(np.float32(config.resolution))
     low, high = network.box + np.array([[-_VERGE], [_VERGE]]) if box is None else box
-    first, last = np.floor(low / cell).astype(np.int64), np.ceil(high / cell - 1e-9).astype(np.int64)
+    first, last = (
+        np.floor(low / cell).astype(np.int64),
+        np.ceil(high / cell - 1e-9).astype(np.int64),
+    )
     width, height = (last - first).tolist()
     refuse_too_many_cells(network.name, width, height, config)
     drivable = np.zeros((height, width), dtype=np.bool_)
@@ -39,7 +44,9 @@ def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig, paved:
     ]
     for outline, is_road in (*outlines, *((lane.outline, True) for lane in network.lanes)):
         corner, inside = covered(np.asarray(outline), cell, first, (height, width))
-        window = drivable[corner[1] : corner[1] + inside.shape[0], corner[0] : corner[0] + inside.shape[1]]
+        window = drivable[
+            corner[1] : corner[1] + inside.shape[0], corner[0] : corner[0] + inside.shape[1]
+        ]
         window[inside] = is_road
     entries, exits = lane_ends(network)
     return Road(
@@ -53,7 +60,9 @@ def road_of(network: LaneNetwork, box: Floats | None, config: RoadConfig, paved:
     )
 
 
-def covered(outline: Floats, cell: float, first: Ints, shape: tuple[int, int]) -> tuple[Ints, Bools]:
+def covered(
+    outline: Floats, cell: float, first: Ints, shape: tuple[int, int]
+) -> tuple[Ints, Bools]:
     """Cells of a grid whose centres lie in a polygon.
 
     The winding number of each centre, by counting the edges that a ray from the left crosses: what lies in the polygon twice,

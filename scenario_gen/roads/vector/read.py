@@ -75,7 +75,9 @@ def read_network(path: Path) -> LaneNetwork:
         status = local(path, "a map").stat()
     except (OSError, ValueError) as error:
         raise (
-            of_system(error, path) if isinstance(error, OSError) else InputError(f"map {shown(str(path))!r}: {error}")
+            of_system(error, path)
+            if isinstance(error, OSError)
+            else InputError(f"map {shown(str(path))!r}: {error}")
         ) from error
     return _read(path, status.st_mtime_ns, status.st_size)
 
@@ -103,7 +105,9 @@ def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
         rows = [k for k, known in enumerate(own) if known and known == name]
         if not rows:
             known = list(dict.fromkeys(value for value in own if value))
-            listed = ", ".join(known[:_NAMED]) + (f" and {len(known) - _NAMED} more" if len(known) > _NAMED else "")
+            listed = ", ".join(known[:_NAMED]) + (
+                f" and {len(known) - _NAMED} more" if len(known) > _NAMED else ""
+            )
             faulty = "".join(f"; {note}" for note in network.notes if FAULTY in note)
             raise InputError(
                 f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {listed or 'none'}{faulty}"
@@ -120,11 +124,17 @@ def box_of(network: LaneNetwork, part: str) -> Floats:
     """
     numbers = part.partition("=")[2].split(",")
     if len(numbers) != 4:
-        raise InputError(f"map {network.name}: {shown(part, 60)!r}; box=x0,y0,x1,y1 in metres is needed")
-    corners = np.array([finite(number.strip(), f"map {network.name}, {part[:60]}") for number in numbers]).reshape(2, 2)
+        raise InputError(
+            f"map {network.name}: {shown(part, 60)!r}; box=x0,y0,x1,y1 in metres is needed"
+        )
+    corners = np.array(
+        [finite(number.strip(), f"map {network.name}, {part[:60]}") for number in numbers]
+    ).reshape(2, 2)
     box = frozen(np.stack((corners.min(axis=0), corners.max(axis=0))))
     if (box[1] - box[0] < 1.0).any():
-        raise InputError(f"map {network.name}: the box {shown(part, 60)!r} is less than 1 m wide; {extent(network)}")
+        raise InputError(
+            f"map {network.name}: the box {shown(part, 60)!r} is less than 1 m wide; {extent(network)}"
+        )
     return box
 
 
@@ -135,7 +145,9 @@ def refuse_unknown_part(name: str, part: str) -> None:
         InputError: it begins with none of `PARTS`.
     """
     if part and part.partition("=")[0] not in PARTS:
-        raise InputError(f"map {name}: part {shown(part, 40)!r}; choose one of {', '.join(f'#{kind}=…' for kind in PARTS)}")
+        raise InputError(
+            f"map {name}: part {shown(part, 40)!r}; choose one of {', '.join(f'#{kind}=…' for kind in PARTS)}"
+        )
 
 
 def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
@@ -162,7 +174,10 @@ def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig)
         box, note = best_part(network, tracks, lanes)
     elif lanes:
         points = np.concatenate([network.lanes[k].outline for k in lanes])
-        box, note = np.stack((points.min(axis=0) - _AROUND, points.max(axis=0) + _AROUND)), f"{_AROUND:g} m around {part}"
+        box, note = (
+            np.stack((points.min(axis=0) - _AROUND, points.max(axis=0) + _AROUND)),
+            f"{_AROUND:g} m around {part}",
+        )
     else:
         return road_of(network, None, config)
     return road_of(part_of(network, box, note), box, config)

@@ -70,7 +70,9 @@ class RuleCheck:
             scenario: in the map's frame.
             conflicts: where the paths of two of its vehicles meet; all of them (`find_conflicts`).
         """
-        drives = [n for n, vehicle in enumerate(scenario.vehicles) if not vehicle.kind.walks]  # the others know no such rules
+        drives = [
+            n for n, vehicle in enumerate(scenario.vehicles) if not vehicle.kind.walks
+        ]  # the others know no such rules
         stops = [breach for n in drives for breach in self._runs(scenario, n)]
         met = [one for one in conflicts if {one.first, one.second} <= set(drives)]
         return [*stops, *(breach for one in met for breach in self._taken(scenario, one))]
@@ -78,7 +80,13 @@ class RuleCheck:
     def kept_orders(self, scenario: Scenario, conflicts: Sequence[Conflict]) -> int:
         """Return at how many conflicts, where two meet within 5 s, the one who goes second has to give way."""
         met = [c for c in conflicts if c.encroachment < _MET]
-        return len([c for c in met if self._over(scenario, c.second, c.entry_second, c.first, c.entry_first)])
+        return len(
+            [
+                c
+                for c in met
+                if self._over(scenario, c.second, c.entry_second, c.first, c.entry_first)
+            ]
+        )
 
     def _runs(self, scenario: Scenario, n: int) -> Iterator[Breach]:
         """Stop lines that vehicle n crosses without a stop."""
@@ -93,7 +101,9 @@ class RuleCheck:
             if at is None:
                 continue
             before = (driven <= driven[at + 1]) & (driven >= driven[at] - _APPROACH)
-            unseen = max(_APPROACH - float(driven[at]), 0.0)  # a stop there can have been before it came
+            unseen = max(
+                _APPROACH - float(driven[at]), 0.0
+            )  # a stop there can have been before it came
             slowest = float(speed[before].min())
             if slowest > max(_STOPPED, math.sqrt(2.0 * _PULLS_AWAY * unseen)):
                 message = f"crosses the stop line of {rule.id}; its minimum speed before it is {slowest:.1f} m/s"
@@ -115,7 +125,11 @@ class RuleCheck:
 
     def _taken(self, scenario: Scenario, met: Conflict) -> Iterator[Breach]:
         """The right of way that the first one at a conflict takes from the second one."""
-        rule = self._over(scenario, met.first, met.entry_first, met.second, met.entry_second) if self._ways else None
+        rule = (
+            self._over(scenario, met.first, met.entry_first, met.second, met.entry_second)
+            if self._ways
+            else None
+        )
         if rule is None:
             return
         gap = met.arrival_gap if met.following else met.encroachment
@@ -123,19 +137,29 @@ class RuleCheck:
         if gap < _HINDERED or waits:
             how = "which waits for it" if waits else f"which follows after {gap:.1f} s"
             first, second = (scenario.vehicles[n].id for n in (met.first, met.second))
-            message = f"goes before vehicle {second}, {how}; by rule {rule.id} vehicle {first} gives way"
+            message = (
+                f"goes before vehicle {second}, {how}; by rule {rule.id} vehicle {first} gives way"
+            )
             yield Breach(met.entry_first, (met.first, met.second), message)
 
-    def _over(self, scenario: Scenario, who: int, entry: float, whom: int, other_entry: float) -> TrafficRule | None:
+    def _over(
+        self, scenario: Scenario, who: int, entry: float, whom: int, other_entry: float
+    ) -> TrafficRule | None:
         """The rule by which a vehicle gives way to another one, at a conflict that they enter at these times [s]."""
         own = self._lanes_before(scenario, who, entry, self._subject)
-        others = self._lanes_before(scenario, whom, other_entry, sorted({*self._first, *self._subject})) if own else set()
+        others = (
+            self._lanes_before(scenario, whom, other_entry, sorted({*self._first, *self._subject}))
+            if own
+            else set()
+        )
         for rule in self._ways:
             if own & set(rule.lanes) and others & set(rule.over) and not others & set(rule.lanes):
                 return rule
         return None
 
-    def _lanes_before(self, scenario: Scenario, n: int, entry: float, lanes: Sequence[int]) -> set[int]:
+    def _lanes_before(
+        self, scenario: Scenario, n: int, entry: float, lanes: Sequence[int]
+    ) -> set[int]:
         """Those of some lanes on which a vehicle drives in the last metres before a time [s]."""
         steps = np.concatenate(([0.0], np.cumsum(edge_lengths(scenario.position[n]))))
         at = scenario.there[n] & (scenario.time <= entry + 1e-9)
@@ -155,7 +179,11 @@ def _same_way(network: LaneNetwork, lane: int, place: Floats, heading: float) ->
 def _waits_before(scenario: Scenario, met: Conflict) -> bool:
     """Whether the second one at a conflict stands before it while the first one passes."""
     n, time = met.second, scenario.time
-    passes: Bools = scenario.there[n] & (time >= met.entry_first) & (time <= min(met.exit_first, met.entry_second))
+    passes: Bools = (
+        scenario.there[n]
+        & (time >= met.entry_first)
+        & (time <= min(met.exit_first, met.entry_second))
+    )
     if not passes.any():
         return False
     steps = np.concatenate(([0.0], np.cumsum(edge_lengths(scenario.position[n]))))

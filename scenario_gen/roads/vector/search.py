@@ -78,14 +78,18 @@ class _Field:
         self.low = low
         size = np.ceil((high - low) / self.cell).astype(np.int64) + 1
         reach = math.ceil(_REACH / self.cell)
-        offsets = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
+        offsets = np.stack(
+            np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1
+        ).reshape(-1, 2)
 
         def around(part: slice) -> tuple[Floats, Ints]:
             """Distances and cells (P, O) about some sections."""
             at = np.floor((points[part] - low) / self.cell).astype(np.int64)
             cells = np.clip(at[:, None] + offsets, 0, size - 1)
             centres = low + (cells + 0.5) * self.cell
-            distance = np.hypot(centres[..., 0] - points[part, None, 0], centres[..., 1] - points[part, None, 1])
+            distance = np.hypot(
+                centres[..., 0] - points[part, None, 0], centres[..., 1] - points[part, None, 1]
+            )
             return distance, cells[..., 1] * size[0] + cells[..., 0]
 
         parts = [slice(k, k + _AT_ONCE) for k in range(0, len(points), _AT_ONCE)]
@@ -114,13 +118,19 @@ class _Field:
         return np.asarray(np.square(self.table[which, turn]))
 
 
-def _sections(network: LaneNetwork, every: int = 1, lanes: Sequence[int] | None = None) -> tuple[Floats, Floats]:
+def _sections(
+    network: LaneNetwork, every: int = 1, lanes: Sequence[int] | None = None
+) -> tuple[Floats, Floats]:
     """Middles (P, 2) [m] and directions (P,) [rad] of the lanes' sections."""
     chosen = network.lanes if lanes is None else [network.lanes[k] for k in lanes]
-    return np.concatenate([lane.middle[::every] for lane in chosen]), np.concatenate([lane.yaw[::every] for lane in chosen])
+    return np.concatenate([lane.middle[::every] for lane in chosen]), np.concatenate(
+        [lane.yaw[::every] for lane in chosen]
+    )
 
 
-def find_spots(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> list[Spot]:
+def find_spots(
+    network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
+) -> list[Spot]:
     """Return the best placements, the best first, each at another place or turned otherwise.
 
     Args:
@@ -196,7 +206,11 @@ def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
     """Poses (P, 3) along all paths, and their weights (P,), whose sum is one for all vehicles alike."""
     poses, weight = [], []
     for track in tracks:
-        count = 1 if track.still else min(max(math.ceil(track.travelled / _SPACING), 1) + 1, _MOST_SAMPLES)
+        count = (
+            1
+            if track.still
+            else min(max(math.ceil(track.travelled / _SPACING), 1) + 1, _MOST_SAMPLES)
+        )
         poses.append(track.curve.at(np.linspace(0.0, track.travelled, count)))
         weight.append(np.full(count, 1.0 / (count * len(tracks))))
     return np.concatenate(poses), np.concatenate(weight)
@@ -215,15 +229,22 @@ def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
 def _costs(field: _Field, poses: Floats, weight: Floats, placements: Floats) -> Floats:
     """Costs (M,) [m²] of placements (M, 3): where the origin lies and how far all is turned."""
     points = place(placements[:, None], *poses[:, :2].T)
-    return np.asarray((field.squared(points, poses[:, 2] + placements[:, 2, None]) * weight).sum(axis=1))
+    return np.asarray(
+        (field.squared(points, poses[:, 2] + placements[:, 2, None]) * weight).sum(axis=1)
+    )
 
 
 def _refined(field: _Field, poses: Floats, weight: Floats, spot: Spot) -> Spot:
     """The best placement near one, by moves and turns about the template's middle."""
     centre = poses[:, :2].mean(axis=0)
     local = poses - np.array([*centre, 0.0])
-    begin, step = np.array([*spot.moved(centre), spot.yaw]), np.array([2.0, 2.0, math.radians(4.0)])
-    state, cost = pattern_search(lambda trials: _costs(field, local, weight, trials), begin, step, 0.2)
+    begin, step = (
+        np.array([*spot.moved(centre), spot.yaw]),
+        np.array([2.0, 2.0, math.radians(4.0)]),
+    )
+    state, cost = pattern_search(
+        lambda trials: _costs(field, local, weight, trials), begin, step, 0.2
+    )
     return Spot(cost, *_laid_onto(centre, state[None, :2], state[2:])[0].tolist())
 
 
@@ -231,7 +252,15 @@ def _distinct(spots: list[Spot], centre: Floats, most: int) -> list[Spot]:
     """The best of those that are alike, at most `most`, the best first."""
     kept: list[Spot] = []
     places = np.empty((0, 3))
-    for spot in sorted(spots, key=lambda spot: (round(spot.cost, 6), round(spot.yaw, 6), round(spot.x, 3), round(spot.y, 3))):
+    for spot in sorted(
+        spots,
+        key=lambda spot: (
+            round(spot.cost, 6),
+            round(spot.yaw, 6),
+            round(spot.x, 3),
+            round(spot.y, 3),
+        ),
+    ):
         own = np.array([*spot.moved(centre), spot.yaw])
         off = np.abs(places - own)
         turned = np.abs(wrap_angle(places[:, 2] - own[2]))

@@ -23,16 +23,32 @@ from scenario_gen.roads.vector.plan_view import Cubics, cubics, ReferenceLine
 from scenario_gen.types import CARS, DRIVERS, LANE_USERS
 
 FOR_CARS = frozenset(
-    ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bidirectional", "mwyEntry", "mwyExit", "HOV")
+    (
+        "driving",
+        "entry",
+        "exit",
+        "onRamp",
+        "offRamp",
+        "connectingRamp",
+        "slipLane",
+        "bidirectional",
+        "mwyEntry",
+        "mwyExit",
+        "HOV",
+    )
 )
 _BY_KIND = {
     **dict.fromkeys(FOR_CARS, DRIVERS), "biking": frozenset(("bicycle",)), "bus": frozenset(("bus",)),
     "sidewalk": frozenset(("pedestrian",)), "walking": frozenset(("pedestrian",)), "shared": frozenset(("bicycle", "pedestrian")),
 }  # fmt: skip
-_MOTORWAYS = frozenset(("entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit", "HOV"))
+_MOTORWAYS = frozenset(
+    ("entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit", "HOV")
+)
 STEP = 0.5  # metres between cross-sections
 _SIDES = (("left", 1), ("right", -1))  # and the sign of their lanes' ids
-_ANYBODY = frozenset(("none", "simulator", "autonomousTraffic", "throughTraffic"))  # restrictions that name no type
+_ANYBODY = frozenset(
+    ("none", "simulator", "autonomousTraffic", "throughTraffic")
+)  # restrictions that name no type
 _RESTRICTED = {  # whom a restriction of access names
     "passengerCar": frozenset(("car", "van")), "delivery": frozenset(("van",)), "trucks": frozenset(("truck",)),
     **{name: frozenset((name,)) for name in LANE_USERS - CARS - {"van"}},
@@ -79,17 +95,31 @@ class SectionLane:
     @cached_property
     def users(self) -> frozenset[str]:
         """Who may use all of it, by its type and its records of access."""
-        users = _BY_KIND.get(self.kind, frozenset()) - (frozenset(("bicycle",)) if self.kind in _MOTORWAYS else frozenset())
-        records: dict[tuple[str, str], set[str]] = defaultdict(set)  # who may, or may not, from some sOffset on
+        users = _BY_KIND.get(self.kind, frozenset()) - (
+            frozenset(("bicycle",)) if self.kind in _MOTORWAYS else frozenset()
+        )
+        records: dict[tuple[str, str], set[str]] = defaultdict(
+            set
+        )  # who may, or may not, from some sOffset on
         for access in self.element.all("access"):
             names = [
                 access.attributes.get("restriction"),
                 *(own.attributes.get("type") for own in access.children),
             ]  # before, in 1.8
-            records[access.attributes.get("sOffset", "0"), access.attributes.get("rule", "deny")].update(filter(None, names))
+            records[
+                access.attributes.get("sOffset", "0"), access.attributes.get("rule", "deny")
+            ].update(filter(None, names))
         for (_, rule), restricted in records.items():
-            named = frozenset[str]().union(*(_RESTRICTED.get(name, frozenset()) for name in restricted))
-            users = users - named if rule == "deny" else users if restricted & _ANYBODY else users & named
+            named = frozenset[str]().union(
+                *(_RESTRICTED.get(name, frozenset()) for name in restricted)
+            )
+            users = (
+                users - named
+                if rule == "deny"
+                else users
+                if restricted & _ANYBODY
+                else users & named
+            )
         return users
 
     def middle(self, at: int) -> Floats:
@@ -170,10 +200,16 @@ def road_of_sections(element: Element, name: str, line: ReferenceLine) -> OpenDr
     road.sections.extend(LaneSection({}, _signs(section)) for section in sections)
     for k, (section, begin) in enumerate(zip(sections, begins, strict=True)):
         after = {sign: road.beyond(k, 1, sign) for sign in road.sections[k].signs}
-        ends = {sign: line.length if other is None else begins[other] for sign, other in after.items()}
+        ends = {
+            sign: line.length if other is None else begins[other] for sign, other in after.items()
+        }
         for end in dict.fromkeys(ends.values()):
-            breaks = line.begin[np.searchsorted(line.begin, begin, side="right") : np.searchsorted(line.begin, end)]
-            even = np.linspace(begin, max(end, begin + 1e-3), max(math.ceil((end - begin) / STEP), 1) + 1)
+            breaks = line.begin[
+                np.searchsorted(line.begin, begin, side="right") : np.searchsorted(line.begin, end)
+            ]
+            even = np.linspace(
+                begin, max(end, begin + 1e-3), max(math.ceil((end - begin) / STEP), 1) + 1
+            )
             s = np.unique(np.concatenate((even, breaks)))
             stations = _Stations(s, end, line.at(s, end), offset.at(s, end))
             for sign in (sign for sign in ends if ends[sign] == end):
@@ -194,18 +230,30 @@ def _lanes(
     s, begin, end = stations.s, float(stations.s[0]), stations.end
     normal, across = unit_left(stations.poses[:, 2]), stations.centre
     inner = stations.poses[:, :2] + across[:, None] * normal
-    elements = [lane for side, own in _SIDES if own == sign for group in section.all(side)[:1] for lane in group.all("lane")]
+    elements = [
+        lane
+        for side, own in _SIDES
+        if own == sign
+        for group in section.all(side)[:1]
+        for lane in group.all("lane")
+    ]
     refuse_too_many_lanes(len(elements), section.file)
     refuse_too_long(len(elements) * len(s), section.file)
-    for count, lane in enumerate(sorted(elements, key=lambda lane: sign * _lane_id(lane, sign)), 1):
+    for count, lane in enumerate(
+        sorted(elements, key=lambda lane: sign * _lane_id(lane, sign)), 1
+    ):
         name = _lane_id(lane, sign)
         if name != sign * count:
-            raise InputError(f"{lane.place}: lane {name} is there twice, or those between it and the centre are missing")
+            raise InputError(
+                f"{lane.place}: lane {name} is there twice, or those between it and the centre are missing"
+            )
         if lane.all("width"):
             width = cubics(lane.all("width"), "sOffset").at(s - begin, end - begin)
             across = across + sign * np.maximum(width, 0.0)
         elif lane.all("border"):
-            across = cubics(lane.all("border"), "sOffset").at(s - begin, end - begin) + stations.centre
+            across = (
+                cubics(lane.all("border"), "sOffset").at(s - begin, end - begin) + stations.centre
+            )
         outer = stations.poses[:, :2] + across[:, None] * normal
         forth = ((name < 0) != road.left_hand) != (lane.attributes.get("direction") == "reversed")
         yield name, SectionLane((road.id, number, name), lane, s, inner, outer, forth)

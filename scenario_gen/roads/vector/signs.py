@@ -17,7 +17,12 @@ from scenario_gen.numerics import Floats
 from scenario_gen.types import LaneNetwork, RuleKind, TrafficRule
 
 _SIGNS = {
-    "de": {"206": RuleKind.STOP, "205": RuleKind.GIVE_WAY, "301": RuleKind.PRIORITY, "306": RuleKind.PRIORITY},
+    "de": {
+        "206": RuleKind.STOP,
+        "205": RuleKind.GIVE_WAY,
+        "301": RuleKind.PRIORITY,
+        "306": RuleKind.PRIORITY,
+    },
     "us": {"r1-1": RuleKind.STOP, "r1-2": RuleKind.GIVE_WAY},
     "es": {"r2": RuleKind.STOP, "r1": RuleKind.GIVE_WAY, "r3": RuleKind.PRIORITY},
 }
@@ -28,7 +33,13 @@ _NAMED = {
     "yield_sign": RuleKind.GIVE_WAY,
     "give_way": RuleKind.GIVE_WAY,
 }
-_COUNTRIES = {"deu": "de", "germany": "de", "usa": "us", "esp": "es", "spain": "es"}  # other names of those with a list
+_COUNTRIES = {
+    "deu": "de",
+    "germany": "de",
+    "usa": "us",
+    "esp": "es",
+    "spain": "es",
+}  # other names of those with a list
 _SPEED_LIMITS = ("274", "274.1", "r2-1", "maxspeed")
 _SUBJECT = (RuleKind.STOP, RuleKind.GIVE_WAY)
 _LEADS = 6  # lanes between a sign and its junction at most
@@ -59,7 +70,10 @@ def kind_of_sign(name: str, subtype: str = "", country: str = "") -> RuleKind | 
     """
     numbers, own = _numbers(name, subtype, country)
     tables = [_SIGNS[own]] if own in _SIGNS else list(_SIGNS.values())
-    return next((table[number] for number in numbers for table in (*tables, _NAMED) if number in table), None)
+    return next(
+        (table[number] for number in numbers for table in (*tables, _NAMED) if number in table),
+        None,
+    )
 
 
 def is_speed_limit(name: str, subtype: str = "", country: str = "") -> bool:
@@ -89,12 +103,16 @@ def with_rules(network: LaneNetwork, drafts: Sequence[DraftRule]) -> LaneNetwork
     rules: list[TrafficRule] = []
     for draft in drafts:
         lanes, over = (
-            tuple(dict.fromkeys(index[name] for name in names if name in index)) for names in (draft.lanes, draft.over)
+            tuple(dict.fromkeys(index[name] for name in names if name in index))
+            for names in (draft.lanes, draft.over)
         )
         if not lanes:
             continue
         if draft.kind == RuleKind.STOP and not len(draft.line):
-            ends = ((k, np.stack((network.lanes[k].left[-1], network.lanes[k].right[-1]))) for k in lanes)
+            ends = (
+                (k, np.stack((network.lanes[k].left[-1], network.lanes[k].right[-1])))
+                for k in lanes
+            )
             rules += (TrafficRule(draft.id, draft.kind, (k,), over, line) for k, line in ends)
         else:
             rules.append(TrafficRule(draft.id, draft.kind, lanes, over, draft.line))
@@ -102,15 +120,27 @@ def with_rules(network: LaneNetwork, drafts: Sequence[DraftRule]) -> LaneNetwork
     notes = network.notes
     if known:
         counts = {kind: len({rule.id for rule in known if rule.kind == kind}) for kind in RuleKind}
-        words = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in counts.items() if count)
-        off = "; lights have no state, so signs hold as where lights are off" if counts[RuleKind.TRAFFIC_LIGHT] else ""
+        words = ", ".join(
+            f"{count} {kind.replace('_', ' ')}" for kind, count in counts.items() if count
+        )
+        off = (
+            "; lights have no state, so signs hold as where lights are off"
+            if counts[RuleKind.TRAFFIC_LIGHT]
+            else ""
+        )
         notes += (f"traffic rules: {words}{off}",)
     return replace(network, rules=known, notes=notes)
 
 
 def _over_others(network: LaneNetwork, rules: Sequence[TrafficRule]) -> Iterator[TrafficRule]:
     """Yield the rules, those without `over` with the lanes into the same junction that no stop or give-way sign concerns."""
-    subject = {lane for rule in rules if rule.kind in _SUBJECT for k in rule.lanes for lane in _mouths(network, k)}
+    subject = {
+        lane
+        for rule in rules
+        if rule.kind in _SUBJECT
+        for k in rule.lanes
+        for lane in _mouths(network, k)
+    }
     into: dict[str, list[int]] = {}
     for k, lane in enumerate(network.lanes):
         for name in dict.fromkeys(network.lanes[after].junction for after in lane.successors):
@@ -121,7 +151,11 @@ def _over_others(network: LaneNetwork, rules: Sequence[TrafficRule]) -> Iterator
             yield rule
             continue
         mouths = [mouth for k in rule.lanes for mouth in _mouths(network, k)]
-        names = dict.fromkeys(network.lanes[after].junction for mouth in mouths for after in network.lanes[mouth].successors)
+        names = dict.fromkeys(
+            network.lanes[after].junction
+            for mouth in mouths
+            for after in network.lanes[mouth].successors
+        )
         over = dict.fromkeys(k for name in names for k in into.get(name, ()) if k not in subject)
         yield replace(rule, over=tuple(over))
 
@@ -131,14 +165,24 @@ def _mouths(network: LaneNetwork, first: int) -> list[int]:
     mouths: list[int] = []
     level = [first]
     for _ in range(_LEADS):
-        mouths += [k for k in level if any(network.lanes[after].junction for after in network.lanes[k].successors)]
+        mouths += [
+            k
+            for k in level
+            if any(network.lanes[after].junction for after in network.lanes[k].successors)
+        ]
         level = [
-            after for k in level if k not in mouths for after in network.lanes[k].successors if not network.lanes[after].junction
+            after
+            for k in level
+            if k not in mouths
+            for after in network.lanes[k].successors
+            if not network.lanes[after].junction
         ]
     return list(dict.fromkeys(mouths))
 
 
-def rules_of_pieces(rules: Sequence[TrafficRule], pieces: Mapping[int, Sequence[int]]) -> tuple[TrafficRule, ...]:
+def rules_of_pieces(
+    rules: Sequence[TrafficRule], pieces: Mapping[int, Sequence[int]]
+) -> tuple[TrafficRule, ...]:
     """Return the rules of a part of a network.
 
     Args:

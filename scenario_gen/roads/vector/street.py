@@ -18,17 +18,29 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads.vector.match import bending, Chains, changed_curve, Course, Match, pressed_aside, speeding
+from scenario_gen.roads.vector.match import (
+    bending,
+    Chains,
+    changed_curve,
+    Course,
+    Match,
+    pressed_aside,
+    speeding,
+)
 from scenario_gen.template import FrenetTracks, to_frenet, Track, turn_of
 from scenario_gen.types import LEVEL
 
 _ROOM = 1.0  # metres between a footprint and the end of the road
 _FORTH = 25.0  # metres of road before and after what is driven, where it has them
 _TRIED = 40  # roads, the straightest first
-_TURN = math.radians(60.0)  # more than the template's that a road may bend; less it may: the template is laid out straight
+_TURN = math.radians(
+    60.0
+)  # more than the template's that a road may bend; less it may: the template is laid out straight
 _APART = 2.2  # metres between the middles of oncoming lanes, at least
 _ASIDE = 18.0  # metres between a road's outermost lanes
-_STRAIGHT = 0.02  # rad/m: how much of the cost is the road's bending: (rad/m)² are counted against this
+_STRAIGHT = (
+    0.02  # rad/m: how much of the cost is the road's bending: (rad/m)² are counted against this
+)
 _PARALLEL = math.radians(20.0)
 _EVERY = 10.0  # metres between the places at which lanes are compared
 _WANDER = 1.8  # metres by which the distance between parallel lanes may differ
@@ -60,7 +72,9 @@ class _Stretch:
     @cached_property
     def axis(self) -> Curve:
         """The middle, with what lies before and after the stretch."""
-        return self.curve.cut(max(self.begin - _FORTH, 0.0), min(self.begin + self.span + _FORTH, self.curve.length))
+        return self.curve.cut(
+            max(self.begin - _FORTH, 0.0), min(self.begin + self.span + _FORTH, self.curve.length)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +86,9 @@ class _Side:
     offset: float
 
 
-def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> Iterator[Match]:
+def along_streets(
+    chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
+) -> Iterator[Match]:
     """Yield the template along the straightest stretches of road that have its lanes.
 
     Args:
@@ -84,8 +100,13 @@ def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int
         compact = to_frenet(tracks)
     except RefusedError:
         return
-    low, high = (end + room for end, room in zip(compact.span(tracks), (-_ROOM, _ROOM), strict=True))
-    stretches = sorted(_stretches(chains, high - low, lanes), key=lambda candidate: (round(candidate.bend, 4), candidate.chain))
+    low, high = (
+        end + room for end, room in zip(compact.span(tracks), (-_ROOM, _ROOM), strict=True)
+    )
+    stretches = sorted(
+        _stretches(chains, high - low, lanes),
+        key=lambda candidate: (round(candidate.bend, 4), candidate.chain),
+    )
     ways = [compact.spread(), *([compact] if any(compact.between) else [])]
     if compact.swerve.any():  # where there is no room for that, others say what is lost
         ways.append(replace(compact, swerve=np.zeros_like(compact.swerve)))
@@ -108,7 +129,9 @@ def _stretches(chains: Chains, span: float, lanes: Sequence[int] | None) -> Iter
         begins = np.arange(0.0, curve.length - span + 1e-9, 5.0)
         station = np.arange(0.0, curve.length + 1e-9, 1.0)
         turned = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(curve.at(station)[:, 2])))))
-        bend = (np.interp(begins + span, station, turned) - np.interp(begins, station, turned)) / span
+        bend = (
+            np.interp(begins + span, station, turned) - np.interp(begins, station, turned)
+        ) / span
         k = int(np.argmin(np.round(bend, 6)))
         yield _Stretch(chain, curve, float(begins[k]), span, float(bend[k]))
 
@@ -128,11 +151,22 @@ def _straight_on(chains: Chains, first: int, span: float) -> tuple[int, ...]:
 def _turn_of(chains: Chains, lane: int) -> float:
     centre = chains.network.lanes[lane].centre
     first, last = centre[1] - centre[0], centre[-1] - centre[-2]
-    return abs(float(np.arctan2(first[0] * last[1] - first[1] * last[0], first[0] * last[0] + first[1] * last[1])))
+    return abs(
+        float(
+            np.arctan2(
+                first[0] * last[1] - first[1] * last[0], first[0] * last[0] + first[1] * last[1]
+            )
+        )
+    )
 
 
 def _laid(
-    chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], along: tuple[FrenetTracks, float], *, own: bool
+    chains: Chains,
+    stretch: _Stretch,
+    tracks: tuple[Track, ...],
+    along: tuple[FrenetTracks, float],
+    *,
+    own: bool,
 ) -> Match | None:
     """The template on a stretch of road, None if lanes are missing.
 
@@ -147,13 +181,20 @@ def _laid(
     axis = stretch.axis
     ahead = sorted(_sides(chains, stretch, 1), key=lambda side: -side.offset)
     against = sorted(_sides(chains, stretch, -1), key=lambda side: side.offset)
-    if ahead and against and against[0].offset < ahead[0].offset:  # traffic keeps left: count from the middle of the road
+    if (
+        ahead and against and against[0].offset < ahead[0].offset
+    ):  # traffic keeps left: count from the middle of the road
         ahead, against = ahead[::-1], against[::-1]
     courses, offsets = [], {1: list[float](), -1: list[float]()}
     for i, track in enumerate(tracks):
         sign = int(frenet.direction[i])
-        closed, favoured = chains.closed_to(track), chains.own_of(track) if own else frozenset[int]()
-        sides = [side for side in (ahead if sign > 0 else against) if closed.isdisjoint(side.chain)]
+        closed, favoured = (
+            chains.closed_to(track),
+            chains.own_of(track) if own else frozenset[int](),
+        )
+        sides = [
+            side for side in (ahead if sign > 0 else against) if closed.isdisjoint(side.chain)
+        ]
         on_own = [side for side in sides if favoured.issuperset(side.chain)]
         sides = on_own or sides
         first, last = (0 if on_own else int(k) for k in frenet.lane[i])
@@ -182,8 +223,18 @@ def _laid(
     if any(abs(a - b) < _APART for a in offsets[1] for b in offsets[-1]):
         return None  # one lane for both directions
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
-    cost = stretch.bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
-    return Match(tuple(courses), cost, "", max(forced for _, forced in aside), chains.off_own(courses, tracks))
+    cost = (
+        stretch.bend / _STRAIGHT
+        + speeding(chains.network, courses, tracks)
+        + bending([usual for usual, _ in aside])
+    )
+    return Match(
+        tuple(courses),
+        cost,
+        "",
+        max(forced for _, forced in aside),
+        chains.off_own(courses, tracks),
+    )
 
 
 def _swerving(used: tuple[int, ...], lane: Curve, places: Floats, swerve: Floats) -> Course:
@@ -205,7 +256,11 @@ def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:
     away = np.hypot(chains.points[:, 0] - start[0], chains.points[:, 1] - start[1])
     own = np.flatnonzero(np.isin(chains.owner, stretch.chain))
     level = chains.height[own[np.argmin(away[own])]]
-    near = (away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL) & ~(np.abs(chains.height - level) > LEVEL)
+    near = (
+        (away < _ASIDE)
+        & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL)
+        & ~(np.abs(chains.height - level) > LEVEL)
+    )
     sides: list[_Side] = []
     for first in np.unique(chains.owner[near]).tolist():
         chain = _beside(chains, first, poses[::sign], sign)
@@ -213,7 +268,9 @@ def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:
         chain = (back[0], *chain) if back and back[0] not in chain else chain
         curve = chains.curve(chain)
         station, _ = curve.project(poses[:, :2])
-        turned = np.abs(wrap_angle(curve.at(station)[:, 2] - poses[:, 2] + (0.0 if sign > 0 else np.pi)))
+        turned = np.abs(
+            wrap_angle(curve.at(station)[:, 2] - poses[:, 2] + (0.0 if sign > 0 else np.pi))
+        )
         _, offset = stretch.axis.project(curve.at(np.clip(station, 0.0, curve.length))[:, :2])
         inside = (station > -0.1).all() and (station < curve.length + 0.1).all()
         if inside and (turned < _PARALLEL).all() and np.ptp(offset) < _WANDER:
@@ -229,12 +286,20 @@ def _beside(chains: Chains, first: int, poses: Floats, sign: int) -> tuple[int, 
     chain, goal = [first], poses[-1, :2]
     while True:
         centre = chains.network.lanes[chain[-1]].centre
-        if float(np.hypot(*(centre - goal).T).min()) < _ASIDE and len(chain) > 1 and _passed(centre, poses[-1], sign):
+        if (
+            float(np.hypot(*(centre - goal).T).min()) < _ASIDE
+            and len(chain) > 1
+            and _passed(centre, poses[-1], sign)
+        ):
             return tuple(chain)
         after = chains.after(chain)
         if not after:
             return tuple(chain)
-        chain.append(min(after, key=lambda k: (round(_off(chains.network.lanes[k].centre[-1], poses), 3), k)))
+        chain.append(
+            min(
+                after, key=lambda k: (round(_off(chains.network.lanes[k].centre[-1], poses), 3), k)
+            )
+        )
 
 
 def _off(point: Floats, poses: Floats) -> float:

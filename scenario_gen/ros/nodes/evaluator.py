@@ -22,9 +22,13 @@ from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.types import WITH
 
-Entries = Sequence[tuple[bytes, ScenarioEntry]]  # scenarios, each with its entry of `scenarios/info`
+Entries = Sequence[
+    tuple[bytes, ScenarioEntry]
+]  # scenarios, each with its entry of `scenarios/info`
 SCENARIOS = ("scenarios", INFO)
-SETTLED_S = 5.0  # seconds without messages after which a closed request's missing messages are reported
+SETTLED_S = (
+    5.0  # seconds without messages after which a closed request's missing messages are reported
+)
 
 
 @dataclass(frozen=True)
@@ -33,10 +37,19 @@ class Config(Parameters):
 
     seed: int = parameter(0, "seed of the bootstrap, and of the choice of what is measured", low=0)
     measured: int = parameter(
-        1000, "scenarios of a request that are measured, chosen by the seed where it has more", low=1, high=1000
+        1000,
+        "scenarios of a request that are measured, chosen by the seed where it has more",
+        low=1,
+        high=1000,
     )
-    keep: int = parameter(3000, "scenarios kept of requests that are not whole yet; the oldest requests are given up", low=1)
-    wait: int = parameter(100, "closed requests that wait for scenarios on their way; older ones are given up", low=1)
+    keep: int = parameter(
+        3000,
+        "scenarios kept of requests that are not whole yet; the oldest requests are given up",
+        low=1,
+    )
+    wait: int = parameter(
+        100, "closed requests that wait for scenarios on their way; older ones are given up", low=1
+    )
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
 
@@ -89,14 +102,22 @@ class Evaluator(StageNode):
         closed = [name for name, request in requests.items() if request.summary]
         for name in closed[: max(0, len(closed) - self.config.wait)]:
             self._forget(name)
-        while len(requests) > 1 and sum(len(request.kept) for request in requests.values()) > self.config.keep:
+        while (
+            len(requests) > 1
+            and sum(len(request.kept) for request in requests.values()) > self.config.keep
+        ):
             self._forget(next(iter(requests)))
 
     def _forget(self, request: str) -> None:
         """Give up a request, and report its missing messages."""
         message = self._requests.open[request].sentence()
         self._requests.forget(request)
-        self.status(Level.WARN, f"{message}; it is not evaluated; see keep and wait", "requests", request=request)
+        self.status(
+            Level.WARN,
+            f"{message}; it is not evaluated; see keep and wait",
+            "requests",
+            request=request,
+        )
 
     def _report_missing(self) -> None:
         """Say what has not come of closed requests, once all is quiet."""
@@ -105,7 +126,12 @@ class Evaluator(StageNode):
         self._news = math.inf
         for request in self._requests.incomplete(closed=True):
             why = "they were lost, or published before this node listened; it is not evaluated without them"
-            self.status(Level.WARN, f"{request.sentence()}: {why}", "requests", missing=str(request.missing))
+            self.status(
+                Level.WARN,
+                f"{request.sentence()}: {why}",
+                "requests",
+                missing=str(request.missing),
+            )
 
     def _submit(self, messages: Mapping[str, bytes], request: TrackedRequest) -> None:
         name, summary = f"request {request.request}", request.summary
@@ -114,13 +140,20 @@ class Evaluator(StageNode):
         scenarios = request.in_order()
         self.work(name, lambda _: self._evaluate(messages, scenarios, summary))
 
-    def _evaluate(self, messages: Mapping[str, bytes], scenarios: Entries, summary: RequestSummary) -> None:
+    def _evaluate(
+        self, messages: Mapping[str, bytes], scenarios: Entries, summary: RequestSummary
+    ) -> None:
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
         # an ego that is left out may have been the first to come
-        decoded = [decode_scenario(data, seed=entry.seed, index=entry.index, late=True) for data, entry in scenarios]
+        decoded = [
+            decode_scenario(data, seed=entry.seed, index=entry.index, late=True)
+            for data, entry in scenarios
+        ]
         if any(stamp != encounter.start_ns for stamp, _ in decoded):
-            raise InputError(f"request {summary.request}: its scenarios are not those of the newest tracks")
+            raise InputError(
+                f"request {summary.request}: its scenarios are not those of the newest tracks"
+            )
         found = summary.result(tuple(scenario for _, scenario in decoded))
         evaluation = evaluate_scenarios(
             encounter,
@@ -133,11 +166,31 @@ class Evaluator(StageNode):
         statuses = []
         chosen = f"measured on {len(decoded)} of {summary.published} scenarios, chosen by seed {self.config.seed}"
         for row in evaluation.rows:
-            figures = {key: repr(entry.value) for key, entry in row.values.items() if math.isfinite(entry.value)}
+            figures = {
+                key: repr(entry.value)
+                for key, entry in row.values.items()
+                if math.isfinite(entry.value)
+            }
             k = str(evaluation.changepoints)  # beside E always: more changepoints always lower it
-            values = {"request": summary.request, "samples": str(row.samples), "changepoints": k, **figures}
-            notes = (*row.notes, chosen) if row.name == WITH and len(decoded) < summary.published else row.notes
-            statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(notes), values))
+            values = {
+                "request": summary.request,
+                "samples": str(row.samples),
+                "changepoints": k,
+                **figures,
+            }
+            notes = (
+                (*row.notes, chosen)
+                if row.name == WITH and len(decoded) < summary.published
+                else row.notes
+            )
+            statuses.append(
+                Status(
+                    f"{self.get_fully_qualified_name()}: {row.name}",
+                    Level.OK,
+                    "; ".join(notes),
+                    values,
+                )
+            )
         self.outputs.send("report", encode_diagnostics(statuses, encounter.start_ns))
         self.diagnostics.resolve("requests")
         self.get_logger().info(f"request {summary.request} evaluated: {len(decoded)} scenarios")

@@ -19,7 +19,13 @@ from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.method.sampling import Cancelled
 from scenario_gen.ros.plumbing.goals import action_type, Goals
-from scenario_gen.ros.plumbing.sampling_requests import Answer, answer_request, Config, OpenRequest, OpenRequests
+from scenario_gen.ros.plumbing.sampling_requests import (
+    Answer,
+    answer_request,
+    Config,
+    OpenRequest,
+    OpenRequests,
+)
 from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
 from scenario_gen.ros.plumbing.topics import unacknowledged
 from scenario_gen.types import tokens
@@ -31,13 +37,26 @@ class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
     INPUTS = ("map", *ENDS, LANES, "tracks", "changepoints", "fit", "fit/info")
-    STAGES = ("template", "roads", "method.fitting", "method.routing", "method.sampling", "method.validity")
+    STAGES = (
+        "template",
+        "roads",
+        "method.fitting",
+        "method.routing",
+        "method.sampling",
+        "method.validity",
+    )
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
     THREADS = min(2, os.cpu_count() or 1)  # so that a small request need not wait for a large one
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
-        paired = ("tracks", "changepoints", "fit", "fit/info", *(("map",) if self.config.pair_map else ()))
+        paired = (
+            "tracks",
+            "changepoints",
+            "fit",
+            "fit/info",
+            *(("map",) if self.config.pair_map else ()),
+        )
         self.inputs = Inputs(paired, () if self.config.pair_map else ("map",), (LANES,))
         self._routes: set[str] = set()
         self._turn = threading.Lock()
@@ -67,9 +86,15 @@ class GpSampler(StageNode):
             self._follow(data)
         self._requests.look()
         config = self.config
-        if config.generate_on_input and (topic not in ENDS or config.moves) and not self.missing(config):
+        if (
+            config.generate_on_input
+            and (topic not in ENDS or config.moves)
+            and not self.missing(config)
+        ):
             messages = self.messages()
-            self.work("inputs", lambda cancelled: self._generate_on_input(messages, config, cancelled))
+            self.work(
+                "inputs", lambda cancelled: self._generate_on_input(messages, config, cancelled)
+            )
 
     def missing(self, config: Config) -> list[str]:
         """The topics that a request still waits for."""
@@ -79,11 +104,18 @@ class GpSampler(StageNode):
     def messages(self) -> dict[str, bytes]:
         """The template's messages; entries, exits and lanes only if the fit was made with them."""
         messages = self.inputs.complete() or {}
-        return {t: data for t, data in messages.items() if t not in (*ENDS, LANES) or self.inputs.named("fit/info", t)}
+        return {
+            t: data
+            for t, data in messages.items()
+            if t not in (*ENDS, LANES) or self.inputs.named("fit/info", t)
+        }
 
     def _follow(self, tracks: bytes) -> None:
         """Listen to the routes of the vehicles in the tracks, and no longer to those of others."""
-        wanted = {vehicle_topic(name, "route") for name in tokens(v.id for v in decode_tracks(tracks).vehicles)}
+        wanted = {
+            vehicle_topic(name, "route")
+            for name in tokens(v.id for v in decode_tracks(tracks).vehicles)
+        }
         self.inputs.forget(self._routes - wanted)
         for topic in sorted(self._routes - wanted):
             self.ignore(topic)
@@ -92,19 +124,35 @@ class GpSampler(StageNode):
         for topic in sorted(wanted):
             self.listen(topic)
 
-    def _generate_on_input(self, messages: Mapping[str, bytes], config: Config, cancelled: Cancelled) -> None:
-        self.generate(messages, self._requests.add(job="inputs", n_requested=config.count), config, cancelled)
+    def _generate_on_input(
+        self, messages: Mapping[str, bytes], config: Config, cancelled: Cancelled
+    ) -> None:
+        self.generate(
+            messages, self._requests.add(job="inputs", n_requested=config.count), config, cancelled
+        )
 
     def given_up(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
         """Return why a request is given up; "" if it is not."""
-        return "given up: its inputs were replaced" if self.inputs.replaced(messages) else "cancelled" if cancelled() else ""
+        return (
+            "given up: its inputs were replaced"
+            if self.inputs.replaced(messages)
+            else "cancelled"
+            if cancelled()
+            else ""
+        )
 
     def generate(
-        self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Cancelled
+        self,
+        messages: Mapping[str, bytes],
+        request: OpenRequest,
+        config: Config,
+        cancelled: Cancelled,
     ) -> Answer | None:
         """Sample, check and publish; the request's summary closes `scenarios/info`. None if it was given up before its end."""
 
-        def stop() -> bool:  # also within a set, so that no scenario of an old map follows a new one
+        def stop() -> (
+            bool
+        ):  # also within a set, so that no scenario of an old map follows a new one
             return bool(self.given_up(messages, cancelled))
 
         level, words, more = Level.WARN, "", dict[str, str]()
@@ -112,9 +160,16 @@ class GpSampler(StageNode):
             if stop():
                 return None
             self._requests.begin(request)
-            node, send = self.get_fully_qualified_name(), partial(self.outputs.send_paced, stop=stop)
-            with self.outputs.paced(self.OUTPUTS[:2], config.patience, partial(self._report_pace, request.name)):
-                result, summary = answer_request(messages, config, request, node, stop, send, self._turn)
+            node, send = (
+                self.get_fully_qualified_name(),
+                partial(self.outputs.send_paced, stop=stop),
+            )
+            with self.outputs.paced(
+                self.OUTPUTS[:2], config.patience, partial(self._report_pace, request.name)
+            ):
+                result, summary = answer_request(
+                    messages, config, request, node, stop, send, self._turn
+                )
             words = summary.status.message
             if summary.cancelled:
                 words = f"{self.given_up(messages, cancelled)}: {words}"
@@ -126,7 +181,15 @@ class GpSampler(StageNode):
                 level, words, more = Level.ERROR, str(error), {"error": type(error).__name__}
             raise
         finally:
-            self._requests.end(request, level, words or self.given_up(messages, cancelled) or "cancelled", **more)
+            self._requests.end(
+                request, level, words or self.given_up(messages, cancelled) or "cancelled", **more
+            )
 
     def _report_pace(self, request: str, topic: str, count: int) -> None:
-        self.status(Level.WARN, unacknowledged(self, topic, count), f"pace of {topic}", request=request, count=str(count))
+        self.status(
+            Level.WARN,
+            unacknowledged(self, topic, count),
+            f"pace of {topic}",
+            request=request,
+            count=str(count),
+        )

@@ -62,7 +62,9 @@ class LogPlayer(StageNode):
         if not config.stream:
             self.outputs.send("tracks", encode_tracks(encounter))
         n, samples = encounter.speed.shape
-        message = f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
+        message = (
+            f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
+        )
         notes = {f"note.{k}": note for k, note in enumerate(result.quality.remarks())}
         if encounter.origin is not None:
             notes["origin"] = "{!r},{!r}".format(*encounter.origin)
@@ -72,16 +74,24 @@ class LogPlayer(StageNode):
 
     def _stream(self, encounter: Encounter, config: Config, cancelled: Callable[[], bool]) -> None:
         """Publish sample after sample, at the rate, until the end or until cancelled; the clock runs ahead of none."""
-        names, places = tokens(vehicle.id for vehicle in encounter.vehicles), latitude_longitude(encounter)
+        names, places = (
+            tokens(vehicle.id for vehicle in encounter.vehicles),
+            latitude_longitude(encounter),
+        )
         clock = self.create_publisher(Clock, "/clock", 10)
         topics = [vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")]
         for topic in topics:
             self.outputs.advertise(topic)
-        while min(map(self.count_subscribers, topics)) < config.wait_matching_subscriptions and not cancelled():
+        while (
+            min(map(self.count_subscribers, topics)) < config.wait_matching_subscriptions
+            and not cancelled()
+        ):
             time.sleep(0.05)
         started = time.monotonic() + HEAD_START_S
         for k in range(encounter.speed.shape[1]):
-            while (ahead := started + k * encounter.dt / config.rate - time.monotonic()) > 0.0 and not cancelled():
+            while (
+                ahead := started + k * encounter.dt / config.rate - time.monotonic()
+            ) > 0.0 and not cancelled():
                 time.sleep(min(ahead, 0.1))
             if cancelled() or not self.context.ok():
                 break
@@ -89,8 +99,13 @@ class LogPlayer(StageNode):
             self.outputs.publish(clock, encode_clock(stamp))
             for i, name in enumerate(names):
                 frame, (latitude, longitude) = f"vehicle_{name}", places[i, k].tolist()
-                self.outputs.send(vehicle_topic(name, "fix"), encode_fix(latitude, longitude, stamp, frame))
-                self.outputs.send(vehicle_topic(name, "speed"), encode_speed(float(encounter.speed[i, k]), stamp, frame))
+                self.outputs.send(
+                    vehicle_topic(name, "fix"), encode_fix(latitude, longitude, stamp, frame)
+                )
+                self.outputs.send(
+                    vehicle_topic(name, "speed"),
+                    encode_speed(float(encounter.speed[i, k]), stamp, frame),
+                )
         else:
             self.status(Level.OK, f"{encounter.name}: streamed", "stream", encounter.start_ns)
         self.destroy_publisher(clock)

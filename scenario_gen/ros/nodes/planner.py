@@ -50,8 +50,12 @@ class Config(Parameters):
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     limits: Limits = field(default_factory=Limits)
     seed: int = parameter(0, "seed of the planner", low=0)
-    radius: float = parameter(1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0)
-    pair_map: bool = parameter(True, "take only a map with the recording's stamp; false: any map server's newest one")
+    radius: float = parameter(
+        1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0
+    )
+    pair_map: bool = parameter(
+        True, "take only a map with the recording's stamp; false: any map server's newest one"
+    )
 
 
 class Planner(StageNode):
@@ -66,7 +70,11 @@ class Planner(StageNode):
         self.create_service(GetPlan, "~/get_plan", self._get_plan, qos_profile=REQUESTS)
         paired = self.config.pair_map
         self._requests = 0
-        self.inputs = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",), (LANES,))
+        self.inputs = Inputs(
+            ("tracks", "changepoints", *(ROAD if paired else ())),
+            () if paired else ("map",),
+            (LANES,),
+        )
 
     def stopped(self) -> None:
         """Forget the inputs: being latched, they come again."""
@@ -77,32 +85,47 @@ class Planner(StageNode):
         if topic in ("road/info", LANES) and not self.config.pair_map:
             return  # a map server of the user's own does not say what belongs to its map
         self.inputs.put(topic, data)
-        messages = self.inputs.complete()  # if not all is there, the work on what was there is cancelled all the same
+        messages = (
+            self.inputs.complete()
+        )  # if not all is there, the work on what was there is cancelled all the same
         self.work("plan", lambda _: self._plan(messages) if messages else None)
 
     def _plan(self, messages: dict[str, bytes]) -> None:
         config = self.config
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
-        _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
-        stages = PipelineConfig(fitting=config.fitting, planning=config.planning, limits=config.limits)
+        _, road = decode_map(
+            messages["map"],
+            messages.get("road/entries"),
+            messages.get("road/exits"),
+            messages.get(LANES),
+        )
+        stages = PipelineConfig(
+            fitting=config.fitting, planning=config.planning, limits=config.limits
+        )
         planned = Chain(encounter, segmentation, road, stages, seed=config.seed).plan()
         (_, fit), routes = planned.road_and_fit(), planned.routes
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         results = {
             vehicle_topic(name, "route"): encode_route(route, anchors, road.frame_id)
-            for name, route in zip(tokens(vehicle.id for vehicle in encounter.vehicles), routes, strict=True)
+            for name, route in zip(
+                tokens(vehicle.id for vehicle in encounter.vehicles), routes, strict=True
+            )
         }
         results["fit"] = encode_fit(encounter, fit, road.frame_id)
         results["fit/info"] = encode_hashes("fit", messages | results, encounter.start_ns)
         for topic, data in results.items():
             self.outputs.send(topic, data)
         self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
-        statuses = fit_statuses(fit, self.get_fully_qualified_name(), template_hashes(messages), routes)
+        statuses = fit_statuses(
+            fit, self.get_fully_qualified_name(), template_hashes(messages), routes
+        )
         self.diagnostics.report(*statuses, stamp_ns=encounter.start_ns)
 
-    async def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
+    async def _get_plan(
+        self, request: GetPlan.Request, response: GetPlan.Response
+    ) -> GetPlan.Response:
         """Plan for a caller, off the executor's thread."""
         grid = self.inputs.get("map")
         stamp = Time.from_msg(request.start.header.stamp).nanoseconds
@@ -119,7 +142,14 @@ class Planner(StageNode):
                 return encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp)
             except ScenarioGenError as error:
                 kind = type(error).__name__
-                self.status(Level.ERROR, str(error), "get_plan", error=kind, job=name, request_stamp=decimal_stamp(stamp))
+                self.status(
+                    Level.ERROR,
+                    str(error),
+                    "get_plan",
+                    error=kind,
+                    job=name,
+                    request_stamp=decimal_stamp(stamp),
+                )
                 return b""
 
         response.plan.header.stamp = request.start.header.stamp
@@ -142,7 +172,9 @@ def query_of(request: Any, frame_id: str, radius: float) -> Query:
     for name, stamped in (("start", request.start), ("goal", request.goal)):
         position = stamped.pose.position
         if stamped.header.frame_id not in ("", frame_id):
-            raise InputError(f"{name} is in frame {stamped.header.frame_id!r}; the map is in {frame_id!r}")
+            raise InputError(
+                f"{name} is in frame {stamped.header.frame_id!r}; the map is in {frame_id!r}"
+            )
         if not (math.isfinite(position.x) and math.isfinite(position.y)):
             raise InputError(f"{name} is not finite ({position.x}, {position.y})")
         ends.append(np.array([position.x, position.y]))

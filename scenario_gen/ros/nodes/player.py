@@ -35,9 +35,18 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.services import offer_trigger
-from scenario_gen.ros.plumbing.topics import message_class, OVERRIDABLE, Pace, publish, qos, unacknowledged
+from scenario_gen.ros.plumbing.topics import (
+    message_class,
+    OVERRIDABLE,
+    Pace,
+    publish,
+    qos,
+    unacknowledged,
+)
 
-STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
+STREAMED = BagConfig(
+    most_bytes=2**62
+)  # a message is published and forgotten, so a bag may be of any size
 PATIENCE_S = 5.0  # seconds in which listeners have to take the last messages
 TICK_S = 0.01  # seconds between two clock messages
 
@@ -48,14 +57,21 @@ class Config(Parameters):
 
     bag: str = parameter("", "bag to play: its folder or one of its files")
     topics: str = parameter(".*", "regular expression of the full names of the topics to play")
-    rate: float = parameter(1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0)
+    rate: float = parameter(
+        1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0
+    )
     start_offset: float = parameter(0.0, "begin so far into the bag", unit="s", low=0.0)
     loop: bool = parameter(False, "begin again at the end")
-    stay: bool = parameter(False, "stay when all is played, so that latched topics reach who comes later, too")
+    stay: bool = parameter(
+        False, "stay when all is played, so that latched topics reach who comes later, too"
+    )
     paused: bool = parameter(False, "wait for ~/resume before the first message")
     clock: bool = parameter(False, "publish /clock")
     patience: float = parameter(
-        60.0, "wait so long for subscribers that acknowledge nothing, then go on and warn; 0: for ever", unit="s", low=0.0
+        60.0,
+        "wait so long for subscribers that acknowledge nothing, then go on and warn; 0: for ever",
+        unit="s",
+        low=0.0,
     )
 
 
@@ -74,7 +90,9 @@ class Player(Node):  # type: ignore[misc]
         self._player: threading.Thread | None = None
         self._offered: dict[str, tuple[Any, bool, int]] = {}
         self._paces: dict[str, Pace] = {}
-        self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
+        self._clock_publisher = (
+            self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
+        )
         offer_trigger(self, "~/pause", partial(self._set_running, running=False))
         offer_trigger(self, "~/resume", partial(self._set_running, running=True))
 
@@ -93,15 +111,31 @@ class Player(Node):  # type: ignore[misc]
                 continue
             try:
                 kind, quality = message_class(topic.type), qos(topic.quality)
-                publisher = self.create_publisher(kind, name, quality, qos_overriding_options=QoSOverridingOptions(OVERRIDABLE))
-                self._offered[topic.name] = (publisher, topic.quality.transient_local, topic.quality.depth)
+                publisher = self.create_publisher(
+                    kind, name, quality, qos_overriding_options=QoSOverridingOptions(OVERRIDABLE)
+                )
+                self._offered[topic.name] = (
+                    publisher,
+                    topic.quality.transient_local,
+                    topic.quality.depth,
+                )
                 self._paces[topic.name] = Pace(
-                    publisher, publisher.qos_profile.depth, config.patience, partial(self._report_pace, name)
+                    publisher,
+                    publisher.qos_profile.depth,
+                    config.patience,
+                    partial(self._report_pace, name),
                 )
             except InputError as error:
-                self.diagnostics.status(Level.ERROR, f"{name} is not played: {error}", "topics", {"error": "InputError"})
+                self.diagnostics.status(
+                    Level.ERROR,
+                    f"{name} is not played: {error}",
+                    "topics",
+                    {"error": "InputError"},
+                )
         if not self._offered:
-            raise InputError(f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics")
+            raise InputError(
+                f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics"
+            )
         if not config.paused:
             self._running.set()
         self._player = threading.Thread(target=self._play, args=(config,), daemon=True)
@@ -120,7 +154,9 @@ class Player(Node):  # type: ignore[misc]
             self.diagnostics.status(Level.OK, f"{config.bag}: played", "playing", {})
         except ScenarioGenError as error:
             self._at = None
-            self.diagnostics.status(Level.ERROR, str(error), "playing", {"error": type(error).__name__})
+            self.diagnostics.status(
+                Level.ERROR, str(error), "playing", {"error": type(error).__name__}
+            )
             self.exit_code = error.exit_code
         if not config.stay and not self._ended.is_set():
             self._leave()
@@ -132,9 +168,15 @@ class Player(Node):  # type: ignore[misc]
         deadline = monotonic() + PATIENCE_S
         with suppress(InvalidHandle):  # the node is being ended already
             for publisher, _, _ in self._offered.values():
-                while not publisher.wait_for_all_acked(Duration()) and monotonic() < deadline and not self._ended.wait(TICK_S):
+                while (
+                    not publisher.wait_for_all_acked(Duration())
+                    and monotonic() < deadline
+                    and not self._ended.wait(TICK_S)
+                ):
                     pass
-        self.executor.create_task(self._finish)  # to wake the executor alone would not make it look
+        self.executor.create_task(
+            self._finish
+        )  # to wake the executor alone would not make it look
 
     def _finish(self) -> None:
         self.diagnostics.publish()  # how it went
@@ -145,7 +187,9 @@ class Player(Node):  # type: ignore[misc]
         elapsed = config.start_offset  # seconds of the bag that have been played
         for message in self._from_offset(config):
             first = message.stamp_ns if first is None else first
-            elapsed = self._wait_until((message.stamp_ns - first) * 1e-9 + config.start_offset, elapsed, config, first)
+            elapsed = self._wait_until(
+                (message.stamp_ns - first) * 1e-9 + config.start_offset, elapsed, config, first
+            )
             if self._ended.is_set():
                 return
             self._publish(message.topic, message.data)
@@ -156,13 +200,20 @@ class Player(Node):  # type: ignore[misc]
         publish(self, self._offered[topic][0], data)
 
     def _report_pace(self, topic: str, count: int) -> None:
-        self.diagnostics.status(Level.WARN, unacknowledged(self, topic, count), f"pace of {topic}", {"count": str(count)})
+        self.diagnostics.status(
+            Level.WARN,
+            unacknowledged(self, topic, count),
+            f"pace of {topic}",
+            {"count": str(count)},
+        )
 
     def _from_offset(self, config: Config) -> Iterator[BagMessage]:
         """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
         latched: dict[str, deque[bytes]] = {}
         begin: int | None = None
-        for message in read_messages(Path(config.bag), lambda topic: topic in self._offered, STREAMED):
+        for message in read_messages(
+            Path(config.bag), lambda topic: topic in self._offered, STREAMED
+        ):
             begin = message.stamp_ns if begin is None else begin
             if message.stamp_ns - begin < config.start_offset * 1e9:
                 if self._offered[message.topic][1]:
@@ -190,8 +241,12 @@ class Player(Node):  # type: ignore[misc]
     def _report_progress(self) -> None:
         """Say how far into the bag it is, each second."""
         if (at := self._at) is not None:
-            message = f"{self.parameters.config.bag}: {at:.1f} s played" + ("" if self._running.is_set() else ", paused")
-            self.diagnostics.status(Level.OK, message, "playing", {"seconds": f"{at:.1f}"}, log=False)
+            message = f"{self.parameters.config.bag}: {at:.1f} s played" + (
+                "" if self._running.is_set() else ", paused"
+            )
+            self.diagnostics.status(
+                Level.OK, message, "playing", {"seconds": f"{at:.1f}"}, log=False
+            )
 
     def _publish_clock(self, stamp_ns: int) -> None:
         if self._clock_publisher is not None:

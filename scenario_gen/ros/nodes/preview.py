@@ -34,7 +34,9 @@ class Config(Parameters):
     """The preview's parameters."""
 
     frame_rate: float = parameter(20.0, "frames a second", unit="Hz", low=1.0, high=100.0)
-    pause: float = parameter(1.0, "how long the end is shown before it begins again", unit="s", low=0.0, high=60.0)
+    pause: float = parameter(
+        1.0, "how long the end is shown before it begins again", unit="s", low=0.0, high=60.0
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +66,9 @@ class Preview(StageNode):
         self._newest: tuple[Scenario, ScenarioEntry] | None = None
         self._shown: Shown | None = None
         self._anchors = np.zeros((0, 0, 3))
-        self.create_timer(1.0 / self.config.frame_rate, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(
+            1.0 / self.config.frame_rate, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
 
     def stopped(self) -> None:
         """Forget what was shown."""
@@ -87,7 +91,11 @@ class Preview(StageNode):
                 return
             scenario, entry = self._newest
             reactions = dict(
-                sorted((part.split(" ", 1)[0], part) for part in entry.status.values.get("reactions", "").split("; ") if part)
+                sorted(
+                    (part.split(" ", 1)[0], part)
+                    for part in entry.status.values.get("reactions", "").split("; ")
+                    if part
+                )
             )
             self._shown = shown = Shown(scenario, now, reactions, conflicts_of(scenario))
         self._publish(shown, min(now - shown.since, float(shown.scenario.time[-1])))
@@ -101,18 +109,38 @@ class Preview(StageNode):
         markers = [Marker("", CUBE, DELETE_ALL)]
         for n, pose, speed in zip(here, poses.tolist(), speeds.tolist(), strict=True):
             vehicle = scenario.vehicles[n]
-            markers.append(body(names[n], vehicle, (pose[0], pose[1], pose[2]), COLOURS[n % len(COLOURS)], 0.9))
+            markers.append(
+                body(
+                    names[n], vehicle, (pose[0], pose[1], pose[2]), COLOURS[n % len(COLOURS)], 0.9
+                )
+            )
             words = f"{shown.reactions.get(names[n], names[n])}, {speed:.1f} m/s"
             place = (pose[0], pose[1] + vehicle.length, 0.0)
-            markers.append(Marker(f"text_{names[n]}", TEXT, pose=place, scale=(0.0, 0.0, HIGH), text=words))
+            markers.append(
+                Marker(f"text_{names[n]}", TEXT, pose=place, scale=(0.0, 0.0, HIGH), text=words)
+            )
         for k, (pose, words) in enumerate(shown.conflicts):
-            markers.append(Marker(f"conflict_{k}", CUBE, pose=pose, scale=(2.0, 2.0, 0.1), colour=(0.9, 0.1, 0.1, 0.5)))
-            markers.append(Marker(f"conflict_text_{k}", TEXT, pose=pose, scale=(0.0, 0.0, HIGH), text=words))
+            markers.append(
+                Marker(
+                    f"conflict_{k}",
+                    CUBE,
+                    pose=pose,
+                    scale=(2.0, 2.0, 0.1),
+                    colour=(0.9, 0.1, 0.1, 0.5),
+                )
+            )
+            markers.append(
+                Marker(f"conflict_text_{k}", TEXT, pose=pose, scale=(0.0, 0.0, HIGH), text=words)
+            )
         for n, anchors in enumerate(self._anchors[:, 1:-1]):
             for k, (x, y, yaw) in enumerate(anchors.tolist()):
                 colour = (*COLOURS[n % len(COLOURS)], 0.6)
                 dot = (0.6, 0.6, 0.2)
-                markers.append(Marker(f"changepoint_{n}_{k}", CUBE, pose=(x, y, yaw), scale=dot, colour=colour))
+                markers.append(
+                    Marker(
+                        f"changepoint_{n}_{k}", CUBE, pose=(x, y, yaw), scale=dot, colour=colour
+                    )
+                )
         self.outputs.send("preview", encode_markers(markers, scenario.frame_id, stamp_ns))
 
 
@@ -122,10 +150,15 @@ def conflicts_of(scenario: Scenario) -> tuple[tuple[tuple[float, float, float], 
     found = []
     for conflict in conflicts_in(scenario):
         n = conflict.second
-        x, y, yaw = (float(np.interp(conflict.entry_second, time, row)) for row in (*scenario.position[n].T, scenario.heading[n]))
+        x, y, yaw = (
+            float(np.interp(conflict.entry_second, time, row))
+            for row in (*scenario.position[n].T, scenario.heading[n])
+        )
         first, second = names[conflict.first], names[n]
         words = (
-            f"{second} behind {first}" if conflict.following else f"{first} first, {second} {conflict.encroachment:.1f} s later"
+            f"{second} behind {first}"
+            if conflict.following
+            else f"{first} first, {second} {conflict.encroachment:.1f} s later"
         )
         found.append(((x, y, yaw), words))
     return tuple(found)
@@ -136,5 +169,7 @@ def states_at(scenario: Scenario, time: float) -> tuple[list[int], Floats, Float
     ends = scenario.time[scenario.present]
     here = np.flatnonzero((ends[:, 0] <= time) & (time <= ends[:, 1])).tolist()
     rows = [(*scenario.position[n].T, scenario.heading[n], scenario.speed[n]) for n in here]
-    values = np.array([[np.interp(time, scenario.time, row) for row in own] for own in rows]).reshape(-1, 4)
+    values = np.array(
+        [[np.interp(time, scenario.time, row) for row in own] for own in rows]
+    ).reshape(-1, 4)
     return here, values[:, :3], values[:, 3]

@@ -63,7 +63,9 @@ class Config(RecorderParameters):
 
 
 @contextmanager
-def _disk_errors(advice: str = "; `scenario-gen reindex` saves what is whole in the bag") -> Iterator[None]:
+def _disk_errors(
+    advice: str = "; `scenario-gen reindex` saves what is whole in the bag",
+) -> Iterator[None]:
     """Turn the system's errors into ours."""
     try:
         yield
@@ -99,7 +101,11 @@ class Recorder(Node):  # type: ignore[misc]
     def _start(self, folder: Path) -> None:
         config = self.parameters.config
         with _disk_errors("; name another folder for the bag"):
-            self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
+            self._bag = BagWriter(
+                folder,
+                compress=config.compress,
+                split=Split(config.split_bytes, config.split_seconds),
+            )
         self._losses, self._warned = Losses(self.count_publishers), {}
         self._report(Level.OK, f"recording to {folder}")
         self._refused.clear()
@@ -126,7 +132,9 @@ class Recorder(Node):  # type: ignore[misc]
         self._report(Level.OK, f"{bag.folder} is closed")
         return str(bag.folder)
 
-    def _report(self, level: Level, message: str, subject: str = "recording", **values: str) -> None:
+    def _report(
+        self, level: Level, message: str, subject: str = "recording", **values: str
+    ) -> None:
         self.diagnostics.status(level, message, subject, values)
 
     def _take_rest(self) -> None:
@@ -160,7 +168,11 @@ class Recorder(Node):  # type: ignore[misc]
             return
         wanted = re.compile(self.parameters.config.topics or default_topics(self.get_namespace()))
         for topic, kinds in self.get_topic_names_and_types():
-            if topic not in self._listening and topic not in self._refused and wanted.fullmatch(topic):
+            if (
+                topic not in self._listening
+                and topic not in self._refused
+                and wanted.fullmatch(topic)
+            ):
                 self._listen(topic, kinds[0])
 
     def _report_counts(self) -> None:
@@ -203,23 +215,33 @@ class Recorder(Node):  # type: ignore[misc]
         publishers = self.get_publishers_info_by_topic(topic)
         if not publishers or self._bag is None:
             return
-        quality, recorded = adapted_quality(topic, [publisher.qos_profile for publisher in publishers])
+        quality, recorded = adapted_quality(
+            topic, [publisher.qos_profile for publisher in publishers]
+        )
         try:
             message = message_class(kind)
-            self._bag.add_topic(topic, kind, qos_yaml(recorded), str(publishers[0].topic_type_hash))
+            self._bag.add_topic(
+                topic, kind, qos_yaml(recorded), str(publishers[0].topic_type_hash)
+            )
         except InputError as error:
             self._refused.add(topic)
-            self._report(Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError")
+            self._report(
+                Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError"
+            )
             return
         take, losses = partial(self._write, topic), self._losses
         losses.begin(topic, recorded)
-        lost = SubscriptionEventCallbacks(message_lost=lambda event: losses.count_by_dds(topic, event.total_count))
+        lost = SubscriptionEventCallbacks(
+            message_lost=lambda event: losses.count_by_dds(topic, event.total_count)
+        )
 
         def received(data: bytes, about: dict[str, Any]) -> None:  # rclpy counts the arguments
             take(data, about["publication_sequence_number"])
             self._take_more(topic)
 
-        self._listening[topic] = self.create_subscription(message, topic, received, qos(quality), raw=True, event_callbacks=lost)
+        self._listening[topic] = self.create_subscription(
+            message, topic, received, qos(quality), raw=True, event_callbacks=lost
+        )
 
     def _write(self, topic: str, data: bytes, number: int | None) -> None:
         if self._bag is not None:
@@ -245,7 +267,9 @@ class Recorder(Node):  # type: ignore[misc]
     def _start_now(self) -> str:
         if self._bag is not None:
             raise InputError(f"{self._bag.folder} is being recorded; call ~/stop first")
-        folder = Path(self.parameters.config.bag or f"bag_{self.get_clock().now().nanoseconds // 1_000_000}")
+        folder = Path(
+            self.parameters.config.bag or f"bag_{self.get_clock().now().nanoseconds // 1_000_000}"
+        )
         self._start(folder)
         return str(folder)
 

@@ -52,11 +52,17 @@ def road_of_url(url: str) -> str:
         return unquote(parts.path)
     if parts.scheme == "package":
         try:
-            return str(Path(get_package_share_directory(parts.netloc)) / unquote(parts.path).lstrip("/"))
+            return str(
+                Path(get_package_share_directory(parts.netloc)) / unquote(parts.path).lstrip("/")
+            )
         except (PackageNotFoundError, ValueError):
-            raise InputError(f"{url}: package {parts.netloc!r} is not installed or not sourced") from None
+            raise InputError(
+                f"{url}: package {parts.netloc!r} is not installed or not sourced"
+            ) from None
     if parts.scheme:
-        raise InputError(f"{url}: give file://, package://, a path, or the name of a built-in road")
+        raise InputError(
+            f"{url}: give file://, package://, a path, or the name of a built-in road"
+        )
     return url
 
 
@@ -72,7 +78,9 @@ class RoadServer(StageNode):
         self._tracks: bytes | None = None
         self._name = self.config.road_name
         self._grid: bytes | None = None
-        self._with_lanes = False  # whether the last road had lanes: an empty message then replaces them
+        self._with_lanes = (
+            False  # whether the last road had lanes: an empty message then replaces them
+        )
         self.create_service(GetMap, "~/get_map", self._get_map, qos_profile=REQUESTS)
         self._requests = 0
         self.create_service(LoadMap, "~/load_map", self._load_map, qos_profile=REQUESTS)
@@ -98,7 +106,10 @@ class RoadServer(StageNode):
             "map": encode_map(road, stamp_ns),
         }
         if road.lanes is not None:
-            messages = {LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns), **messages}  # published before their map
+            messages = {
+                LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns),
+                **messages,
+            }  # published before their map
         stop_if_cancelled()
         if self._with_lanes and road.lanes is None:
             self.outputs.send(LANES, encode_lanes(None, road.frame_id, stamp_ns))
@@ -111,8 +122,12 @@ class RoadServer(StageNode):
         self._grid = messages["map"]
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
-        faults = [note for note in (road.lanes.notes if road.lanes is not None else ()) if FAULTY in note]
-        level, message = (Level.WARN, "; ".join([message, *faults])) if faults else (Level.OK, message)
+        faults = [
+            note for note in (road.lanes.notes if road.lanes is not None else ()) if FAULTY in note
+        ]
+        level, message = (
+            (Level.WARN, "; ".join([message, *faults])) if faults else (Level.OK, message)
+        )
         self.status(level, message, "road", stamp_ns, **template_hashes(messages | template))
 
     def _get_map(self, _request: Any, response: Any) -> Any:
@@ -120,7 +135,9 @@ class RoadServer(StageNode):
             response.map = deserialize_message(self._grid, OccupancyGrid)
         return response
 
-    async def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
+    async def _load_map(
+        self, request: LoadMap.Request, response: LoadMap.Response
+    ) -> LoadMap.Response:
         """Load another road, off the executor's thread; it stays until the next request or restart."""
         codes = LoadMap.Response
         self._requests += 1
@@ -135,9 +152,15 @@ class RoadServer(StageNode):
                 return int(codes.RESULT_SUCCESS)
             except ScenarioGenError as reason:
                 message = f"load_map {request.map_url!r}: {reason}"
-                self.status(Level.ERROR, message, "load_map", error=type(reason).__name__)  # cleared when the job ends
+                self.status(
+                    Level.ERROR, message, "load_map", error=type(reason).__name__
+                )  # cleared when the job ends
                 missing = not Path(request.map_url.removeprefix("file://")).exists()
-                return int(codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA)
+                return int(
+                    codes.RESULT_MAP_DOES_NOT_EXIST
+                    if missing
+                    else codes.RESULT_INVALID_MAP_METADATA
+                )
 
         response.result = codes.RESULT_UNDEFINED_FAILURE
         if self.active:

@@ -23,7 +23,12 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import encounters_of, LogConfig, RawLog
-from scenario_gen.method.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
+from scenario_gen.method.segmentation import (
+    LiveSegmenter,
+    OnlineConfig,
+    segment,
+    SegmentationConfig,
+)
 from scenario_gen.ros.plumbing.live import LiveConfig, LiveStreams
 from scenario_gen.ros.plumbing.services import offer_trigger
 from scenario_gen.ros.plumbing.stage_node import StageNode
@@ -82,7 +87,9 @@ class Segmenter(StageNode):
         stop_if_cancelled()
         self.outputs.send("changepoints", encode_changepoints(encounter, segmentation))
         self.outputs.send("posterior", encode_posterior(encounter, segmentation))
-        status = segmentation_status(segmentation, self.get_fully_qualified_name(), encounter.duration)
+        status = segmentation_status(
+            segmentation, self.get_fully_qualified_name(), encounter.duration
+        )
         self.get_logger().info(status.message)
         self.diagnostics.report(status, stamp_ns=encounter.start_ns)
 

@@ -49,7 +49,12 @@ from scenario_gen.ros.plumbing.driving import (
 from scenario_gen.ros.plumbing.node_parameters import TrafficParameters as Config
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.services import offer_trigger
-from scenario_gen.ros.plumbing.topics import create_frames_publisher, create_publisher, create_subscription, publish
+from scenario_gen.ros.plumbing.topics import (
+    create_frames_publisher,
+    create_publisher,
+    create_subscription,
+    publish,
+)
 from scenario_gen.types import tokens
 
 OUTPUTS = ("/clock", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
@@ -62,7 +67,9 @@ class Traffic(Node):  # type: ignore[misc]
     """Drives one scenario after the other."""
 
     def __init__(self, namespace: str | None = None, config: Config = Config()) -> None:
-        self._together = ReentrantCallbackGroup()  # a call of ~/step waits for a command, which another callback takes
+        self._together = (
+            ReentrantCallbackGroup()
+        )  # a call of ~/step waits for a command, which another callback takes
         super().__init__("traffic", namespace=namespace)
         self.parameters = ConfigParameters(self, config)
         self.diagnostics = NodeDiagnostics(self, self._report)
@@ -86,9 +93,16 @@ class Traffic(Node):  # type: ignore[misc]
         self._out["/tf"] = create_frames_publisher(self)
         self._autoware: tuple[str, ...] = ()
         for topic in INPUTS:
-            create_subscription(self, topic, lambda data, topic=topic: self._receive_command(topic, data))
+            create_subscription(
+                self, topic, lambda data, topic=topic: self._receive_command(topic, data)
+            )
         pause, resume = partial(self._pause, paused=True), partial(self._pause, paused=False)
-        for name, action in (("next", self._next), ("reset", self._reset), ("pause", pause), ("resume", resume)):
+        for name, action in (
+            ("next", self._next),
+            ("reset", self._reset),
+            ("pause", pause),
+            ("resume", resume),
+        ):
             offer_trigger(self, f"~/{name}", action)
         self.create_service(Trigger, "~/step", self._serve_step)
 
@@ -113,14 +127,18 @@ class Traffic(Node):  # type: ignore[misc]
             try:
                 Path(config.results).mkdir(parents=True, exist_ok=True)
             except OSError as error:
-                raise of_system(error, f"parameter results is {config.results}", "; name another folder") from error
+                raise of_system(
+                    error, f"parameter results is {config.results}", "; name another folder"
+                ) from error
         if config.autoware:
             self._autoware = (OBJECTS, EGO)
             self._out |= {topic: create_publisher(self, topic) for topic in self._autoware}
         if config.bag:
             self._trials = read_trials(Path(config.bag), config.ego)
             if config.index >= len(self._trials):
-                raise InputError(f"parameter index is {config.index}; {config.bag} has {len(self._trials)} scenarios, from 0")
+                raise InputError(
+                    f"parameter index is {config.index}; {config.bag} has {len(self._trials)} scenarios, from 0"
+                )
             self._load(config.index)
         else:
             for topic in ("map", *TOPICS):
@@ -148,7 +166,12 @@ class Traffic(Node):  # type: ignore[misc]
         """
         trial = self._trials[number]
         self._loop = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config.drive)
-        self._at, self._states, self._received, self._verdict = number, [self._loop.start()], None, ""
+        self._at, self._states, self._received, self._verdict = (
+            number,
+            [self._loop.start()],
+            None,
+            "",
+        )
         self._replies = 0
         self._load_at = math.inf
         self._names = tokens(vehicle.id for vehicle in self._loop.scenario.vehicles)
@@ -169,7 +192,9 @@ class Traffic(Node):  # type: ignore[misc]
         if self._loop is None or self._load_at < math.inf:
             return
         state = self._states[-1]
-        command = decode_command(topic, data, self._loop, self._children[self._loop.ego], state.step)
+        command = decode_command(
+            topic, data, self._loop, self._children[self._loop.ego], state.step
+        )
         self._heard_at = monotonic()
         self._replies += command.step == state.step
         if fault := command.fault or self._doubled(state):
@@ -189,7 +214,11 @@ class Traffic(Node):  # type: ignore[misc]
             return None, fault
         if state.step % LOOK_AROUND == 0:
             self._sources = self.commanding()
-        several = f"several egos: {', '.join(self._sources)}; what came last counts" if len(self._sources) > 1 else ""
+        several = (
+            f"several egos: {', '.join(self._sources)}; what came last counts"
+            if len(self._sources) > 1
+            else ""
+        )
         return command.at(state), several or self._doubled(state)
 
     def _doubled(self, state: State) -> str:
@@ -230,14 +259,21 @@ class Traffic(Node):  # type: ignore[misc]
         verdict, trial = judge(loop, drive), self._trials[self._at]
         self._verdict = verdict.sentence()
         self.outcomes.append(Outcome(trial.name, verdict, drive))
-        self._publish("verdicts", encode_verdict(self.get_name(), self.outcomes[-1], stamp_of(self._states[-1])))
+        self._publish(
+            "verdicts",
+            encode_verdict(self.get_name(), self.outcomes[-1], stamp_of(self._states[-1])),
+        )
         self.get_logger().info(f"scenario {trial.name}: {self._verdict}")
         if self.config.results:
             Path(self.config.results).mkdir(parents=True, exist_ok=True)
-            Drives(self.outcomes, f"{self.get_name()} over ROS 2", self.config.drive).write(Path(self.config.results))
+            Drives(self.outcomes, f"{self.get_name()} over ROS 2", self.config.drive).write(
+                Path(self.config.results)
+            )
         if self._at + 1 < len(self._trials):
             if not self.config.follow_on:
-                self.get_logger().info(f"the next scenario waits for a call of {self.get_fully_qualified_name()}/next")
+                self.get_logger().info(
+                    f"the next scenario waits for a call of {self.get_fully_qualified_name()}/next"
+                )
             elif self.config.lock_step:
                 self._load_at = monotonic() + FOLLOWS_ON_S
             else:
@@ -248,7 +284,9 @@ class Traffic(Node):  # type: ignore[misc]
                 f"that was the last scenario of {self.config.bag}: {passed} of {len(self.outcomes)} drives passed"
             )
 
-    async def _serve_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    async def _serve_step(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
         """Go one step, with a command that came after the one before; after the patience, without one."""
         loop = self._loop
         if loop is None or self._verdict or not self.config.lock_step:
@@ -256,7 +294,9 @@ class Traffic(Node):  # type: ignore[misc]
             return response
         await self._step_once(loop)
         response.success = True
-        response.message = json.dumps({"time": self._states[-1].time, "over": bool(self._verdict), "verdict": self._verdict})
+        response.message = json.dumps(
+            {"time": self._states[-1].time, "over": bool(self._verdict), "verdict": self._verdict}
+        )
         return response
 
     async def _step_once(self, loop: ClosedLoop) -> None:
@@ -289,14 +329,18 @@ class Traffic(Node):  # type: ignore[misc]
             return "the parameter lock_step is false: the clock makes the steps"
         if self._loop is None:
             return "there is no scenario yet"
-        after = "the next one begins at once" if self._load_at < math.inf else "call ~/next or ~/reset"
+        after = (
+            "the next one begins at once" if self._load_at < math.inf else "call ~/next or ~/reset"
+        )
         return f"scenario {self._trials[self._at].name} is over: {self._verdict}; {after}"
 
     # --- services ---------------------------------------------------------------------------------------------
 
     def _next(self) -> str:
         if self._at + 1 >= len(self._trials):
-            raise InputError(f"there is no scenario after number {self._at}; there are {len(self._trials)}")
+            raise InputError(
+                f"there is no scenario after number {self._at}; there are {len(self._trials)}"
+            )
         self._load(self._at + 1)
         return f"scenario {self._trials[self._at].name}"
 
@@ -318,7 +362,9 @@ class Traffic(Node):  # type: ignore[misc]
     def _publish_state(self) -> None:
         """Publish the state of all vehicles; the ego's odometry last, so that a reply to it knows the others."""
         if self._loop is not None:
-            for topic, data in surroundings(self._loop, self._states[-2:], self._names, self._autoware, self._has_subscribers):
+            for topic, data in surroundings(
+                self._loop, self._states[-2:], self._names, self._autoware, self._has_subscribers
+            ):
                 self._publish(topic, data)
 
     def _has_subscribers(self, topic: str) -> bool:
@@ -331,13 +377,25 @@ class Traffic(Node):  # type: ignore[misc]
     def _report(self) -> None:
         """Report each second which scenario is driven; clear a fault of the ego that is over."""
         if self._loop is None:
-            waiting = f": {self._arriving.unmatched} messages wait for scenarios/info" if self._arriving.unmatched else ""
+            waiting = (
+                f": {self._arriving.unmatched} messages wait for scenarios/info"
+                if self._arriving.unmatched
+                else ""
+            )
             self._report_status(Level.WARN, f"there is no scenario yet{waiting}", "driving")
             return
         state, trial = self._states[-1], self._trials[self._at]
         over = f"{self._verdict}; ~/next begins the next scenario" if self._verdict else ""
-        doing = over or ("paused" if self._paused else "waiting for the ego" if self._waits_for_ego else "driving")
-        self._report_status(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
+        doing = over or (
+            "paused"
+            if self._paused
+            else "waiting for the ego"
+            if self._waits_for_ego
+            else "driving"
+        )
+        self._report_status(
+            Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving"
+        )
         if self._waits_for_ego and not self._verdict:
             self._publish_state()  # for planners that started late
         if not state.fault and not (self._received and self._received.fault):

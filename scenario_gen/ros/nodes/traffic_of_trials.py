@@ -30,10 +30,14 @@ Progress = Callable[[int, int], None]
 class TrafficOfTrials(Traffic):
     """Drives trials one after the other for `scenario-gen drive --ros`; each step waits for the planner's reply."""
 
-    def __init__(self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress) -> None:
+    def __init__(
+        self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress
+    ) -> None:
         super().__init__(config=TrafficParameters(lock_step=True, follow_on=False, drive=config))
         self._trials, self._progress = list(trials), progress
-        self._sent: State | None = None  # the state that was published last, when [s], and how many times
+        self._sent: State | None = (
+            None  # the state that was published last, when [s], and how many times
+        )
         self._sent_at, self._times_sent = 0.0, 0
 
     def _publish_state(self) -> None:
@@ -53,7 +57,9 @@ class TrafficOfTrials(Traffic):
             loop, began = self._loop, monotonic()
             await self._wait_for_command(self._states[-1], self.config.patience)
             if self._times_sent > 1:
-                until = monotonic() + LAST_REPLY_S  # each copy may get a reply, of which the last one counts
+                until = (
+                    monotonic() + LAST_REPLY_S
+                )  # each copy may get a reply, of which the last one counts
                 while monotonic() < until:
                     await self._next_command(until)
             while loop is not None and not self._verdict:
@@ -75,7 +81,11 @@ class TrafficOfTrials(Traffic):
 
 
 def drive_trials(
-    trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress, planner: str, check: Callable[[], None]
+    trials: Sequence[Trial],
+    config: ClosedLoopConfig,
+    progress: Progress,
+    planner: str,
+    check: Callable[[], None],
 ) -> list[Outcome]:
     """Drive a planner that is a node through every trial, in lock-step; return the outcomes in the trials' order.
 
@@ -110,7 +120,9 @@ def drive_trials(
                 task = executor.create_task(node.drive_all)
                 while not task.done():
                     check()
-                    executor.spin_once(timeout_sec=1.0)  # spin_until_future_complete of rclpy 7.1 leaves a task for each look
+                    executor.spin_once(
+                        timeout_sec=1.0
+                    )  # spin_until_future_complete of rclpy 7.1 leaves a task for each look
                 task.result()
             return node.outcomes
         finally:

@@ -47,7 +47,9 @@ class _Entry:
 class NodeDiagnostics:
     """The statuses of one node, from any thread; its executor publishes them."""
 
-    def __init__(self, node: Node, update: Callable[[], None] = lambda: None, *, enabled: bool = True) -> None:
+    def __init__(
+        self, node: Node, update: Callable[[], None] = lambda: None, *, enabled: bool = True
+    ) -> None:
         """Report from now on; `update` is called each second, to bring what goes on up to date, `enabled` see `enable`."""
         self._node, self._update, self._enabled = node, update, enabled
         self._entries: dict[str, _Entry] = {}
@@ -80,14 +82,26 @@ class NodeDiagnostics:
         """
         with self._lock:
             stop_if_abandoned()
-            names, families = {status.name for status in statuses}, {family(status.name) for status in statuses}
-            for name in [name for name in self._entries if family(name) in families and name not in names]:
+            names, families = (
+                {status.name for status in statuses},
+                {family(status.name) for status in statuses},
+            )
+            for name in [
+                name for name in self._entries if family(name) in families and name not in names
+            ]:
                 self._entries.pop(name)
             for status in statuses:
                 self._keep(of_template(status, stamp_ns) if stamp_ns else status)
 
     def status(
-        self, level: Level, message: str, subject: str, values: Mapping[str, str], stamp_ns: int = 0, *, log: bool = True
+        self,
+        level: Level,
+        message: str,
+        subject: str,
+        values: Mapping[str, str],
+        stamp_ns: int = 0,
+        *,
+        log: bool = True,
     ) -> None:
         """Keep one status and log it; an abandoned job ends here, before it is logged.
 
@@ -100,7 +114,9 @@ class NodeDiagnostics:
             self._keep(of_template(status, stamp_ns) if stamp_ns else status)
         if not log:
             return
-        if level is Level.OK:  # a call of its own for each severity: rclpy refuses to change it between calls from one line
+        if (
+            level is Level.OK
+        ):  # a call of its own for each severity: rclpy refuses to change it between calls from one line
             self._node.get_logger().info(message)
         elif level is Level.WARN:
             self._node.get_logger().warning(message)
@@ -128,13 +144,24 @@ class NodeDiagnostics:
     def publish(self) -> None:
         """Publish all that is known now."""
         with self._lock:
-            statuses = [*([self._state] if self._state else []), *(entry.status for entry in self._entries.values())]
+            statuses = [
+                *([self._state] if self._state else []),
+                *(entry.status for entry in self._entries.values()),
+            ]
             self._changed = False
             self._fresh.clear()
-        publish(self._node, self._publisher, encode_diagnostics(statuses, self._node.get_clock().now().nanoseconds))
+        publish(
+            self._node,
+            self._publisher,
+            encode_diagnostics(statuses, self._node.get_clock().now().nanoseconds),
+        )
 
-    def _status(self, subject: str, level: Level, message: str, values: Mapping[str, str]) -> Status:
-        return Status(f"{self._node.get_fully_qualified_name()}: {subject}", level, message, values)
+    def _status(
+        self, subject: str, level: Level, message: str, values: Mapping[str, str]
+    ) -> Status:
+        return Status(
+            f"{self._node.get_fully_qualified_name()}: {subject}", level, message, values
+        )
 
     def _keep(self, status: Status) -> None:
         """Take a status in."""
@@ -150,12 +177,19 @@ class NodeDiagnostics:
                 status = replace(status, values={**status.values, "times": str(times)})
                 if status.name in self._fresh:
                     known = status.message in old.status.message
-                    status = replace(status, message=old.status.message if known else f"{status.message}; {old.status.message}")
+                    status = replace(
+                        status,
+                        message=old.status.message
+                        if known
+                        else f"{status.message}; {old.status.message}",
+                    )
             self._fresh.add(status.name)
         self._entries[status.name] = _Entry(bounded(status), monotonic(), times)
         while len(self._entries) > MAX_STATUSES:  # at first what is well
             first = next(iter(self._entries))
-            self._entries.pop(next((name for name, entry in self._entries.items() if not entry.bad), first))
+            self._entries.pop(
+                next((name for name, entry in self._entries.items() if not entry.bad), first)
+            )
 
     def _tick(self) -> None:
         """Every second bring all up to date, end what is over and was shown long enough, and publish; between, what changed."""
@@ -166,7 +200,11 @@ class NodeDiagnostics:
             with self._lock:
                 for name, entry in self._entries.items():
                     if entry.over and monotonic() - entry.since >= HOLD_S:
-                        values = {key: value for key, value in entry.status.values.items() if key != "error"}
+                        values = {
+                            key: value
+                            for key, value in entry.status.values.items()
+                            if key != "error"
+                        }
                         status = Status(name, Level.OK, f"over: {entry.status.message}", values)
                         self._entries[name] = _Entry(status, monotonic())
         if self._changed or self._ticks % TICKS == 0:
@@ -174,16 +212,25 @@ class NodeDiagnostics:
 
     def _look_for_twins(self) -> None:
         """Warn of other nodes that publish the node's own topics: who listens hears both and cannot tell them apart."""
-        found = {topic: who for topic in own_topics(self._node) if (who := others_on(self._node, topic))}
+        found = {
+            topic: who for topic in own_topics(self._node) if (who := others_on(self._node, topic))
+        }
         if found == self._twins:
             return
         self._twins = found
         if not found:
             self.resolve("twins")
             return
-        said = "; ".join(f"{topic} is published by {' and '.join(who)}, too" for topic, who in found.items())
+        said = "; ".join(
+            f"{topic} is published by {' and '.join(who)}, too" for topic, who in found.items()
+        )
         remedy = "who listens hears both: end one of the nodes, or give it another namespace"
-        self.status(Level.WARN, f"{said}; {remedy}", "twins", {topic: " ".join(who) for topic, who in found.items()})
+        self.status(
+            Level.WARN,
+            f"{said}; {remedy}",
+            "twins",
+            {topic: " ".join(who) for topic, who in found.items()},
+        )
 
 
 def family(name: str) -> str:
@@ -202,4 +249,9 @@ def bounded(status: Status) -> Status:
         values[key] = value
     if missing := len(status.values) - len(values):
         values["left_out"] = f"{missing} values, which would make the message too long"
-    return Status(status.name[:LONGEST_REFUSAL], status.level, presentable(status.message, LONGEST_REFUSAL), values)
+    return Status(
+        status.name[:LONGEST_REFUSAL],
+        status.level,
+        presentable(status.message, LONGEST_REFUSAL),
+        values,
+    )

@@ -16,11 +16,30 @@ import sys
 OK, WARNING, ERROR = "ok", "warning", "error"
 PYTHONS = ((3, 11), (3, 13))
 MODULES = (
-    *("numpy", "scipy", "numba", "ompl", "daqp", "clarabel", "mcap", "rosbags", "pandas", "pyarrow"),
+    *(
+        "numpy",
+        "scipy",
+        "numba",
+        "ompl",
+        "daqp",
+        "clarabel",
+        "mcap",
+        "rosbags",
+        "pandas",
+        "pyarrow",
+    ),
     *("shapely", "PIL", "yaml", "jinja2", "typer", "rich"),
 )
 INTERFACES = (
-    *("builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "lifecycle_msgs", "nav_msgs", "rcl_interfaces", "rosgraph_msgs"),
+    *(
+        "builtin_interfaces",
+        "diagnostic_msgs",
+        "geometry_msgs",
+        "lifecycle_msgs",
+        "nav_msgs",
+        "rcl_interfaces",
+        "rosgraph_msgs",
+    ),
     *("sensor_msgs", "std_msgs", "std_srvs", "trajectory_msgs", "visualization_msgs"),
 )
 NODE = "import rclpy; rclpy.init(); rclpy.create_node('doctor'); print(rclpy.get_rmw_implementation_identifier())"
@@ -48,18 +67,35 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
         advice = "not here: everything works but the nodes and `demo --ros`. Source a Jazzy installation, or `make install`"
         yield Finding(WARNING, "ROS 2", advice)
         return
-    yield packages("interfaces", INTERFACES, "install ros-jazzy-common-interfaces, or source a Jazzy installation")
+    yield packages(
+        "interfaces",
+        INTERFACES,
+        "install ros-jazzy-common-interfaces, or source a Jazzy installation",
+    )
     action = importlib.util.find_spec("scenario_gen_interfaces")
     missing = "scenario_gen_interfaces is not built: gp_sampler has the service generate, and no action generate_scenarios"
-    yield Finding(OK, "action", "scenario_gen_interfaces is here" if action and action.origin else missing)
-    run = subprocess.run([sys.executable, "-c", NODE], capture_output=True, text=True, check=False, env=dict(environment))
+    yield Finding(
+        OK, "action", "scenario_gen_interfaces is here" if action and action.origin else missing
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", NODE],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=dict(environment),
+    )
     if run.returncode:
-        why = next((line for line in reversed(run.stderr.splitlines()) if line.strip()), "it does not say why")
+        why = next(
+            (line for line in reversed(run.stderr.splitlines()) if line.strip()),
+            "it does not say why",
+        )
         yield Finding(ERROR, "ROS 2", f"no node starts: {why.strip()}")
     else:
         domain = environment.get("ROS_DOMAIN_ID") or "0"
         further = "for the network and QoS see `ros2 doctor --report` and `ros2 doctor hello`"
-        yield Finding(OK, "ROS 2", f"a node starts: {run.stdout.strip()}, domain {domain}; {further}")
+        yield Finding(
+            OK, "ROS 2", f"a node starts: {run.stdout.strip()}, domain {domain}; {further}"
+        )
 
 
 def python(version: tuple[int, ...]) -> Finding:

@@ -10,7 +10,13 @@ import json
 import numpy as np
 
 from msg_conventions import driving
-from msg_conventions.autoware import encode_kinematic_state, encode_predicted_objects, HORIZON_NS, OBJECTS, STEP_NS
+from msg_conventions.autoware import (
+    encode_kinematic_state,
+    encode_predicted_objects,
+    HORIZON_NS,
+    OBJECTS,
+    STEP_NS,
+)
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.ego import encode_state
 from msg_conventions.frames import encode_frames
@@ -33,7 +39,9 @@ from scenario_gen.types import Road
 
 INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "ego/odom")
 WAYS = ("ego/trajectory", "ego/path")  # their times say for when they are; they may be old
-FIRST_STAMP = 1_000_000_000  # ns of a drive's clock at its start: a time of 0 means that none is known
+FIRST_STAMP = (
+    1_000_000_000  # ns of a drive's clock at its start: a time of 0 means that none is known
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,19 +103,33 @@ def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -
     period, frame, own = loop.config.step, loop.scenario.frame_id, (child, "base_link", "")
 
     def answered(stamp_ns: int) -> int:
-        return min(step, round((stamp_ns - FIRST_STAMP) * 1e-9 / period)) if stamp_ns >= FIRST_STAMP else step
+        return (
+            min(step, round((stamp_ns - FIRST_STAMP) * 1e-9 / period))
+            if stamp_ns >= FIRST_STAMP
+            else step
+        )
 
     if topic.startswith("ego/cmd_vel"):
-        stamp, given_frame, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
+        stamp, given_frame, speed, rate = driving.decode_twist(
+            data, topic, stamped=topic.endswith("stamped")
+        )
         if given_frame not in own and given_frame != frame:
-            raise InputError(f"{topic}: frame {given_frame!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
-        return EgoCommand(topic, answered(stamp), stamp, lambda state: of_twist(state.ego, speed, rate, period))
+            raise InputError(
+                f"{topic}: frame {given_frame!r} is not the ego's; {', '.join(map(repr, own[:2]))} are"
+            )
+        return EgoCommand(
+            topic, answered(stamp), stamp, lambda state: of_twist(state.ego, speed, rate, period)
+        )
     if topic in WAYS:
-        decode = driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
+        decode = (
+            driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
+        )
         way = decode(data, topic)
         stamp, given_frame = 0, way.frame_id
         track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
-        command: Callable[[State], Command | Pose | None] = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
+        command: Callable[[State], Command | Pose | None] = lambda state: track.command(
+            state.ego, state.time, period
+        )  # noqa: E731
     else:
         stamp, given_frame, _, state = decode_odometry(data, topic)
         pose = Pose(*state[:4].tolist())
@@ -154,7 +176,9 @@ def task_messages(loop: ClosedLoop, child: str) -> Iterator[tuple[str, bytes]]:
 GRID_EVERY = 0.2  # seconds of the drive between two local maps
 
 
-def encode_odometries(states: Sequence[State], children: Sequence[str], period: float, frame: str) -> Iterator[tuple[int, bytes]]:
+def encode_odometries(
+    states: Sequence[State], children: Sequence[str], period: float, frame: str
+) -> Iterator[tuple[int, bytes]]:
     """Yield index and CDR bytes of the odometry of each vehicle that is there.
 
     Args:
@@ -166,7 +190,12 @@ def encode_odometries(states: Sequence[State], children: Sequence[str], period: 
     before, state = states[0], states[-1]
     turned = (state.vehicles[:, 2] - before.vehicles[:, 2]) / period
     for i in np.flatnonzero(state.here).tolist():
-        yield i, encode_odometry(state.vehicles[i], float(turned[i]), children[i], frame, stamp_of(state))
+        yield (
+            i,
+            encode_odometry(
+                state.vehicles[i], float(turned[i]), children[i], frame, stamp_of(state)
+            ),
+        )
 
 
 def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
@@ -184,21 +213,33 @@ def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
     paths = []
     for i in others:
         at = np.minimum(state.clock[i] + state.rate[i] * ahead, known.spans[i, 1])
-        paths.append(np.column_stack([np.interp(at, known.time, known.motion[i, :, c]) for c in range(3)]))
+        paths.append(
+            np.column_stack([np.interp(at, known.time, known.motion[i, :, c]) for c in range(3)])
+        )
     objects = [loop.scenario.vehicles[i] for i in others]
-    return encode_predicted_objects(objects, _rates(loop, states)[others], paths, loop.scenario.frame_id, stamp_of(state))
+    return encode_predicted_objects(
+        objects, _rates(loop, states)[others], paths, loop.scenario.frame_id, stamp_of(state)
+    )
 
 
 def encode_ego(loop: ClosedLoop, states: Sequence[State]) -> bytes:
     """Return the CDR bytes of the ego's Odometry as Autoware takes it, at its rear axle; arguments as above."""
     vehicle = loop.scenario.vehicles[loop.ego]
-    return encode_kinematic_state(vehicle, _rates(loop, states)[loop.ego], loop.scenario.frame_id, stamp_of(states[-1]))
+    return encode_kinematic_state(
+        vehicle, _rates(loop, states)[loop.ego], loop.scenario.frame_id, stamp_of(states[-1])
+    )
 
 
 def _rates(loop: ClosedLoop, states: Sequence[State]) -> Floats:
     """Return (N, 6) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s] of all."""
     before, now = states[0].vehicles, states[-1].vehicles
-    return np.column_stack([now, (now[:, 3] - before[:, 3]) / loop.config.step, (now[:, 2] - before[:, 2]) / loop.config.step])
+    return np.column_stack(
+        [
+            now,
+            (now[:, 3] - before[:, 3]) / loop.config.step,
+            (now[:, 2] - before[:, 2]) / loop.config.step,
+        ]
+    )
 
 
 def encode_verdict(node: str, outcome: Outcome, stamp_ns: int) -> bytes:
@@ -208,7 +249,9 @@ def encode_verdict(node: str, outcome: Outcome, stamp_ns: int) -> bytes:
     if outcome.drive.faults:
         values["first_faults"] = json.dumps(outcome.drive.faults[:5])
     level = Level.OK if verdict.passed else Level.ERROR
-    return encode_diagnostics([Status(f"{node}: scenario {outcome.name}", level, verdict.sentence(), values)], stamp_ns)
+    return encode_diagnostics(
+        [Status(f"{node}: scenario {outcome.name}", level, verdict.sentence(), values)], stamp_ns
+    )
 
 
 def surroundings(
@@ -235,14 +278,25 @@ def surroundings(
     for i, data in odometries.items():
         yield vehicle_topic(names[i], "odom"), data
     here = np.flatnonzero(state.here)
-    yield "/tf", encode_frames(state.vehicles[here, :3], [children[i] for i in here.tolist()], frame, stamp)
+    yield (
+        "/tf",
+        encode_frames(
+            state.vehicles[here, :3], [children[i] for i in here.tolist()], frame, stamp
+        ),
+    )
     if heard("traffic/markers"):
         vehicles = loop.scenario.vehicles
-        yield "traffic/markers", vehicle_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
+        yield (
+            "traffic/markers",
+            vehicle_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp),
+        )
     every = max(round(GRID_EVERY / loop.config.step), 1)
     if state.step % every == 0 and loop.road is not None and heard("traffic/local_map"):
         grid = local_map(loop, state)
-        yield "traffic/local_map", driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp)
+        yield (
+            "traffic/local_map",
+            driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp),
+        )
     for topic in autoware:
         yield topic, (encode_predictions if topic == OBJECTS else encode_ego)(loop, states)
     yield vehicle_topic(names[loop.ego], "odom"), own

@@ -55,7 +55,9 @@ class Goals:
             feedback_pub_qos_profile=QoSProfile(depth=100),
             result_timeout=KEPT_S,
         )
-        self._timer = node.create_timer(FEEDBACK_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(
+            FEEDBACK_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
 
     def destroy(self) -> None:
         """Withdraw the action."""
@@ -68,7 +70,9 @@ class Goals:
         self._timer.reset()
         asked = handle.request
         try:
-            outcome = await self._requests.answer(asked.parameters, asked.wait, partial(setattr, goal, "request"))
+            outcome = await self._requests.answer(
+                asked.parameters, asked.wait, partial(setattr, goal, "request")
+            )
         finally:
             del self._goals[key]
         if outcome.code is Code.OK:
@@ -85,7 +89,11 @@ class Goals:
         goal = self._goals.get(bytes(handle.goal_id.uuid))
         if goal is None or goal.request is None:
             return CancelResponse.REJECT  # it has ended
-        return CancelResponse.ACCEPT if self._requests.cancelled(goal.request) else CancelResponse.REJECT
+        return (
+            CancelResponse.ACCEPT
+            if self._requests.cancelled(goal.request)
+            else CancelResponse.REJECT
+        )
 
     def _tell(self) -> None:
         """Tell each client how far its goal is, if that has changed."""
@@ -96,23 +104,40 @@ class Goals:
             if request is None:
                 continue
             waiting = list(request.waiting_for)
-            counts = {"wanted": request.n_requested, "found": request.accepted, "candidates": request.candidates}
-            feedback = self._action.Feedback(waiting_for=waiting, position=self._requests.position(request), **counts)
+            counts = {
+                "wanted": request.n_requested,
+                "found": request.accepted,
+                "candidates": request.candidates,
+            }
+            feedback = self._action.Feedback(
+                waiting_for=waiting, position=self._requests.position(request), **counts
+            )
             if feedback != goal.told:
                 goal.handle.publish_feedback(feedback)
                 goal.told = feedback
 
     def _result(self, outcome: Outcome, request: OpenRequest | None) -> Any:
         """Return the result of a goal."""
-        result = self._action.Result(code=int(outcome.code), reason=outcome.reason, request=outcome.request)
+        result = self._action.Result(
+            code=int(outcome.code), reason=outcome.reason, request=outcome.request
+        )
         if request:
-            result.requested, result.published = request.n_requested, request.accepted  # what a cancelled one has sent stays
+            result.requested, result.published = (
+                request.n_requested,
+                request.accepted,
+            )  # what a cancelled one has sent stays
         if outcome.answer:
             sampled, summary = outcome.answer
             published = [scenario.index for scenario in sampled.generated.scenarios]
             result.published = len(published)
-            result.first_index, result.last_index = (min(published), max(published)) if published else (0, 0)
-            counts = {key: text for key, text in summary.values.items() if key == "candidates" or key.startswith(REFUSED)}
+            result.first_index, result.last_index = (
+                (min(published), max(published)) if published else (0, 0)
+            )
+            counts = {
+                key: text
+                for key, text in summary.values.items()
+                if key == "candidates" or key.startswith(REFUSED)
+            }
             result.account = [KeyValue(key=key, value=text) for key, text in counts.items()]
         return result
 

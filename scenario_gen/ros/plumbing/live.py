@@ -29,8 +29,16 @@ class LiveConfig(Parameters):
     """How a node listens to streams."""
 
     listen: bool = parameter(True, "listen to vehicle_<id>/fix and vehicle_<id>/speed, too")
-    late: float = parameter(0.5, "a message may be so far behind the newest one and still count", unit="s", low=0.0, high=10.0)
-    silence: float = parameter(2.0, "when nothing comes for so long, real time, the streams have ended", unit="s", low=0.1)
+    late: float = parameter(
+        0.5,
+        "a message may be so far behind the newest one and still count",
+        unit="s",
+        low=0.0,
+        high=10.0,
+    )
+    silence: float = parameter(
+        2.0, "when nothing comes for so long, real time, the streams have ended", unit="s", low=0.1
+    )
 
 
 class LiveStreams:
@@ -54,12 +62,18 @@ class LiveStreams:
         self._streams = Streams(log, config.late)
         self._last_message = monotonic()
         self._topics: dict[str, tuple[str, str]] = {}  # by full name: vehicle, kind
-        self._left_out: set[str] = set()  # topics that are not subscribed to, with the reason on /diagnostics
-        self._timer = node.create_timer(CHECK_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._left_out: set[str] = (
+            set()
+        )  # topics that are not subscribed to, with the reason on /diagnostics
+        self._timer = node.create_timer(
+            CHECK_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
 
     def _look(self) -> None:
         """Subscribe to new streams, forget ended ones that were left out, and end the log after silence."""
-        for topic in [topic for topic in self._left_out if not self._node.get_publishers_info_by_topic(topic)]:
+        for topic in [
+            topic for topic in self._left_out if not self._node.get_publishers_info_by_topic(topic)
+        ]:
             self._left_out.discard(topic)
             self._topics.pop(topic)
             if not self._left_out:
@@ -76,23 +90,39 @@ class LiveStreams:
         for name in self._vehicles():
             for kind, kind_type in TYPES.items():
                 topic = self._node.resolve_topic_name(vehicle_topic(name, kind))
-                publishers = () if topic in self._topics else self._node.get_publishers_info_by_topic(topic)
+                publishers = (
+                    () if topic in self._topics else self._node.get_publishers_info_by_topic(topic)
+                )
                 if not publishers:
                     continue
                 self._topics[topic] = (name, kind)
                 self._left_out.add(topic)
-                if name not in list(dict.fromkeys(vehicle for vehicle, _ in self._topics.values()))[:MOST_VEHICLES]:
-                    raise InputError(f"{topic} is left out: {MOST_VEHICLES} others are in use; choose vehicles with log.vehicles")
+                if (
+                    name
+                    not in list(dict.fromkeys(vehicle for vehicle, _ in self._topics.values()))[
+                        :MOST_VEHICLES
+                    ]
+                ):
+                    raise InputError(
+                        f"{topic} is left out: {MOST_VEHICLES} others are in use; choose vehicles with log.vehicles"
+                    )
                 if publishers[0].topic_type != kind_type:
-                    raise InputError(f"{topic} is a {publishers[0].topic_type}; {kind_type} is needed, so it is left out")
+                    raise InputError(
+                        f"{topic} is a {publishers[0].topic_type}; {kind_type} is needed, so it is left out"
+                    )
                 self._left_out.discard(topic)
-                self._node.listen(topic, adapted_quality(topic, [publisher.qos_profile for publisher in publishers])[0])
+                self._node.listen(
+                    topic,
+                    adapted_quality(topic, [publisher.qos_profile for publisher in publishers])[0],
+                )
 
     def _vehicles(self) -> list[str]:
         """The vehicles of the parameter `log.vehicles`, or all that have a fix in the node's namespace."""
         if named := [token(name) for name in self._log.vehicles.split(",") if name.strip()]:
             return named
-        pattern = re.compile(re.escape(self._node.get_namespace().rstrip("/")) + r"/vehicle_(\w+)/fix")
+        pattern = re.compile(
+            re.escape(self._node.get_namespace().rstrip("/")) + r"/vehicle_(\w+)/fix"
+        )
         matches = (pattern.fullmatch(topic) for topic, _ in self._node.get_topic_names_and_types())
         return sorted(match[1] for match in matches if match)
 
@@ -108,7 +138,9 @@ class LiveStreams:
         self._last_message = monotonic()
         if self._streams.breaks(stamp_ns) or self._streams.seconds > self._log.max_duration:
             self.end()
-        (self._streams.put_fix if kind == "fix" else self._streams.put_speed)(vehicle, stamp_ns, *values)
+        (self._streams.put_fix if kind == "fix" else self._streams.put_speed)(
+            vehicle, stamp_ns, *values
+        )
         for sample in self._streams.samples():
             self._sampled(sample)
 
@@ -117,7 +149,9 @@ class LiveStreams:
         log = self._streams.take("live")
         if log is not None:
             for topic in self._topics:
-                self._node.diagnostics.resolve(topic)  # its stream has ended, and so have its faults
+                self._node.diagnostics.resolve(
+                    topic
+                )  # its stream has ended, and so have its faults
             self._ended(log, self._streams.config)
         return log is not None
 

@@ -37,7 +37,9 @@ from scenario_gen.numerics.kernels import registered
 from scenario_gen.ros.plumbing.ros_parameters import help_of, USAGE
 
 REPORT_S = 5.0  # seconds between two reports of how many kernels are there
-ENDING = 5.0  # seconds that a node may take to react to a signal, and again to leave its ROS domain
+ENDING = (
+    5.0  # seconds that a node may take to react to a signal, and again to leave its ROS domain
+)
 REMEDY = (
     "write -r FROM:=TO and -p NAME:=VALUE, an empty text as -p \"NAME:=''\", "
     "a text with colons or brackets as -p \"NAME:='1: 10 2'\""
@@ -62,7 +64,9 @@ def run_nodes(makers: Sequence[Maker], arguments: Sequence[str] | None = None) -
     gc.collect()  # a lifecycle node leaves its ROS domain when nothing refers to it any more
     rclpy.try_shutdown()
     _flush()
-    os._exit(code)  # all that matters is closed, and to take Python and the compiler down costs half a second of the CPU
+    os._exit(
+        code
+    )  # all that matters is closed, and to take Python and the compiler down costs half a second of the CPU
 
 
 def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str | None]) -> int:
@@ -75,7 +79,9 @@ def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str
 
         def end() -> None:
             if not requested.is_set():
-                leave_within(max((getattr(node, "ENDING", ENDING) for node in nodes), default=ENDING))
+                leave_within(
+                    max((getattr(node, "ENDING", ENDING) for node in nodes), default=ENDING)
+                )
             requested.set()
             executor.create_task(lambda: None)  # so that it looks up
 
@@ -95,9 +101,13 @@ def _run(makers: Sequence[Maker], arguments: Sequence[str], spaces: Sequence[str
     end_orderly(lambda: None)  # a Ctrl-C does not disturb the clean end
     end_workers()
     for node in nodes:
-        getattr(node, "cancel", list)()  # all at once, so that no node waits for the end of another
+        getattr(
+            node, "cancel", list
+        )()  # all at once, so that no node waits for the end of another
     for step in ("close", "destroy_node"):
-        for node in nodes:  # each has its time, for on a busy machine many take longer than one may
+        for (
+            node
+        ) in nodes:  # each has its time, for on a busy machine many take longer than one may
             leave_within(getattr(node, "ENDING", ENDING))
             try:
                 getattr(node, step, list)()
@@ -130,7 +140,9 @@ def show(text: str) -> None:
     try:
         print(text, flush=True)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python complains when it ends
+        os.dup2(
+            os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
+        )  # or Python complains when it ends
 
 
 def namespaces(arguments: Sequence[str]) -> list[str | None]:
@@ -166,7 +178,9 @@ def _print_progress() -> Progress:
     return report
 
 
-def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any], requested: threading.Event) -> int:
+def _spin(
+    executor: SingleThreadedExecutor, nodes: Sequence[Any], requested: threading.Event
+) -> int:
     """Start the nodes, once their kernels are there, and spin them until their end is `requested`; return the exit code."""
     stages = dict.fromkeys(stage for node in nodes for stage in getattr(node, "STAGES", ()))
     loading = ThreadPoolExecutor(1).submit(kernels_ready, stages, _print_progress())
@@ -176,7 +190,11 @@ def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any], requested: thr
         if not requested.is_set():
             loading.result()
             node.autostart()
-    while not requested.is_set() and rclpy.ok() and not all(getattr(node, "done", False) for node in nodes):
+    while (
+        not requested.is_set()
+        and rclpy.ok()
+        and not all(getattr(node, "done", False) for node in nodes)
+    ):
         try:
             executor.spin_once()
         except RuntimeError as error:  # rclpy raises it of a lifecycle transition that cannot be

@@ -15,7 +15,12 @@ import re
 import sys
 from typing import Any, TypeVar
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -25,14 +30,18 @@ from scenario_gen.base.parameters import flatten, updated
 Config = TypeVar("Config")
 INT64 = 2**63 - 1
 USAGE = "usage: {name} [--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]"
-STATES = ("starts", "goals")  # `1: 10.5 -1.75` would be a mapping to `param load`, so it is kept as `1:10.5 -1.75`
+STATES = (
+    "starts",
+    "goals",
+)  # `1: 10.5 -1.75` would be a mapping to `param load`, so it is kept as `1:10.5 -1.75`
 
 
 def descriptor(entry: "Field[Any]") -> ParameterDescriptor:
     """Return the descriptor of one declared parameter; what is no real number or text may become one (see `meant`)."""
     meta = entry.metadata
     result = ParameterDescriptor(
-        description=meta["meaning"] + _unit(entry), dynamic_typing=isinstance(entry.default, float | str)
+        description=meta["meaning"] + _unit(entry),
+        dynamic_typing=isinstance(entry.default, float | str),
     )
     if meta["choices"]:
         result.additional_constraints = "one of " + ", ".join(meta["choices"])
@@ -50,9 +59,17 @@ def descriptor(entry: "Field[Any]") -> ParameterDescriptor:
 
 def meant(entry: "Field[Any]", value: Any) -> Any:
     """Return a value as the type that `entry` declares, if it can be meant so, else as it is."""
-    if isinstance(entry.default, str) and isinstance(value, int | float) and not isinstance(value, bool):
+    if (
+        isinstance(entry.default, str)
+        and isinstance(value, int | float)
+        and not isinstance(value, bool)
+    ):
         return str(value)
-    if isinstance(entry.default, float) and isinstance(value, int | str) and not isinstance(value, bool):
+    if (
+        isinstance(entry.default, float)
+        and isinstance(value, int | str)
+        and not isinstance(value, bool)
+    ):
         with suppress(ValueError):
             return float(value)
     return value
@@ -65,7 +82,9 @@ def with_values(config: Config, parameters: Sequence[Parameter]) -> Config:
         InputError: a value has the wrong type or is out of range.
     """
     known = flatten(config)
-    return updated(config, {p.name: meant(known[p.name][0], p.value) for p in parameters if p.name in known})
+    return updated(
+        config, {p.name: meant(known[p.name][0], p.value) for p in parameters if p.name in known}
+    )
 
 
 def values_of_call(config: Config, messages: Sequence[Any]) -> Config:
@@ -96,7 +115,9 @@ class ConfigParameters:
             try:
                 node.declare_parameter(name, value, descriptor(entry))
             except Exception as error:
-                raise InputError(f"{node.get_fully_qualified_name()}: parameter {name}: {error}") from error
+                raise InputError(
+                    f"{node.get_fully_qualified_name()}: parameter {name}: {error}"
+                ) from error
         given = [node.get_parameter(name) for name in self._declared]
         self.config = with_values(config, given)
         node.set_parameters([kept for old in given if (kept := self._kept(old)) is not old])
@@ -105,12 +126,16 @@ class ConfigParameters:
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._take)
         # a parameter file keyed to another node would be ignored in silence
-        values = ", ".join(f"{name}={value!r}" for name, (_, value) in flatten(self.config).items())
+        values = ", ".join(
+            f"{name}={value!r}" for name, (_, value) in flatten(self.config).items()
+        )
         node.get_logger().info(f"effective parameters: {values}")
 
     def _keep(self, parameters: list[Parameter]) -> list[Parameter]:
         """Return what is to be set: values of the declared types, and nothing that is read-only and in effect already."""
-        changes = [self._kept(parameter) for parameter in parameters if not self._repeats(parameter)]
+        changes = [
+            self._kept(parameter) for parameter in parameters if not self._repeats(parameter)
+        ]
         # `param load` sets what was dumped one by one, read-only ones too, and rclpy refuses to set nothing
         return changes or [self._node.get_parameter(next(iter(self._declared)))]
 
@@ -127,7 +152,10 @@ class ConfigParameters:
     def _repeats(self, parameter: Parameter) -> bool:
         """Say whether a read-only parameter is given the value that it has."""
         node = self._node
-        if not node.has_parameter(parameter.name) or not node.describe_parameter(parameter.name).read_only:
+        if (
+            not node.has_parameter(parameter.name)
+            or not node.describe_parameter(parameter.name).read_only
+        ):
             return False
         return bool(node.get_parameter(parameter.name).value == parameter.value)
 
@@ -157,7 +185,9 @@ def help_of(name: str, nodes: Sequence[Any]) -> str:
             meta = entry.metadata
             choices = f"; one of {', '.join(meta['choices'])}" if meta["choices"] else ""
             written = f"'{value}'" if isinstance(value, str) else json.dumps(value)
-            lines.append(f"  {parameter} := {written}{_unit(entry)}\n      {meta['meaning']}{choices}")
+            lines.append(
+                f"  {parameter} := {written}{_unit(entry)}\n      {meta['meaning']}{choices}"
+            )
     return "\n".join(lines)
 
 

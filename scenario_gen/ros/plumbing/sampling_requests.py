@@ -46,7 +46,9 @@ SHOWN = 20  # waiting requests that are named
 LOG_S = 5.0  # seconds between two lines on the terminal that say how far a request is
 POLL_S = 0.1  # seconds between two looks whether those that wait can be served
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
-Answer = tuple[GenerationResult, RequestSummary]  # the result of a request, whose scenarios are published by then
+Answer = tuple[
+    GenerationResult, RequestSummary
+]  # the result of a request, whose scenarios are published by then
 
 
 @dataclass(frozen=True)
@@ -124,10 +126,18 @@ class OpenRequests:
         self._numbers = count(1)
         self._lock = threading.Lock()
         self._waiters: list[tuple[Future, Callable[[], bool]]] = []
-        self._timer = node.create_timer(POLL_S, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        node.create_service(SetParametersAtomically, "~/generate", self._generate, qos_profile=REQUESTS)
-        node.create_service(Trigger, "~/wait_until_ready", self._wait_until_ready, qos_profile=REQUESTS)
-        node.create_service(SetParametersAtomically, "~/cancel_request", self._cancel_request, qos_profile=REQUESTS)
+        self._timer = node.create_timer(
+            POLL_S, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        node.create_service(
+            SetParametersAtomically, "~/generate", self._generate, qos_profile=REQUESTS
+        )
+        node.create_service(
+            Trigger, "~/wait_until_ready", self._wait_until_ready, qos_profile=REQUESTS
+        )
+        node.create_service(
+            SetParametersAtomically, "~/cancel_request", self._cancel_request, qos_profile=REQUESTS
+        )
         offer_trigger(node, "~/cancel", self._cancel_all)
 
     def add(self, given: str = "", job: str = "", n_requested: int = 0) -> OpenRequest:
@@ -138,9 +148,13 @@ class OpenRequests:
         """
         with self._lock:
             if given and not NAME.fullmatch(given):
-                raise InputError(f"request is {given!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` are a name")
+                raise InputError(
+                    f"request is {given!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` are a name"
+                )
             if given in self._open:
-                raise InputError(f"request {given!r} is open already; give another name, or wait for its answer")
+                raise InputError(
+                    f"request {given!r} is open already; give another name, or wait for its answer"
+                )
             name = given or str(next(self._numbers))
             self._open[name] = OpenRequest(name, job or f"request {name}", n_requested)
             return self._open[name]
@@ -155,7 +169,14 @@ class OpenRequests:
         """Close a request that is done, cancelled or refused; `more` is reported on /diagnostics beside how far it came."""
         with self._lock:
             self._open.pop(request.name, None)
-        self._node.status(level, f"request {request.name}: {message}", "generate", request.stamp_ns, **request.values(), **more)
+        self._node.status(
+            level,
+            f"request {request.name}: {message}",
+            "generate",
+            request.stamp_ns,
+            **request.values(),
+            **more,
+        )
         self._node.diagnostics.resolve("generate")
         self.report()
 
@@ -182,29 +203,47 @@ class OpenRequests:
     def report(self) -> None:
         """Report on /diagnostics how far the request at work is, and now and then on the terminal."""
         with self._lock:
-            running = next((request for request in self._open.values() if request.began is not None), None)
+            running = next(
+                (request for request in self._open.values() if request.began is not None), None
+            )
             waiting = [request for request in self._open.values() if request.began is None]
         if running is None:
-            self._node.diagnostics.status(Level.OK, "no request is at work", "progress", {}, log=False)
+            self._node.diagnostics.status(
+                Level.OK, "no request is at work", "progress", {}, log=False
+            )
             return
-        values = running.values() | {"at_work": str(len(self._open) - len(waiting)), "waiting": str(len(waiting))}
-        values |= {f"waiting.{request.name}": f"{request.n_requested} scenarios" for request in waiting[:SHOWN]}
+        values = running.values() | {
+            "at_work": str(len(self._open) - len(waiting)),
+            "waiting": str(len(waiting)),
+        }
+        values |= {
+            f"waiting.{request.name}": f"{request.n_requested} scenarios"
+            for request in waiting[:SHOWN]
+        }
         found = f"{running.accepted} of {running.n_requested} scenarios from {running.candidates} candidates"
         message = f"request {running.name}: {found}, {running.seconds():.0f} s"
         if log := monotonic() - running.logged >= LOG_S:
             running.logged = monotonic()
-        self._node.diagnostics.status(Level.OK, message, "progress", values, running.stamp_ns, log=log)
+        self._node.diagnostics.status(
+            Level.OK, message, "progress", values, running.stamp_ns, log=log
+        )
 
     async def _generate(
         self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
         """Generate with the caller's parameters; the answer comes when the set is done."""
         outcome = await self.answer(request.parameters)
-        response.result.successful, response.result.reason = outcome.code is Code.OK, outcome.reason
+        response.result.successful, response.result.reason = (
+            outcome.code is Code.OK,
+            outcome.reason,
+        )
         return response
 
     async def answer(
-        self, parameters: Sequence[Any], wait: float = 0.0, opened: Callable[[OpenRequest], None] = lambda _: None
+        self,
+        parameters: Sequence[Any],
+        wait: float = 0.0,
+        opened: Callable[[OpenRequest], None] = lambda _: None,
     ) -> Outcome:
         """Serve a request, on the executor's thread, to its end.
 
@@ -238,10 +277,18 @@ class OpenRequests:
             try:
                 result: Answer | None = node.generate(messages, request, config, cancelled)
             except ScenarioGenError as error:  # which has been reported
-                return Code.INVALID if isinstance(error, InputError) else Code.IMPOSSIBLE, str(error), None
+                return (
+                    Code.INVALID if isinstance(error, InputError) else Code.IMPOSSIBLE,
+                    str(error),
+                    None,
+                )
             if result is None:
                 return Code.CANCELLED, node.given_up(messages, lambda: True), None
-            return Code.OK if result[0].generated.scenarios else Code.IMPOSSIBLE, result[1].status.message, result
+            return (
+                Code.OK if result[0].generated.scenarios else Code.IMPOSSIBLE,
+                result[1].status.message,
+                result,
+            )
 
         def failed(error: BaseException) -> tuple[Code, str, Answer | None]:
             if isinstance(error, CancelledError):
@@ -265,7 +312,10 @@ class OpenRequests:
         if not self._node.active:
             return Code.NOT_READY, "the node is not active; activate it first"
         if request.waiting_for:
-            return Code.NOT_READY, f"nothing to generate from yet: waiting for {', '.join(request.waiting_for)}"
+            return (
+                Code.NOT_READY,
+                f"nothing to generate from yet: waiting for {', '.join(request.waiting_for)}",
+            )
         with self._lock:
             self._open[request.name] = self._open.pop(request.name)
         return Code.OK, ""
@@ -278,7 +328,9 @@ class OpenRequests:
         self._waiters.append((arrived, ready))
         self._timer.reset()
         await arrived
-        self._node.executor.create_task(self.look)  # when this one stands in the queue, it is the next one's turn
+        self._node.executor.create_task(
+            self.look
+        )  # when this one stands in the queue, it is the next one's turn
 
     def missing(self, config: Any) -> list[str]:
         """The topics that a request waits for; `activation` while the node is not active."""
@@ -289,7 +341,9 @@ class OpenRequests:
         """How many requests are served before this one; 0 if it is at work, or waits for its inputs."""
         with self._lock:
             served = [name for name, other in self._open.items() if not other.waiting_for]
-        return served.index(request.name) if request.began is None and request.name in served else 0
+        return (
+            served.index(request.name) if request.began is None and request.name in served else 0
+        )
 
     def look(self) -> None:
         """Let the first one go on that waits for inputs and need not any more; called when an input has come."""
@@ -302,7 +356,9 @@ class OpenRequests:
         if not self._waiters:
             self._timer.cancel()
 
-    async def _wait_until_ready(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    async def _wait_until_ready(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
         """Answer once a request with the node's own parameters can be served, however long that takes."""
         node = self._node
         await self._until(lambda: not self.missing(node.config))
@@ -327,8 +383,14 @@ class OpenRequests:
 
 def _named(parameters: Sequence[Any]) -> tuple[list[Any], str]:
     """Return a caller's parameters but `request`, and what that is, "" if there is none; the tools of ROS make 7 of '7'."""
-    names = [Parameter.from_parameter_msg(parameter).value for parameter in parameters if parameter.name == "request"]
-    return [parameter for parameter in parameters if parameter.name != "request"], str(names[0]) if names else ""
+    names = [
+        Parameter.from_parameter_msg(parameter).value
+        for parameter in parameters
+        if parameter.name == "request"
+    ]
+    return [parameter for parameter in parameters if parameter.name != "request"], str(
+        names[0]
+    ) if names else ""
 
 
 def answer_request(
@@ -356,23 +418,36 @@ def answer_request(
         RefusedError: the request is impossible; the message says why, and which similar request is possible.
     """
     template = decode_template(messages)
-    encounter, segmentation, (road, _) = template.encounter, template.segmentation, template.road_and_fit()
+    encounter, segmentation, (road, _) = (
+        template.encounter,
+        template.segmentation,
+        template.road_and_fit(),
+    )
 
     def advance(done: int, _total: int, candidates: int) -> None:
         request.progress(done, candidates, encounter.start_ns)
 
     hashes = template_hashes(messages)
-    sender = RequestSender(RequestMessages(encounter, request.name, node, hashes), road.frame_id, send)
+    sender = RequestSender(
+        RequestMessages(encounter, request.name, node, hashes), road.frame_id, send
+    )
 
     def in_turn(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
         with turn:
             sender.scenario(scenario, requested, ego)
 
     callbacks = Callbacks(advance, cancelled, found=in_turn)
-    stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
+    stages = PipelineConfig(
+        fitting=config.fitting,
+        planning=config.planning,
+        sampling=config.sampling,
+        limits=config.limits,
+    )
     chain = Chain(encounter, segmentation, road, stages, config, config.count, config.seed)
     try:
-        outcome = chain.sample(chain.plan() if config.moves else replace(template, seed=config.seed), callbacks)
+        outcome = chain.sample(
+            chain.plan() if config.moves else replace(template, seed=config.seed), callbacks
+        )
     except RefusedError as error:
         from scenario_gen.method.nearest import suggest_nearest  # only a refusal needs it
 
@@ -380,7 +455,15 @@ def answer_request(
     result = outcome.generated
     provenance = parameter_texts(config) | versions() | hashes
     stopped = cancelled() and len(result.scenarios) < result.requested
-    summary = request_summary(result, request.name, node, config.seed, provenance, cancelled=stopped, reactions=outcome.reacting)
+    summary = request_summary(
+        result,
+        request.name,
+        node,
+        config.seed,
+        provenance,
+        cancelled=stopped,
+        reactions=outcome.reacting,
+    )
     with turn:
         sender.close(result, summary)
     return outcome, summary

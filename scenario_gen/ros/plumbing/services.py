@@ -12,7 +12,9 @@ from std_srvs.srv import Trigger
 
 from scenario_gen.base.errors import describe, ScenarioGenError
 
-REQUESTS = QoSProfile(depth=1000)  # ROS's own 10 would drop the oldest of many requests that come at once
+REQUESTS = QoSProfile(
+    depth=1000
+)  # ROS's own 10 would drop the oldest of many requests that come at once
 
 
 def offer_trigger(node: Node, name: str, action: Callable[[], str]) -> None:

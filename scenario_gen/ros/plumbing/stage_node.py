@@ -33,7 +33,9 @@ from scenario_gen.ros.plumbing.topics import create_subscription, Outputs
 from scenario_gen.template import MOST_SAMPLES, refuse_too_large
 from scenario_gen.types import Encounter, Quality
 
-MOST_BYTES = 200 * MOST_SAMPLES  # of tracks: a sample of a vehicle takes 176 at most, and an instant 36
+MOST_BYTES = (
+    200 * MOST_SAMPLES
+)  # of tracks: a sample of a vehicle takes 176 at most, and an instant 36
 
 
 def take_tracks(data: bytes) -> Encounter:
@@ -95,7 +97,9 @@ class Inputs:
         if_named: topics that count only where an info names them, and are waited for there.
     """
 
-    def __init__(self, paired: Iterable[str], unpaired: Iterable[str] = (), if_named: Iterable[str] = ()) -> None:
+    def __init__(
+        self, paired: Iterable[str], unpaired: Iterable[str] = (), if_named: Iterable[str] = ()
+    ) -> None:
         self._paired = set(paired)
         self._unpaired = set(unpaired)
         self._if_named = set(if_named)
@@ -139,7 +143,9 @@ class Inputs:
 
     def missing(self) -> list[str]:
         """Return the topics from which nothing came yet, or nothing that belongs to the newest template and road."""
-        silent = [topic for topic in sorted(self._paired | self._unpaired) if topic not in self._newest]
+        silent = [
+            topic for topic in sorted(self._paired | self._unpaired) if topic not in self._newest
+        ]
         held = dict(self._newest)
         stamps = {topic: held[topic].stamp for topic in self._paired if topic in held}
         newest = stamps.get("tracks", max(stamps.values(), default=0))
@@ -148,10 +154,15 @@ class Inputs:
             f"{info} of this {topic}"
             for info in INFOS
             for topic, named in (held[info].together.items() if info in held else ())
-            if (topic in held and held[topic].hash != named) or (topic in self._if_named and topic not in held)
+            if (topic in held and held[topic].hash != named)
+            or (topic in self._if_named and topic not in held)
         ]
-        if not any(info in held for info in INFOS):  # it may name them: what is done without would be done again
-            others += [f"road/info of this {topic}" for topic in sorted(self._if_named & set(held))]
+        if not any(
+            info in held for info in INFOS
+        ):  # it may name them: what is done without would be done again
+            others += [
+                f"road/info of this {topic}" for topic in sorted(self._if_named & set(held))
+            ]
         return silent + old + others
 
     def complete(self) -> dict[str, bytes] | None:
@@ -176,9 +187,13 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     """
 
     INPUTS: tuple[str, ...] = ()
-    OUTPUTS: tuple[str, ...] = ()  # advertised while configuring, so that listeners are there before the first message
+    OUTPUTS: tuple[
+        str, ...
+    ] = ()  # advertised while configuring, so that listeners are there before the first message
     THREADS = 1  # jobs that run at a time
-    STAGES: tuple[str, ...] = ()  # packages of scenario_gen whose kernels are compiled before it is configured
+    STAGES: tuple[
+        str, ...
+    ] = ()  # packages of scenario_gen whose kernels are compiled before it is configured
 
     def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
         self._together = ReentrantCallbackGroup()
@@ -209,7 +224,10 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def autostart(self) -> None:
         """Configure and activate, unless the parameter `autostart` is false."""
-        if self.get_parameter("autostart").value and self.trigger_configure() is TransitionCallbackReturn.SUCCESS:
+        if (
+            self.get_parameter("autostart").value
+            and self.trigger_configure() is TransitionCallbackReturn.SUCCESS
+        ):
             self.trigger_activate()
 
     # --- for subclasses ---------------------------------------------------------------------------------------
@@ -227,7 +245,9 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         """Subscribe to a topic of the suite, raw; `received` gets its messages. `quality`: another one than the suite's."""
         if topic not in self._listening:
             take = self._receive_latched if topic_entry(topic)[1] == LATCHED else self._receive
-            self._listening[topic] = create_subscription(self, topic, lambda data: take(topic, data), quality)
+            self._listening[topic] = create_subscription(
+                self, topic, lambda data: take(topic, data), quality
+            )
 
     def ignore(self, topic: str) -> None:
         """End a subscription."""
@@ -242,7 +262,10 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self._worker.submit(name, lambda cancelled: None if cancelled() else job(cancelled))
 
     async def result_of(
-        self, name: str, job: Callable[[Callable[[], bool]], Result], failed: Callable[[BaseException], Result]
+        self,
+        name: str,
+        job: Callable[[Callable[[], bool]], Result],
+        failed: Callable[[BaseException], Result],
     ) -> Result:
         """Run a job off the executor's thread for a service, also if it is cancelled before its turn; return its result.
 
@@ -271,7 +294,9 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         """Cancel all jobs, or those of one name; return their names."""
         return self._worker.cancel(only) if self._worker is not None else []
 
-    def status(self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str) -> None:
+    def status(
+        self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str
+    ) -> None:
         """Report one status on /diagnostics and log it; an abandoned job ends here, before it is logged."""
         self.diagnostics.status(level, message, subject, values, stamp_ns)
 
@@ -291,7 +316,9 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Subscribe to the inputs."""
-        self._worker = Worker(self.diagnostics.failed, self.get_name(), self.diagnostics.resolve, self.THREADS)
+        self._worker = Worker(
+            self.diagnostics.failed, self.get_name(), self.diagnostics.resolve, self.THREADS
+        )
         self.outputs.activate()
         self.diagnostics.enable(True)
         self.diagnostics.state("active")

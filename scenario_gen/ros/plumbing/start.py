@@ -17,7 +17,17 @@ from typing import Any
 from scenario_gen.base.errors import InputError, print_error
 from scenario_gen.base.interrupts import hear
 
-NODES = ("recorder", "evaluator", "preview", "gp_sampler", "planner", "segmenter", "road_server", "log_player", "player")
+NODES = (
+    "recorder",
+    "evaluator",
+    "preview",
+    "gp_sampler",
+    "planner",
+    "segmenter",
+    "road_server",
+    "log_player",
+    "player",
+)
 SUITE = """\
 suite: all nodes in one process with one executor, for small machines: `ros2 run scenario_gen suite`.
 
@@ -29,7 +39,9 @@ stands in a parameter file, or, where there is no namespace, behind its name: `-
 
 def node_class(name: str) -> Any:
     """Return the class of a node: GpSampler of `gp_sampler`."""
-    return getattr(importlib.import_module(f"scenario_gen.ros.nodes.{name}"), name.title().replace("_", ""))
+    return getattr(
+        importlib.import_module(f"scenario_gen.ros.nodes.{name}"), name.title().replace("_", "")
+    )
 
 
 def chosen(arguments: list[str]) -> tuple[list[str], list[str]]:
@@ -41,14 +53,18 @@ def chosen(arguments: list[str]) -> tuple[list[str], list[str]]:
         del rest[at : at + 2]
     wanted = [name.strip() for name in names.split(",")]
     if unknown := [name for name in wanted if name not in NODES]:
-        raise SystemExit(f"usage: --nodes NAME,NAME of {', '.join(NODES)}; unknown: {', '.join(unknown)!r}")
+        raise SystemExit(
+            f"usage: --nodes NAME,NAME of {', '.join(NODES)}; unknown: {', '.join(unknown)!r}"
+        )
     return [name for name in NODES if name in wanted], rest
 
 
 def start(name: str) -> None:
     """Load the node `name`, or the suite, and run it."""
     hear()
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: matrices are small here, and threads only wait
+    os.environ.setdefault(
+        "OPENBLAS_NUM_THREADS", "1"
+    )  # before numpy is loaded: matrices are small here, and threads only wait
     names, arguments = chosen(sys.argv) if name == "suite" else ([name], sys.argv)
     gc.disable()  # what the libraries make while they load stays: to look for garbage in it takes a sixth of the time
     from scenario_gen.ros.plumbing.process import asks_for_help, run_nodes, show

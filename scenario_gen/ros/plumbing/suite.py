@@ -66,7 +66,9 @@ class Progress:
     heard: set[str] = field(default_factory=set)  # topics, by their full names
     published: dict[str, int] = field(default_factory=dict)  # scenarios, by namespace
     recorded: dict[str, int] = field(default_factory=dict)  # messages in the bag, by topic
-    told: dict[str, str] = field(default_factory=dict)  # messages by status: /diagnostics has all again every second
+    told: dict[str, str] = field(
+        default_factory=dict
+    )  # messages by status: /diagnostics has all again every second
 
     def complete(self) -> bool:
         """Say whether every job's scenarios have been published and recorded."""
@@ -98,7 +100,9 @@ class Progress:
             if topic == "/diagnostics":
                 self._take_status(status)
             elif "published" in status.values:
-                self.published[topic.removesuffix("/scenarios/info")] = int(status.values["published"])
+                self.published[topic.removesuffix("/scenarios/info")] = int(
+                    status.values["published"]
+                )
                 self.tell(f"{topic.removesuffix('/scenarios/info')}: {status.message}")
 
     def _take_status(self, status: Status) -> None:
@@ -107,15 +111,29 @@ class Progress:
         elif status.level >= Level.ERROR:
             error = InputError if status.values.get("error") == "InputError" else RefusedError
             raise error(f"{status.name}: {status.message}")
-        elif "progress" in status.name and "request" in status.values and self.told.get(status.name) != status.message:
+        elif (
+            "progress" in status.name
+            and "request" in status.values
+            and self.told.get(status.name) != status.message
+        ):
             self.told[status.name] = status.message
             self.tell(f"{status.name.partition(':')[0]}: {status.message}")
 
 
-def parameters(jobs: Sequence[Job], config: PipelineConfig, count: int, seed: int, bag: Path) -> dict[str, Any]:
+def parameters(
+    jobs: Sequence[Job], config: PipelineConfig, count: int, seed: int, bag: Path
+) -> dict[str, Any]:
     """Return the parameter file of the suite: of every node what it declares of the pipeline's parameters."""
-    values = {name: value for name, (_, value) in flatten(config).items()} | {"count": count, "seed": seed}
-    common = {node: {name: values[name] for name in flatten(config_of(node_class(node))) if name in values} for node in NODES}
+    values = {name: value for name, (_, value) in flatten(config).items()} | {
+        "count": count,
+        "seed": seed,
+    }
+    common = {
+        node: {
+            name: values[name] for name in flatten(config_of(node_class(node))) if name in values
+        }
+        for node in NODES
+    }
     result: dict[str, Any] = {"/recorder": {"bag": str(bag)}}
     for job in jobs:
         own = {
@@ -160,11 +178,20 @@ def run_suite(
     try:
         with ending(partial(shutil.rmtree, scratch, ignore_errors=True)), own_domain():
             file = scratch / "parameters.yaml"
-            file.write_text(yaml.safe_dump(parameters(jobs, config, count, seed, scratch / bag.name)), encoding="utf-8")
+            file.write_text(
+                yaml.safe_dump(parameters(jobs, config, count, seed, scratch / bag.name)),
+                encoding="utf-8",
+            )
             spaces = [word for job in jobs for word in ("--namespace", job.namespace)]
             words = ["--ros-args", "--params-file", str(file)]
-            commands = (["recorder", *words], ["suite", "--nodes", ",".join(NODES), *spaces, *words])
-            with _watched(Progress(jobs, progress)) as (state, look), _processes(commands, scratch) as processes:
+            commands = (
+                ["recorder", *words],
+                ["suite", "--nodes", ",".join(NODES), *spaces, *words],
+            )
+            with (
+                _watched(Progress(jobs, progress)) as (state, look),
+                _processes(commands, scratch) as processes,
+            ):
                 _follow(processes, state, look, scratch, timeout)
         bag.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(scratch / bag.name, bag)
@@ -181,7 +208,10 @@ def _watched(state: Progress) -> Iterator[tuple[Progress, Callable[[], None]]]:
         node = rclpy.create_node("watcher", enable_rosout=False, start_parameter_services=False)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        for topic in ("/diagnostics", *(f"{job.namespace}/{topic}" for job in state.jobs for topic in CHAIN)):
+        for topic in (
+            "/diagnostics",
+            *(f"{job.namespace}/{topic}" for job in state.jobs for topic in CHAIN),
+        ):
             create_subscription(node, topic, partial(state.take, topic))
         yield state, lambda: executor.spin_once(timeout_sec=POLL_S)
         node.destroy_node()
@@ -190,7 +220,9 @@ def _watched(state: Progress) -> Iterator[tuple[Progress, Callable[[], None]]]:
 
 
 @contextmanager
-def _processes(commands: Sequence[list[str]], scratch: Path) -> Iterator[Mapping[str, BaseProcess]]:
+def _processes(
+    commands: Sequence[list[str]], scratch: Path
+) -> Iterator[Mapping[str, BaseProcess]]:
     """Run nodes as processes of their own, as their executables do; Ctrl-C ends those that are left at the end, in order."""
     context = multiprocessing.get_context("spawn")
     processes = {}
@@ -220,7 +252,9 @@ def _become(words: list[str], log: str) -> None:
 
 def _end(processes: Sequence[BaseProcess]) -> None:
     for number in (signal.SIGINT, signal.SIGKILL):
-        alive = [process for process in processes if process.pid is not None and process.is_alive()]
+        alive = [
+            process for process in processes if process.pid is not None and process.is_alive()
+        ]
         for process in alive:
             with suppress(ProcessLookupError):
                 os.kill(process.pid or 0, number)
@@ -229,7 +263,11 @@ def _end(processes: Sequence[BaseProcess]) -> None:
 
 
 def _follow(
-    processes: Mapping[str, BaseProcess], state: Progress, look: Callable[[], None], scratch: Path, timeout: float
+    processes: Mapping[str, BaseProcess],
+    state: Progress,
+    look: Callable[[], None],
+    scratch: Path,
+    timeout: float,
 ) -> None:
     """Wait until every job is done and recorded.
 
@@ -241,15 +279,23 @@ def _follow(
         look()
         for name, process in processes.items():
             if not process.is_alive():
-                raise RefusedError(f"{name} ended with code {process.exitcode}{_tail(scratch, name)}")
+                raise RefusedError(
+                    f"{name} ended with code {process.exitcode}{_tail(scratch, name)}"
+                )
         if time.monotonic() > deadline:
             late = state.late()
             name = "recorder" if late == "/recorder" else "suite"
-            raise RefusedError(f"{late} did not answer within {timeout:.0f} s{_tail(scratch, name)}")
+            raise RefusedError(
+                f"{late} did not answer within {timeout:.0f} s{_tail(scratch, name)}"
+            )
 
 
 def _tail(scratch: Path, name: str) -> str:
     """Return the last lines that a process wrote, to put behind a message."""
     path = scratch / f"{name}.log"
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()[-5:] if path.is_file() else []
+    lines = (
+        path.read_text(encoding="utf-8", errors="replace").splitlines()[-5:]
+        if path.is_file()
+        else []
+    )
     return "; its last output: " + " | ".join(lines) if lines else ""

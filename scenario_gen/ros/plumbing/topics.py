@@ -28,9 +28,23 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.types import Quality
 
-OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
+OVERRIDABLE = (
+    QoSPolicyKind.HISTORY,
+    QoSPolicyKind.DEPTH,
+    QoSPolicyKind.RELIABILITY,
+    QoSPolicyKind.DURABILITY,
+)
 OWN_QUALITY = ("/diagnostics", "/tf")  # as others expect them
-SHARED = ("/diagnostics", "/rosout", "/parameter_events", "/tf", "/tf_static", "/clock", "/footprint", "/transition_event")
+SHARED = (
+    "/diagnostics",
+    "/rosout",
+    "/parameter_events",
+    "/tf",
+    "/tf_static",
+    "/clock",
+    "/footprint",
+    "/transition_event",
+)
 """How the names of topics end that many nodes publish."""
 DEPTH = 1000  # messages that a subscription holds at least
 POLL_S = 0.002  # seconds between two looks for acknowledgements
@@ -47,7 +61,9 @@ def message_class(kind: str) -> Any:
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
     except (ImportError, AttributeError, ValueError, TypeError):  # TypeError: a topic of no type
-        raise InputError(f"message type {kind} is not installed; source the workspace that has {package or 'it'}") from None
+        raise InputError(
+            f"message type {kind} is not installed; source the workspace that has {package or 'it'}"
+        ) from None
 
 
 def qos(quality: Quality) -> QoSProfile:
@@ -55,8 +71,12 @@ def qos(quality: Quality) -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if quality.keep_all else HistoryPolicy.KEEP_LAST,
         depth=quality.depth,
-        reliability=ReliabilityPolicy.RELIABLE if quality.reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if quality.transient_local else DurabilityPolicy.VOLATILE,
+        reliability=ReliabilityPolicy.RELIABLE
+        if quality.reliable
+        else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL
+        if quality.transient_local
+        else DurabilityPolicy.VOLATILE,
     )
 
 
@@ -74,7 +94,9 @@ def adapted_quality(topic: str, offers: Sequence[QoSProfile]) -> tuple[Quality, 
     own = None
     with suppress(KeyError):
         own = topic_entry(topic)[1]
-    subscribed = Quality(max(DEPTH, offered), reliable, transient_local, keep_all=reliable and own is not None)
+    subscribed = Quality(
+        max(DEPTH, offered), reliable, transient_local, keep_all=reliable and own is not None
+    )
     return subscribed, Quality(offered or (own.depth if own else 1), reliable, transient_local)
 
 
@@ -85,7 +107,9 @@ def create_publisher(node: Node, topic: str, name: str = "") -> Any:
     """
     kind, quality = topic_entry(topic)
     options = None if topic in OWN_QUALITY else QoSOverridingOptions(OVERRIDABLE)
-    return node.create_publisher(message_class(kind), name or topic, qos(quality), qos_overriding_options=options)
+    return node.create_publisher(
+        message_class(kind), name or topic, qos(quality), qos_overriding_options=options
+    )
 
 
 def create_frames_publisher(node: Node) -> Any:
@@ -97,10 +121,14 @@ def create_frames_publisher(node: Node) -> Any:
         return None
 
 
-def create_subscription(node: Node, topic: str, callback: Callable[..., None], quality: Quality | None = None) -> Any:
+def create_subscription(
+    node: Node, topic: str, callback: Callable[..., None], quality: Quality | None = None
+) -> Any:
     """Subscribe, raw, to a topic of the suite, with its own quality of service or another."""
     kind, own = topic_entry(topic)
-    return node.create_subscription(message_class(kind), topic, callback, qos(quality or own), raw=True)
+    return node.create_subscription(
+        message_class(kind), topic, callback, qos(quality or own), raw=True
+    )
 
 
 def publish(node: Node, publisher: Any, data: bytes) -> None:
@@ -173,7 +201,9 @@ class Outputs:
                 publish(self._node, publisher, data)
 
     @contextmanager
-    def paced(self, topics: Iterable[str], patience: float, report: Callable[[str, int], None]) -> Iterator[None]:
+    def paced(
+        self, topics: Iterable[str], patience: float, report: Callable[[str, int], None]
+    ) -> Iterator[None]:
         """Let `send_paced` pace these topics inside; `report` is called with the topic and what its `Pace` reports.
 
         Several threads may pace the same topics, by one pace for each topic: that of the first one.
@@ -184,7 +214,9 @@ class Outputs:
                 self.advertise(topic)
                 publisher = self._publishers[topic]
                 if topic not in self._paces:
-                    self._paces[topic] = Pace(publisher, publisher.qos_profile.depth, patience, partial(report, topic))
+                    self._paces[topic] = Pace(
+                        publisher, publisher.qos_profile.depth, patience, partial(report, topic)
+                    )
             self._pacing += 1
         try:
             yield
@@ -219,7 +251,9 @@ class Outputs:
 class Pace:
     """Counts what one publisher's subscribers may not have acknowledged yet."""
 
-    def __init__(self, publisher: Any, depth: int, patience: float, report: Callable[[int], None]) -> None:
+    def __init__(
+        self, publisher: Any, depth: int, patience: float, report: Callable[[int], None]
+    ) -> None:
         """Begin.
 
         Args:
@@ -288,12 +322,19 @@ def others_on(node: Node, topic: str) -> list[str]:
 
     The log player and the segmenter share `tracks`: one plays a log, the other publishes what streams have brought.
     """
-    names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in node.get_publishers_info_by_topic(topic)]
+    names = [
+        f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+        for info in node.get_publishers_info_by_topic(topic)
+    ]
     own = node.get_fully_qualified_name()
     if own in names:
         names.remove(own)
     partner = {"log_player": "segmenter", "segmenter": "log_player"}.get(node.get_name())
-    return sorted(name for name in names if not (topic.endswith("/tracks") and name.rpartition("/")[2] == partner))
+    return sorted(
+        name
+        for name in names
+        if not (topic.endswith("/tracks") and name.rpartition("/")[2] == partner)
+    )
 
 
 def let_others_take(executor: Executor | None, stop: Callable[[], bool]) -> None:
@@ -315,5 +356,8 @@ def unacknowledged(node: Node, topic: str, count: int) -> str:
     message = f"a subscriber of {name} acknowledges nothing; it is not waited for any more"
     if count:
         message = f"{count} messages of {name} were published without acknowledgement, a subscriber may lack them"
-    who = ", ".join(sorted({info.node_name for info in node.get_subscriptions_info_by_topic(name)})) or "none any more"
+    who = (
+        ", ".join(sorted({info.node_name for info in node.get_subscriptions_info_by_topic(name)}))
+        or "none any more"
+    )
     return f"{message} (subscribers: {who}); see which one hangs, or raise patience; who joins anew gets the last 1000"

@@ -27,7 +27,9 @@ def copied(bag: Path, target: Path, change: Callable[[BagMessage], bytes | None]
     with atomic_bag(target) as writer:
         for message in read_messages(bag):
             if (data := change(message)) is not None:
-                writer.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
+                writer.add_topic(
+                    message.topic, message.type, qos_yaml(topic_entry(message.topic)[1])
+                )
                 writer.write(message.topic, data, message.stamp_ns)
     return target
 
@@ -41,22 +43,40 @@ def hand_made_run() -> GenerationResult:
     heading = np.array([[0.0], [np.pi]]) * np.ones_like(x)
     speed = np.array([[5.0], [6.0]]) * np.ones_like(x)
     vehicles = (Vehicle("1"), Vehicle("bus 2", 12.0, 2.5))
-    encounter = Encounter("made by hand", vehicles, 1_600_000_000_000_000_000, 100_000_000, position, heading, speed)
+    encounter = Encounter(
+        "made by hand", vehicles, 1_600_000_000_000_000_000, 100_000_000, position, heading, speed
+    )
     labels = np.searchsorted(k, np.arange(t), side="right")
     segmentation = Segmentation(labels, k, np.isin(np.arange(t), k) * 0.9, ("a", "b", "c"))
     index = np.array([0, *k, t - 1])
     anchors = np.concatenate([position, heading[..., None]], axis=-1)[:, index]
-    fitted = tuple(FittedVehicle(a, np.zeros(4), np.zeros(3, dtype=bool), 1.0, "straight") for a in anchors)
+    fitted = tuple(
+        FittedVehicle(a, np.zeros(4), np.zeros(3, dtype=bool), 1.0, "straight") for a in anchors
+    )
     states = np.concatenate([anchors, speed[:, index, None]], axis=-1)
     asked = BoundaryStates(states[:, 0], states[:, -1])
     fit = Fit(vehicles, fitted, index, asked, ("both keep right",))
     routes = tuple(
-        Route(np.column_stack([p[::2], h[::2]]), np.array([0, 10, 22, 30]), np.abs(p[::2, 0] - p[0, 0]))
+        Route(
+            np.column_stack([p[::2], h[::2]]),
+            np.array([0, 10, 22, 30]),
+            np.abs(p[::2, 0] - p[0, 0]),
+        )
         for p, h in zip(position[:, : t + 1], heading, strict=True)
     )
-    road = Road("straight", np.ones((50, 300), dtype=bool), 0.2, np.array([-10.0, -5.0]), anchors[:, 0], anchors[:, -1])
+    road = Road(
+        "straight",
+        np.ones((50, 300), dtype=bool),
+        0.2,
+        np.array([-10.0, -5.0]),
+        anchors[:, 0],
+        anchors[:, -1],
+    )
     scenarios = tuple(
-        Scenario(vehicles, time, position + 0.01 * i, heading, speed, np.zeros((n, t)), seed=7, index=i) for i in range(5)
+        Scenario(
+            vehicles, time, position + 0.01 * i, heading, speed, np.zeros((n, t)), seed=7, index=i
+        )
+        for i in range(5)
     )
     result = ScenarioSet(5, scenarios, 8, Counter({Cause.OVERLAP: 3}))
     return GenerationResult(encounter, segmentation, road, fit, routes, result, seed=7)

@@ -20,7 +20,11 @@ def small_bag(folder: Path, *, compress: bool) -> Path:
         bag.add_topic("/a", "std_msgs/msg/String")
         bag.add_topic("/b", "std_msgs/msg/Header")
         for k in range(60):
-            bag.write("/a" if k % 3 else "/b", b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00" + bytes([k]), 1000 + k)
+            bag.write(
+                "/a" if k % 3 else "/b",
+                b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00" + bytes([k]),
+                1000 + k,
+            )
     return folder / f"{folder.name}_0.mcap"
 
 
@@ -43,5 +47,7 @@ def salvaged(data: bytes, path: Path) -> list[tuple[int, bytes]]:
         whole = McapFile(file, len(data), Allowance(config, str(path), len(data)))
         whole.scan()
         whole.allowance = Allowance(config, str(path), len(data))
-        known = {channel.id for channel in whole.channels.values() if channel.schema_id in whole.schemas}
+        known = {
+            channel.id for channel in whole.channels.values() if channel.schema_id in whole.schemas
+        }
         return [(stamp, message) for stamp, _, message in whole.in_order(known)]

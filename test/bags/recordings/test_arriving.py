@@ -24,14 +24,27 @@ def set_of(count):
         all_of_it = scenario(7 + index, n=4)
         last = len(all_of_it.time) - 1
         present = np.array([[0, last], [2, last], [2, last - 3], [1, last]])
-        arrays = (all_of_it.time, all_of_it.position, all_of_it.heading, all_of_it.speed, all_of_it.acceleration)
-        one = with_witness(Scenario(all_of_it.vehicles, *arrays, 3, index, all_of_it.frame_id, present), 3)
+        arrays = (
+            all_of_it.time,
+            all_of_it.position,
+            all_of_it.heading,
+            all_of_it.speed,
+            all_of_it.acceleration,
+        )
+        one = with_witness(
+            Scenario(all_of_it.vehicles, *arrays, 3, index, all_of_it.frame_id, present), 3
+        )
         data = encode_scenario(one, 17)
         slot = EgoSlot(one.reference_drive.vehicles[0], np.zeros(4), np.ones(4))
         asked = BoundaryStates(np.zeros((4, 4)), np.ones((4, 4)))
-        entry = scenario_entry(one, data, "r", "/n", template=all_of_it.vehicles, asked=asked, ego=slot)
+        entry = scenario_entry(
+            one, data, "r", "/n", template=all_of_it.vehicles, asked=asked, ego=slot
+        )
         messages += [(SCENARIOS, part) for part in messages_of(data)]
-        messages += [(WITNESS, encode_scenario(one.reference_drive, 17)), (INFO, encode_info(entry, 17))]
+        messages += [
+            (WITNESS, encode_scenario(one.reference_drive, 17)),
+            (INFO, encode_info(entry, 17)),
+        ]
         made.append(one)
     return made, messages
 
@@ -49,7 +62,9 @@ def test_whatever_comes_first(order):
         assert stamp == 17 and entry.ego == got.reference_drive.vehicles[0].id
         wanted = join_ego(MADE[entry.index])
         assert encode_scenario(join_ego(got), 17) == encode_scenario(wanted, 17)
-    assert [one for k in order for one in arriving.take(*MESSAGES[k])] == [], "what comes twice counts once"
+    assert [one for k in order for one in arriving.take(*MESSAGES[k])] == [], (
+        "what comes twice counts once"
+    )
 
 
 def test_what_is_not_whole_waits():

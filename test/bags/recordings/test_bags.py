@@ -52,7 +52,9 @@ def test_every_message_decodes_in_every_reader(run, tmp_path):
             reader.deserialize(data, connection.msgtype)
             counts["rosbags"] += 1
     with (folder / "bag_0.mcap").open("rb") as stream:
-        for schema, channel, _, message in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+        for schema, channel, _, message in make_reader(
+            stream, decoder_factories=[DecoderFactory()]
+        ).iter_decoded_messages():
             assert message is not None
             assert schema.encoding == "ros2msg"
             assert channel.message_encoding == "cdr"
@@ -75,15 +77,22 @@ def test_the_file_says_what_rosbag2_wants(run, tmp_path):
             assert channel.metadata["topic_type_hash"] == store.hash_rihs01(schema.name)
             (profile,) = yaml.safe_load(channel.metadata["offered_qos_profiles"])
             assert profile["durability"] == "transient_local"
-            assert profile["depth"] == (1000 if "scenarios" in channel.topic else 100 if "diag" in channel.topic else 1)
+            assert profile["depth"] == (
+                1000 if "scenarios" in channel.topic else 100 if "diag" in channel.topic else 1
+            )
     text = (folder / "metadata.yaml").read_text()
     info = yaml.safe_load(text)["rosbag2_bagfile_information"]
     assert info["version"] == 9
     assert info["storage_identifier"] == "mcap"
     assert info["relative_file_paths"] == ["bag_0.mcap"]
     assert info["starting_time"]["nanoseconds_since_epoch"] == run.encounter.start_ns
-    assert info["message_count"] == sum(topic["message_count"] for topic in info["topics_with_message_count"])
-    topics = {topic["topic_metadata"]["name"]: topic["topic_metadata"] for topic in info["topics_with_message_count"]}
+    assert info["message_count"] == sum(
+        topic["message_count"] for topic in info["topics_with_message_count"]
+    )
+    topics = {
+        topic["topic_metadata"]["name"]: topic["topic_metadata"]
+        for topic in info["topics_with_message_count"]
+    }
     assert topics["/scenarios"]["offered_qos_profiles"][0]["reliability"] == "reliable"
     assert "/vehicle_bus_2/route" in topics
     assert "&" not in text
@@ -100,35 +109,54 @@ def test_a_run_is_read_back_from_its_bag(run, tmp_path):
     assert decode_posterior(by_topic["/posterior"]).changepoints.tolist() == [20, 45]
     assert decode_fit(by_topic["/fit"])[2].end.tobytes() == run.fit.requested.end.tobytes()
     anchors = anchor_stamps(template, run.segmentation.changepoints)
-    assert decode_route(by_topic["/vehicle_1/route"], anchors)[1].points.tobytes() == run.routes[0].points.tobytes()
+    assert (
+        decode_route(by_topic["/vehicle_1/route"], anchors)[1].points.tobytes()
+        == run.routes[0].points.tobytes()
+    )
     sent = [message.data for message in messages if message.topic == "/scenarios"]
     *entries, summary = [decode_info(m.data)[0] for m in messages if m.topic == "/scenarios/info"]
     assert [entry.sha256 for entry in entries] == [digest(data) for data in sent]
     scenarios = [decode_scenario(data)[1] for data in sent]
-    assert [s.position.tobytes() for s in scenarios] == [s.position.tobytes() for s in run.generated.scenarios]
+    assert [s.position.tobytes() for s in scenarios] == [
+        s.position.tobytes() for s in run.generated.scenarios
+    ]
     found = summary.result()
     assert (found.requested, found.candidates, found.refused) == (5, 8, run.generated.refused)
 
 
 def test_the_scenarios_of_a_request_are_read_with_their_counts(run, tmp_path):
-    other = replace(run, generated=replace(run.generated, requested=6, scenarios=run.generated.scenarios[:2]))
+    other = replace(
+        run, generated=replace(run.generated, requested=6, scenarios=run.generated.scenarios[:2])
+    )
     folder = write_recording(tmp_path / "bag", {"": run, "/b": other})
     for namespace, sent in (("", run), ("/b", other)):
         got = read_scenario_set(folder, namespace)
-        assert (got.requested, got.candidates, got.refused) == (sent.generated.requested, 8, run.generated.refused)
-        assert [(s.index, s.seed) for s in got.scenarios] == [(s.index, s.seed) for s in sent.generated.scenarios]
-        assert [s.position.tobytes() for s in got.scenarios] == [s.position.tobytes() for s in sent.generated.scenarios]
+        assert (got.requested, got.candidates, got.refused) == (
+            sent.generated.requested,
+            8,
+            run.generated.refused,
+        )
+        assert [(s.index, s.seed) for s in got.scenarios] == [
+            (s.index, s.seed) for s in sent.generated.scenarios
+        ]
+        assert [s.position.tobytes() for s in got.scenarios] == [
+            s.position.tobytes() for s in sent.generated.scenarios
+        ]
     with pytest.raises(InputError, match="no request"):
         read_scenario_set(folder, "/c")
 
 
 @pytest.mark.parametrize(
-    "indices", [(0, 1, 2, 3, 4), (1, 2, 1_000_001, 1_000_003, 4)], ids=["none refused", "refused and adapted"]
+    "indices",
+    [(0, 1, 2, 3, 4), (1, 2, 1_000_001, 1_000_003, 4)],
+    ids=["none refused", "refused and adapted"],
 )
 @pytest.mark.parametrize("begun", [3, 5, 7])
 def test_a_request_that_came_twice_counts_once(run, tmp_path, indices, begun):
     """As a sampler publishes it that was killed in the midst of it and started again."""
-    scenarios = tuple(replace(s, index=index) for s, index in zip(run.generated.scenarios, indices, strict=True))
+    scenarios = tuple(
+        replace(s, index=index) for s, index in zip(run.generated.scenarios, indices, strict=True)
+    )
     run = replace(run, generated=replace(run.generated, scenarios=scenarios))
     whole = list(read_messages(write_recording(tmp_path / "whole", run)))
     told = [message for message in whole if message.topic in ("/scenarios", "/scenarios/info")]
@@ -140,7 +168,9 @@ def test_a_request_that_came_twice_counts_once(run, tmp_path, indices, begun):
     bag.close()
     got = read_scenario_set(tmp_path / "twice")
     assert [s.index for s in got.scenarios] == list(indices)
-    assert [s.position.tobytes() for s in got.scenarios] == [s.position.tobytes() for s in run.generated.scenarios]
+    assert [s.position.tobytes() for s in got.scenarios] == [
+        s.position.tobytes() for s in run.generated.scenarios
+    ]
 
 
 def test_same_run_same_bytes(run, tmp_path):
@@ -150,14 +180,18 @@ def test_same_run_same_bytes(run, tmp_path):
 
 
 def test_nothing_half_written_and_no_folder_of_others_is_touched(run, tmp_path):
-    broken = replace(run, routes=(run.routes[0], replace(run.routes[1], anchor=np.array([0, 10, 22, 99]))))
+    broken = replace(
+        run, routes=(run.routes[0], replace(run.routes[1], anchor=np.array([0, 10, 22, 99])))
+    )
     with pytest.raises(IndexError):
         write_recording(tmp_path / "bag", broken)
     assert list(tmp_path.iterdir()) == []
     write_recording(tmp_path / "bag", run)
     with pytest.raises(IndexError):
         write_recording(tmp_path / "bag", broken)
-    assert len(list(read_messages(tmp_path / "bag"))) == len(list(result_messages(run)))  # the earlier one is still there
+    assert len(list(read_messages(tmp_path / "bag"))) == len(
+        list(result_messages(run))
+    )  # the earlier one is still there
     write_recording(tmp_path / "bag", run)
     assert [p.name for p in tmp_path.iterdir()] == ["bag"]
     (tmp_path / "mine").mkdir()
@@ -175,7 +209,9 @@ def test_splitting_by_size_and_by_time(tmp_path):
         for k in range(35):
             bag.write("/t", b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00", k * 100_000_000)
     assert len(bag.info.files) == 4
-    assert [m.stamp_ns for m in read_messages(tmp_path / "bag")] == [k * 100_000_000 for k in range(35)]
+    assert [m.stamp_ns for m in read_messages(tmp_path / "bag")] == [
+        k * 100_000_000 for k in range(35)
+    ]
     with BagWriter(tmp_path / "size", split=Split(bytes=100)) as bag:
         bag.add_topic("/t", "std_msgs/msg/String")
         for k in range(35):
@@ -197,7 +233,12 @@ os.kill(os.getpid(), 9)
 
 
 def test_a_killed_recording_loses_its_last_chunk_only(tmp_path):
-    assert subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "bag")], check=False).returncode == -9
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", KILLED, str(tmp_path / "bag")], check=False
+        ).returncode
+        == -9
+    )
     with pytest.raises(InputError, match="reindex"):
         list(read_messages(tmp_path / "bag"))
     saved = reindex(tmp_path / "bag", tmp_path / "saved").messages
@@ -223,7 +264,10 @@ def test_a_bag_that_could_not_be_written_on_is_left_for_reindex(tmp_path):
 
 
 def test_an_unknown_type_says_where_its_definition_was_sought(tmp_path):
-    with pytest.raises(InputError, match=r"no_such/msg/Thing.*AMENT_PREFIX_PATH"), BagWriter(tmp_path / "bag") as bag:
+    with (
+        pytest.raises(InputError, match=r"no_such/msg/Thing.*AMENT_PREFIX_PATH"),
+        BagWriter(tmp_path / "bag") as bag,
+    ):
         bag.add_topic("/t", "no_such/msg/Thing")
 
 
@@ -232,7 +276,9 @@ def test_a_type_of_an_installed_package_is_found(tmp_path, monkeypatch):
     share.mkdir(parents=True)
     (share / "Inner.msg").write_text("float64[3] a\nstd_msgs/Header h\n")
     (share / "Outer.msg").write_text("Inner[] many\nInner one\nstring s\n")
-    monkeypatch.setenv("AMENT_PREFIX_PATH", os.pathsep.join([str(tmp_path / "elsewhere"), str(tmp_path)]))
+    monkeypatch.setenv(
+        "AMENT_PREFIX_PATH", os.pathsep.join([str(tmp_path / "elsewhere"), str(tmp_path)])
+    )
     with BagWriter(tmp_path / "bag") as bag:
         bag.add_topic("/t", "my_msgs/msg/Outer")
         bag.write("/t", b"\x00\x01\x00\x00", 1)
@@ -246,7 +292,9 @@ def test_bags_of_genuine_rosbag2_are_read_alike_in_both_storages(data: Path, nam
     for storage in ("mcap", "sqlite3"):
         folder = data / "bags" / storage / name
         messages = list(read_messages(folder))
-        info = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+        info = yaml.safe_load((folder / "metadata.yaml").read_text())[
+            "rosbag2_bagfile_information"
+        ]
         assert len(messages) == info["message_count"]
         assert sum(topic.count for topic in bag_topics(folder)) == len(messages)
         read[storage] = Counter((m.topic, m.type) for m in messages)
@@ -256,9 +304,15 @@ def test_bags_of_genuine_rosbag2_are_read_alike_in_both_storages(data: Path, nam
 def test_scenarios_of_vehicles_that_come_and_go_are_read_back_whole(run, tmp_path):
     present = np.array([[0, 60], [20, 50]])
     scenarios = tuple(replace(scenario, present=present) for scenario in run.generated.scenarios)
-    late = replace(run, encounter=replace(run.encounter, present=present), generated=replace(run.generated, scenarios=scenarios))
+    late = replace(
+        run,
+        encounter=replace(run.encounter, present=present),
+        generated=replace(run.generated, scenarios=scenarios),
+    )
     folder = write_recording(tmp_path / "bag", late)
-    assert sum(message.topic == "/scenarios" for message in read_messages(folder)) == 2 * len(scenarios)
+    assert sum(message.topic == "/scenarios" for message in read_messages(folder)) == 2 * len(
+        scenarios
+    )
     found = read_recording(folder).namespaces[""]
     assert not found.missing
     assert not found.unknown
@@ -268,15 +322,24 @@ def test_scenarios_of_vehicles_that_come_and_go_are_read_back_whole(run, tmp_pat
             assert getattr(before, name).tobytes() == getattr(after, name).tobytes()
     (info, (entry,)), summary = found.infos[2], found.summaries[0]
     alone = found.messages_of(info, entry, summary)
-    assert [message.data for message in alone if message.topic == "/scenarios"] == list(messages_of(found.data("scenarios")[2]))
+    assert [message.data for message in alone if message.topic == "/scenarios"] == list(
+        messages_of(found.data("scenarios")[2])
+    )
 
 
 def test_a_saved_result_is_loaded_with_the_same_scenarios(run, tmp_path):
     found = load(run.save(tmp_path / "bag"))
-    assert (len(found), found.seed, found.generated.candidates) == (5, 7, 8) and found.generated.refused == run.generated.refused
+    assert (len(found), found.seed, found.generated.candidates) == (
+        5,
+        7,
+        8,
+    ) and found.generated.refused == run.generated.refused
     assert all(np.array_equal(a.position, b.position) for a, b in zip(found, run, strict=True))
     assert found.road is not None and np.array_equal(found.road.drivable, run.road.drivable)
-    assert np.array_equal(found.segmentation.changepoints, run.segmentation.changepoints) and not found.evaluation.rows
+    assert (
+        np.array_equal(found.segmentation.changepoints, run.segmentation.changepoints)
+        and not found.evaluation.rows
+    )
 
 
 def test_what_holds_no_result_cannot_be_loaded(run, tmp_path):

@@ -9,7 +9,10 @@ from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.losses import LATE, Losses
 
 
-@pytest.mark.parametrize("topic", ["/tf", "/clock", "/vehicle_1/odom", "/vehicle_1/fix", "/verdicts", "/ego/witness", "/map"])
+@pytest.mark.parametrize(
+    "topic",
+    ["/tf", "/clock", "/vehicle_1/odom", "/vehicle_1/fix", "/verdicts", "/ego/witness", "/map"],
+)
 def test_what_was_published_before_the_recording_is_missed_of_results_only(topic):
     losses, quality = Losses(lambda _: 1), topic_entry(topic)[1]
     losses.begin(topic, quality)
@@ -17,4 +20,6 @@ def test_what_was_published_before_the_recording_is_missed_of_results_only(topic
         losses.take(topic, b"", number)
     said = losses.summary().get(topic, "")
     assert (LATE in said) == (topic in ("/verdicts", "/ego/witness"))
-    assert said.startswith("2 lost") == (topic != "/map"), "a map that was overwritten is not missed"
+    assert said.startswith("2 lost") == (topic != "/map"), (
+        "a map that was overwritten is not missed"
+    )

@@ -90,7 +90,10 @@ def test_split_files_are_read_and_saved_by_time(tmp_path):
     for path in (folder, tmp_path / "saved"):
         stamps = [message.stamp_ns for message in read_messages(path)]
         assert stamps == sorted(stamps) and len(stamps) == 30
-    one, two = ([message.data[-1] for message in read_messages(path)] for path in (folder, tmp_path / "saved"))
+    one, two = (
+        [message.data[-1] for message in read_messages(path)]
+        for path in (folder, tmp_path / "saved")
+    )
     assert one == two  # of one stamp in the order of the files
 
 
@@ -100,22 +103,33 @@ def test_recorded_bags_are_saved_whole(data, tmp_path, name):
     folder = data / "bags" / "mcap" / name
     made = reindex(folder, tmp_path / "saved")
     assert made.lines() == []
-    whole, saved = ([(m.topic, m.type, m.data, m.stamp_ns) for m in read_messages(path)] for path in (folder, tmp_path / "saved"))
+    whole, saved = (
+        [(m.topic, m.type, m.data, m.stamp_ns) for m in read_messages(path)]
+        for path in (folder, tmp_path / "saved")
+    )
     assert saved == whole
 
 
 def changed(tmp_path, topic, change):
     """A bag in which `change` has changed the messages of a topic."""
     bag = write_recording(tmp_path / "bag", hand_made_run())
-    return copied(bag, tmp_path / "broken", lambda message: change(message.data) if message.topic == topic else message.data)
+    return copied(
+        bag,
+        tmp_path / "broken",
+        lambda message: change(message.data) if message.topic == topic else message.data,
+    )
 
 
-@pytest.mark.parametrize("topic", ["/tracks", "/map", "/changepoints", "/scenarios/info", "/scenarios"])
+@pytest.mark.parametrize(
+    "topic", ["/tracks", "/map", "/changepoints", "/scenarios/info", "/scenarios"]
+)
 @pytest.mark.parametrize("damage", ["cut", "other type"])
 def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
     another = "map" if topic != "/map" else "tracks"
     (other,) = (data for name, data, _ in result_messages(hand_made_run()) if name == another)
-    broken = changed(tmp_path, topic, lambda data: other if damage == "other type" else data[: len(data) // 2])
+    broken = changed(
+        tmp_path, topic, lambda data: other if damage == "other type" else data[: len(data) // 2]
+    )
     if topic == "/scenarios":
         (found,) = validate_bag(broken)
         assert found.invalid == found.scenarios == 5 and UNUSABLE in found.found
@@ -130,14 +144,24 @@ def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
     [
         (lambda message: replace(message, position=message.position * 1e9), "position is"),
         (lambda message: replace(message, speed=message.speed * 1e6), "speed is"),
-        (lambda message: replace(message, time_ns=message.time_ns * 10_000), "at most 7200 s|steps of 0.001 to 10 s"),
-        (lambda message: replace(message, vehicles=tuple(replace(v, length=1e9) for v in message.vehicles)), "0.01 to 1000 m"),
+        (
+            lambda message: replace(message, time_ns=message.time_ns * 10_000),
+            "at most 7200 s|steps of 0.001 to 10 s",
+        ),
+        (
+            lambda message: replace(
+                message, vehicles=tuple(replace(v, length=1e9) for v in message.vehicles)
+            ),
+            "0.01 to 1000 m",
+        ),
     ],
     ids=["position", "speed", "time", "length"],
 )
 @pytest.mark.parametrize("topic", ["/tracks", "/scenarios"])
 def test_what_no_vehicle_does_is_refused_before_it_takes_memory(tmp_path, topic, change, said):
-    broken = changed(tmp_path, topic, lambda data: trajectory.encode(change(trajectory.decode(data, topic))))
+    broken = changed(
+        tmp_path, topic, lambda data: trajectory.encode(change(trajectory.decode(data, topic)))
+    )
     with pytest.raises(InputError, match=said):
         bag_results(broken)
 
@@ -145,7 +169,9 @@ def test_what_no_vehicle_does_is_refused_before_it_takes_memory(tmp_path, topic,
 def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
     def far_apart(data):
         message = trajectory.decode(data, "/scenarios")
-        return trajectory.encode(replace(message, position=message.position * np.array([[[1e6]], [[1.0]]])))
+        return trajectory.encode(
+            replace(message, position=message.position * np.array([[[1e6]], [[1.0]]]))
+        )
 
     with pytest.raises(InputError, match=r"broken: gap from .* no vehicles move so"):
         bag_results(changed(tmp_path, "/scenarios", far_apart))
@@ -154,7 +180,10 @@ def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
 def test_a_fit_of_other_vehicles_is_refused(tmp_path):
     def of_one(data):
         fit = trajectory.decode(data, "/fit")
-        parts = {key: getattr(fit, key)[:1] for key in ("vehicles", "position", "heading", "speed", "acceleration")}
+        parts = {
+            key: getattr(fit, key)[:1]
+            for key in ("vehicles", "position", "heading", "speed", "acceleration")
+        }
         return trajectory.encode(replace(fit, **parts))
 
     messages = {m.topic[1:]: m.data for m in read_messages(changed(tmp_path, "/fit", of_one))}

@@ -34,8 +34,14 @@ def test_every_cut_leaves_the_whole_chunks_before_it(bag, tmp_path):
     whole, messages = bag.read_bytes(), told(bag)
     ends = chunk_ends(whole)
     rng = random.Random(3)
-    near = [cut for cut in range(ends[-3][0], ends[-1][0] + 1) if any(-100 <= cut - end <= 20 for end, _ in ends)]
-    for cut in range(len(whole) + 1) if LONG else (*near, *(rng.randrange(len(whole)) for _ in range(60))):
+    near = [
+        cut
+        for cut in range(ends[-3][0], ends[-1][0] + 1)
+        if any(-100 <= cut - end <= 20 for end, _ in ends)
+    ]
+    for cut in (
+        range(len(whole) + 1) if LONG else (*near, *(rng.randrange(len(whole)) for _ in range(60)))
+    ):
         expected = max((count for end, count in ends if end <= cut), default=0)
         found = salvaged(whole[:cut], tmp_path / "cut.mcap")
         assert found == [(stamp, data) for _, _, stamp, data in messages[:expected]], cut
@@ -98,12 +104,19 @@ def test_what_was_lost_is_said_in_the_terminal(bag, tmp_path):
     start = end
     while broken[start] != 6:
         start += 9 + int.from_bytes(broken[start + 1 : start + 9], "little")
-    broken[start + 9 + 16 : start + 9 + 24] = (2**50).to_bytes(8, "little")  # of what size it is after decompression
+    broken[start + 9 + 16 : start + 9 + 24] = (2**50).to_bytes(
+        8, "little"
+    )  # of what size it is after decompression
     bag.write_bytes(broken[:-20])
-    answer = CliRunner().invoke(app, ["reindex", str(bag.parent), "--out", str(tmp_path / "saved")])
+    answer = CliRunner().invoke(
+        app, ["reindex", str(bag.parent), "--out", str(tmp_path / "saved")]
+    )
     assert answer.exit_code == 0, answer.output
     said = answer.output
-    assert f"from byte {start}, {then - count} messages by its index" in said and "most_chunk_bytes" in said
+    assert (
+        f"from byte {start}, {then - count} messages by its index" in said
+        and "most_chunk_bytes" in said
+    )
     assert "bag_0.mcap was not closed" in said and "bytes were passed over in all" in said
 
 
@@ -161,7 +174,9 @@ def test_a_type_that_is_not_installed_is_saved_as_it_was_described(tmp_path):
         writer = Writer(stream)
         writer.start(profile="ros2")
         schema = writer.register_schema("no_such/msg/Thing", "ros2msg", b"int32 a")
-        channel = writer.register_channel("/t", "cdr", schema, {"offered_qos_profiles": "[", "topic_type_hash": "RIHS01_1"})
+        channel = writer.register_channel(
+            "/t", "cdr", schema, {"offered_qos_profiles": "[", "topic_type_hash": "RIHS01_1"}
+        )
         writer.add_message(channel, log_time=5, data=bytes(8), publish_time=5)
         writer.finish()
     assert reindex(tmp_path / "a.mcap", tmp_path / "saved").messages == 1

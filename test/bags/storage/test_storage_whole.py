@@ -32,16 +32,26 @@ def written(folder, plugin, mode=CompressionMode.NONE):
 
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
-@pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.FILE, CompressionMode.MESSAGE])
+@pytest.mark.parametrize(
+    "mode", [CompressionMode.NONE, CompressionMode.FILE, CompressionMode.MESSAGE]
+)
 def test_bags_of_rosbags_are_read(tmp_path, plugin, mode):
     written(tmp_path / "bag", plugin, mode)
-    assert [(m.stamp_ns, m.data[-1]) for m in read_messages(tmp_path / "bag")] == [(1000 + k, k) for k in range(20)]
+    assert [(m.stamp_ns, m.data[-1]) for m in read_messages(tmp_path / "bag")] == [
+        (1000 + k, k) for k in range(20)
+    ]
     assert bag_topics(tmp_path / "bag")[0].count == 20
     if mode is not CompressionMode.NONE:
         with pytest.raises(InputError, match=r"bag\.most_"):
-            list(read_messages(tmp_path / "bag", config=BagConfig(most_bytes=10, most_chunk_bytes=10)))
+            list(
+                read_messages(
+                    tmp_path / "bag", config=BagConfig(most_bytes=10, most_chunk_bytes=10)
+                )
+            )
         for file in tmp_path.glob("bag/bag.*"):
-            file.write_bytes(file.read_bytes().replace(b"\x28\xb5\x2f\xfd", b"none"))  # what each compressed piece begins with
+            file.write_bytes(
+                file.read_bytes().replace(b"\x28\xb5\x2f\xfd", b"none")
+            )  # what each compressed piece begins with
         with pytest.raises(InputError, match="bag"):
             list(read_messages(tmp_path / "bag"))
 
@@ -59,20 +69,25 @@ def test_a_changed_database_is_an_error(tmp_path, statement):
     written(tmp_path / "bag", StoragePlugin.SQLITE3)
     (file,) = (tmp_path / "bag").glob("*.db3")
     with contextlib.closing(sqlite3.connect(file)) as base:
-        base.executescript("pragma writable_schema = on; drop index if exists timestamp_idx;" + statement)
+        base.executescript(
+            "pragma writable_schema = on; drop index if exists timestamp_idx;" + statement
+        )
         base.commit()
     with pytest.raises(InputError, match=r"\.db3"):
         list(read_messages(tmp_path / "bag"))
 
 
 @pytest.mark.parametrize(
-    ("encoding", "profile", "said"), [("json", "ros2", "/t is encoded as 'json'"), ("cdr", "ros1", "profile 'ros1'")]
+    ("encoding", "profile", "said"),
+    [("json", "ros2", "/t is encoded as 'json'"), ("cdr", "ros1", "profile 'ros1'")],
 )
 def test_other_encodings_are_refused_by_name(tmp_path, encoding, profile, said):
     stream = BytesIO()
     writer = Writer(stream)
     writer.start(profile=profile)
-    channel = writer.register_channel("/t", encoding, writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data"))
+    channel = writer.register_channel(
+        "/t", encoding, writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+    )
     writer.add_message(channel, log_time=1, data=b"{}", publish_time=1)
     writer.finish()
     (tmp_path / "a.mcap").write_bytes(stream.getvalue())

@@ -17,7 +17,18 @@ from scenario_gen.base.folders import Kind, replaced_folder, write_text
 
 KIND = Kind("test")
 TEXT = b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00"
-CALLS = ("mkdir", "open", "write", "fsync", "rename", "replace", "unlink", "rmdir", "scandir", "stat")
+CALLS = (
+    "mkdir",
+    "open",
+    "write",
+    "fsync",
+    "rename",
+    "replace",
+    "unlink",
+    "rmdir",
+    "scandir",
+    "stat",
+)
 
 
 def write_bag(target: Path, messages: int) -> None:
@@ -38,7 +49,11 @@ def write_texts(target: Path, size: int) -> None:
 
 def content(folder: Path) -> dict[str, bytes]:
     """Every file below, by name."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
 class Failing:

@@ -54,11 +54,19 @@ class Case:
 
 
 EVERY = 1 if LONG else 4
-CASES = {"texts": (write_texts, True), "nothing_there": (write_texts, False), "bag": (write_bag, True)}
+CASES = {
+    "texts": (write_texts, True),
+    "nothing_there": (write_texts, False),
+    "bag": (write_bag, True),
+}
 
 
 @pytest.mark.parametrize(
-    ("name", "later_too"), [*((name, False) for name in CASES), *((name, True) for name in (CASES if LONG else ("texts",)))]
+    ("name", "later_too"),
+    [
+        *((name, False) for name in CASES),
+        *((name, True) for name in (CASES if LONG else ("texts",))),
+    ],
 )
 def test_every_call_fails(folder, name, later_too):
     case = Case(folder, *CASES[name])
@@ -74,7 +82,11 @@ def test_every_call_fails(folder, name, later_too):
                 case.write(target, 5)
             except InputError as refused:
                 error = str(refused)
-        assert content(target) == case.new if not error else "out" in error and len(error) < 500 and "Errno" not in error, error
+        assert (
+            content(target) == case.new
+            if not error
+            else "out" in error and len(error) < 500 and "Errno" not in error
+        ), error
         case.settled(target)
         if failing.calls <= k:
             break
@@ -106,7 +118,11 @@ def test_a_real_disk_that_is_full_or_read_only(tmp_path):
     """The earlier result stays until the new one fits beside it."""
 
     def mount(options):
-        return subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", tmp_path], capture_output=True, check=False)
+        return subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", options, "tmpfs", tmp_path],
+            capture_output=True,
+            check=False,
+        )
 
     if mount("size=400k").returncode:
         pytest.skip("no file system can be mounted here")

@@ -39,7 +39,9 @@ def test_an_empty_folder_may_be_there_and_missing_ones_are_made(tmp_path):
     (tmp_path / "empty").mkdir()
     write_texts(tmp_path / "empty", 1)
     write_texts(tmp_path / "a" / "b" / "c", 1)
-    assert (tmp_path / "empty" / "one.txt").exists() and (tmp_path / "a" / "b" / "c" / "one.txt").exists()
+    assert (tmp_path / "empty" / "one.txt").exists() and (
+        tmp_path / "a" / "b" / "c" / "one.txt"
+    ).exists()
     with pytest.raises(ZeroDivisionError), replaced_folder(tmp_path / "d" / "e" / "f", KIND):
         raise ZeroDivisionError
     assert not (tmp_path / "d").exists()
@@ -54,7 +56,9 @@ SPOILED = {
     "inner/notes.txt": lambda out: (out / "inner" / "notes.txt").write_text("mine"),
     "link": lambda out: (out / "link").symlink_to("/nowhere"),
     "one.txt in it": lambda out: (out / "one.txt").write_text("my own words"),
-    "earlier result (test)": lambda out: (out / MARKER).write_text('{"kind": "another", "format": 1, "files": {}}'),
+    "earlier result (test)": lambda out: (out / MARKER).write_text(
+        '{"kind": "another", "format": 1, "files": {}}'
+    ),
     "an earlier result": lambda out: (out / MARKER).write_text("{"),
     "is not an earlier result": lambda out: (out / MARKER).unlink(),
     "is a file": lambda out: moved(out).write_text("mine"),
@@ -73,7 +77,9 @@ def test_what_is_no_earlier_result_is_not_replaced(out, words):
     assert (content(out.parent), sorted(out.parent.rglob("*"))) == before
 
 
-@pytest.mark.parametrize("place", ["/", ".", "..", "/proc/out", "x" * 300, "y/" * 2500, "file/out", "loop/out", "a\0b"])
+@pytest.mark.parametrize(
+    "place", ["/", ".", "..", "/proc/out", "x" * 300, "y/" * 2500, "file/out", "loop/out", "a\0b"]
+)
 def test_places_where_no_result_can_be(tmp_path, monkeypatch, place):
     (tmp_path / "file").touch()
     (tmp_path / "loop").symlink_to("loop")
@@ -98,13 +104,21 @@ def test_what_comes_while_a_result_is_made_is_kept(out, monkeypatch):
     monkeypatch.setattr(Path, "rename", late)
     with pytest.raises(InputError, match="notes"):
         write_texts(out, 3)
-    assert (out / "notes.txt").read_text() == "mine" and (out / "one.txt").read_text() == "one.txt" * 2
+    assert (out / "notes.txt").read_text() == "mine" and (
+        out / "one.txt"
+    ).read_text() == "one.txt" * 2
     assert list(out.parent.iterdir()) == [out]
 
 
 def test_inputs_are_not_replaced(out, tmp_path):
     (tmp_path / "link.txt").symlink_to(out / "inner" / "two.txt")
-    for given in (out, out / "one.txt", out / "inner", tmp_path / "link.txt", out / ".." / "out" / "one.txt"):
+    for given in (
+        out,
+        out / "one.txt",
+        out / "inner",
+        tmp_path / "link.txt",
+        out / ".." / "out" / "one.txt",
+    ):
         with pytest.raises(InputError, match="which is read"), replaced_folder(out, KIND, [given]):
             pass
     for given in (tmp_path, tmp_path / "missing", Path("z" * 300)):
@@ -127,14 +141,18 @@ with replaced_folder(Path(sys.argv[1]), Kind("test")) as folder:
 def holder(out):
     """A process that is writing to `out`."""
     words = [sys.executable, "-c", HOLDING, str(out)]
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdout.readline() == "writing\n"
         yield process
         process.kill()
 
 
 def test_a_second_writer_is_refused_and_told_who_the_first_is(out, holder):
-    with pytest.raises(InputError, match=rf"is being written by process {holder.pid} on .*; wait for it"):
+    with pytest.raises(
+        InputError, match=rf"is being written by process {holder.pid} on .*; wait for it"
+    ):
         write_texts(out, 3)
     sweep_beside([str(out)])
     write_texts(out.with_name("other"), 3)

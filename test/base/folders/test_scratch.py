@@ -55,10 +55,14 @@ def test_a_folder_goes_with_who_holds_it(tmp_path, number, stays):
 
 def test_what_is_started_hears_no_ctrl_c():
     def said():
-        run = subprocess.run(["sh", "-c", "kill -INT $$; echo deaf"], capture_output=True, text=True, check=False)
+        run = subprocess.run(
+            ["sh", "-c", "kill -INT $$; echo deaf"], capture_output=True, text=True, check=False
+        )
         return run.stdout
 
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
+    before = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # a job in the background ignores it
     try:
         with starting():
             context = multiprocessing.get_context("spawn")
@@ -71,7 +75,11 @@ def test_what_is_started_hears_no_ctrl_c():
 
 @pytest.mark.parametrize("words", [["{}"], ["--out={}"], ["x", "{}/bag"], ["\0", "{}/"]])
 def test_a_command_sweeps_where_its_words_point(tmp_path, words):
-    places = [tmp_path / "batch", tmp_path / "batch" / "cases", tmp_path / "batch" / "bags" / "road=a"]
+    places = [
+        tmp_path / "batch",
+        tmp_path / "batch" / "cases",
+        tmp_path / "batch" / "bags" / "road=a",
+    ]
     deep = not any("bag" in word for word in words)
     for folder in places if deep else places[:1]:
         killed_in(folder)

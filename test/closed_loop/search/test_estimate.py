@@ -23,7 +23,11 @@ class Plane:
     def __init__(self, rate, allowed=math.inf):
         direction = np.zeros(DIMENSIONS)
         direction[[3, 10, 20]] = 0.6, 0.5, 0.624
-        self.direction, self.rate, self.allowed = direction / np.linalg.norm(direction), rate, allowed
+        self.direction, self.rate, self.allowed = (
+            direction / np.linalg.norm(direction),
+            rate,
+            allowed,
+        )
         self.driven = []
 
     size = DIMENSIONS
@@ -40,7 +44,9 @@ class Plane:
     def drive(self, candidates):
         self.driven += [row.copy() for row in candidates]
         margins = [self.margin(row) for row in candidates]
-        return [Response(margin, (margin,), "fails" if margin <= 0.0 else "") for margin in margins]
+        return [
+            Response(margin, (margin,), "fails" if margin <= 0.0 else "") for margin in margins
+        ]
 
 
 class TwoPlanes(Plane):
@@ -51,7 +57,14 @@ class TwoPlanes(Plane):
 
     def drive(self, candidates):
         both = [self.margins(row) for row in candidates]
-        return [Response(min(pair), pair, ("first", "second")[int(np.argmin(pair))] if min(pair) <= 0.0 else "") for pair in both]
+        return [
+            Response(
+                min(pair),
+                pair,
+                ("first", "second")[int(np.argmin(pair))] if min(pair) <= 0.0 else "",
+            )
+            for pair in both
+        ]
 
 
 class Unforeseen(Plane):
@@ -70,7 +83,9 @@ def test_the_interval_holds_the_rate_and_costs_fewer_drives_than_plain_sampling(
         held += found.rate.low <= rate <= found.rate.high <= found.bound
         half = 0.5 * (found.rate.high - found.rate.low)
         share.append(found.drives * half * half / (1.96**2 * rate * (1.0 - rate)))
-        assert found.drives == len(search.z) == budget and 0.8 < found.valid < 0.88  # norm.cdf(1) is 0.84
+        assert (
+            found.drives == len(search.z) == budget and 0.8 < found.valid < 0.88
+        )  # norm.cdf(1) is 0.84
     assert held >= HELD
     assert np.median(share) < 1 / 3
 
@@ -107,11 +122,14 @@ def test_a_smaller_budget_is_the_beginning_of_a_larger_one():
     small, large = Plane(1e-2), Plane(1e-2)
     Search(small, 5, 333).run()
     Search(large, 5, 480).run()
-    assert len(small.driven) == 333 and all(np.array_equal(a, b) for a, b in zip(small.driven, large.driven[:333], strict=True))
+    assert len(small.driven) == 333 and all(
+        np.array_equal(a, b) for a, b in zip(small.driven, large.driven[:333], strict=True)
+    )
 
 
 @pytest.mark.parametrize(
-    ("rate", "allowed", "budget"), [(1e-2, math.inf, 1), (1e-2, 0.0, 200), (1e-300, math.inf, 400), (1e-2, -math.inf, 100)]
+    ("rate", "allowed", "budget"),
+    [(1e-2, math.inf, 1), (1e-2, 0.0, 200), (1e-300, math.inf, 400), (1e-2, -math.inf, 100)],
 )
 def test_little_budget_no_failure_and_nothing_valid_give_what_they_can(rate, allowed, budget):
     problem = Plane(rate, allowed)
@@ -119,12 +137,18 @@ def test_little_budget_no_failure_and_nothing_valid_give_what_they_can(rate, all
     if allowed == -math.inf:
         assert found.drives == 0 and math.isnan(found.rate.value)
         return
-    assert found.drives == len(problem.driven) == budget and all(row[7] < allowed for row in problem.driven)
-    assert 0.0 <= found.rate.low <= found.rate.high <= (0.2 if rate < 1e-9 else 1.0) and (found.first == 0 or rate > 1e-9)
+    assert found.drives == len(problem.driven) == budget and all(
+        row[7] < allowed for row in problem.driven
+    )
+    assert 0.0 <= found.rate.low <= found.rate.high <= (0.2 if rate < 1e-9 else 1.0) and (
+        found.first == 0 or rate > 1e-9
+    )
 
 
 def test_the_worst_is_worse_than_what_the_rate_needs():
     calm, worst = Search(Plane(1e-2), 2, 300), Search(Plane(1e-2), 2, 300, worst=True)
     calm.run(), worst.run()
     assert min(one.margin for one in worst.responses) < min(one.margin for one in calm.responses)
-    assert np.median([one.margin for one in worst.responses]) < np.median([one.margin for one in calm.responses])
+    assert np.median([one.margin for one in worst.responses]) < np.median(
+        [one.margin for one in calm.responses]
+    )

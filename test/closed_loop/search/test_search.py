@@ -65,7 +65,14 @@ def bag(tmp_path_factory):
 def request_of(bag, planner, **further):
     source = replanned(bag)
     known = {"ego": "2", "objective": Objective("collision"), "budget": BUDGET} | further
-    return SearchRequest(source.planned, source.request, source.sampling, source.limits, f"{__name__}:{planner}", **known)
+    return SearchRequest(
+        source.planned,
+        source.request,
+        source.sampling,
+        source.limits,
+        f"{__name__}:{planner}",
+        **known,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +83,9 @@ def found(bag, tmp_path_factory):
 
 def test_every_finding_is_certified_and_its_witness_passes(found):
     result, out = found
-    assert result.findings and all(one.passed and not one.outcome.verdict.passed for one in result.findings)
+    assert result.findings and all(
+        one.passed and not one.outcome.verdict.passed for one in result.findings
+    )
     (validation,) = validate_bag(out / "bag")
     assert (validation.scenarios, validation.invalid) == (len(result.findings), 0)
 
@@ -92,9 +101,15 @@ def test_the_bag_of_failures_fails_again(found):
 def test_files_say_what_was_found(found):
     result, out = found
     document = json.loads((out / "search.json").read_text())
-    assert document["drives"] == BUDGET and document["rate"]["low"] <= document["rate"]["value"] <= document["rate"]["high"]
+    assert (
+        document["drives"] == BUDGET
+        and document["rate"]["low"] <= document["rate"]["value"] <= document["rate"]["high"]
+    )
     rates = document["rates"]  # of both, whatever is searched for
-    assert rates["collision"] == document["rate"] and 0.0 < rates["at_fault"]["value"] <= rates["collision"]["value"]
+    assert (
+        rates["collision"] == document["rate"]
+        and 0.0 < rates["at_fault"]["value"] <= rates["collision"]["value"]
+    )
     assert document["bound"] >= document["rate"]["high"]
     assert len(document["findings"]) == len(result.findings) and document["kinds"]
     suite = ElementTree.parse(out / "junit.xml").getroot()
@@ -112,11 +127,16 @@ def test_a_stopped_search_goes_on_with_the_same_bytes(bag, found, tmp_path):
     for name in ("search.json", "search.html", "junit.xml", "bag/bag_0.mcap"):
         assert (tmp_path / "out" / name).read_bytes() == (found[1] / name).read_bytes()
     with pytest.raises(InputError, match="of another search \\(objective differ"):
-        search_failures(request_of(bag, "Blind", objective=Objective("goal")), tmp_path / "out", workers=1)
+        search_failures(
+            request_of(bag, "Blind", objective=Objective("goal")), tmp_path / "out", workers=1
+        )
 
 
 def test_what_is_beside_the_results_is_no_journal_of_this_search_and_stays(bag, found, tmp_path):
-    journal, lines = tmp_path / f"out{JOURNAL}", found[1].with_name(f"out{JOURNAL}").read_text().splitlines(keepends=True)
+    journal, lines = (
+        tmp_path / f"out{JOURNAL}",
+        found[1].with_name(f"out{JOURNAL}").read_text().splitlines(keepends=True),
+    )
     other = lines[2].replace(lines[2].split(",")[1], " 7.25", 1)
     (tmp_path / "elsewhere").write_text("".join(lines))
     for text, said in (
@@ -134,7 +154,10 @@ def test_what_is_beside_the_results_is_no_journal_of_this_search_and_stays(bag, 
             journal.write_text(text)
         with pytest.raises(InputError, match=rf"{said}.*; move it away, or give another --out"):
             search_failures(request_of(bag, "Blind"), tmp_path / "out", workers=1)
-        assert journal.read_text() == ("".join(lines) if text is None else text) and not (tmp_path / "out").exists()
+        assert (
+            journal.read_text() == ("".join(lines) if text is None else text)
+            and not (tmp_path / "out").exists()
+        )
 
 
 def test_a_planner_that_fails_is_named_and_its_drives_are_kept(bag, tmp_path):
@@ -145,21 +168,32 @@ def test_a_planner_that_fails_is_named_and_its_drives_are_kept(bag, tmp_path):
 
 def test_a_planner_that_stands_misses_every_goal(bag, tmp_path):
     result = search_failures(
-        request_of(bag, "Stands", objective=Objective("goal"), budget=12, assignments=["overtime=1.0"]),
+        request_of(
+            bag, "Stands", objective=Objective("goal"), budget=12, assignments=["overtime=1.0"]
+        ),
         tmp_path / "out",
         workers=1,
     )
-    assert result.estimate.first == 1 and result.estimate.rate.high == 1.0 and result.estimate.rate.low > 0.7
+    assert (
+        result.estimate.first == 1
+        and result.estimate.rate.high == 1.0
+        and result.estimate.rate.low > 0.7
+    )
 
 
-@pytest.mark.parametrize(("further", "message"), [({"ego": "9"}, "--ego 9: .* there are 1, 2"), ({"budget": 0}, "--budget 0")])
+@pytest.mark.parametrize(
+    ("further", "message"),
+    [({"ego": "9"}, "--ego 9: .* there are 1, 2"), ({"budget": 0}, "--budget 0")],
+)
 def test_bad_requests_are_refused(bag, tmp_path, further, message):
     with pytest.raises(InputError, match=message):
         search_failures(request_of(bag, "Blind", **further), tmp_path / "out")
 
 
 def test_objectives():
-    assert Objective.parsed(" pet < 1 ") == Objective("pet", 1.0) and Objective.parsed("goal") == Objective("goal")
+    assert Objective.parsed(" pet < 1 ") == Objective("pet", 1.0) and Objective.parsed(
+        "goal"
+    ) == Objective("goal")
     for text in ("speed", "ttc", "ttc<", "ttc<-1", "pet<1s", ""):
         with pytest.raises(InputError, match="take at_fault"):
             Objective.parsed(text)
@@ -183,17 +217,26 @@ def test_margins_are_zero_or_less_in_failures_alone(bag):
     for planner in ("Strays", "Blind"):
         (outcome, *_) = run_trials(read_trials(bag, "2", 1), f"{__name__}:{planner}")
         response = Objective("off_road").response(outcome)
-        assert response.margin == outcome.verdict.road_margin + 0.1 and response.failed == (planner == "Strays")
+        assert response.margin == outcome.verdict.road_margin + 0.1 and response.failed == (
+            planner == "Strays"
+        )
 
 
 def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
     words = f"search {LOG} --road {ROAD} --planner {__name__}:Blind --ego 2 --budget 12 --workers 1 --out {tmp_path}/out".split()
     done = CliRunner().invoke(app, [*words, "--max-rate", "0.0", "--objective", "collision"])
-    assert done.exit_code == 1 and "the failure rate may be above 0" in done.output and "by the ego's fault:" in done.output, (
-        done.output
+    assert (
+        done.exit_code == 1
+        and "the failure rate may be above 0" in done.output
+        and "by the ego's fault:" in done.output
+    ), done.output
+    assert (
+        "natural drives alone" in done.output
+        and json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 12
     )
-    assert "natural drives alone" in done.output and json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 12
     refused = CliRunner().invoke(app, [*words, "--max-rate", "0.1", "--worst"])
     assert "a search for the worst gives no rate" in str(refused.exception)
     refused = CliRunner().invoke(app, [*words, "--encounter", "none"])
-    assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(refused.exception)
+    assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(
+        refused.exception
+    )

@@ -34,7 +34,9 @@ def crossing(dt=0.1, steps=121, lag=2.0):
     zero = np.zeros_like(time)
     position = np.stack([np.stack([east, zero], -1), np.stack([zero, north], -1)])
     heading = np.stack([zero, zero + np.pi / 2])
-    return Encounter("crossing", CARS, 0, round(dt * 1e9), position, heading, np.stack([zero + 10.0, pace]))
+    return Encounter(
+        "crossing", CARS, 0, round(dt * 1e9), position, heading, np.stack([zero + 10.0, pace])
+    )
 
 
 def replayed(encounter, index=0, shift=(0.0, 0.0), pace=1.0):
@@ -47,14 +49,23 @@ def replayed(encounter, index=0, shift=(0.0, 0.0), pace=1.0):
     way = np.stack([np.cos(encounter.heading), np.sin(encounter.heading)], axis=-1)
     position = encounter.position[:, :1] + along[..., None] * way + np.asarray(shift)
     return Scenario(
-        encounter.vehicles, encounter.time, position, encounter.heading, speed, np.gradient(speed, dt, axis=1), index=index
+        encounter.vehicles,
+        encounter.time,
+        position,
+        encounter.heading,
+        speed,
+        np.gradient(speed, dt, axis=1),
+        index=index,
     )
 
 
 def samples(encounter, count, seed=3, spread=0.5, pace=1.0):
     """`count` scenarios around the encounter, shifted at random."""
     rng = np.random.default_rng(seed)
-    return [replayed(encounter, i, rng.normal(0.0, spread, 2), pace + rng.normal(0.0, 0.1)) for i in range(count)]
+    return [
+        replayed(encounter, i, rng.normal(0.0, spread, 2), pace + rng.normal(0.0, 0.1))
+        for i in range(count)
+    ]
 
 
 def cross_road():
@@ -69,7 +80,10 @@ def cross_road():
 @cache
 def report_case(count=12, name="crossing", without=True):
     """A whole case of the report, around the crossing."""
-    cars = (CARS[0], replace(CARS[1], id="south" if name == "crossing" else "A_VEHICLE_WITH_A_LONG_NAME"))
+    cars = (
+        CARS[0],
+        replace(CARS[1], id="south" if name == "crossing" else "A_VEHICLE_WITH_A_LONG_NAME"),
+    )
     encounter = replace(crossing(), name=name, vehicles=cars)
     steps = encounter.speed.shape[1]
     labels = np.repeat([0, 1, 0], [40, 40, steps - 80])
@@ -85,8 +99,14 @@ def report_case(count=12, name="crossing", without=True):
         fitted.append(FittedVehicle(poses[index], moved, stands, 1.0, "straight"))
         length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
         routes.append(Route(poses, index, length))
-    ends = [np.column_stack([encounter.position[:, k], encounter.heading[:, k], encounter.speed[:, k]]) for k in (0, -1)]
-    notes = ("west enters at 1 and leaves at 1: straight, as in the template", "south: anchor 1 moved by 0.12 m")
+    ends = [
+        np.column_stack([encounter.position[:, k], encounter.heading[:, k], encounter.speed[:, k]])
+        for k in (0, -1)
+    ]
+    notes = (
+        "west enters at 1 and leaves at 1: straight, as in the template",
+        "south: anchor 1 moved by 0.12 m",
+    )
     fit = Fit(encounter.vehicles, tuple(fitted), index, BoundaryStates(*ends), notes)
     oracle = replayed(encounter)
     near = ScenarioSet(
@@ -97,12 +117,18 @@ def report_case(count=12, name="crossing", without=True):
         ("the clock was stretched by 3 %",),
     )
     far = ScenarioSet(
-        count, tuple(samples(encounter, count, seed=4, spread=1.0, pace=0.0)), count + 1, Counter({Cause.OFF_ROAD: 1})
+        count,
+        tuple(samples(encounter, count, seed=4, spread=1.0, pace=0.0)),
+        count + 1,
+        Counter({Cause.OFF_ROAD: 1}),
     )
     rows = {"with changepoints": near.scenarios, "replay": [oracle]}
     if without:
         rows["without changepoints"] = far.scenarios
-    checks = {"with changepoints": CheckCounts.of_set(near), "without changepoints": CheckCounts.of_set(far)}
+    checks = {
+        "with changepoints": CheckCounts.of_set(near),
+        "without changepoints": CheckCounts.of_set(far),
+    }
     evaluation = evaluate_scenarios(
         encounter,
         rows,
@@ -112,7 +138,19 @@ def report_case(count=12, name="crossing", without=True):
         config=EvaluationConfig(resamples=50),
     )
     references, refusals = ({WITHOUT: far}, {}) if without else ({}, {WITHOUT: "no route exists"})
-    return GenerationResult(encounter, segmentation, cross_road(), fit, routes, near, 0, evaluation, references, refusals, oracle)
+    return GenerationResult(
+        encounter,
+        segmentation,
+        cross_road(),
+        fit,
+        routes,
+        near,
+        0,
+        evaluation,
+        references,
+        refusals,
+        oracle,
+    )
 
 
 def ego_case(count=4):
@@ -124,6 +162,9 @@ def ego_case(count=4):
     made = replace(case.generated, scenarios=left, ego=slot)
     rows = {"with changepoints": left, "replay": [case.replay]}
     evaluation = evaluate_scenarios(
-        case.encounter, rows, changepoints=len(case.segmentation.changepoints), config=EvaluationConfig(resamples=50)
+        case.encounter,
+        rows,
+        changepoints=len(case.segmentation.changepoints),
+        config=EvaluationConfig(resamples=50),
     )
     return replace(case, generated=made, evaluation=evaluation)

@@ -19,30 +19,54 @@ TIME = np.arange(101) * 0.1
 def crossing(behind, index=0):
     """Two cars of 4 x 2 m at 10 m/s on crossing axes, the second so many metres behind the first."""
     along = 10.0 * TIME
-    position = np.stack([np.stack([along - 30.0, 0 * TIME], axis=-1), np.stack([0 * TIME, along - 30.0 - behind], axis=-1)])
+    position = np.stack(
+        [
+            np.stack([along - 30.0, 0 * TIME], axis=-1),
+            np.stack([0 * TIME, along - 30.0 - behind], axis=-1),
+        ]
+    )
     heading = np.stack([0 * TIME, 0 * TIME + 0.5 * np.pi])
     speed = np.full((2, 101), 10.0)
-    return Scenario((Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0)), TIME, position, heading, speed, 0 * speed, 0, index)
+    return Scenario(
+        (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0)),
+        TIME,
+        position,
+        heading,
+        speed,
+        0 * speed,
+        0,
+        index,
+    )
 
 
 @pytest.fixture
 def template():
     one = crossing(20.0)
-    return Encounter("crossing", one.vehicles, 0, 100_000_000, one.position, one.heading, one.speed)
+    return Encounter(
+        "crossing", one.vehicles, 0, 100_000_000, one.position, one.heading, one.speed
+    )
 
 
 def test_figures_matrix_and_picks(template):
     """20 m behind at 10 m/s: 2 s from entry to entry, and 0.6 s less from exit to entry (6 m of 4 + 2)."""
-    found = coverage_of(template, [crossing(8.0, 5), crossing(19.0, 6), crossing(21.0, 7), crossing(50.0, 8)])
+    found = coverage_of(
+        template, [crossing(8.0, 5), crossing(19.0, 6), crossing(21.0, 7), crossing(50.0, 8)]
+    )
     assert found.spreads["pet"].values == pytest.approx((0.2, 1.3, 1.5, 4.4), abs=0.02)
     assert found.spreads["pet"].template == pytest.approx(1.4, abs=0.02)
     assert found.pairs == {"straight and straight": (0, 1, 0, 2, 0, 1, 0)}
-    assert found.picks["most critical"] == 5 and found.picks["most different"] == 8 and found.picks["most typical"] in (6, 7)
+    assert (
+        found.picks["most critical"] == 5
+        and found.picks["most different"] == 8
+        and found.picks["most typical"] in (6, 7)
+    )
     document = json.loads(json.dumps(found.document(), allow_nan=False))
     assert document["figures"]["ttc"]["values"] == [None] * 4 and document["index"] == [5, 6, 7, 8]
 
 
 def test_outcomes_of_the_order_are_counted_and_an_empty_set_has_no_picks(template):
-    named = [replace(crossing(15.0, k), facts={"passing_order": said}) for k, said in enumerate("aab")]
+    named = [
+        replace(crossing(15.0, k), facts={"passing_order": said}) for k, said in enumerate("aab")
+    ]
     assert coverage_of(template, named).orders == {"a": 2, "b": 1}
     assert coverage_of(template, []).picks == {}

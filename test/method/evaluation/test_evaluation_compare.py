@@ -25,7 +25,11 @@ def sets():
     def made(pace, seed):
         rows = {"with changepoints": samples(encounter, 50, seed, pace=pace)}
         return evaluate_scenarios(
-            encounter, rows, changepoints=len(segmentation.changepoints), road="cross", config=EvaluationConfig(resamples=200)
+            encounter,
+            rows,
+            changepoints=len(segmentation.changepoints),
+            road="cross",
+            config=EvaluationConfig(resamples=200),
         )
 
     return made(1.0, 1), made(1.0, 2), made(0.0, 3), made(1.0, 4), made(1.0, 5)
@@ -34,11 +38,21 @@ def sets():
 def test_a_worse_set_is_named_and_another_seed_is_not(sets):
     good, again, bad, *more = sets
     found = {entry.metric.id: entry for entry in compare([good], [bad])}
-    assert found["e_speed"].better == "first" and found["js_speed"].better == "first" and found["coverage"].better == "first"
-    assert {entry.metric.id: entry for entry in compare([bad], [good])}["e_speed"].better == "second"
+    assert (
+        found["e_speed"].better == "first"
+        and found["js_speed"].better == "first"
+        and found["coverage"].better == "first"
+    )
+    assert {entry.metric.id: entry for entry in compare([bad], [good])}[
+        "e_speed"
+    ].better == "second"
     equal = [compare([one], [two]) for one, two in combinations((good, again, *more), 2)]
-    assert sum(entry.clear for entries in equal for entry in entries) <= 0.05 * sum(len(entries) for entries in equal)
-    assert found["min_distance"].clear and not found["min_distance"].better  # neither direction is better
+    assert sum(entry.clear for entries in equal for entry in entries) <= 0.05 * sum(
+        len(entries) for entries in equal
+    )
+    assert (
+        found["min_distance"].clear and not found["min_distance"].better
+    )  # neither direction is better
     table = comparison_table(compare([good], [bad]), ("seed 1", "slow"))
     assert "## crossing on cross" in table and "| seed 1 |" in table and "| differs |" in table
 
@@ -51,7 +65,10 @@ def test_sets_without_a_common_case_are_refused(sets):
 
 
 def test_figures_are_read_from_a_run(tmp_path, sets):
-    document = {"provenance": {}, "cases": [json.loads(evaluation.to_json()) for evaluation in sets[:2]]}
+    document = {
+        "provenance": {},
+        "cases": [json.loads(evaluation.to_json()) for evaluation in sets[:2]],
+    }
     (tmp_path / "evaluation.json").write_text(json.dumps(document))
     assert len(read_evaluations(tmp_path)) == 2
     (tmp_path / "one.json").write_text(sets[0].to_json())

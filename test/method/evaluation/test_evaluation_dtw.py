@@ -24,7 +24,9 @@ numbers = st.floats(-100.0, 100.0, allow_subnormal=False)
 
 
 def series(channels):
-    return st.integers(1, 12).flatmap(lambda n: arrays.arrays(np.float64, (n, channels), elements=numbers))
+    return st.integers(1, 12).flatmap(
+        lambda n: arrays.arrays(np.float64, (n, channels), elements=numbers)
+    )
 
 
 def naive(a, b, metric, band):
@@ -35,7 +37,9 @@ def naive(a, b, metric, band):
     for i in range(n):
         for j in range(m):
             if band is None or (j - i <= max(0, m - n) + band and i - j <= max(0, n - m) + band):
-                total[i + 1, j + 1] = cost[i, j] + min(total[i, j], total[i, j + 1], total[i + 1, j])
+                total[i + 1, j + 1] = cost[i, j] + min(
+                    total[i, j], total[i, j + 1], total[i + 1, j]
+                )
     return total[1:, 1:]
 
 
@@ -46,10 +50,17 @@ def test_by_hand():
 
 
 @settings(max_examples=60)
-@given(series(2), series(2), st.sampled_from(["euclidean", "manhattan"]), st.one_of(st.none(), st.integers(0, 5)))
+@given(
+    series(2),
+    series(2),
+    st.sampled_from(["euclidean", "manhattan"]),
+    st.one_of(st.none(), st.integers(0, 5)),
+)
 def test_the_distance_agrees_with_a_naive_transcription(a, b, distance, band):
     expected = naive(a, b, {"manhattan": "cityblock"}.get(distance, distance), band)
-    assert dtw_distance(a, b, distance, band) == pytest.approx(expected[-1, -1], rel=1e-12, abs=1e-9)
+    assert dtw_distance(a, b, distance, band) == pytest.approx(
+        expected[-1, -1], rel=1e-12, abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("shape", [(300, 300), (257, 400), (1000, 700)])
@@ -58,7 +69,9 @@ def test_equals_dtaidistance(shape, band):
     peer = pytest.importorskip("dtaidistance.dtw_ndim", reason="dtaidistance is not installed")
     rng = np.random.default_rng(1)
     a, b = (rng.normal(size=(n, 2)).cumsum(axis=0) for n in shape)
-    expected = peer.distance_fast(a, b, inner_dist="euclidean", window=None if band is None else band + 1)
+    expected = peer.distance_fast(
+        a, b, inner_dist="euclidean", window=None if band is None else band + 1
+    )
     assert dtw_distance(a, b, band=band) == pytest.approx(expected, abs=1e-9)
 
 
@@ -69,7 +82,9 @@ def test_feature_matrix_by_hand_and_against_scipy():
     a, b = rng.normal(size=(40, 2)), rng.normal(size=(31, 2))
     for ours, theirs in (("euclidean", "euclidean"), ("manhattan", "cityblock")):
         cost = cdist(a, b, theirs)
-        np.testing.assert_allclose(feature_matrix(a, b, ours), (cost - cost.min()) / np.ptp(cost), atol=1e-14)
+        np.testing.assert_allclose(
+            feature_matrix(a, b, ours), (cost - cost.min()) / np.ptp(cost), atol=1e-14
+        )
 
 
 @settings(max_examples=60)
@@ -78,7 +93,9 @@ def test_headings_differ_by_the_wrapped_angle(a, b):
     away = np.abs(np.angle(np.exp(1j * (a - b.T))))
     spread = np.ptp(away)
     if spread > 1e-6:
-        np.testing.assert_allclose(feature_matrix(a, b, "angle"), (away - away.min()) / spread, atol=1e-11 / spread)
+        np.testing.assert_allclose(
+            feature_matrix(a, b, "angle"), (away - away.min()) / spread, atol=1e-11 / spread
+        )
     assert dtw_distance(a[:1], b[:1], "angle") == pytest.approx(away[0, 0], abs=1e-11)
 
 

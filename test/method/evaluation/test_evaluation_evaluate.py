@@ -35,8 +35,16 @@ def run(**extra):
 
 
 def test_rows_say_what_happened():
-    found = run(checks={"with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1})}, road="cross")
-    assert [row.name for row in found.rows] == ["recording", "with changepoints", "without changepoints", "replay"]
+    found = run(
+        checks={"with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1})},
+        road="cross",
+    )
+    assert [row.name for row in found.rows] == [
+        "recording",
+        "with changepoints",
+        "without changepoints",
+        "replay",
+    ]
     assert found.changepoints == 2 and found.vehicles == ("west", "south")
     assert found.value("replay", "e_position") < 1e-6 and found.value("replay", "min_ade") < 1e-6
     for key in ("e_position", "e_speed", "js_speed", "js_acceleration", "wasserstein_speed"):
@@ -46,8 +54,12 @@ def test_rows_say_what_happened():
     assert found.value("with changepoints", "acceptance") == pytest.approx(50 / 60)
     assert "from 12, not 50" in found.row("without changepoints").notes[0]
     assert not found.row("with changepoints").notes
-    assert all(math.isnan(estimate.low) for estimate in found.row("replay").values.values())  # one sample has no interval
-    assert math.isnan(found.value("replay", "diversity")) and math.isnan(found.value("nobody", "e_position"))
+    assert all(
+        math.isnan(estimate.low) for estimate in found.row("replay").values.values()
+    )  # one sample has no interval
+    assert math.isnan(found.value("replay", "diversity")) and math.isnan(
+        found.value("nobody", "e_position")
+    )
 
 
 def test_every_estimate_lies_in_its_interval_and_survives_json_and_markdown():
@@ -58,7 +70,12 @@ def test_every_estimate_lies_in_its_interval_and_survives_json_and_markdown():
                 assert estimate.low <= estimate.value <= estimate.high, (row.name, key)
     text = found.to_json()
     assert "NaN" not in text and json.loads(text)["changepoints"] == 2
-    assert Evaluation.from_json(text).to_json() == text == run(seed=3).to_json() != run(seed=4).to_json()
+    assert (
+        Evaluation.from_json(text).to_json()
+        == text
+        == run(seed=3).to_json()
+        != run(seed=4).to_json()
+    )
     page = found.to_markdown()
     assert "K = 2 changepoints" in page and "| E position |" in page and "–" in page
     with pytest.raises(InputError, match="not an evaluation"):
@@ -80,7 +97,9 @@ def test_headings_and_turns():
     kept = [found.value(name, "turn_kept") for name in rows]
     assert kept == [0.5, 1.0, 1.0, 1.0]  # of two cars one goes straight on instead
     errors = [found.value(name, "e_heading") for name in rows]
-    assert errors[0] == pytest.approx(1.0) and errors[3] < 1e-6  # parallel headings are a matrix of zeros
+    assert (
+        errors[0] == pytest.approx(1.0) and errors[3] < 1e-6
+    )  # parallel headings are a matrix of zeros
     straight = evaluate_scenarios(encounter, rows, changepoints=K, config=QUICK)
     assert "e_heading" not in straight.row("0").values  # nobody turns in the template
     assert straight.value("60", "turn_kept") == 0.5
@@ -88,12 +107,19 @@ def test_headings_and_turns():
 
 def test_vanished_conflicts_are_counted_for_themselves():
     encounter = crossing()
-    away = replace(replayed(encounter, 1), position=replayed(encounter).position + np.array([[[0.0, 0.0]], [[500.0, 0.0]]]))
-    found = evaluate_scenarios(encounter, {"x": [replayed(encounter), away]}, changepoints=K, config=QUICK)
+    away = replace(
+        replayed(encounter, 1),
+        position=replayed(encounter).position + np.array([[[0.0, 0.0]], [[500.0, 0.0]]]),
+    )
+    found = evaluate_scenarios(
+        encounter, {"x": [replayed(encounter), away]}, changepoints=K, config=QUICK
+    )
     assert found.value("recording", "conflicts") == 1.0
     assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
     assert found.value("x", "order_kept") == 1.0  # of those that are there
-    assert any("0.5 of the recording's 1 conflict(s) vanish" in note for note in found.row("x").notes)
+    assert any(
+        "0.5 of the recording's 1 conflict(s) vanish" in note for note in found.row("x").notes
+    )
 
 
 def late(source, n, first):
@@ -106,10 +132,19 @@ def late(source, n, first):
 def test_who_arrives_late_is_measured_while_there():
     whole = crossing()
     encounter, made = late(whole, 1, 40), [late(sample, 1, 40) for sample in samples(whole, 3)]
-    found = evaluate_scenarios(encounter, {"x": made, "replay": [late(replayed(whole), 1, 40)]}, changepoints=K, config=QUICK)
+    found = evaluate_scenarios(
+        encounter,
+        {"x": made, "replay": [late(replayed(whole), 1, 40)]},
+        changepoints=K,
+        config=QUICK,
+    )
     # for the pair the same as where both are there from then on
     cut = replace(
-        whole, position=whole.position[:, 40:], heading=whole.heading[:, 40:], speed=whole.speed[:, 40:], present=ALWAYS
+        whole,
+        position=whole.position[:, 40:],
+        heading=whole.heading[:, 40:],
+        speed=whole.speed[:, 40:],
+        present=ALWAYS,
     )
     rows = [replayed_from(sample, 40) for sample in samples(whole, 3)]
     after = evaluate_scenarios(cut, {"x": rows}, changepoints=K, config=QUICK)
@@ -119,15 +154,22 @@ def test_who_arrives_late_is_measured_while_there():
         assert found.value("x", key) == pytest.approx(after.value("x", key), rel=1e-9), key
     assert found.value("replay", "e_position") < 1e-6 and found.value("replay", "js_gap") < 1e-9
     alone = late(encounter, 1, 115)
-    last = evaluate_scenarios(alone, {"x": [late(replayed(whole), 1, 115)]}, changepoints=K, config=QUICK)
+    last = evaluate_scenarios(
+        alone, {"x": [late(replayed(whole), 1, 115)]}, changepoints=K, config=QUICK
+    )
     assert any("E leaves out 1 pair(s)" in note for note in last.row("x").notes)
     assert math.isnan(last.value("x", "e_position")) and math.isfinite(last.value("x", "js_speed"))
 
 
 def replayed_from(scenario, first):
     """The scenario from an instant on."""
-    parts = {name: getattr(scenario, name)[:, first:] for name in ("position", "heading", "speed", "acceleration")}
-    return replace(scenario, time=scenario.time[first:] - scenario.time[first], present=ALWAYS, **parts)
+    parts = {
+        name: getattr(scenario, name)[:, first:]
+        for name in ("position", "heading", "speed", "acceleration")
+    }
+    return replace(
+        scenario, time=scenario.time[first:] - scenario.time[first], present=ALWAYS, **parts
+    )
 
 
 def test_missing_and_empty_rows():
@@ -141,7 +183,10 @@ def test_missing_and_empty_rows():
 def test_another_number_of_vehicles_is_refused():
     encounter = crossing()
     scenario = replayed(encounter)
-    arrays = {name: getattr(scenario, name)[[0, 1, 1]] for name in ("position", "heading", "speed", "acceleration", "present")}
+    arrays = {
+        name: getattr(scenario, name)[[0, 1, 1]]
+        for name in ("position", "heading", "speed", "acceleration", "present")
+    }
     trio = replace(scenario, vehicles=(*CARS, replace(CARS[0], id="third")), **arrays)
     with pytest.raises(InputError, match="3 vehicles"):
         evaluate_scenarios(encounter, {"x": [trio]}, changepoints=K, config=QUICK)
@@ -149,15 +194,21 @@ def test_another_number_of_vehicles_is_refused():
 
 def test_a_long_template_is_resampled_and_says_so():
     encounter, config = crossing(), EvaluationConfig(max_steps=60, resamples=20)
-    found = evaluate_scenarios(encounter, {"x": [replayed(encounter)]}, changepoints=K, config=config)
-    assert "60 instants" in found.row("recording").notes[0] and found.value("x", "e_position") < 1e-6
+    found = evaluate_scenarios(
+        encounter, {"x": [replayed(encounter)]}, changepoints=K, config=config
+    )
+    assert (
+        "60 instants" in found.row("recording").notes[0] and found.value("x", "e_position") < 1e-6
+    )
 
 
 def test_counts_from_sets_and_verdicts():
     made = ScenarioSet(5, (), 8)
     made.refused[Cause.OFF_ROAD] = 3
     assert CheckCounts.of_set(made) == CheckCounts(8, {Cause.OFF_ROAD: 3})
-    bad = Verdict((Violation(Cause.OVERLAP, 1.0, (0, 1), ""), Violation(Cause.SPEED, 1.0, (0,), "")))
+    bad = Verdict(
+        (Violation(Cause.OVERLAP, 1.0, (0, 1), ""), Violation(Cause.SPEED, 1.0, (0,), ""))
+    )
     assert CheckCounts.of_verdicts([Verdict(), bad, bad]) == CheckCounts(3, {Cause.OVERLAP: 2})
 
 
@@ -167,12 +218,18 @@ def test_the_oracle_goes_through_the_anchors():
     anchors = []
     for n in range(2):
         pose = np.column_stack([encounter.position[n, index], encounter.heading[n, index]])
-        turned = np.column_stack([-1.1 * pose[:, 1] + 5.0, 1.1 * pose[:, 0], pose[:, 2] + np.pi / 2])  # turned left, 10 % larger
+        turned = np.column_stack(
+            [-1.1 * pose[:, 1] + 5.0, 1.1 * pose[:, 0], pose[:, 2] + np.pi / 2]
+        )  # turned left, 10 % larger
         anchors.append(turned)
     ends = [np.stack([np.append(a[k], 0.0) for a in anchors]) for k in (0, -1)]
-    fitted = tuple(FittedVehicle(a, np.zeros(4), np.zeros(3, dtype=bool), 1.1, "straight") for a in anchors)
+    fitted = tuple(
+        FittedVehicle(a, np.zeros(4), np.zeros(3, dtype=bool), 1.1, "straight") for a in anchors
+    )
     found = replay(encounter, Fit(CARS, fitted, index, BoundaryStates(*ends), ()))
-    expected = np.stack([-1.1 * encounter.position[..., 1] + 5.0, 1.1 * encounter.position[..., 0]], axis=-1)
+    expected = np.stack(
+        [-1.1 * encounter.position[..., 1] + 5.0, 1.1 * encounter.position[..., 0]], axis=-1
+    )
     np.testing.assert_allclose(found.position, expected, atol=1e-6)
     np.testing.assert_allclose(found.speed, 1.1 * encounter.speed, atol=1e-9)
     turn = found.heading - encounter.heading - np.pi / 2
@@ -183,7 +240,15 @@ def test_the_oracle_keeps_a_dwell_and_a_short_chord():
     time = np.arange(21) * 0.1
     x = np.minimum(time, 1.0) * 4.0
     position = np.stack([np.stack([x, 0 * x], -1), np.stack([0.1 * np.sin(time), 20 + 0 * x], -1)])
-    encounter = Encounter("stop", CARS, 0, 100_000_000, position, np.zeros((2, 21)), np.stack([np.gradient(x, 0.1), 0 * x]))
+    encounter = Encounter(
+        "stop",
+        CARS,
+        0,
+        100_000_000,
+        position,
+        np.zeros((2, 21)),
+        np.stack([np.gradient(x, 0.1), 0 * x]),
+    )
     first = np.array([[0, 0, 0], [8, 0, 0], [8, 0, 0.0]])
     second = np.array([[50, 0, np.pi / 2], [50, 0.2, np.pi / 2], [50, 0.2, np.pi / 2]])
     fitted = (
@@ -200,13 +265,19 @@ def test_the_oracle_keeps_a_dwell_and_a_short_chord():
 def alone(scenario, n):
     """The scenario of vehicle n alone."""
     fields = ("position", "heading", "speed", "acceleration", "present")
-    return replace(scenario, vehicles=(scenario.vehicles[n],), **{name: getattr(scenario, name)[[n]] for name in fields})
+    return replace(
+        scenario,
+        vehicles=(scenario.vehicles[n],),
+        **{name: getattr(scenario, name)[[n]] for name in fields},
+    )
 
 
 def test_a_vehicle_left_out_for_an_ego_is_left_out_of_every_row():
     encounter = crossing()
     ones = [alone(scenario, 1) for scenario in samples(encounter, 4)]
-    found = evaluate_scenarios(encounter, {"x": ones, "replay": [replayed(encounter)]}, changepoints=K, config=QUICK)
+    found = evaluate_scenarios(
+        encounter, {"x": ones, "replay": [replayed(encounter)]}, changepoints=K, config=QUICK
+    )
     assert found.vehicles == (CARS[1].id,)
     for figure in ("e_position", "min_distance", "min_ttc", "pet", "js_gap", "order_kept"):
         assert np.isnan(found.value("x", figure)), figure
@@ -220,5 +291,8 @@ def test_the_order_of_the_vehicles_does_not_matter():
     made = samples(encounter, 3)
     fields = ("vehicles", "position", "heading", "speed", "acceleration")
     swapped = [replace(s, **{name: getattr(s, name)[::-1] for name in fields}) for s in made]
-    one, other = (evaluate_scenarios(encounter, {"x": rows}, changepoints=K, config=QUICK).row("x") for rows in (made, swapped))
+    one, other = (
+        evaluate_scenarios(encounter, {"x": rows}, changepoints=K, config=QUICK).row("x")
+        for rows in (made, swapped)
+    )
     assert one == other

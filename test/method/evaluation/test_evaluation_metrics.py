@@ -16,7 +16,12 @@ from scipy.spatial.distance import jensenshannon
 from scenario_gen.method.evaluation import diversity, evaluate_scenarios, similarity
 from scenario_gen.method.evaluation.bootstrap import Bootstrap, wilson
 from scenario_gen.method.evaluation.criticality import criticality
-from scenario_gen.method.evaluation.distributions import compare, jensen_shannon, QUANTITIES, values_of
+from scenario_gen.method.evaluation.distributions import (
+    compare,
+    jensen_shannon,
+    QUANTITIES,
+    values_of,
+)
 from scenario_gen.method.evaluation.dtw import feature_matrix
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import at_count, at_period, Motion
@@ -27,24 +32,37 @@ ONCE = np.ones((1, 1))
 
 def still(xy, yaw, sizes=((4.0, 2.0), (4.0, 2.0)), speed=(0.0, 0.0)):
     vehicles = tuple(Vehicle(str(n), *size) for n, size in enumerate(sizes))
-    position, heading, pace = np.array(xy, float)[:, None], np.array(yaw, float)[:, None], np.array(speed, float)[:, None]
+    position, heading, pace = (
+        np.array(xy, float)[:, None],
+        np.array(yaw, float)[:, None],
+        np.array(speed, float)[:, None],
+    )
     return Motion(vehicles, 0.1, position, heading, pace)
 
 
 def test_footprint_distance_by_hand():
     assert footprint_distance(still([(0, 0), (10, 0)], (0, 0)), 0, 1) == pytest.approx(6.0)
-    assert footprint_distance(still([(0, 0), (7, 7)], (0, 0)), 0, 1) == pytest.approx(math.hypot(3.0, 5.0))
+    assert footprint_distance(still([(0, 0), (7, 7)], (0, 0)), 0, 1) == pytest.approx(
+        math.hypot(3.0, 5.0)
+    )
     assert (
-        footprint_distance(still([(0, 0), (0, 0)], (0, np.pi / 2), ((10, 1), (10, 1))), 0, 1) == 0.0
+        footprint_distance(still([(0, 0), (0, 0)], (0, np.pi / 2), ((10, 1), (10, 1))), 0, 1)
+        == 0.0
     )  # a cross, no corner inside
 
 
 def test_time_to_collision_by_hand():
-    head_on = still([(0, 0), (24, 0)], (0, np.pi), speed=(5.0, 5.0))  # 20 m between bumpers, closing at 10 m/s
+    head_on = still(
+        [(0, 0), (24, 0)], (0, np.pi), speed=(5.0, 5.0)
+    )  # 20 m between bumpers, closing at 10 m/s
     assert time_to_collision(head_on, 0, 1) == pytest.approx(2.0)
-    passing = still([(0, 0), (24, 2.5)], (0, np.pi), speed=(5.0, 5.0))  # half a metre beside each other
+    passing = still(
+        [(0, 0), (24, 2.5)], (0, np.pi), speed=(5.0, 5.0)
+    )  # half a metre beside each other
     assert np.isinf(time_to_collision(passing, 0, 1))
-    abreast = still([(0, 0), (6, 0)], (0, 0), speed=(0.5, np.nextafter(0.5, 0)))  # differ by rounding alone
+    abreast = still(
+        [(0, 0), (6, 0)], (0, 0), speed=(0.5, np.nextafter(0.5, 0))
+    )  # differ by rounding alone
     assert np.isinf(time_to_collision(abreast, 0, 1))
     parting = still([(0, 0), (24, 0)], (np.pi, 0), speed=(5.0, 5.0))
     assert np.isinf(time_to_collision(parting, 0, 1))
@@ -52,19 +70,26 @@ def test_time_to_collision_by_hand():
 
 
 @settings(max_examples=25)
-@given(*[st.tuples(st.floats(-b, b), st.floats(-b, b)) for b in (20, 3)], st.tuples(st.floats(0.5, 12), st.floats(0.5, 12)))
+@given(
+    *[st.tuples(st.floats(-b, b), st.floats(-b, b)) for b in (20, 3)],
+    st.tuples(st.floats(0.5, 12), st.floats(0.5, 12)),
+)
 def test_footprints_touch_at_the_time_to_collision(place, yaws, speeds):
     motion = still([(0, 0), place], yaws, speed=speeds)
     found = float(time_to_collision(motion, 0, 1)[0])
     way = np.stack([np.cos(motion.heading), np.sin(motion.heading)], -1) * motion.speed[..., None]
 
     def distance(t):
-        moved = Motion(motion.vehicles, 0.1, motion.position + t * way, motion.heading, motion.speed)
+        moved = Motion(
+            motion.vehicles, 0.1, motion.position + t * way, motion.heading, motion.speed
+        )
         return footprint_distance(moved, 0, 1)[0]
 
     if np.isinf(found):
         assert all(distance(t) >= 0.0 for t in np.linspace(0, 5, 11))
-        assert not any(distance(t) == 0.0 and distance(t + 0.01) == 0.0 for t in np.linspace(0, 10, 41))
+        assert not any(
+            distance(t) == 0.0 and distance(t + 0.01) == 0.0 for t in np.linspace(0, 10, 41)
+        )
     else:
         assert distance(found) < 1e-6
         assert all(distance(share * found) > 0.0 for share in (0.0, 0.3, 0.6, 0.9)) or found == 0.0
@@ -86,7 +111,11 @@ def test_values_by_hand():
     time = np.arange(31) * 0.1
     speed = np.stack([2.0 + time**2, 5.0 + 0.0 * time])  # acceleration 2t, jerk 2
     motion = Motion(
-        CARS, 0.1, np.broadcast_to([[[0.0, 0.0]], [[10.0, 0.0]]], (2, 31, 2)), np.stack([0.3 * time, 0 * time]), speed
+        CARS,
+        0.1,
+        np.broadcast_to([[[0.0, 0.0]], [[10.0, 0.0]]], (2, 31, 2)),
+        np.stack([0.3 * time, 0 * time]),
+        speed,
     )
     values = values_of(motion)
     np.testing.assert_allclose(values["acceleration"].reshape(2, 31)[0, 1:-1], 2.0 * time[1:-1])
@@ -111,7 +140,9 @@ def test_comparison_of_one_quantity():
     found = compare(QUANTITIES[0], template, drawn)
     every = np.ones((1, 6))
     assert found.template.sum() == 400 and found.samples.sum() == 1800
-    assert found.wasserstein == pytest.approx(stats.wasserstein_distance(np.concatenate(drawn), template))
+    assert found.wasserstein == pytest.approx(
+        stats.wasserstein_distance(np.concatenate(drawn), template)
+    )
     assert found.wasserstein_near(every)[0] == pytest.approx(found.wasserstein, abs=0.01)
     edges = np.arange(-30, 31) * QUANTITIES[0].bin_width
     p, q = np.histogram(np.concatenate(drawn), edges)[0], np.histogram(template, edges)[0]
@@ -128,7 +159,9 @@ def test_error_and_correlation_are_those_of_the_mean_matrix():
     pairs = similarity.pair_similarities(template.position, position, "euclidean")
     target = feature_matrix(*template.position)
     for weights in (np.ones(7), np.array([3.0, 0, 0, 1, 0, 2, 1])):
-        mean = np.average([feature_matrix(*motion.position) for motion in motions], axis=0, weights=weights)
+        mean = np.average(
+            [feature_matrix(*motion.position) for motion in motions], axis=0, weights=weights
+        )
         expected = np.linalg.norm(mean - target) / np.linalg.norm(target)
         assert similarity.mean_error(pairs, weights[None])[0] == pytest.approx(expected, rel=1e-9)
         assert similarity.mean_correlation(pairs, weights[None])[0] == pytest.approx(
@@ -137,8 +170,12 @@ def test_error_and_correlation_are_those_of_the_mean_matrix():
 
 
 def test_a_matrix_that_is_constant_is_left_out_of_the_mean():
-    speed = np.stack([np.zeros(9), np.zeros(9), np.linspace(0, 5, 9)])[..., None]  # two stand, one drives off
-    pairs = similarity.pair_similarities(speed, np.stack([speed * 1.1 + 0.1 * np.linspace(0, 1, 9)[:, None]]), "manhattan")
+    speed = np.stack([np.zeros(9), np.zeros(9), np.linspace(0, 5, 9)])[
+        ..., None
+    ]  # two stand, one drives off
+    pairs = similarity.pair_similarities(
+        speed, np.stack([speed * 1.1 + 0.1 * np.linspace(0, 1, 9)[:, None]]), "manhattan"
+    )
     errors = [pair.error(ONCE)[0] for pair in pairs]
     assert math.isnan(errors[0]) and np.isfinite(errors[1:]).all()
     assert similarity.mean_error(pairs, ONCE)[0] == pytest.approx(np.mean(errors[1:]))
@@ -159,10 +196,14 @@ def test_diversity_by_hand():
 def test_interval_of_a_mean_agrees_with_scipy():
     values = np.random.default_rng(5).exponential(2.0, 80)
     ours = Bootstrap.draw(np.arange(80), 4000, 0.95, 1).mean(values)
-    theirs = stats.bootstrap((values,), np.mean, n_resamples=4000, method="percentile", random_state=1).confidence_interval
+    theirs = stats.bootstrap(
+        (values,), np.mean, n_resamples=4000, method="percentile", random_state=1
+    ).confidence_interval
     assert ours.value == pytest.approx(values.mean())
     width = theirs.high - theirs.low
-    assert ours.low == pytest.approx(theirs.low, abs=0.08 * width) and ours.high == pytest.approx(theirs.high, abs=0.08 * width)
+    assert ours.low == pytest.approx(theirs.low, abs=0.08 * width) and ours.high == pytest.approx(
+        theirs.high, abs=0.08 * width
+    )
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
@@ -190,7 +231,9 @@ def test_samples_that_depend_on_each_other_are_drawn_together():
 
 def test_one_sample_has_no_interval_and_the_seed_decides():
     assert math.isnan(Bootstrap.draw(np.arange(1), 50, 0.95, 0).mean(np.array([2.0])).low)
-    assert math.isnan(Bootstrap.draw(np.zeros(2, dtype=int), 50, 0.95, 0).mean(np.array([2.0, 3.0])).low)  # a antithetic pair
+    assert math.isnan(
+        Bootstrap.draw(np.zeros(2, dtype=int), 50, 0.95, 0).mean(np.array([2.0, 3.0])).low
+    )  # a antithetic pair
     one, two, other = (Bootstrap.draw(np.arange(9), 50, 0.95, seed).weights for seed in (4, 4, 5))
     assert (one == two).all() and (one != other).any() and (one.sum(axis=1) == 9).all()
 
@@ -212,7 +255,9 @@ def test_motion_on_another_clock():
     np.testing.assert_allclose(even.position[0, :, 0], np.linspace(-50, 70, 7), atol=1e-6)
 
 
-def test_a_large_set_has_the_same_error_and_nearly_the_same_interval_with_pooled_units(monkeypatch):
+def test_a_large_set_has_the_same_error_and_nearly_the_same_interval_with_pooled_units(
+    monkeypatch,
+):
     """At most MOST_UNITS units are drawn, and the value does not depend on how they are pooled."""
     encounter = crossing()
     scenarios = samples(encounter, 150)

@@ -16,5 +16,7 @@ def test_as_many_as_the_segmenter_placed_and_the_best_ones():
     even = uniform_changepoints(segmentation)
     assert even.changepoints.tolist() == [40, 80] and len(even.descriptions) == 3
     assert (np.flatnonzero(np.diff(even.labels)) + 1).tolist() == [40, 80]
-    speed = np.stack([np.interp(np.arange(121.0), [0, 30, 70, 120], [0, 15, 15, 2]), np.full(121, 4.0)])
+    speed = np.stack(
+        [np.interp(np.arange(121.0), [0, 30, 70, 120], [0, 15, 15, 2]), np.full(121, 4.0)]
+    )
     assert np.abs(best_linear_pieces(speed, 2) - [30, 70]).max() <= 1  # corners are found

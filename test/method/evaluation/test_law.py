@@ -15,7 +15,13 @@ from scenario_gen import generate, PipelineConfig
 from scenario_gen.cli.folder import FolderRequest, generate_all
 from scenario_gen.method.evaluation.law import Law, measures_in, SHIPPED
 from scenario_gen.method.evaluation.population import FEATURES, member_of
-from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, regenerate, SamplingConfig
+from scenario_gen.method.sampling import (
+    checker_of,
+    NaturalScenarios,
+    plan_of,
+    regenerate,
+    SamplingConfig,
+)
 from scenario_gen.types import Cause, Request, Scenario
 
 POPULATION = PipelineConfig(sampling=SamplingConfig(variety="population"))
@@ -26,7 +32,12 @@ KIND = "crossing, rolls"
 def as_scenario(encounter, pace=1.0):
     """The encounter driven `pace` times as fast."""
     return Scenario(
-        encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.speed * pace, 0.0 * encounter.speed
+        encounter.vehicles,
+        encounter.time,
+        encounter.position,
+        encounter.heading,
+        encounter.speed * pace,
+        0.0 * encounter.speed,
     )
 
 
@@ -38,14 +49,20 @@ def encounters():
 @pytest.fixture(scope="module")
 def sets(encounters):
     """Of the first encounter: as recorded ones differ, and as by default."""
-    return [generate(encounters, "corridor", config, count=40, seed=5) for config in (POPULATION, PipelineConfig())]
+    return [
+        generate(encounters, "corridor", config, count=40, seed=5)
+        for config in (POPULATION, PipelineConfig())
+    ]
 
 
 def test_the_shipped_law_is_one_of_these_features_names_its_source_and_has_no_rows():
     document = json.loads(SHIPPED.read_text())
     assert "public domain" in document["source"] and tuple(document["features"]) == FEATURES
     for law in document["kinds"].values():
-        assert set(law) == {"encounters", "mean", "covariance"} and np.linalg.eigvalsh(law["covariance"]).min() > 0.0
+        assert (
+            set(law) == {"encounters", "mean", "covariance"}
+            and np.linalg.eigvalsh(law["covariance"]).min() > 0.0
+        )
 
 
 def test_few_encounters_hardly_move_the_shipped_law_and_many_make_it_theirs():
@@ -64,7 +81,9 @@ def test_few_encounters_hardly_move_the_shipped_law_and_many_make_it_theirs():
 def test_what_no_recorded_driver_does_is_rarer_and_others_that_do_it_make_it_usual(encounters):
     own, fast = encounters[0], replace(encounters[0], speed=3.0 * encounters[0].speed)
     rarity = measures_in("population", own).rarity
-    alike = measures_in("population", own, [replace(fast, name=f"fast {n}") for n in range(9)]).rarity
+    alike = measures_in(
+        "population", own, [replace(fast, name=f"fast {n}") for n in range(9)]
+    ).rarity
     assert rarity(as_scenario(own, 3.0)) > 1.5 * rarity(as_scenario(own))
     assert alike(as_scenario(own, 3.0)) < 0.7 * rarity(as_scenario(own, 3.0))
     assert measures_in("wide", own).rarity is None
@@ -72,7 +91,10 @@ def test_what_no_recorded_driver_does_is_rarer_and_others_that_do_it_make_it_usu
 
 def test_the_template_counts_once_whether_it_is_named_or_not(encounters):
     scenario = as_scenario(encounters[1])
-    named, unnamed = (measures_in("population", encounters[0], others).rarity for others in (encounters, encounters[1:]))
+    named, unnamed = (
+        measures_in("population", encounters[0], others).rarity
+        for others in (encounters, encounters[1:])
+    )
     assert named(scenario) == pytest.approx(unnamed(scenario))
 
 
@@ -80,7 +102,8 @@ def test_encounters_are_told_apart_by_what_they_are_and_not_by_their_names(encou
     scenario = as_scenario(encounters[1])
     others, copies = [replace(one, name="log") for one in encounters[1:]], 5 * [encounters[0]]
     named, alike, copied = (
-        measures_in("population", encounters[0], given).rarity(scenario) for given in (encounters[1:], others, copies)
+        measures_in("population", encounters[0], given).rarity(scenario)
+        for given in (encounters[1:], others, copies)
     )
     assert alike == pytest.approx(named)
     assert copied == pytest.approx(measures_in("population", encounters[0]).rarity(scenario))
@@ -89,7 +112,12 @@ def test_encounters_are_told_apart_by_what_they_are_and_not_by_their_names(encou
 def test_vehicles_that_share_no_area_are_in_no_population(encounters):
     position = encounters[0].position.copy()
     position[0] += 1000.0
-    assert measures_in("population", encounters[0]).rarity(as_scenario(replace(encounters[0], position=position))) == np.inf
+    assert (
+        measures_in("population", encounters[0]).rarity(
+            as_scenario(replace(encounters[0], position=position))
+        )
+        == np.inf
+    )
 
 
 def test_approaches_of_a_set_spread_towards_those_of_the_population(sets, encounters):
@@ -120,20 +148,32 @@ def test_the_same_seed_gives_the_same_and_an_index_one_alone(sets, encounters):
 
 
 def test_an_unusual_template_keeps_its_least_rare_ones_and_says_so(encounters):
-    others = [replace(other, name=f"{n}", speed=0.1 * other.speed) for n, other in enumerate(4 * encounters)]
+    others = [
+        replace(other, name=f"{n}", speed=0.1 * other.speed)
+        for n, other in enumerate(4 * encounters)
+    ]
     made = generate([encounters[0], *others], "corridor", POPULATION, count=10, seed=5)
-    assert len(made) == 10 and any("unusual among recorded encounters" in note for note in made.generated.adaptations)
+    assert len(made) == 10 and any(
+        "unusual among recorded encounters" in note for note in made.generated.adaptations
+    )
 
 
 def test_natural_scenarios_of_a_population_are_usual_too(sets, encounters):
-    plan, sampling = plan_of(sets[0], POPULATION.sampling, POPULATION.limits, Request()), POPULATION.sampling
+    plan, sampling = (
+        plan_of(sets[0], POPULATION.sampling, POPULATION.limits, Request()),
+        POPULATION.sampling,
+    )
     measures = measures_in("population", encounters[0], encounters)
     check = checker_of(plan, sampling, POPULATION.limits, Request()).check
-    natural, any_of_them = (NaturalScenarios.of(plan, check, sampling, 5, given) for given in (measures, None))
+    natural, any_of_them = (
+        NaturalScenarios.of(plan, check, sampling, 5, given) for given in (measures, None)
+    )
     numbers = np.random.default_rng(0).standard_normal((40, natural.size))
     usual, valid = natural.scenarios(numbers), any_of_them.scenarios(numbers)
     kept = [one is not None and measures.rarity(one) <= natural.usual.most for one in valid]
-    assert [one is not None for one in usual] == kept and sum(kept) < sum(one is not None for one in valid)
+    assert [one is not None for one in usual] == kept and sum(kept) < sum(
+        one is not None for one in valid
+    )
 
 
 def test_the_encounters_of_a_command_are_its_population(encounters):
@@ -142,4 +182,6 @@ def test_the_encounters_of_a_command_are_its_population(encounters):
     for number in (1, 2):
         made = generate_all(pairs[:number], folder)[0][0]
         rarity = measures_in("population", encounters[0], encounters[:number]).rarity
-        assert [float(one.facts["rarity"]) for one in made] == pytest.approx([rarity(one) for one in made], abs=1e-3)
+        assert [float(one.facts["rarity"]) for one in made] == pytest.approx(
+            [rarity(one) for one in made], abs=1e-3
+        )

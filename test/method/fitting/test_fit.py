@@ -27,7 +27,12 @@ def segmented(encounter, *changepoints):
     labels = np.zeros(t, dtype=np.int64)
     for c in changepoints:
         labels[c:] += 1
-    return Segmentation(labels, np.array(changepoints, dtype=np.int64), np.zeros(t), ("piece",) * (len(changepoints) + 1))
+    return Segmentation(
+        labels,
+        np.array(changepoints, dtype=np.int64),
+        np.zeros(t),
+        ("piece",) * (len(changepoints) + 1),
+    )
 
 
 def every(encounter, step=25):
@@ -56,7 +61,13 @@ def turn(x, y, yaw, before, angle, radius, after=60.0):
     local = np.vstack(([0.0, 0.0, 0.0], local, end))
     cos, sin = np.cos(yaw), np.sin(yaw)
     return Curve(
-        np.column_stack((x + local[:, 0] * cos - local[:, 1] * sin, y + local[:, 0] * sin + local[:, 1] * cos, yaw + local[:, 2]))
+        np.column_stack(
+            (
+                x + local[:, 0] * cos - local[:, 1] * sin,
+                y + local[:, 0] * sin + local[:, 1] * cos,
+                yaw + local[:, 2],
+            )
+        )
     )
 
 
@@ -66,7 +77,12 @@ def straight(x, y, yaw):
 
 def relative(pose, other):
     d = other[:2] - pose[:2]
-    return np.array([d[0] * np.cos(pose[2]) + d[1] * np.sin(pose[2]), d[1] * np.cos(pose[2]) - d[0] * np.sin(pose[2])])
+    return np.array(
+        [
+            d[0] * np.cos(pose[2]) + d[1] * np.sin(pose[2]),
+            d[1] * np.cos(pose[2]) - d[0] * np.sin(pose[2]),
+        ]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +108,9 @@ def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(recorded):
                 assert footprint_fits(road, f.anchors, vehicle.length, vehicle.width).all()
                 assert 0.8 <= f.scale <= 1.25
                 assert f.moved.max() <= 3.0
-            assert turned_otherwise(encounter, fit) <= {loss.vehicles[0] for loss in fit.losses if loss.kind == "turn"}
+            assert turned_otherwise(encounter, fit) <= {
+                loss.vehicles[0] for loss in fit.losses if loss.kind == "turn"
+            }
         assert fitted >= 2, name
 
 
@@ -111,7 +129,10 @@ def turned_otherwise(encounter, fit):
 @pytest.mark.data
 def test_who_goes_straight_on_has_an_arm_ahead_even_where_its_record_ends_before(data):
     files = sorted((data / "trajectories").glob("*/encounter_*.csv"))
-    for name in ("a_cross", "b_left"):  # one vehicle's record begins, or ends, in the middle of the junction
+    for name in (
+        "a_cross",
+        "b_left",
+    ):  # one vehicle's record begins, or ends, in the middle of the junction
         encounter = read_log([next(file for file in files if name in file.stem)]).encounters[0]
         for road_name in ("t_intersection", "four_way"):
             fit = fit_template(encounter, every(encounter), build_road(road_name, encounter))
@@ -121,9 +142,16 @@ def test_who_goes_straight_on_has_an_arm_ahead_even_where_its_record_ends_before
 
 def test_oncoming_vehicles_stay_as_far_apart_where_there_are_lanes():
     speed = np.full(80, 9.0)
-    encounter = encounter_of(driven(straight(0.0, 0.0, 0.3), speed), driven(straight(110.0, 45.0, 0.3 - np.pi), speed))
-    assert relative(np.array([0.0, 0.0, 0.3]), np.array([110.0, 45.0]))[1] == pytest.approx(10.5, abs=0.1)
-    for lanes, apart in ((0, 10.5), (1, 3.5)):  # as many as the template needs; one, which does too
+    encounter = encounter_of(
+        driven(straight(0.0, 0.0, 0.3), speed), driven(straight(110.0, 45.0, 0.3 - np.pi), speed)
+    )
+    assert relative(np.array([0.0, 0.0, 0.3]), np.array([110.0, 45.0]))[1] == pytest.approx(
+        10.5, abs=0.1
+    )
+    for lanes, apart in (
+        (0, 10.5),
+        (1, 3.5),
+    ):  # as many as the template needs; one, which does too
         road = build_road("straight", encounter, RoadConfig(lanes=lanes))
         fit = fit_template(encounter, every(encounter), road)
         one, two = (f.anchors[0] for f in fit.fitted)
@@ -135,7 +163,10 @@ def test_ends_do_not_depend_on_changepoints(recorded):
     for encounter in recorded.values():
         for road_name in ("four_way", "corridor"):
             road = build_road(road_name, encounter)
-            with_, without = (fit_template(encounter, s, road) for s in (every(encounter, 10), segmented(encounter)))
+            with_, without = (
+                fit_template(encounter, s, road)
+                for s in (every(encounter, 10), segmented(encounter))
+            )
             assert np.array_equal(with_.requested.start, without.requested.start)
             assert np.array_equal(with_.requested.end, without.requested.end)
             assert [f.manoeuvre for f in with_.fitted] == [f.manoeuvre for f in without.fitted]
@@ -146,16 +177,24 @@ def test_the_template_is_replayed_without_overlap_in_its_order_and_speed(recorde
     for name, encounter in recorded.items():
         for road_name in ("four_way", "corridor"):
             road = build_road(road_name, encounter)
-            fit = fit_template(encounter, every(encounter, 1), road)  # every sample an anchor: the dense placement
+            fit = fit_template(
+                encounter, every(encounter, 1), road
+            )  # every sample an anchor: the dense placement
             poses = np.stack([f.anchors for f in fit.fitted])
             heading = np.unwrap(poses[..., 2], axis=1)
-            found = find_conflicts(fit.vehicles, encounter.time[fit.anchor_index], poses[..., :2], heading)
+            found = find_conflicts(
+                fit.vehicles, encounter.time[fit.anchor_index], poses[..., :2], heading
+            )
             order = {frozenset((c.first, c.second)): c.first for c in found}
-            template = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+            template = find_conflicts(
+                encounter.vehicles, encounter.time, encounter.position, encounter.heading
+            )
             for conflict in template:
                 pair = frozenset((conflict.first, conflict.second))
                 assert order.get(pair, conflict.first) == conflict.first, (name, road_name)
-            step = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=1), 2, 0)) / np.diff(encounter.time[fit.anchor_index])
+            step = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=1), 2, 0)) / np.diff(
+                encounter.time[fit.anchor_index]
+            )
             recorded_speed = encounter.speed[:, fit.anchor_index]
             middle = (recorded_speed[:, 1:] + recorded_speed[:, :-1]) / 2.0
             scale = np.array([[vehicle.scale] for vehicle in fit.fitted])
@@ -165,8 +204,13 @@ def test_the_template_is_replayed_without_overlap_in_its_order_and_speed(recorde
 def crossing_pair():
     """Vehicle 1 comes from the right of vehicle 0 and waits for it."""
     t = 120
-    waiting = np.concatenate((np.full(30, 6.0), np.linspace(6.0, 0.0, 30), np.zeros(30), np.linspace(0.0, 7.0, 30)))
-    return encounter_of(driven(straight(-50.0, 0.0, 0.0), np.full(t, 9.0)), driven(straight(0.0, -35.0, np.pi / 2.0), waiting))
+    waiting = np.concatenate(
+        (np.full(30, 6.0), np.linspace(6.0, 0.0, 30), np.zeros(30), np.linspace(0.0, 7.0, 30))
+    )
+    return encounter_of(
+        driven(straight(-50.0, 0.0, 0.0), np.full(t, 9.0)),
+        driven(straight(0.0, -35.0, np.pi / 2.0), waiting),
+    )
 
 
 @pytest.mark.parametrize("road_name", ["four_way"])
@@ -188,7 +232,9 @@ def test_who_comes_from_the_right_still_does_and_arrival_times_are_kept(road_nam
     assert [f.manoeuvre for f in fit.fitted] == ["straight", "straight"]
     for k in (0, 5, 15):
         i = fit.anchor_index[k]
-        template = relative([*encounter.position[0, i], encounter.heading[0, i]], encounter.position[1, i])
+        template = relative(
+            [*encounter.position[0, i], encounter.heading[0, i]], encounter.position[1, i]
+        )
         assert relative(first[k], second[k]) == pytest.approx(template, abs=0.3)
     assert fit.fitted[1].stands[13:17].all()  # it waits from 6 s to 9 s
     assert not fit.fitted[0].stands.any()
@@ -199,7 +245,8 @@ def test_turns_take_the_arm_on_their_side():
     for angle, name in ((np.pi / 2.0, "left"), (-np.pi / 2.0, "right")):
         speeds = np.full(110, 7.0)
         encounter = encounter_of(
-            driven(turn(-40.0, -1.75, 0.0, 35.0, angle, 9.0), speeds), driven(straight(45.0, 1.75, np.pi), np.full(110, 3.0))
+            driven(turn(-40.0, -1.75, 0.0, 35.0, angle, 9.0), speeds),
+            driven(straight(45.0, 1.75, np.pi), np.full(110, 3.0)),
         )
         fit = fit_template(encounter, every(encounter), build_road("four_way", encounter))
         assert [f.manoeuvre for f in fit.fitted] == [name, "straight"]
@@ -210,7 +257,9 @@ def test_turns_take_the_arm_on_their_side():
 
 
 @pytest.mark.parametrize("road_name", ["curve", "t_intersection", "four_way"])
-def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_straight_road(road_name):
+def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_straight_road(
+    road_name,
+):
     bend = turn(0.0, 0.0, 0.0, 20.0, 1.4, 120.0, 400.0)
     ahead = Curve(bend.at(np.arange(18.0, 400.0, 0.5)))
     encounter = encounter_of(driven(ahead, np.full(150, 12.0)), driven(bend, np.full(150, 12.0)))
@@ -220,13 +269,16 @@ def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_str
     for f in fit.fitted:
         assert f.turned[1] == pytest.approx(f.turned[0], abs=np.radians(5.0))
     assert not [loss for loss in fit.losses if loss.kind != "arm"]
-    with pytest.raises(RefusedError, match=r"vehicle 0 turns left by 80°: road straight has no lanes for that"):
+    with pytest.raises(
+        RefusedError, match=r"vehicle 0 turns left by 80°: road straight has no lanes for that"
+    ):
         fit_template(encounter, every(encounter), build_road("straight", encounter))
 
 
 def test_scale_out_of_range_is_refused_with_the_figure():
     encounter = encounter_of(
-        driven(straight(0.0, 0.0, 0.0), np.full(150, 12.0)), driven(straight(-20.0, 0.0, 0.0), np.full(150, 12.0))
+        driven(straight(0.0, 0.0, 0.0), np.full(150, 12.0)),
+        driven(straight(-20.0, 0.0, 0.0), np.full(150, 12.0)),
     )
     from scenario_gen.roads import RoadConfig
 
@@ -240,7 +292,14 @@ def test_scale_out_of_range_is_refused_with_the_figure():
 
 def test_given_ends_are_met_exactly_and_the_map_keeps_orientation():
     encounter = crossing_pair()
-    road = Road("open", np.ones((1000, 1000), dtype=bool), 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    road = Road(
+        "open",
+        np.ones((1000, 1000), dtype=bool),
+        0.2,
+        np.zeros(2),
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+    )
     chord = np.hypot(*(encounter.position[:, -1] - encounter.position[:, 0]).T)
     starts = np.array([[30.0, 100.0, 0.3, 9.0], [100.0, 60.0, 1.8, 6.0]])
     goals = starts.copy()
@@ -259,7 +318,11 @@ def test_given_ends_are_met_exactly_and_the_map_keeps_orientation():
         far = goals.copy()
         far[:, :2] = starts[:, :2] + 2.0 / 1.1 * (goals[:, :2] - starts[:, :2])
         fit_template(encounter, every(encounter), road, starts=starts, goals=far)
-    for bad in ({"starts": starts}, {"starts": starts[:1], "goals": goals}, {"starts": starts * np.nan, "goals": goals}):
+    for bad in (
+        {"starts": starts},
+        {"starts": starts[:1], "goals": goals},
+        {"starts": starts * np.nan, "goals": goals},
+    ):
         with pytest.raises(InputError):
             fit_template(encounter, every(encounter), road, **bad)
 
@@ -267,7 +330,8 @@ def test_given_ends_are_met_exactly_and_the_map_keeps_orientation():
 def test_who_waits_throughout_stays_and_cannot_be_sent_away():
     still = np.zeros(100)
     encounter = encounter_of(
-        driven(straight(-30.0, 0.0, 0.0), np.full(100, 6.0)), driven(straight(0.0, -9.0, np.pi / 2.0), still)
+        driven(straight(-30.0, 0.0, 0.0), np.full(100, 6.0)),
+        driven(straight(0.0, -9.0, np.pi / 2.0), still),
     )
     fit = fit_template(encounter, every(encounter), build_road("four_way", encounter))
     assert fit.fitted[1].manoeuvre == "wait"
@@ -275,24 +339,42 @@ def test_who_waits_throughout_stays_and_cannot_be_sent_away():
     assert (fit.fitted[1].anchors == fit.fitted[1].anchors[0]).all()
     moving, waiting = (f.anchors[0] for f in fit.fitted)
     assert relative(moving, waiting) == pytest.approx([30.0, -9.0], abs=2.5)
-    road = Road("open", np.ones((600, 600), dtype=bool), 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    road = Road(
+        "open",
+        np.ones((600, 600), dtype=bool),
+        0.2,
+        np.zeros(2),
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+    )
     starts = np.array([[20.0, 60.0, 0.0], [60.0, 40.0, 1.5]])
     with pytest.raises(RefusedError, match="waits throughout"):
-        fit_template(encounter, every(encounter), road, starts=starts, goals=starts + np.array([59.0, 0.0, 0.0]))
+        fit_template(
+            encounter,
+            every(encounter),
+            road,
+            starts=starts,
+            goals=starts + np.array([59.0, 0.0, 0.0]),
+        )
 
 
 def test_anchors_without_room_are_moved_and_said_and_far_ones_refused():
     encounter = encounter_of(
-        driven(straight(10.0, 20.0, 0.0), np.full(100, 5.0)), driven(straight(10.0, 40.0, 0.0), np.full(100, 5.0))
+        driven(straight(10.0, 20.0, 0.0), np.full(100, 5.0)),
+        driven(straight(10.0, 40.0, 0.0), np.full(100, 5.0)),
     )
     drivable = np.zeros((300, 400), dtype=bool)
     drivable[170:230, :] = True
-    drivable[96:150, :] = True  # the lower road begins at y = 19.2: vehicle 0 needs 19.05 or more, 0.15 m up
+    drivable[96:150, :] = (
+        True  # the lower road begins at y = 19.2: vehicle 0 needs 19.05 or more, 0.15 m up
+    )
     road = Road("two roads", drivable, 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
     fit = fit_template(encounter, every(encounter), road, FittingConfig(placement="identity"))
     assert fit.fitted[0].moved == pytest.approx(np.full(len(fit.anchor_index), 0.15), abs=0.02)
     assert not fit.fitted[1].moved.any()
-    assert any("vehicle 0: its start had no room and was moved by 0.15 m" in note for note in fit.notes)
+    assert any(
+        "vehicle 0: its start had no room and was moved by 0.15 m" in note for note in fit.notes
+    )
     drivable[96:120] = False
     far = Road("far", drivable, 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
     with pytest.raises(
@@ -308,12 +390,23 @@ def test_search_finds_a_road_of_the_templates_shape_wherever_it_is():
         driven(straight(60.0, 3.5, np.pi), np.full(100, 2.0)),
     )
     home = build_road("corridor", encounter)
-    turned = Road("turned", np.rot90(home.drivable), 0.2, np.array([300.0, -80.0]), np.zeros((0, 3)), np.zeros((0, 3)))
+    turned = Road(
+        "turned",
+        np.rot90(home.drivable),
+        0.2,
+        np.array([300.0, -80.0]),
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+    )
     fit = fit_template(encounter, every(encounter), turned)
     one, two = (f.anchors for f in fit.fitted)
     assert all(f.scale == 1.0 for f in fit.fitted)
     assert relative(one[0], two[0]) == pytest.approx([60.0, 3.5], abs=0.1)
-    assert one[0, 2] == pytest.approx(-np.pi / 2.0, abs=0.1)  # rows grow with y: rot90 turns clockwise
-    narrow = Road("narrow", home.drivable[:, :60], 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    assert one[0, 2] == pytest.approx(
+        -np.pi / 2.0, abs=0.1
+    )  # rows grow with y: rot90 turns clockwise
+    narrow = Road(
+        "narrow", home.drivable[:, :60], 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3))
+    )
     with pytest.raises(RefusedError, match="no placement on road narrow has room"):
         fit_template(encounter, every(encounter), narrow)

@@ -45,7 +45,8 @@ def place(monkeypatch):
 def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
     place(apart(CROSSING, 120.0))
     with pytest.raises(
-        LostEncounterError, match=r"vehicles 1 and 2 have crossing or merging paths .* fitting\.allow=lost_conflict"
+        LostEncounterError,
+        match=r"vehicles 1 and 2 have crossing or merging paths .* fitting\.allow=lost_conflict",
     ):
         fit_template(CROSSING, SEGMENTATION, OPEN)
     taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"))
@@ -54,11 +55,18 @@ def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
 
 def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place):
     place(apart(CROSSING, 0.0))
-    ends = {name: apart(CROSSING, 120.0).tracks[1].curve.points[k] for name, k in (("starts", 0), ("goals", -1))}
-    request = Request(**{name: f"2: {x:.2f} {y:.2f} {yaw:.4f}" for name, (x, y, yaw) in ends.items()})
+    ends = {
+        name: apart(CROSSING, 120.0).tracks[1].curve.points[k]
+        for name, k in (("starts", 0), ("goals", -1))
+    }
+    request = Request(
+        **{name: f"2: {x:.2f} {y:.2f} {yaw:.4f}" for name, (x, y, yaw) in ends.items()}
+    )
     with pytest.raises(LostEncounterError, match=r"fitting\.allow=lost_conflict"):
         fit_template(CROSSING, SEGMENTATION, OPEN, request=request)
-    taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"), request=request)
+    taken = fit_template(
+        CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"), request=request
+    )
     assert [loss.kind for loss in taken.losses] == ["conflict"]
 
 
@@ -66,19 +74,24 @@ def test_what_is_kept_or_at_home_is_not_refused(place):
     place(apart(CROSSING, 1.0))
     assert not fit_template(CROSSING, SEGMENTATION, OPEN).losses
     place(replace(apart(CROSSING, 120.0), at_home=True))
-    assert [loss.kind for loss in fit_template(CROSSING, SEGMENTATION, OPEN).losses] == ["conflict"]
+    assert [loss.kind for loss in fit_template(CROSSING, SEGMENTATION, OPEN).losses] == [
+        "conflict"
+    ]
 
 
 def along(*offsets, ahead=0.0, kind="car"):
     """The tracks of two of a type that go east at 10 m/s: for each its offsets [m, left] at start, middle and end."""
     x = np.arange(0.0, 150.0)
     poses = [
-        np.column_stack((x + k * ahead, np.interp(x, [0.0, 50.0, 75.0, 100.0, 149.0], own))) for k, own in enumerate(offsets)
+        np.column_stack((x + k * ahead, np.interp(x, [0.0, 50.0, 75.0, 100.0, 149.0], own)))
+        for k, own in enumerate(offsets)
     ]
     position = np.stack(poses)
     heading = np.zeros(position.shape[:2])
     vehicles = (Vehicle("1", type=kind), Vehicle("2", type=kind))
-    return clean_tracks(Encounter("two", vehicles, 0, 100_000_000, position, heading, np.full(heading.shape, 10.0)))
+    return clean_tracks(
+        Encounter("two", vehicles, 0, 100_000_000, position, heading, np.full(heading.shape, 10.0))
+    )
 
 
 SAME, LEFT, INTO = (0.0,) * 5, (3.5,) * 5, (3.5, 3.5, 1.75, 0.0, 0.0)
@@ -106,7 +119,9 @@ def test_who_walks_is_in_no_lane():
 
 def test_who_is_recorded_beside_another_one_in_its_width_does_not_follow_it():
     template = along(SAME, (1.7,) * 5, ahead=1.0)
-    assert {loss.kind for loss in find_losses(template, along(SAME, LEFT, ahead=1.0))} == {"beside"}
+    assert {loss.kind for loss in find_losses(template, along(SAME, LEFT, ahead=1.0))} == {
+        "beside"
+    }
 
 
 def test_who_passes_whom_and_on_which_side_is_kept():
@@ -115,10 +130,14 @@ def test_who_passes_whom_and_on_which_side_is_kept():
 
     def scene(side, still):
         x = np.full(150, 40.0) if still else ahead / 2.0
-        position = np.stack([np.column_stack((x, np.zeros(150))), np.column_stack((past, side * swerve))])
+        position = np.stack(
+            [np.column_stack((x, np.zeros(150))), np.column_stack((past, side * swerve))]
+        )
         speed = np.array([[0.0 if still else 5.0], [20.0]]) * np.ones((2, 150))
         vehicles = (Vehicle("1"), Vehicle("2"))
-        return clean_tracks(Encounter("two", vehicles, 0, 100_000_000, position, np.zeros((2, 150)), speed))
+        return clean_tracks(
+            Encounter("two", vehicles, 0, 100_000_000, position, np.zeros((2, 150)), speed)
+        )
 
     for still, kind in ((False, "overtaking"), (True, "stand")):
         template = scene(1.0, still)
@@ -132,14 +151,20 @@ def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
     first, second = clean_tracks(encounter)
     beside = replace(second, curve=Curve(second.curve.points + np.array([0.0, 8.0, 0.0])))
     place(Placement((first, beside), np.ones(2), np.zeros(2), ()))
-    with pytest.raises(LostEncounterError, match=r"drive in one lane .* fitting\.allow=lost_following takes it"):
+    with pytest.raises(
+        LostEncounterError, match=r"drive in one lane .* fitting\.allow=lost_following takes it"
+    ):
         fit_template(encounter, segment(encounter), OPEN)
-    taken = fit_template(encounter, segment(encounter), OPEN, FittingConfig(allow="lost_following, lost_merge"))
+    taken = fit_template(
+        encounter, segment(encounter), OPEN, FittingConfig(allow="lost_following, lost_merge")
+    )
     assert [loss.kind for loss in taken.losses] == ["following"]
 
 
 def test_the_refusal_names_roads_that_keep_it():
-    answer = suggest_nearest(LostEncounterError("lost"), Chain(CROSSING, SEGMENTATION, OPEN, PipelineConfig()))
+    answer = suggest_nearest(
+        LostEncounterError("lost"), Chain(CROSSING, SEGMENTATION, OPEN, PipelineConfig())
+    )
     assert isinstance(answer, LostEncounterError)
     assert re.match(r"lost\. Nearest possible: road (t_intersection|four_way)", str(answer))
 

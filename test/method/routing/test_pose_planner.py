@@ -17,8 +17,18 @@ from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.routing import plan, plan_routes, PlanningConfig
 from scenario_gen.method.routing.distance import farthest
 from scenario_gen.method.routing.search.dubins import Pose, shortest_curve
-from scenario_gen.method.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError
-from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, PoseSearchConfig, Wishes
+from scenario_gen.method.routing.search.planner import (
+    BlockedError,
+    Budget,
+    BudgetSpentError,
+    NoWayError,
+)
+from scenario_gen.method.routing.search.pose_planner import (
+    PoseQuery,
+    PoseRrtStarConnect,
+    PoseSearchConfig,
+    Wishes,
+)
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.types.encounter import Vehicle
@@ -34,7 +44,11 @@ pose = st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-7, 7))
 def street(obstacles="", length=60.0, width=8.0):
     """A straight road along x from y = 1 m on, cells of 0.2 m."""
     y = (np.arange(int((width + 2.0) / 0.2)) + 0.5) * 0.2
-    road = road_of("street", np.repeat(((y > 1.0) & (y < 1.0 + width))[:, None], int(length / 0.2), axis=1), 0.2)
+    road = road_of(
+        "street",
+        np.repeat(((y > 1.0) & (y < 1.0 + width))[:, None], int(length / 0.2), axis=1),
+        0.2,
+    )
     return with_obstacles(road, read_obstacles(obstacles))
 
 
@@ -49,9 +63,16 @@ def query(start=(4.0, 3.0, 0.0), goal=(56.0, 3.0, 0.0)):
 def route_on(road, *anchors, config=PlanningConfig(), seed=0, path=None):
     poses = np.array(anchors)
     more = {} if path is None else {"path": np.array(path)}
-    fitted = FittedVehicle(poses, np.zeros(len(poses)), np.zeros(len(poses) - 1, dtype=bool), 1.0, "straight", **more)
+    fitted = FittedVehicle(
+        poses, np.zeros(len(poses)), np.zeros(len(poses) - 1, dtype=bool), 1.0, "straight", **more
+    )
     states = BoundaryStates(*(np.append(poses[k], 5.0)[None] for k in (0, -1)))
-    (route,) = plan_routes(road, Fit((Vehicle("a", *CAR),), (fitted,), np.arange(len(poses)), states, ()), config, seed)
+    (route,) = plan_routes(
+        road,
+        Fit((Vehicle("a", *CAR),), (fitted,), np.arange(len(poses)), states, ()),
+        config,
+        seed,
+    )
     return route
 
 
@@ -69,9 +90,13 @@ def test_a_dubins_curve_ends_where_it_should(start, end, radius):
 
 
 def test_a_dubins_curve_is_as_long_driven_backwards():
-    for start, end in np.random.default_rng(0).uniform((-5.0, -5.0, -4.0), (5.0, 5.0, 4.0), (200, 2, 3)):
+    for start, end in np.random.default_rng(0).uniform(
+        (-5.0, -5.0, -4.0), (5.0, 5.0, 4.0), (200, 2, 3)
+    ):
         there, _ = shortest_curve(Pose(*start), Pose(*end), 1.7)
-        back, _ = shortest_curve(*(Pose(*each[:2], each[2] + np.pi) for each in (end, start)), 1.7)  # a car that was turned round
+        back, _ = shortest_curve(
+            *(Pose(*each[:2], each[2] + np.pi) for each in (end, start)), 1.7
+        )  # a car that was turned round
         assert sum(back[1:]) == pytest.approx(sum(there[1:]), abs=1e-6)
 
 
@@ -84,7 +109,12 @@ def test_what_is_swept_is_free_exactly(seed):
     first = np.array([*rng.uniform(2.0, 12.0, 2), rng.uniform(-np.pi, np.pi)])
     turn = first[2] + curvature * np.array([0.0, 0.2])
     middle = turn.mean()
-    poses = np.array([[*first[:2], turn[0]], [first[0] + 0.2 * np.cos(middle), first[1] + 0.2 * np.sin(middle), turn[1]]])
+    poses = np.array(
+        [
+            [*first[:2], turn[0]],
+            [first[0] + 0.2 * np.cos(middle), first[1] + 0.2 * np.sin(middle), turn[1]],
+        ]
+    )
     swept = shapely.convex_hull(shapely.union_all(footprints(poses[:, :2], poses[:, 2], *size)))
     area = drivable_area(road)
     overlap, doubt = (
@@ -105,7 +135,9 @@ def test_paths_are_arcs_and_keep_clear(obstacles):
     assert plan.cost <= first.cost
     np.testing.assert_allclose(plan.poses[[0, -1]], [query().start, query().goal], atol=1e-6)
     assert np.abs(plan.curvature).max() <= LIMIT * (1 + 1e-9)
-    turn = (np.diff(plan.poses[:, 2]) - plan.curvature[1:] * plan.step[1:] + np.pi) % (2 * np.pi) - np.pi
+    turn = (np.diff(plan.poses[:, 2]) - plan.curvature[1:] * plan.step[1:] + np.pi) % (
+        2 * np.pi
+    ) - np.pi
     np.testing.assert_allclose(turn, 0.0, atol=1e-6)
     half = 0.5 * plan.curvature[1:] * plan.step[1:]
     chord = plan.step[1:] * np.sinc(half / np.pi)
@@ -134,7 +166,9 @@ def test_searches_that_fail_say_why():
 
 def test_more_iterations_never_make_a_path_dearer():
     costs = [
-        PoseRrtStarConnect(PoseSearchConfig(improve=improve)).plan(street(GATES), query(), Budget(5000), 1).cost
+        PoseRrtStarConnect(PoseSearchConfig(improve=improve))
+        .plan(street(GATES), query(), Budget(5000), 1)
+        .cost
         for improve in (0, 100, 400)
     ]
     assert costs[0] >= costs[1] >= costs[2]
@@ -142,21 +176,31 @@ def test_more_iterations_never_make_a_path_dearer():
 
 def test_room_is_kept_where_the_road_has_it():
     road = street("30 6.5 0 4.5 1.8")
-    bare = PoseRrtStarConnect().plan(road, query(goal=(56.0, 4.4, 0.0), start=(4.0, 4.4, 0.0)), Budget(500), 0)
+    bare = PoseRrtStarConnect().plan(
+        road, query(goal=(56.0, 4.4, 0.0), start=(4.0, 4.4, 0.0)), Budget(500), 0
+    )
     wished = PoseRrtStarConnect().plan(
-        road, query(goal=(56.0, 4.4, 0.0), start=(4.0, 4.4, 0.0)), Budget(500), 0, Wishes(room=0.8, lack=3.0)
+        road,
+        query(goal=(56.0, 4.4, 0.0), start=(4.0, 4.4, 0.0)),
+        Budget(500),
+        0,
+        Wishes(room=0.8, lack=3.0),
     )
     room = [sweep_is_free(road, plan.poses, *CAR)[:, 1].min() for plan in (bare, wished)]
     assert room[1] >= room[0]
 
 
 def test_routes_pass_obstacles_on_their_own_side():
-    oncoming = route_on(street("30 3 0 4.5 1.8"), (4.0, 3.0, 0.0), (56.0, 3.0, 0.0))  # own lane closed: by the other one
+    oncoming = route_on(
+        street("30 3 0 4.5 1.8"), (4.0, 3.0, 0.0), (56.0, 3.0, 0.0)
+    )  # own lane closed: by the other one
     assert (oncoming.joined, oncoming.searched) == (0, 1)
     assert oncoming.points[:, 1].max() > 4.5
     wide = street("30 6.2 0 4.5 1.8", width=11.0)  # room for a car on either side
     for side, sign in (("right", -1.0), ("left", 1.0)):
-        route = route_on(wide, (4.0, 6.5, 0.0), (56.0, 6.5, 0.0), config=PlanningConfig(traffic_side=side))
+        route = route_on(
+            wide, (4.0, 6.5, 0.0), (56.0, 6.5, 0.0), config=PlanningConfig(traffic_side=side)
+        )
         offset = route.points[:, 1] - 6.5
         assert sign * offset[np.argmax(np.abs(offset))] > 1.0
 
@@ -174,7 +218,10 @@ def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
     case = obstructed(113)
     ends = (case.query.start, case.query.goal)
     route = route_on(case.road, *ends)
-    assert np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max() <= Dynamics().planned.max_curvature
+    assert (
+        np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max()
+        <= Dynamics().planned.max_curvature
+    )
     monkeypatch.setattr(plan, "TIGHTEST", plan.TIGHTEST[:1])
     with pytest.raises(RefusedError, match="its curvature reaches"):
         route_on(case.road, *ends)
@@ -182,16 +229,23 @@ def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
 
 def test_what_is_far_from_the_fit_is_said():
     path = [(4.0, 3.0, 0.0), (56.0, 3.0, 0.0)]
-    straight, round_it = (route_on(street(text), *path, path=path) for text in ("", "30 3 0 4.5 1.8"))
+    straight, round_it = (
+        route_on(street(text), *path, path=path) for text in ("", "30 3 0 4.5 1.8")
+    )
     assert straight.farthest < 0.05
     assert straight.remarks("7") == []
     assert round_it.farthest == pytest.approx(np.abs(round_it.points[:, 1] - 3.0).max(), abs=1e-6)
-    assert round_it.remarks("7") == [f"vehicle 7: its route passes {round_it.farthest:.1f} m from its fitted path"]
+    assert round_it.remarks("7") == [
+        f"vehicle 7: its route passes {round_it.farthest:.1f} m from its fitted path"
+    ]
     assert routes_in_words([straight, round_it]) == (
         f"1 legs joined at once, 1 searched for, at most {round_it.farthest:.2f} m from the fitted paths"
     )
     assert np.isnan(farthest(straight.points, np.zeros((0, 3))))
-    assert Route(straight.points, straight.anchor, straight.length).figures()["farthest_from_fit_m"] is None
+    assert (
+        Route(straight.points, straight.anchor, straight.length).figures()["farthest_from_fit_m"]
+        is None
+    )
 
 
 def test_a_changepoint_that_cannot_be_passed_is_left_out_and_said():

@@ -31,7 +31,11 @@ def t_road(half=3.5, kerb=5.0):
     for side in (-1.0, 1.0):
         u, v = side * (x - 50.0), 50.0 - y
         drivable |= (
-            (u > 0) & (v > 0) & (u < half + kerb) & (v < half + kerb) & (np.hypot(u - half - kerb, v - half - kerb) > kerb)
+            (u > 0)
+            & (v > 0)
+            & (u < half + kerb)
+            & (v < half + kerb)
+            & (np.hypot(u - half - kerb, v - half - kerb) > kerb)
         )
     return road_of("t", drivable, 0.2)
 
@@ -41,7 +45,10 @@ T = t_road()
 
 def fit_of(*vehicles, cars=None):
     """A fit from (anchors, stands) per vehicle."""
-    fitted = tuple(FittedVehicle(np.array(a, float), np.zeros(len(a)), np.array(s, bool), 1.0, "any") for a, s in vehicles)
+    fitted = tuple(
+        FittedVehicle(np.array(a, float), np.zeros(len(a)), np.array(s, bool), 1.0, "any")
+        for a, s in vehicles
+    )
     start, end = (np.array([[*np.array(a, float)[k], 5.0] for a, _ in vehicles]) for k in (0, -1))
     cars = cars or tuple(Vehicle(f"car{n}", CAR.length, CAR.width) for n in range(len(vehicles)))
     return Fit(cars, fitted, np.arange(len(vehicles[0][0])), BoundaryStates(start, end), ())
@@ -84,7 +91,13 @@ def assert_drivable(route, anchors, limit=0.2):
     [
         [[51.75, 10, UP], [10, 51.75, LEFT]],
         [[51.75, 10, UP], [90, 48.25, RIGHT]],
-        [[51.75, 10, UP], [51.75, 30, UP], [46, 51, LEFT - 0.5], [30, 51.75, LEFT], [10, 51.75, LEFT]],
+        [
+            [51.75, 10, UP],
+            [51.75, 30, UP],
+            [46, 51, LEFT - 0.5],
+            [30, 51.75, LEFT],
+            [10, 51.75, LEFT],
+        ],
         [[51.75, 10, UP], [54.5, 46, UP / 2], [90, 48.25, RIGHT]],
         [[5, 48.25, RIGHT], [95, 48.25, RIGHT]],
         [[95, 51.75, LEFT], [48.25, 10, -UP]],
@@ -173,16 +186,23 @@ def test_refusals_name_vehicle_and_anchor():
         routes_of(T, ([goal, goal], [True]), ([goal, [10, 53.0, LEFT]], [False]))
     cut = T.drivable.copy()
     cut[:, 150:153] = False
-    with pytest.raises(RefusedError, match=r"between the start of vehicle car0 .* and the end .*no route leads"):
+    with pytest.raises(
+        RefusedError, match=r"between the start of vehicle car0 .* and the end .*no route leads"
+    ):
         routes_of(road_of("cut", cut, 0.2), ([[51.75, 10, UP], goal], [False]))
     with pytest.raises(RefusedError, match=r"no drivable route for vehicle car0 .*curvature"):
-        routes_of(T, ([[51.75, 10, UP], [51.75, 20, -UP]], [False]))  # turn round within 10 m of a lane 7 m wide
+        routes_of(
+            T, ([[51.75, 10, UP], [51.75, 20, -UP]], [False])
+        )  # turn round within 10 m of a lane 7 m wide
     with pytest.raises(InputError, match="traffic_side"):
         PlanningConfig(traffic_side="middle")
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("name", ["b_left_turn_vs_opposite_Lanker-2_13_2839_21019", "c_opposite_stop_go_Peach-4_2_134_334"])
+@pytest.mark.parametrize(
+    "name",
+    ["b_left_turn_vs_opposite_Lanker-2_13_2839_21019", "c_opposite_stop_go_Peach-4_2_134_334"],
+)
 def test_recorded_vehicles_on_their_own_map(data, name):
     roads = {road.name: road for road in recorded_maps(data / "maps" / "occupancy_grids")}
     road = roads["USA_Lanker-2_13_T-1" if "Lanker" in name else "USA_Peach-4_2_T-1"]
@@ -191,7 +211,9 @@ def test_recorded_vehicles_on_their_own_map(data, name):
     for vehicle in sorted({row["vehicle_id"] for row in rows}):
         own = [row for row in rows if row["vehicle_id"] == vehicle]
         car = Vehicle(vehicle, float(own[0]["length_m"]), float(own[0]["width_m"]))
-        poses = np.array([[float(row[key]) for key in ("x_m", "y_m", "heading_rad")] for row in own])
+        poses = np.array(
+            [[float(row[key]) for key in ("x_m", "y_m", "heading_rad")] for row in own]
+        )
         anchors = []
         for pose in poses[np.linspace(0, len(poses) - 1, 5).astype(int)]:
             found = nearest_pose_with_room(road, pose, car.length, car.width)

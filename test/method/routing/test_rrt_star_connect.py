@@ -9,7 +9,14 @@ from lengths import LONG
 import numpy as np
 import pytest
 
-from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, road_of, t_intersection
+from benchmarks._planning_maps import (
+    clutter,
+    enters_blocked,
+    lane,
+    optimum,
+    road_of,
+    t_intersection,
+)
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.search.planner import (
     BlockedError,
@@ -20,7 +27,12 @@ from scenario_gen.method.routing.search.planner import (
     plan_with_retry,
     Query,
 )
-from scenario_gen.method.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig, straight_path
+from scenario_gen.method.routing.search.rrt_star_connect import (
+    PAPER,
+    RrtStarConnect,
+    RrtStarConnectConfig,
+    straight_path,
+)
 from scenario_gen.method.routing.search.tree import CHUNK, COST, EDGE, PARENT
 from scenario_gen.method.routing.search.two_trees import LARGE
 from scenario_gen.roads.clearance import segments_free
@@ -36,7 +48,9 @@ def random_query(rng, density):
     return road_of("random", drivable), rng.uniform(0.0, SMALL, (2, 2))
 
 
-@pytest.mark.parametrize("config", [RrtStarConnectConfig(step=4.0), PAPER], ids=["default", "paper"])
+@pytest.mark.parametrize(
+    "config", [RrtStarConnectConfig(step=4.0), PAPER], ids=["default", "paper"]
+)
 @pytest.mark.parametrize("radius", [0.0, 0.7])
 def test_no_path_enters_a_blocked_cell(config, radius):
     rng = np.random.default_rng([1, int(10 * radius)])
@@ -72,7 +86,9 @@ def test_cost_is_near_the_optimum_and_never_below(seed, density):
     except RefusedError:
         assert common_component(road, *ends, 0.0) is None
         return
-    best = optimum(road, ends)  # may pass between two cells that touch at a corner: then it is shorter
+    best = optimum(
+        road, ends
+    )  # may pass between two cells that touch at a corner: then it is shorter
     assert plan.cost >= best - 1e-9
     padded = ~np.pad(road.drivable, 1)
     pinched = (padded[:-1, :-1] & padded[1:, 1:] & ~padded[:-1, 1:] & ~padded[1:, :-1]).any()
@@ -81,7 +97,9 @@ def test_cost_is_near_the_optimum_and_never_below(seed, density):
         assert plan.cost <= best * 1.01 + 1e-6
 
 
-@pytest.mark.parametrize(("case", "slack"), [(lane, 1e-9), (t_intersection, 1e-4), (clutter, 3e-3)])
+@pytest.mark.parametrize(
+    ("case", "slack"), [(lane, 1e-9), (t_intersection, 1e-4), (clutter, 3e-3)]
+)
 def test_large_maps_come_close_to_the_true_optimum(case, slack):
     road, ends = case()
     best = optimum(road, ends)
@@ -99,7 +117,9 @@ def test_the_paper_preset_goes_on_improving_after_the_first_meeting():
     assert later.iterations == 10_000
     assert best < later.cost < first.cost
     assert later.cost < 1.005 * best
-    assert np.hypot(*np.diff(first.path, axis=0).T).max() <= 30.0 + 1e-9  # no edge longer than the near radius
+    assert (
+        np.hypot(*np.diff(first.path, axis=0).T).max() <= 30.0 + 1e-9
+    )  # no edge longer than the near radius
 
 
 def small():
@@ -131,7 +151,9 @@ def test_large_trees_are_whole(config, case):
     parent = search.tree.link[m, PARENT]
     edge = np.hypot(*(search.tree.node[m, :2] - search.tree.node[parent, :2]).T)
     np.testing.assert_allclose(search.tree.node[m, EDGE], edge, atol=1e-9)
-    np.testing.assert_allclose(search.tree.node[m, COST], search.tree.node[parent, COST] + edge, atol=1e-7)
+    np.testing.assert_allclose(
+        search.tree.node[m, COST], search.tree.node[parent, COST] + edge, atol=1e-7
+    )
     assert segments_free(road, search.tree.node[parent, :2], search.tree.node[m, :2], 0.0).all()
     path = straight_path(search)
     assert path_length(path) == pytest.approx(search.best)
@@ -142,7 +164,10 @@ def test_only_an_informed_search_leaves_out_what_cannot_help():
     drivable = np.ones((200, 200), dtype=bool)
     drivable[95:140, 100] = False  # a wall to go round
     road, ends = road_of("open", drivable), np.array([[80.5, 100.5], [120.5, 100.5]])
-    for config, everywhere in ((PAPER, True), (RrtStarConnectConfig(greedy=False, pull=False), False)):
+    for config, everywhere in (
+        (PAPER, True),
+        (RrtStarConnectConfig(greedy=False, pull=False), False),
+    ):
         search, m = grown(road, ends, config, 4_000)
         place = search.tree.node[m, :2]
         by_way_of = np.hypot(*(place - ends[0]).T) + np.hypot(*(place - ends[1]).T)
@@ -174,7 +199,12 @@ def test_failures_are_told_apart():
     with pytest.raises(BudgetSpentError, match="3 iterations"):
         planner.plan(road_of("a gap", drivable), Query(left, right), Budget(3), 0)
     with pytest.raises(BudgetSpentError):
-        planner.plan(road_of("a gap", drivable), Query(left, right), Budget(10**9, cancelled=lambda: True), 0)
+        planner.plan(
+            road_of("a gap", drivable),
+            Query(left, right),
+            Budget(10**9, cancelled=lambda: True),
+            0,
+        )
 
 
 def test_time_and_cancelling_end_a_search_that_keeps_what_it_has():
@@ -183,7 +213,9 @@ def test_time_and_cancelling_end_a_search_that_keeps_what_it_has():
     assert timed.iterations > 100
     assert timed.history[-1, 1] < 0.5
     looks = iter([False] * 8 + [True])
-    plan = RrtStarConnect().plan(road, Query(*ends), Budget(None, cancelled=lambda: next(looks)), 0)
+    plan = RrtStarConnect().plan(
+        road, Query(*ends), Budget(None, cancelled=lambda: next(looks)), 0
+    )
     assert plan.cost == pytest.approx(plan.history[-1, 2])
     assert plan.iterations < 8 * 512
 
@@ -205,7 +237,10 @@ def test_patience_finds_the_way_that_a_small_budget_does_not():
     drivable = np.zeros((60, 60), dtype=bool)
     drivable[:, :28] = drivable[:, 34:] = True
     drivable[57, :] = True
-    road, query = road_of("a far gap", drivable), Query(np.array([2.5, 2.5]), np.array([57.5, 2.5]))
+    road, query = (
+        road_of("a far gap", drivable),
+        Query(np.array([2.5, 2.5]), np.array([57.5, 2.5])),
+    )
     with pytest.raises(BudgetSpentError):
         RrtStarConnect().plan(road, query, Budget(20), 0)
     plan = plan_with_retry(RrtStarConnect(), road, query, 20, 0)

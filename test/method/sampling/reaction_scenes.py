@@ -13,7 +13,9 @@ DT = 0.1
 def wander(rng, count, sigma=1.0, length=2.0):
     """A smooth random speed about 12 m/s."""
     time = np.arange(count) * DT
-    covariance = sigma**2 * np.exp(-0.5 * ((time[:, None] - time) / length) ** 2) + 1e-8 * np.eye(count)
+    covariance = sigma**2 * np.exp(-0.5 * ((time[:, None] - time) / length) ** 2) + 1e-8 * np.eye(
+        count
+    )
     return 12.0 + np.linalg.cholesky(covariance) @ rng.standard_normal(count)
 
 
@@ -32,7 +34,13 @@ def lane_encounter(leader, follower, gap=20.0, lane=0.0):
     """Two vehicles on the x axis, the second `gap` metres behind the first."""
     position = np.stack([along(leader, gap), along(follower, 0.0, lane)])
     return Encounter(
-        "lane", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, np.zeros((2, len(leader))), np.stack([leader, follower])
+        "lane",
+        (Vehicle("1"), Vehicle("2")),
+        0,
+        100_000_000,
+        position,
+        np.zeros((2, len(leader))),
+        np.stack([leader, follower]),
     )
 
 
@@ -51,7 +59,9 @@ def crossing(wait_until, speed=8.0, seconds=20.0):
     position = np.stack([first, np.column_stack([np.full(len(time), 0.0), y])])
     heading = np.stack([np.zeros(len(time)), np.full(len(time), 0.5 * np.pi)])
     speeds = np.stack([np.full(len(time), speed), own])
-    return Encounter("crossing", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, speeds)
+    return Encounter(
+        "crossing", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, speeds
+    )
 
 
 def platoon(count, rows=200, seed=3):
@@ -61,12 +71,25 @@ def platoon(count, rows=200, seed=3):
         speeds.append(answering(speeds[-1], 1.2, 0.9))
     position = np.stack([along(speed, 20.0 * (count - 1 - k)) for k, speed in enumerate(speeds)])
     vehicles = tuple(Vehicle(str(k + 1)) for k in range(count))
-    return Encounter("platoon", vehicles, 0, 100_000_000, position, np.zeros((count, rows)), np.stack(speeds))
+    return Encounter(
+        "platoon", vehicles, 0, 100_000_000, position, np.zeros((count, rows)), np.stack(speeds)
+    )
 
 
 def led_crossing(wait_until=8.0):
     """The crossing, with vehicle 3 20 m ahead of vehicle 1."""
     two = crossing(wait_until)
-    rows = {name: np.concatenate([getattr(two, name), getattr(two, name)[:1]]) for name in ("heading", "speed")}
+    rows = {
+        name: np.concatenate([getattr(two, name), getattr(two, name)[:1]])
+        for name in ("heading", "speed")
+    }
     position = np.concatenate([two.position, two.position[:1] + np.array([20.0, 0.0])])
-    return Encounter("led", (*two.vehicles, Vehicle("3")), 0, two.dt_ns, position, rows["heading"], rows["speed"])
+    return Encounter(
+        "led",
+        (*two.vehicles, Vehicle("3")),
+        0,
+        two.dt_ns,
+        position,
+        rows["heading"],
+        rows["speed"],
+    )

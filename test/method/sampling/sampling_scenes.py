@@ -55,10 +55,19 @@ def scene(width=60.0):
     routes.append(Route(np.array([[30.0, 15.0, 0.3]]), np.zeros(5, dtype=int), [0.0]))
     speed = np.array([steady, stopping, np.zeros(201)])
     vehicles = (Vehicle("a"), Vehicle("b"), Vehicle("c"))
-    encounter = Encounter("scene", vehicles, 0, 100_000_000, np.zeros((3, 201, 2)), np.zeros((3, 201)), speed)
-    segmentation = Segmentation(np.searchsorted(CHANGES, np.arange(201), side="right"), CHANGES, np.zeros(201), ("",) * 4)
-    road = Road("open", np.ones((int(2 * width), 500), dtype=bool), 0.5, [-50.0, -0.5 * width], [], [])
+    encounter = Encounter(
+        "scene", vehicles, 0, 100_000_000, np.zeros((3, 201, 2)), np.zeros((3, 201)), speed
+    )
+    segmentation = Segmentation(
+        np.searchsorted(CHANGES, np.arange(201), side="right"), CHANGES, np.zeros(201), ("",) * 4
+    )
+    road = Road(
+        "open", np.ones((int(2 * width), 500), dtype=bool), 0.5, [-50.0, -0.5 * width], [], []
+    )
     asked = BoundaryStates(
-        *(np.array([[*r.points[r.anchor[k]], v[k]] for r, v in zip(routes, speed, strict=True)]) for k in (0, -1))
+        *(
+            np.array([[*r.points[r.anchor[k]], v[k]] for r, v in zip(routes, speed, strict=True)])
+            for k in (0, -1)
+        )
     )
     return encounter, segmentation, road, tuple(routes), asked, (Wait(1, 7.0, 13.0),)

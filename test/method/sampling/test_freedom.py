@@ -13,7 +13,15 @@ from sampling_scenes import scene
 
 from scenario_gen.method.sampling import draw_scenarios, Plan, relaxed_states, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
-from scenario_gen.method.sampling.freedom import CATALOGUE, cut, FADES, freedom_of, onward, OwnClock, seconds_onward
+from scenario_gen.method.sampling.freedom import (
+    CATALOGUE,
+    cut,
+    FADES,
+    freedom_of,
+    onward,
+    OwnClock,
+    seconds_onward,
+)
 from scenario_gen.method.sampling.pace import clock_of
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.validity import Checker
@@ -59,9 +67,21 @@ def stand(b):
     ],
 )
 def test_each_freedom_has_its_monotone_effect(name, measure):
-    others = dict.fromkeys(("arrival_sigma", "pace_sigma", "wait_sigma", "end_speed_sigma", "place_sigma", "time_sigma"), 0.0)
+    others = dict.fromkeys(
+        (
+            "arrival_sigma",
+            "pace_sigma",
+            "wait_sigma",
+            "end_speed_sigma",
+            "place_sigma",
+            "time_sigma",
+        ),
+        0.0,
+    )
     largest = {"pace_sigma": 0.08, "end_speed_sigma": 0.8, "place_sigma": 0.4}.get(name, 1.6)
-    found = [measure(batch(**(others | {name: share * largest}))[1]) for share in (0.0, 0.25, 0.5, 1.0)]
+    found = [
+        measure(batch(**(others | {name: share * largest}))[1]) for share in (0.0, 0.25, 0.5, 1.0)
+    ]
     assert (np.diff(found) > 0.0).all(), found
     assert found[0] == pytest.approx(0.0, abs=1e-9)
 
@@ -74,10 +94,17 @@ def test_each_freedom_has_its_monotone_effect(name, measure):
     st.floats(0.1, 3.0),
     st.floats(0.0, 0.2),
 )
-def test_own_clocks_run_forward_within_their_bounds_and_agree_where_states_are_asked(z, start, end, shift, pace):
+def test_own_clocks_run_forward_within_their_bounds_and_agree_where_states_are_asked(
+    z, start, end, shift, pace
+):
     config = replace(SamplingConfig(), arrival_sigma=shift, pace_sigma=pace)
     own = OwnClock.of(NOMINAL, [(7.0, 13.0)], (start, end), config)
-    clock = own.sample(np.array([z]), 1.0, replace(NOMINAL, time=NOMINAL.time[None], rate=NOMINAL.rate[None]), NOMINAL)
+    clock = own.sample(
+        np.array([z]),
+        1.0,
+        replace(NOMINAL, time=NOMINAL.time[None], rate=NOMINAL.rate[None]),
+        NOMINAL,
+    )
     waits = (GRID > 6.9) & (GRID < 13.1)
     assert clock.rate[0, ~waits].min() > 0.7
     assert clock.rate[0, ~waits].max() < 1.4
@@ -85,7 +112,9 @@ def test_own_clocks_run_forward_within_their_bounds_and_agree_where_states_are_a
     if start:
         assert clock.time[0, 0] == pytest.approx(0.0, abs=1e-9)
     if end:
-        assert clock.time[0, -1] == pytest.approx(GRID[-1], abs=1e-9), "it makes up for a longer wait"
+        assert clock.time[0, -1] == pytest.approx(GRID[-1], abs=1e-9), (
+            "it makes up for a longer wait"
+        )
 
 
 def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
@@ -97,7 +126,13 @@ def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
     assert (states.relaxed[0, 0] == 0.0).all()
     assert (states.relaxed[0, 1] > 0.0).all()
     check = Checker(None, states, None, None).check
-    made = draw_scenarios(Plan(encounter, segmentation, road, routes, states, waits), check, config, count=40, request=request)
+    made = draw_scenarios(
+        Plan(encounter, segmentation, road, routes, states, waits),
+        check,
+        config,
+        count=40,
+        request=request,
+    )
     assert len(made.scenarios) == 40
     for scenario in made.scenarios:
         assert np.hypot(*(scenario.position[0, 0] - asked.start[0, :2])) < 0.1
@@ -116,25 +151,35 @@ def test_a_start_off_its_bounds_is_refused():
     config = SamplingConfig()
     states = relaxed_states(asked, encounter, config, Request())
     given = (encounter, segmentation, road, routes, states)
-    made = draw_scenarios(Plan(*given, waits), Checker(None, states, None, None).check, config, count=20)
+    made = draw_scenarios(
+        Plan(*given, waits), Checker(None, states, None, None).check, config, count=20
+    )
     assert len(made.scenarios) == 20
     tight = replace(states, relaxed=0.0 * states.relaxed)
     verdicts = Checker(None, tight, None, None).check(made.scenarios)
     assert any("from the request" in v.message for verdict in verdicts for v in verdict.violations)
 
 
-@pytest.mark.parametrize(("gap", "longest"), [(np.inf, 4.96), (3.1, 4.46), (0.4, 4.05), (0.0, 3.6), (-0.3, 3.6)])
+@pytest.mark.parametrize(
+    ("gap", "longest"), [(np.inf, 4.96), (3.1, 4.46), (0.4, 4.05), (0.0, 3.6), (-0.3, 3.6)]
+)
 def test_who_stands_close_to_another_one_hardly_becomes_longer(gap, longest):
     car, arc, none = Vehicle("1", 4.0, 1.8), np.arange(20.0), np.zeros(2)
     clock = OwnClock.of(NOMINAL, [], (False, False), SamplingConfig())
-    made = freedom_of(car, arc, clock, np.ones((2, 2)), none.astype(np.bool_), none, gap, SamplingConfig())
+    made = freedom_of(
+        car, arc, clock, np.ones((2, 2)), none.astype(np.bool_), none, gap, SamplingConfig()
+    )
     assert made.sizes[:, 0].max() == longest
 
 
 def test_sizes_are_those_of_the_catalogue():
     model, some = batch(200)
     sizes = {(one.length, one.width) for one in some.drawn[0].vehicles}
-    assert sizes == {tuple(size) for size in model.vehicles[0].freedom.sizes.tolist()} <= set(CATALOGUE)
+    assert (
+        sizes
+        == {tuple(size) for size in model.vehicles[0].freedom.sizes.tolist()}
+        <= set(CATALOGUE)
+    )
     assert len(sizes) > 4
     assert {one.id for one in some.drawn[0].vehicles} == {"a"}
     _, same = batch(20, sizes="recorded")
@@ -144,7 +189,12 @@ def test_sizes_are_those_of_the_catalogue():
 
 
 @settings(max_examples=50)
-@given(st.floats(2.0, 20.0), st.floats(-5.0, 4.0), st.floats(-0.15, 0.15), st.sampled_from([-1.0, 1.0]))
+@given(
+    st.floats(2.0, 20.0),
+    st.floats(-5.0, 4.0),
+    st.floats(-0.15, 0.15),
+    st.sampled_from([-1.0, 1.0]),
+)
 def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
     state = np.array([[3.0, -2.0, 0.7, speed, acceleration]])
     if seconds_onward(state, 100.0, sign)[0] == 0.0:
@@ -156,7 +206,9 @@ def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
     assert (found[:, 3] > 0.0).all()
     step = np.hypot(*np.diff(found[:, :2], axis=0).T)
     assert step / 0.005 == pytest.approx(0.5 * (found[1:, 3] + found[:-1, 3]), rel=2e-3)
-    assert np.diff(found[:, 3]) / 0.005 * sign == pytest.approx(0.5 * (found[1:, 4] + found[:-1, 4]), abs=0.02)
+    assert np.diff(found[:, 3]) / 0.005 * sign == pytest.approx(
+        0.5 * (found[1:, 4] + found[:-1, 4]), abs=0.02
+    )
     heading = np.arctan2(*(sign * np.diff(found[:, :2], axis=0))[:, ::-1].T)
     assert np.abs(np.angle(np.exp(1j * (heading - found[1:, 2])))).max() < 0.02
     assert abs(found[1, 4] - found[0, 4]) < 1e-3 * abs(acceleration) + 1e-9  # no jolt
@@ -166,5 +218,7 @@ def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
 def test_cut_numbers_are_truncated_normal():
     values = cut(normal(20_000, 1)[:, 0], 2.0)
     assert np.abs(values).max() <= 2.0
-    assert values.std() == pytest.approx(0.8796, rel=0.02)  # of the standard normal truncated at two standard deviations
+    assert values.std() == pytest.approx(
+        0.8796, rel=0.02
+    )  # of the standard normal truncated at two standard deviations
     assert (np.diff(cut(np.linspace(-5.0, 5.0, 101), 2.0)) > 0.0).all()

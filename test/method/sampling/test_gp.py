@@ -17,7 +17,10 @@ from scenario_gen.method.sampling.gp import Features, Observations, Regression, 
 def dense(x, y, noise, at, sigma, length, degree):
     """Rasmussen & Williams eqs 2.25, 2.26 and, with a fitted mean, 2.41 and 2.42."""
     k = squared_exponential(x, x, sigma, length) + np.diag(noise**2)
-    cross, prior = squared_exponential(x, at, sigma, length), squared_exponential(at, at, sigma, length)
+    cross, prior = (
+        squared_exponential(x, at, sigma, length),
+        squared_exponential(at, at, sigma, length),
+    )
     factor = scipy.linalg.cho_factor(k)
 
     def solve(b):
@@ -46,21 +49,30 @@ def test_agrees_with_dense_reference(n, m):
     noise = np.full(n, 10.0)
     noise[[0, -1]] = 0.0
     at = np.linspace(0.0, 1000.0, m)
-    posterior = Regression(Features(0.0, 1000.0, 10.0, 100.0, 3), Observations(x, y, noise)).predict(at)
+    posterior = Regression(
+        Features(0.0, 1000.0, 10.0, 100.0, 3), Observations(x, y, noise)
+    ).predict(at)
     mean, cov = dense(x, y, noise, at, 10.0, 100.0, 3)
     assert np.abs(posterior.mean - mean).max() < 1e-10
     assert np.abs(posterior.covariance - cov).max() < 1e-10
 
 
 @settings(max_examples=25)
-@given(n=st.integers(6, 20), ratio=st.floats(0.5, 20.0), noise=st.floats(0.05, 2.0), degree=st.integers(-1, 3))
+@given(
+    n=st.integers(6, 20),
+    ratio=st.floats(0.5, 20.0),
+    noise=st.floats(0.05, 2.0),
+    degree=st.integers(-1, 3),
+)
 def test_agrees_with_dense_reference_everywhere(n, ratio, noise, degree):
     x, y = data(n, 100.0, n)
     sigmas = np.full(n, noise)
     sigmas[[0, -1]] = 0.0
     at = np.linspace(0.0, 100.0, 57)
     y = y / np.abs(y).max()
-    posterior = Regression(Features(0.0, 100.0, 1.0, 100.0 / ratio, degree), Observations(x, y, sigmas)).predict(at)
+    posterior = Regression(
+        Features(0.0, 100.0, 1.0, 100.0 / ratio, degree), Observations(x, y, sigmas)
+    ).predict(at)
     mean, cov = dense(x, y, sigmas, at, 1.0, 100.0 / ratio, degree)
     assert np.abs(posterior.mean - mean).max() < 1e-10
     assert np.abs(posterior.covariance - cov).max() < 1e-10
@@ -89,16 +101,22 @@ def test_value_and_slope_are_exact_where_they_are_given():
 def test_derivative_of_features_is_their_rate():
     features = Features(0.0, 50.0, 2.0, 10.0, 3)
     x, step = np.linspace(1.0, 49.0, 20), 1e-5
-    assert np.allclose(features(x, 1), (features(x + step) - features(x - step)) / (2 * step), atol=1e-7)
+    assert np.allclose(
+        features(x, 1), (features(x + step) - features(x - step)) / (2 * step), atol=1e-7
+    )
 
 
 def test_samples_have_the_posterior_mean_and_covariance():
-    anchors = np.array([[0.0, 100.0], [200.0, 180.0], [450.0, 120.0], [700.0, 300.0], [1000.0, 260.0]])
+    anchors = np.array(
+        [[0.0, 100.0], [200.0, 180.0], [450.0, 120.0], [700.0, 300.0], [1000.0, 260.0]]
+    )
     x = np.array([0.0, 120.0, 330.0, 500.0, 610.0, 900.0, 1000.0])
     posterior = ordinate_posterior(anchors, x)
     drawn = ordinate_samples(anchors, x, 100_000, seed=3)
     spread = np.sqrt(np.diag(posterior.covariance))
-    assert np.abs(drawn.mean(axis=0) - posterior.mean).max() < 5.0 * spread.max() / np.sqrt(100_000)
+    assert np.abs(drawn.mean(axis=0) - posterior.mean).max() < 5.0 * spread.max() / np.sqrt(
+        100_000
+    )
     bound = 5.0 * np.sqrt((np.outer(spread**2, spread**2) + posterior.covariance**2) / 100_000)
     assert (np.abs(np.cov(drawn.T) - posterior.covariance) <= bound + 1e-9).all()
     assert (
@@ -112,7 +130,10 @@ def test_fitted_mean_adds_its_uncertainty():
     x, y = data(12, 1000.0)
     noise, at = np.full(12, 10.0), np.linspace(0.0, 1000.0, 50)
     without, with_mean = (
-        Regression(Features(0.0, 1000.0, 10.0, 100.0, degree), Observations(x, y, noise)).predict(at).factor for degree in (-1, 3)
+        Regression(Features(0.0, 1000.0, 10.0, 100.0, degree), Observations(x, y, noise))
+        .predict(at)
+        .factor
+        for degree in (-1, 3)
     )
     assert (np.linalg.norm(with_mean, axis=1) > np.linalg.norm(without, axis=1)).all()
 
@@ -138,4 +159,7 @@ def test_too_few_observations_for_the_mean():
 
 def test_contradicting_exact_observations():
     with pytest.raises(InputError, match="repeat or contradict"):
-        Regression(Features(0.0, 10.0, 1.0, 3.0), Observations(np.array([1.0, 1.0]), np.array([0.0, 1.0]), np.zeros(2)))
+        Regression(
+            Features(0.0, 10.0, 1.0, 3.0),
+            Observations(np.array([1.0, 1.0]), np.array([0.0, 1.0]), np.zeros(2)),
+        )

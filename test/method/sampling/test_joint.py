@@ -35,7 +35,10 @@ FREE = replace(CONFIG, sampling=SamplingConfig(reactions="none"))
 @pytest.fixture(scope="module", params=["lane", "crossing"])
 def case(request):
     encounter = {"lane": LANE, "crossing": CROSSING}[request.param]
-    road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
+    road, segmentation = (
+        build_road("corridor", encounter, CONFIG.road),
+        segment(encounter, CONFIG.segmentation, 1),
+    )
 
     def made(config=CONFIG, count=40):
         return Chain(encounter, segmentation, road, config, count=count, seed=1).run()
@@ -45,7 +48,9 @@ def case(request):
 
 def model_of(encounter, result):
     waits = waits_to_keep(encounter, result.segmentation)
-    plan = Plan(encounter, result.segmentation, result.road, result.routes, result.fit.requested, waits)
+    plan = Plan(
+        encounter, result.segmentation, result.road, result.routes, result.fit.requested, waits
+    )
     return prepare(plan, CONFIG.sampling).model
 
 
@@ -89,7 +94,9 @@ def test_a_mixing_is_linear_so_mirror_images_stay_mirror_images(case):
     mixing = Mixing.of(model.vehicles, first, model.warp.nominal, model.reactions, Scale(own=0.25))
     eps = np.random.default_rng(0).standard_normal((4, model.size))
     np.testing.assert_allclose(mixing.mixed(-eps), -mixing.mixed(eps), atol=1e-12)
-    np.testing.assert_allclose(mixing.mixed(eps)[1:2], mixing.mixed(eps[1:2]), atol=1e-12)  # alone as among others
+    np.testing.assert_allclose(
+        mixing.mixed(eps)[1:2], mixing.mixed(eps[1:2]), atol=1e-12
+    )  # alone as among others
 
 
 def test_what_is_published_answers_as_the_template_does(case):
@@ -102,9 +109,13 @@ def test_what_is_published_answers_as_the_template_does(case):
     for scenario in made.generated.scenarios[:3]:
         (figures,) = figures_of(scenario)
         assert float(scenario.facts["closest_approach"]) == pytest.approx(figures.gap, abs=5e-4)
-        assert float(scenario.facts.get("pet", "nan")) == pytest.approx(figures.pet, abs=5e-4, nan_ok=True)
+        assert float(scenario.facts.get("pet", "nan")) == pytest.approx(
+            figures.pet, abs=5e-4, nan_ok=True
+        )
     if edge.kind == FOLLOW:
-        seen, before = (following(edge, encounter, one.generated.scenarios) for one in (made, free))
+        seen, before = (
+            following(edge, encounter, one.generated.scenarios) for one in (made, free)
+        )
         assert seen.slope > 0.75 > before.slope
         assert seen.gaps[0] > 0.65 and seen.gaps[1] < 1.35 < before.gaps[1]
         assert seen.lag == pytest.approx(edge.lag, abs=0.5)
@@ -118,12 +129,26 @@ def test_what_is_published_answers_as_the_template_does(case):
 def test_who_gives_way_is_slow_when_the_other_one_passes():
     encounter = labelled("meets another one closely", 3).encounter
     (edge,) = reactions_of(encounter).edges
-    road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
+    road, segmentation = (
+        build_road("corridor", encounter, CONFIG.road),
+        segment(encounter, CONFIG.segmentation, 1),
+    )
     lost = []
     for config in (CONFIG, FREE):
-        scenarios = Chain(encounter, segmentation, road, config, count=30, seed=1).run().generated.scenarios
-        passed = [int(np.argmin(np.hypot(*(one.position[0] - one.position[1]).T))) for one in scenarios]
-        lost.append([one.speed[edge.who].max() - one.speed[edge.who, k] for one, k in zip(scenarios, passed, strict=True)])
+        scenarios = (
+            Chain(encounter, segmentation, road, config, count=30, seed=1)
+            .run()
+            .generated.scenarios
+        )
+        passed = [
+            int(np.argmin(np.hypot(*(one.position[0] - one.position[1]).T))) for one in scenarios
+        ]
+        lost.append(
+            [
+                one.speed[edge.who].max() - one.speed[edge.who, k]
+                for one, k in zip(scenarios, passed, strict=True)
+            ]
+        )
     assert np.std(lost[0]) < 0.6 * np.std(lost[1])
     assert min(lost[0]) > 4.0 > min(lost[1])
 

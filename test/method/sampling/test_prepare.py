@@ -32,16 +32,28 @@ def track(speed, bend):
     yaw = np.concatenate([[0.0], np.cumsum(bend(0.5 * (fine[1:] + fine[:-1])) * np.diff(fine))])
     step = np.diff(fine) * np.array([np.cos(yaw[:-1]), np.sin(yaw[:-1])])
     way = np.concatenate([np.zeros((2, 1)), np.cumsum(step, axis=1)], axis=1)
-    return np.column_stack([np.interp(s, fine, row) for row in way]), np.interp(s, fine, yaw), speed
+    return (
+        np.column_stack([np.interp(s, fine, row) for row in way]),
+        np.interp(s, fine, yaw),
+        speed,
+    )
 
 
 def s_bend():
     """Two cars through an S-bend at up to 3.4 m/s² sideways, one behind the other."""
     time = np.arange(201) * DT
-    drives = [track(13.0 + 0.8 * np.sin(0.4 * (time - late)), lambda s: 0.02 * np.sin(s / 22.0)) for late in (0.0, 1.5)]
+    drives = [
+        track(13.0 + 0.8 * np.sin(0.4 * (time - late)), lambda s: 0.02 * np.sin(s / 22.0))
+        for late in (0.0, 1.5)
+    ]
     position = np.stack([one[0] for one in drives]) + np.array([[[0.0, 0.0]], [[-22.0, 0.0]]])
     return Encounter(
-        "s", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, *(np.stack([d[k] for d in drives]) for k in (1, 2))
+        "s",
+        (Vehicle("1"), Vehicle("2")),
+        0,
+        100_000_000,
+        position,
+        *(np.stack([d[k] for d in drives]) for k in (1, 2)),
     )
 
 
@@ -50,10 +62,18 @@ def rolls_out():
     time = np.arange(141) * DT
     slow = np.interp(time, [0.0, 5.0, 8.0, 11.0, 14.0], [8.0, 6.0, 0.45, 0.0, 0.0])
     hard = np.interp(time, [0.0, 4.0, 13.0, 14.0], [6.0, 9.0, 9.0, 5.0])
-    drives = [track(np.convolve(np.pad(v, 3, mode="edge"), np.ones(7) / 7.0, "valid"), lambda s: 0.0 * s) for v in (slow, hard)]
+    drives = [
+        track(np.convolve(np.pad(v, 3, mode="edge"), np.ones(7) / 7.0, "valid"), lambda s: 0.0 * s)
+        for v in (slow, hard)
+    ]
     position = np.stack([one[0] for one in drives]) + np.array([[[0.0, 0.0]], [[0.0, 4.0]]])
     return Encounter(
-        "r", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, *(np.stack([d[k] for d in drives]) for k in (1, 2))
+        "r",
+        (Vehicle("1"), Vehicle("2")),
+        0,
+        100_000_000,
+        position,
+        *(np.stack([d[k] for d in drives]) for k in (1, 2)),
     )
 
 
@@ -61,8 +81,22 @@ def undisturbed(encounter, segmentation):
     """The drive without deviations on the own road, and what was adapted."""
     road = build_road("corridor", encounter, CONFIG.road)
     planned = Chain(encounter, segmentation, road, CONFIG).plan()
-    done = prepare(Plan(encounter, segmentation, road, planned.routes, planned.fit.requested, find_waits(encounter)), NARROW)
-    return done.model.draw(np.zeros((1, done.model.size)), Scale()).scenarios(0, [0], "map")[0], done.adaptations, planned
+    done = prepare(
+        Plan(
+            encounter,
+            segmentation,
+            road,
+            planned.routes,
+            planned.fit.requested,
+            find_waits(encounter),
+        ),
+        NARROW,
+    )
+    return (
+        done.model.draw(np.zeros((1, done.model.size)), Scale()).scenarios(0, [0], "map")[0],
+        done.adaptations,
+        planned,
+    )
 
 
 @pytest.mark.parametrize("encounter", [s_bend(), rolls_out()], ids=["s-bend", "rolls out"])

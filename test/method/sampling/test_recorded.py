@@ -31,13 +31,20 @@ def test_recorded_encounter(data, case, ablation):
     segmentation = segment(encounter)
     if ablation:
         labels, changes = np.zeros_like(segmentation.labels), np.zeros(0, dtype=np.int64)
-        segmentation = replace(segmentation, labels=labels, changepoints=changes, descriptions=("",))
+        segmentation = replace(
+            segmentation, labels=labels, changepoints=changes, descriptions=("",)
+        )
     waits = () if ablation else find_waits(encounter)
     road = build_road("corridor", encounter)
     fit = fit_template(encounter, segmentation, road)
     routes = plan_routes(road, fit)
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
-    checker, config = Checker(road, fit.requested, conflicts, waits), SamplingConfig(variety="narrow")
+    conflicts = find_conflicts(
+        encounter.vehicles, encounter.time, encounter.position, encounter.heading
+    )
+    checker, config = (
+        Checker(road, fit.requested, conflicts, waits),
+        SamplingConfig(variety="narrow"),
+    )
     plan = Plan(encounter, segmentation, road, routes, fit.requested, waits)
     found = draw_scenarios(plan, checker.check, config, count=30, seed=2)
     assert len(found.scenarios) == 30
@@ -46,7 +53,10 @@ def test_recorded_encounter(data, case, ablation):
     for s in found.scenarios:
         assert s.acceleration.max() <= 5.0 + 1e-6  # the checker's limit
         assert s.acceleration.min() >= -9.0 - 1e-6
-        assert abs(s.time[-1] / encounter.duration - 1.0) <= (1.0 + config.max_stretch) * 1.1 - 1.0 + 1e-9
+        assert (
+            abs(s.time[-1] / encounter.duration - 1.0)
+            <= (1.0 + config.max_stretch) * 1.1 - 1.0 + 1e-9
+        )
         for wait in waits:
             inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
             stood = (encounter.speed[wait.vehicle, inside] <= STAND_SPEED).sum() * encounter.dt

@@ -12,7 +12,13 @@ from sampling_scenes import CLOCK, route, scene, TIME, turn
 from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics, TypeLimits
-from scenario_gen.method.sampling import Callbacks, draw_scenarios, Plan, regenerate, SamplingConfig
+from scenario_gen.method.sampling import (
+    Callbacks,
+    draw_scenarios,
+    Plan,
+    regenerate,
+    SamplingConfig,
+)
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.sampling.sampler import LEVEL_SIZE
@@ -36,8 +42,12 @@ def drawn(count=50, check=all_valid, config=None, seed=5):
 
 def batch(samples=200, scale=None, **changes):
     *head, waits = scene(120.0)
-    model = prepare(Plan(*head, waits), SamplingConfig(variety="narrow", bend_acceleration=5.0, **changes)).model
-    return model, model.draw(np.random.default_rng(1).standard_normal((samples, model.size)), scale or Scale())
+    model = prepare(
+        Plan(*head, waits), SamplingConfig(variety="narrow", bend_acceleration=5.0, **changes)
+    ).model
+    return model, model.draw(
+        np.random.default_rng(1).standard_normal((samples, model.size)), scale or Scale()
+    )
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +66,9 @@ def test_grid_and_duration(fifty):
         assert np.array_equal(s.time, np.round(np.arange(len(s.time)) * 0.1, 9))
         assert 18.0 - 1e-9 <= s.time[-1] <= 22.0 + 1e-9
     assert len({len(s.time) for s in fifty.scenarios}) > 5
-    fixed = drawn(config=SamplingConfig(variety="narrow", fixed_duration=True, bend_acceleration=5.0))
+    fixed = drawn(
+        config=SamplingConfig(variety="narrow", fixed_duration=True, bend_acceleration=5.0)
+    )
     assert {s.time[-1] for s in fixed.scenarios} == {20.0}
 
 
@@ -92,12 +104,16 @@ def test_speed_is_the_rate_of_position_and_acceleration_that_of_speed(fifty):
         low = np.minimum(s.acceleration[:, 1:], s.acceleration[:, :-1])
         high = np.maximum(s.acceleration[:, 1:], s.acceleration[:, :-1])
         assert ((rate > low - 0.05) & (rate < high + 0.05)).all()
-        assert np.abs(np.diff(s.acceleration, axis=1)).max() / 0.1 < 14.0  # the template's has corners of 20
+        assert (
+            np.abs(np.diff(s.acceleration, axis=1)).max() / 0.1 < 14.0
+        )  # the template's has corners of 20
 
 
 def test_headings_are_smooth(fifty):
     for s in fifty.scenarios:
-        turn_rate = np.abs(np.diff(s.heading, axis=1)) / np.maximum(0.05 * (s.speed[:, 1:] + s.speed[:, :-1]), 1e-3)
+        turn_rate = np.abs(np.diff(s.heading, axis=1)) / np.maximum(
+            0.05 * (s.speed[:, 1:] + s.speed[:, :-1]), 1e-3
+        )
         assert turn_rate[:2].max() < 0.2
 
 
@@ -106,13 +122,18 @@ def test_same_seed_same_bytes_and_any_one_again(fifty):
     more = drawn(count=120)
     *head, waits = scene()
     for a, b, c in zip(fifty.scenarios, again.scenarios, more.scenarios, strict=False):
-        assert a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
+        assert (
+            a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
+        )
         np.testing.assert_allclose(c.position, a.position, atol=1e-9)
     last = more.scenarios[-1]
     one = regenerate(Plan(*head, waits), PLAIN, seed=5, index=last.index)
     for name in ("time", "position", "heading", "speed", "acceleration"):
         np.testing.assert_allclose(getattr(one, name), getattr(last, name), atol=1e-9)
-    assert drawn(count=1, seed=6).scenarios[0].position.tobytes() != fifty.scenarios[0].position.tobytes()
+    assert (
+        drawn(count=1, seed=6).scenarios[0].position.tobytes()
+        != fifty.scenarios[0].position.tobytes()
+    )
 
 
 def test_state_at_any_time_agrees_with_the_published_samples():
@@ -168,7 +189,9 @@ def stops(b):
 def test_deviations_have_the_stated_standard_deviation():
     model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
     middle = len(model.vehicles[0].path.node) // 2
-    assert some.drawn[0].curve[:, middle, 1].std() == pytest.approx(0.36, rel=0.05)  # tied down at both ends
+    assert some.drawn[0].curve[:, middle, 1].std() == pytest.approx(
+        0.36, rel=0.05
+    )  # tied down at both ends
 
 
 def test_clocks_are_monotone_and_shared_and_end_on_the_grid():
@@ -176,7 +199,12 @@ def test_clocks_are_monotone_and_shared_and_end_on_the_grid():
     rate = some.drawn[0].clock.rate
     assert rate.min() > 0.7
     assert rate.max() < 1.4
-    assert np.abs(some.drawn[0].clock.time[:, -1] / 0.1 - np.round(some.drawn[0].clock.time[:, -1] / 0.1)).max() < 1e-9
+    assert (
+        np.abs(
+            some.drawn[0].clock.time[:, -1] / 0.1 - np.round(some.drawn[0].clock.time[:, -1] / 0.1)
+        ).max()
+        < 1e-9
+    )
     assert np.abs(rate[:, [0, -1]] - 1.0).max() < 1e-6  # speeds are given at both ends
 
 
@@ -185,8 +213,13 @@ def test_lateral_deviation_leaves_room_on_a_narrow_road():
     lane = np.zeros(road.drivable.shape, dtype=bool)
     lane[57:63] = True  # 1.5 m to either side of y = 0
     narrow = Road("lane", lane, 0.5, road.origin, [], [])
-    done = prepare(Plan(encounter, segmentation, narrow, routes, asked, waits), SamplingConfig(variety="narrow"))
-    some = done.model.draw(np.random.default_rng(0).standard_normal((500, done.model.size)), Scale())
+    done = prepare(
+        Plan(encounter, segmentation, narrow, routes, asked, waits),
+        SamplingConfig(variety="narrow"),
+    )
+    some = done.model.draw(
+        np.random.default_rng(0).standard_normal((500, done.model.size)), Scale()
+    )
     assert np.abs(some.drawn[0].curve[..., 1]).max() < 1.5 - 0.5 * 1.9
     assert any("narrow" in sentence for sentence in done.adaptations)
 
@@ -194,7 +227,9 @@ def test_lateral_deviation_leaves_room_on_a_narrow_road():
 def test_refusals_are_counted_by_cause_and_levels_are_tried():
     def strict(scenarios):
         wide = [np.abs(s.position[0, :, 1]).max() > 0.12 for s in scenarios]
-        return [Verdict((Violation(Cause.OFF_ROAD, 0.0, (0,), ""),)) if w else Verdict() for w in wide]
+        return [
+            Verdict((Violation(Cause.OFF_ROAD, 0.0, (0,), ""),)) if w else Verdict() for w in wide
+        ]
 
     found = drawn(check=strict)
     assert len(found.scenarios) == 50
@@ -238,7 +273,11 @@ def test_nothing_is_given_out_after_a_cancellation():
 
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     *head, _ = scene()
-    speed = prepare(Plan(*head, (Wait(1, 6.8, 13.2),)), SamplingConfig(variety="narrow")).model.vehicles[1].speed
+    speed = (
+        prepare(Plan(*head, (Wait(1, 6.8, 13.2),)), SamplingConfig(variety="narrow"))
+        .model.vehicles[1]
+        .speed
+    )
     at_rest = speed.spline.breaks[speed.spline.design(speed.spline.breaks) @ speed.mean == 0.0]
     assert 7.0 <= at_rest[0] < 7.5
     assert 12.5 < at_rest[-1] <= 13.0
@@ -254,10 +293,20 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
     ends[1] = [*own.points[-1], 6.0]
     waits = tuple(wait for wait in find_waits(creeping) if wait.vehicle == 1)
     assert [wait.moves_slowly for wait in waits] == [True]
-    given = (creeping, segmentation, road, (routes[0], own, routes[2]), BoundaryStates(asked.start, ends))
+    given = (
+        creeping,
+        segmentation,
+        road,
+        (routes[0], own, routes[2]),
+        BoundaryStates(asked.start, ends),
+    )
     made = draw_scenarios(Plan(*given, waits), all_valid, PLAIN, count=20, seed=1).scenarios
     verdicts = Checker(None, None, None, waits).check(made)
-    assert not any(violation.cause is Cause.STOP_NOT_KEPT for verdict in verdicts for violation in verdict.violations)
+    assert not any(
+        violation.cause is Cause.STOP_NOT_KEPT
+        for verdict in verdicts
+        for violation in verdict.violations
+    )
     assert all((s.speed[1] > 0.0).all() for s in made)
     stands = Plan(*given, (replace(waits[0], moves_slowly=False),))
     stood = draw_scenarios(stands, all_valid, PLAIN, count=20, seed=1).scenarios
@@ -266,17 +315,30 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
 
 def test_stretched_clock_is_said():
     encounter, segmentation, road, routes, asked, waits = scene()
-    plan = Plan(encounter, segmentation, road, routes, asked, waits, TypeLimits(car=Dynamics(max_speed=6.75)))
+    plan = Plan(
+        encounter,
+        segmentation,
+        road,
+        routes,
+        asked,
+        waits,
+        TypeLimits(car=Dynamics(max_speed=6.75)),
+    )
     done = prepare(plan, PLAIN)
     assert done.model is not None
     assert any("stretched" in sentence for sentence in done.adaptations)
     slowest = replace(plan, limits=TypeLimits(car=Dynamics(max_speed=3.375)))
     impossible = draw_scenarios(slowest, all_valid, PLAIN, count=5)
     assert impossible.refused[Cause.SPEED_PROFILE] == 1
-    assert "cannot drive" in impossible.adaptations[0] and "more of limits.car.max_speed would do" in impossible.adaptations[0]
+    assert (
+        "cannot drive" in impossible.adaptations[0]
+        and "more of limits.car.max_speed would do" in impossible.adaptations[0]
+    )
 
 
 def test_routes_that_do_not_suit():
     encounter, segmentation, road, routes, asked, waits = scene()
     with pytest.raises(InputError, match="routes do not suit"):
-        draw_scenarios(Plan(encounter, segmentation, road, routes[:2], asked, waits), all_valid, count=5)
+        draw_scenarios(
+            Plan(encounter, segmentation, road, routes[:2], asked, waits), all_valid, count=5
+        )

@@ -13,7 +13,14 @@ from scipy.optimize import minimize
 from scenario_gen.method.sampling.pace import clock_of, REACH, slowed_clock
 from scenario_gen.method.sampling.speed_profile import mean as mean_module
 from scenario_gen.method.sampling.speed_profile.knots import speed_knots
-from scenario_gen.method.sampling.speed_profile.mean import Bounds, fixed_coefficients, mean_speed, Motion, rounded_lines, Target
+from scenario_gen.method.sampling.speed_profile.mean import (
+    Bounds,
+    fixed_coefficients,
+    mean_speed,
+    Motion,
+    rounded_lines,
+    Target,
+)
 from scenario_gen.method.sampling.speed_profile.model import kernel_root, speed_model
 from scenario_gen.method.sampling.speed_profile.spline import KNOT_SPACING, SpeedSpline
 
@@ -32,32 +39,45 @@ def plain(basis):
 
 
 def loose(basis, **changes):
-    given = {"most": np.full(basis.size, 40.0), "speeding": 4.5, "braking": 8.0, "jerk": 3.0} | changes
+    given = {
+        "most": np.full(basis.size, 40.0),
+        "speeding": 4.5,
+        "braking": 8.0,
+        "jerk": 3.0,
+    } | changes
     return Bounds(**given)
 
 
 def target(speed, length=None, ends=None):
-    anchor = np.interp(CLOCK[1:-1], TIME, np.concatenate([[0.0], np.cumsum(0.05 * (speed[1:] + speed[:-1]))]))
+    anchor = np.interp(
+        CLOCK[1:-1], TIME, np.concatenate([[0.0], np.cumsum(0.05 * (speed[1:] + speed[:-1]))])
+    )
     total = float((0.05 * (speed[1:] + speed[:-1])).sum()) if length is None else length
-    return Target(TIME, speed, CLOCK[1:-1], anchor, (speed[0], speed[-1]) if ends is None else ends, total)
+    return Target(
+        TIME, speed, CLOCK[1:-1], anchor, (speed[0], speed[-1]) if ends is None else ends, total
+    )
 
 
 def test_basis_is_scipys():
     basis, c = spline(), np.random.default_rng(0).normal(size=spline().size)
     other, x = BSpline(basis.knots, c, 3), np.linspace(0.0, 20.0, 997)
     for k in range(3):  # a knot that stands twice has no third
-        assert basis.design(x, k) @ c == pytest.approx((other.derivative(k) if k else other)(x), abs=1e-9)
+        assert basis.design(x, k) @ c == pytest.approx(
+            (other.derivative(k) if k else other)(x), abs=1e-9
+        )
     whole = other.antiderivative()
     assert basis.driven(x) @ c == pytest.approx(whole(x) - whole(0.0), abs=1e-9)
     assert basis.length @ c == pytest.approx(whole(20.0) - whole(0.0))
     i = 7
     dt = 0.6 * (basis.breaks[i + 1] - basis.breaks[i])
-    assert basis.pieces[i] @ c[basis.first[i] : basis.first[i] + 4] @ dt ** np.arange(4) == pytest.approx(
-        float(other(basis.breaks[i] + dt))
-    )
+    assert basis.pieces[i] @ c[basis.first[i] : basis.first[i] + 4] @ dt ** np.arange(
+        4
+    ) == pytest.approx(float(other(basis.breaks[i] + dt)))
     hat = np.interp(x, [0.0, 6.0, 9.0, 20.0], [0.0, 1.0, 0.0, 0.0])
     found = basis.projected(np.array([0.0, 6.0, 9.0, 20.0]), np.array([0.0, 1.0, 0.0, 0.0]))
-    assert found == pytest.approx(np.trapezoid(basis.design(x) * hat[:, None], x, axis=0), abs=1e-3)
+    assert found == pytest.approx(
+        np.trapezoid(basis.design(x) * hat[:, None], x, axis=0), abs=1e-3
+    )
 
 
 def test_a_stand_is_exactly_zero_and_the_rest_is_not():
@@ -73,18 +93,31 @@ def test_mean_keeps_what_must_hold_and_is_the_minimum():
     speed = 8.0 + 2.0 * np.sin(TIME / 2.0)
     basis = spline([])
     wanted = target(speed, length=170.0, ends=(7.0, 9.5))
-    smooth, found = (mean_speed(basis, wanted, plain(basis), loose(basis, jerk=jerk)) for jerk in (3.0, 1e3))
+    smooth, found = (
+        mean_speed(basis, wanted, plain(basis), loose(basis, jerk=jerk)) for jerk in (3.0, 1e3)
+    )
     for one in (smooth, found):
         assert basis.length @ one == pytest.approx(170.0, abs=1e-5)
         assert one[[0, -1]].tolist() == [7.0, 9.5]
-    assert np.abs(plain(basis).jerk @ smooth).max() < 3.0 + 1e-6 < np.abs(plain(basis).jerk @ found).max()
+    assert (
+        np.abs(plain(basis).jerk @ smooth).max()
+        < 3.0 + 1e-6
+        < np.abs(plain(basis).jerk @ found).max()
+    )
     fine = np.linspace(0.0, 20.0, 2001)
-    rows, bends, reach = basis.design(fine), basis.design(fine, 2), basis.driven(wanted.anchor_time)
+    rows, bends, reach = (
+        basis.design(fine),
+        basis.design(fine, 2),
+        basis.driven(wanted.anchor_time),
+    )
     line = np.interp(fine, TIME, speed)
 
     def cost(c):
         off = np.square(rows @ c - line) + mean_module.SMOOTHING**4 * np.square(bends @ c)
-        return np.trapezoid(off, fine) + mean_module.ANCHOR_WEIGHT * np.square(reach @ c - wanted.anchor).sum()
+        return (
+            np.trapezoid(off, fine)
+            + mean_module.ANCHOR_WEIGHT * np.square(reach @ c - wanted.anchor).sum()
+        )
 
     best = minimize(
         lambda c: cost(np.r_[7.0, c, 9.5]), found[1:-1], constraints={"type": "eq", "fun": lambda c: basis.length[1:-1] @ c
@@ -95,7 +128,10 @@ def test_mean_keeps_what_must_hold_and_is_the_minimum():
 
 def test_no_mean_where_none_can_be():
     basis = spline([])
-    assert mean_speed(basis, target(np.full(201, 8.0), length=900.0), plain(basis), loose(basis)) is None
+    assert (
+        mean_speed(basis, target(np.full(201, 8.0), length=900.0), plain(basis), loose(basis))
+        is None
+    )
 
 
 def test_lines_once_rounded_fit_better_than_lines_alone():
@@ -111,7 +147,9 @@ def test_lines_once_rounded_fit_better_than_lines_alone():
 
 
 def drawn(count=4000, sigma=0.8, jerk=3.0):
-    speed = np.interp(TIME, [3.0, 6.5, 13.5, 17.0], [1.0, 0.0, 0.0, 1.0]) ** 2 * (6.0 + np.sin(1.5 * TIME))
+    speed = np.interp(TIME, [3.0, 6.5, 13.5, 17.0], [1.0, 0.0, 0.0, 1.0]) ** 2 * (
+        6.0 + np.sin(1.5 * TIME)
+    )
     basis = spline()
     ends = (speed[0], speed[-1])
     bounds = loose(basis, jerk=jerk)
@@ -138,7 +176,13 @@ def test_draws_keep_ends_length_stands_and_bounds():
 def test_a_speed_that_is_given_holds_on_any_clock():
     model, ends, _, _ = drawn(1)
     pace = np.array([[0.9, 1.2]])
-    c, _ = model.draw(np.zeros((1, model.size)), np.zeros(1), np.ones((1, len(model.time))), pace, np.zeros((1, 2)))
+    c, _ = model.draw(
+        np.zeros((1, model.size)),
+        np.zeros(1),
+        np.ones((1, len(model.time))),
+        pace,
+        np.zeros((1, 2)),
+    )
     assert c[0, [0, -1]] / pace[0] == pytest.approx(ends)
     assert model.spline.length @ (c[0] - model.mean) == pytest.approx(0.0, abs=1e-9)
 
@@ -155,7 +199,9 @@ def test_the_kernel_is_that_of_a_derivative():
     t = np.linspace(0.0, 10.0, 60)
     root = kernel_root(t, np.full(60, 0.3), 1.2)
     d = t[:, None] - t
-    assert root @ root.T == pytest.approx(0.09 * (1.0 - (d / 1.2) ** 2) * np.exp(-0.5 * (d / 1.2) ** 2), abs=1e-6)
+    assert root @ root.T == pytest.approx(
+        0.09 * (1.0 - (d / 1.2) ** 2) * np.exp(-0.5 * (d / 1.2) ** 2), abs=1e-6
+    )
 
 
 @settings(max_examples=50)

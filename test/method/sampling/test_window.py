@@ -32,7 +32,12 @@ def drawn(encounter, leave_out, request=Request()):
 def before_and_after(scenarios):
     """Seconds before the first entry of the conflict, and after the second one's (S, 2)."""
     found = [conflict_of(scenario, 0, 1) for scenario in scenarios]
-    return np.array([[own.entry_first, one.time[-1] - own.entry_second] for own, one in zip(found, scenarios, strict=True)])
+    return np.array(
+        [
+            [own.entry_first, one.time[-1] - own.entry_second]
+            for own, one in zip(found, scenarios, strict=True)
+        ]
+    )
 
 
 def test_scenarios_begin_nearer_to_the_conflict_and_end_sooner_behind_it(encounter):
@@ -45,7 +50,10 @@ def test_scenarios_begin_nearer_to_the_conflict_and_end_sooner_behind_it(encount
 def test_where_an_ego_slot_keeps_its_states_nothing_is_left_out(encounter):
     request = Request(ego=encounter.vehicles[0].id)
     whole, cut = (drawn(encounter, share, request) for share in (0.0, 0.8))
-    assert all(one.position.tobytes() == other.position.tobytes() for one, other in zip(whole, cut, strict=True))
+    assert all(
+        one.position.tobytes() == other.position.tobytes()
+        for one, other in zip(whole, cut, strict=True)
+    )
 
 
 def test_what_stays_is_the_conflict_and_a_second(encounter):
@@ -62,7 +70,9 @@ def test_what_stays_is_the_conflict_and_a_second(encounter):
 def test_the_largest_numbers_leave_out_the_whole_share_and_no_room_is_not_widened():
     window = Window(np.array([4.0, 8.0]), np.array([0.5, 1.0]))
     kept, span = np.array([[4.0, 8.0], [1.0, 9.0]]), np.array([[0.0, 10.0], [2.0, 8.0]])
-    np.testing.assert_allclose(window.cut(np.full((2, 2), 9.0), kept, span), [[2.0, 8.0], [2.0, 8.0]])
+    np.testing.assert_allclose(
+        window.cut(np.full((2, 2), 9.0), kept, span), [[2.0, 8.0], [2.0, 8.0]]
+    )
     np.testing.assert_allclose(window.cut(np.full((2, 2), -9.0), kept, span), span, atol=1e-9)
 
 
@@ -72,7 +82,13 @@ def test_what_a_recording_holds_by_its_last_sample_is_kept(kind, seed, variety):
     """The record ends as the second one enters, and the drive without deviations ends before."""
     whole = labelled(kind, seed).encounter
     last = math.ceil(conflict_of(whole, 0, 1).entry_second / whole.dt) + 1
-    cut = replace(whole, **{name: getattr(whole, name)[:, :last] for name in ("position", "heading", "speed")}, present=ALWAYS)
-    made = generate(cut, "corridor", PipelineConfig(sampling=SamplingConfig(variety=variety)), count=10, seed=1)
+    cut = replace(
+        whole,
+        **{name: getattr(whole, name)[:, :last] for name in ("position", "heading", "speed")},
+        present=ALWAYS,
+    )
+    made = generate(
+        cut, "corridor", PipelineConfig(sampling=SamplingConfig(variety=variety)), count=10, seed=1
+    )
     assert len(made) == 10 and all(conflict_of(scenario, 0, 1) is not None for scenario in made)
     assert not made.lost_reactions and made.generated.reactions

@@ -42,7 +42,10 @@ def document(tmp_path):
     [
         ({"means": [[0.0] * 6, [0.0] * 5]}, r"means\[1\] holds 5 items where 6 are needed"),
         ({"vehicles": 3}, r"means\[0\] holds 6 items where 9 are needed"),
-        ({"transition": [[0.5, 0.5], [0.5, 0.6]]}, "transition holds probabilities; each row must sum to 1"),
+        (
+            {"transition": [[0.5, 0.5], [0.5, 0.6]]},
+            "transition holds probabilities; each row must sum to 1",
+        ),
         ({"initial": [0.5, 1.5]}, r"initial\[1\] is 1\.5"),
         ({"covariances": [np.eye(6).tolist(), np.zeros((6, 6)).tolist()]}, "positive definite"),
         ({"weight": 1e308}, "weight is 1e"),

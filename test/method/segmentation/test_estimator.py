@@ -13,9 +13,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from scenario_gen.method.segmentation import SamplerConfig, segment_series, SegmentationWarning, StickyHDPHMM
+from scenario_gen.method.segmentation import (
+    SamplerConfig,
+    segment_series,
+    SegmentationWarning,
+    StickyHDPHMM,
+)
 
-pytestmark = pytest.mark.filterwarnings("ignore::scenario_gen.method.segmentation.SegmentationWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::scenario_gen.method.segmentation.SegmentationWarning"
+)
 QUICK = {"chains": 2, "sweeps": 60, "random_state": 1}
 TRUE_MEANS = np.array([[0.0, 0.0], [400.0, -0.3]])
 TRUE_COVARIANCES = np.array([[[900.0, 1.2], [1.2, 0.0064]], [[2500.0, -1.0], [-1.0, 0.0016]]])
@@ -44,7 +51,9 @@ def test_parameters_are_the_samplers():
         changed.set_params(depth=2)
 
 
-@pytest.mark.parametrize("bad", [{"sweeps": 1}, {"emission": "poisson"}, {"random_state": -1}, {"random_state": 0.5}])
+@pytest.mark.parametrize(
+    "bad", [{"sweeps": 1}, {"emission": "poisson"}, {"random_state": -1}, {"random_state": 0.5}]
+)
 def test_fit_refuses_bad_parameters(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):
         StickyHDPHMM(**bad).fit(drawn(0)[0])
@@ -60,7 +69,9 @@ def test_states_have_their_means_covariances_and_transitions_in_units(fitted):
         own = x[labels == k]
         unit = np.sqrt(np.diag(TRUE_COVARIANCES[k]))
         np.testing.assert_allclose((model.means_[k] - own.mean(axis=0)) / unit, 0.0, atol=0.02)
-        np.testing.assert_allclose((model.covariances_[k] - np.cov(own.T)) / np.outer(unit, unit), 0.0, atol=0.05)
+        np.testing.assert_allclose(
+            (model.covariances_[k] - np.cov(own.T)) / np.outer(unit, unit), 0.0, atol=0.05
+        )
     np.testing.assert_allclose(model.transitions_.sum(axis=1), 1.0)
     np.testing.assert_allclose(np.diag(model.transitions_), [248 / 250, 349 / 350], atol=0.01)
     assert model.startprob_[0] > 0.5
@@ -75,14 +86,20 @@ def test_score_and_predict_proba_are_those_of_the_hidden_markov_model(fitted):
     model, x, _ = fitted
     few = x[147:153]
     density = np.array(
-        [stats.multivariate_normal(m, c).pdf(few) for m, c in zip(model.means_, model.covariances_, strict=True)]
+        [
+            stats.multivariate_normal(m, c).pdf(few)
+            for m, c in zip(model.means_, model.covariances_, strict=True)
+        ]
     ).T
     paths = np.array(np.meshgrid(*[[0, 1]] * len(few), indexing="ij")).reshape(len(few), -1).T
     joint = model.startprob_[paths[:, 0]] * density[0, paths[:, 0]]
     for t in range(1, len(few)):
         joint = joint * model.transitions_[paths[:, t - 1], paths[:, t]] * density[t, paths[:, t]]
     assert model.score(few) * len(few) == pytest.approx(np.log(joint.sum()), rel=1e-9)
-    expected = np.array([[joint[paths[:, t] == k].sum() for k in range(2)] for t in range(len(few))]) / joint.sum()
+    expected = (
+        np.array([[joint[paths[:, t] == k].sum() for k in range(2)] for t in range(len(few))])
+        / joint.sum()
+    )
     assert model.posterior_.weight == pytest.approx(1.0)
     np.testing.assert_allclose(model.predict_proba(few), expected, atol=1e-9)
 
@@ -147,10 +164,15 @@ def test_what_is_nan_is_integrated_out(fitted):
     for k in range(2):
         unit = np.sqrt(np.diag(TRUE_COVARIANCES[k]))
         np.testing.assert_allclose((found.means_[k] - model.means_[k]) / unit, 0.0, atol=0.15)
-        np.testing.assert_allclose((found.covariances_[k] - model.covariances_[k]) / np.outer(unit, unit), 0.0, atol=0.2)
+        np.testing.assert_allclose(
+            (found.covariances_[k] - model.covariances_[k]) / np.outer(unit, unit), 0.0, atol=0.2
+        )
     half = x[:1].copy()
     half[0, 1] = np.nan
-    at = [stats.norm(m[0], np.sqrt(c[0, 0])).pdf(half[0, 0]) for m, c in zip(model.means_, model.covariances_, strict=True)]
+    at = [
+        stats.norm(m[0], np.sqrt(c[0, 0])).pdf(half[0, 0])
+        for m, c in zip(model.means_, model.covariances_, strict=True)
+    ]
     assert model.score(half) == pytest.approx(np.log(np.dot(model.startprob_, at)))
     assert model.score(np.full((4, 2), np.nan)) == pytest.approx(0.0)
 
@@ -169,7 +191,10 @@ def test_heavy_tails_are_students_t():
         np.testing.assert_allclose(model.means_[k], 6.0 * k, atol=0.25)
         np.testing.assert_allclose(model.covariances_[k], np.eye(2), atol=0.35)
     one = x[:1]
-    at = [stats.multivariate_t(m, c, 3.0).pdf(one) for m, c in zip(model.means_, model.covariances_, strict=True)]
+    at = [
+        stats.multivariate_t(m, c, 3.0).pdf(one)
+        for m, c in zip(model.means_, model.covariances_, strict=True)
+    ]
     assert model.score(one) == pytest.approx(np.log(np.dot(model.startprob_, at)))
     assert np.mean(model.predict(lost) != model.labels_) < 0.01
 
@@ -188,15 +213,21 @@ def test_a_single_outlier_hides_nothing_wherever_it_is(fitted, lost):
 
 def test_channels_that_are_left_out_have_means_and_covariances_and_are_named(fitted):
     _, x, _ = fitted
-    wide = np.column_stack([x, 2.0 * x[:, 0] - 100.0 * x[:, 1] + 7.0, np.full(len(x), 3.0), np.full(len(x), np.nan)])
+    wide = np.column_stack(
+        [x, 2.0 * x[:, 0] - 100.0 * x[:, 1] + 7.0, np.full(len(x), 3.0), np.full(len(x), np.nan)]
+    )
     left = r"left out: 2 \(follows from those before it\), 3 \(does not vary\), 4 \(not measured\)"
     with pytest.warns(SegmentationWarning, match=left):
         model = StickyHDPHMM(**QUICK).fit(wide)
     for k in range(2):
         a, b = model.means_[k, :2]
-        np.testing.assert_allclose(model.means_[k, 2], 2.0 * a - 100.0 * b + 7.0, rtol=1e-6, atol=1e-3)
+        np.testing.assert_allclose(
+            model.means_[k, 2], 2.0 * a - 100.0 * b + 7.0, rtol=1e-6, atol=1e-3
+        )
         turn = np.array([2.0, -100.0])
-        np.testing.assert_allclose(model.covariances_[k, 2, 2], turn @ model.covariances_[k, :2, :2] @ turn, rtol=1e-6)
+        np.testing.assert_allclose(
+            model.covariances_[k, 2, 2], turn @ model.covariances_[k, :2, :2] @ turn, rtol=1e-6
+        )
     np.testing.assert_allclose(model.means_[:, 3], 3.0)
     np.testing.assert_allclose(model.covariances_[:, 3, 3], 0.0, atol=1e-20)
     assert np.isnan(model.means_[:, 4]).all()
@@ -226,12 +257,19 @@ def test_autoregressive_states_in_units():
     model = StickyHDPHMM(emission="autoregressive", **QUICK).fit(x)
     assert np.mean(model.labels_ != labels) < 0.02
     for k in range(2):
-        np.testing.assert_allclose(model.coefficients_[k][:, 1:] * unit / unit[:, None], regressions[k], atol=0.15)
-        np.testing.assert_allclose(model.covariances_[k] / np.outer(unit, unit), np.eye(2), atol=0.3)
+        np.testing.assert_allclose(
+            model.coefficients_[k][:, 1:] * unit / unit[:, None], regressions[k], atol=0.15
+        )
+        np.testing.assert_allclose(
+            model.covariances_[k] / np.outer(unit, unit), np.eye(2), atol=0.3
+        )
     assert np.mean(model.predict(x) != model.labels_) < 0.02
     two = x[10:14]
     rest = [
-        [stats.multivariate_normal(b[:, 0] + b[:, 1:] @ two[t - 1], c).pdf(two[t]) for t in (1, 2, 3)]
+        [
+            stats.multivariate_normal(b[:, 0] + b[:, 1:] @ two[t - 1], c).pdf(two[t])
+            for t in (1, 2, 3)
+        ]
         for b, c in zip(model.coefficients_, model.covariances_, strict=True)
     ]
     ahead, total = model.startprob_, 0.0
@@ -250,8 +288,12 @@ def test_warns_of_chains_that_disagree_and_of_a_full_truncation():
         model = StickyHDPHMM(states=2, chains=4, sweeps=12, r_hat=1.001, random_state=0).fit(x)
     messages = [str(each.message) for each in told]
     assert not model.converged_
-    assert any("R-hat is above 1.001" in message and "raise `sweeps`" in message for message in messages)
-    assert any("all L = 2 states" in message and "raise `states`" in message for message in messages)
+    assert any(
+        "R-hat is above 1.001" in message and "raise `sweeps`" in message for message in messages
+    )
+    assert any(
+        "all L = 2 states" in message and "raise `states`" in message for message in messages
+    )
 
 
 def test_to_arviz_has_every_chain(fitted):
@@ -287,8 +329,12 @@ def test_a_fit_can_be_pickled_and_the_seed_decides(fitted):
 
 def test_scikit_learns_checks():
     """Of the checks none needs leave but one: the second argument of `fit` is `lengths`, as for other hidden Markov models."""
-    checks = pytest.importorskip("sklearn.utils.estimator_checks", reason="scikit-learn is not installed")
-    leave = {"check_fit_score_takes_y": "the second argument is `lengths`; `y` is the third, and ignored"}
+    checks = pytest.importorskip(
+        "sklearn.utils.estimator_checks", reason="scikit-learn is not installed"
+    )
+    leave = {
+        "check_fit_score_takes_y": "the second argument is `lengths`; `y` is the third, and ignored"
+    }
     small = StickyHDPHMM(chains=1, sweeps=20)
     ran = checks.check_estimator(small, expected_failed_checks=leave, on_fail=None, on_skip=None)
     failed = {each["check_name"]: each["exception"] for each in ran if each["status"] == "failed"}
@@ -306,12 +352,20 @@ def test_works_in_a_pipeline_and_under_cross_validation(fitted):
     _, x, labels = fitted
     model = StickyHDPHMM(**QUICK)
     assert base.clone(model).get_params() == model.get_params()
-    np.testing.assert_array_equal(make_pipeline(StandardScaler(), model).fit(x, labels).predict(x), model.fit(x).labels_)
+    np.testing.assert_array_equal(
+        make_pipeline(StandardScaler(), model).fit(x, labels).predict(x), model.fit(x).labels_
+    )
     assert np.isfinite(cross_val_score(model, x, cv=2)).all()
 
 
 ALLOWED = {"filelock", "numpy", "scipy", "numba", "llvmlite", "scenario_gen"}
-TAKEN_ALONG = {"cffi", "charset_normalizer", "coverage", "pycparser", "yaml"}  # by numba and numpy.f2py, where they are installed
+TAKEN_ALONG = {
+    "cffi",
+    "charset_normalizer",
+    "coverage",
+    "pycparser",
+    "yaml",
+}  # by numba and numpy.f2py, where they are installed
 
 
 def test_the_segmentation_loads_numpy_scipy_and_numba_alone():
@@ -320,8 +374,12 @@ def test_the_segmentation_loads_numpy_scipy_and_numba_alone():
         "s.StickyHDPHMM(chains=1, sweeps=10, random_state=0).fit(np.arange(40.0).reshape(20, 2) % 7);"
         "print(json.dumps([n for n in set(sys.modules) - before if getattr(sys.modules[n], '__file__', None)]))"
     )
-    ran = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, check=True)
+    ran = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, check=True
+    )
     files = {name.partition(".")[0] for name in json.loads(ran.stdout)}
     assert {
-        name for name in files - ALLOWED - TAKEN_ALONG - set(sys.stdlib_module_names) if not name.startswith(("_", "cython"))
+        name
+        for name in files - ALLOWED - TAKEN_ALONG - set(sys.stdlib_module_names)
+        if not name.startswith(("_", "cython"))
     } == set()

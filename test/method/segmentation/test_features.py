@@ -17,11 +17,18 @@ from scenario_gen.types.segmentation import Segmentation
 @settings(max_examples=30)
 @given(at=st.integers(2, 57), size=st.floats(5.0, 1e6), seed=st.integers(0, 1000))
 def test_a_spike_is_replaced_by_what_lies_between(at, size, seed):
-    smooth = np.cumsum(np.random.default_rng(seed).normal(size=(60, 2)) * 0.01, axis=0) + np.arange(60.0)[:, None]
+    smooth = (
+        np.cumsum(np.random.default_rng(seed).normal(size=(60, 2)) * 0.01, axis=0)
+        + np.arange(60.0)[:, None]
+    )
     values = smooth.copy()
     values[at] += size
-    np.testing.assert_allclose(without_spikes(values, 0.5)[at], (smooth[at - 1] + smooth[at + 1]) / 2.0, atol=0.1)
-    np.testing.assert_array_equal(np.delete(without_spikes(values, 0.5), at, axis=0), np.delete(smooth, at, axis=0))
+    np.testing.assert_allclose(
+        without_spikes(values, 0.5)[at], (smooth[at - 1] + smooth[at + 1]) / 2.0, atol=0.1
+    )
+    np.testing.assert_array_equal(
+        np.delete(without_spikes(values, 0.5), at, axis=0), np.delete(smooth, at, axis=0)
+    )
 
 
 @given(st.integers(0, 1000))
@@ -30,7 +37,9 @@ def test_a_drive_stays_as_it_is(seed):
     rng = np.random.default_rng(seed)
     speed = np.maximum(10.0 - 8.0 * np.maximum(np.arange(80) * 0.1 - 3.0, 0.0), 0.0)
     heading = np.cumsum(0.04 * speed * 0.1 * 2.0)
-    position = np.cumsum(0.1 * speed[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+    position = np.cumsum(
+        0.1 * speed[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0
+    )
     noisy = position + rng.uniform(-0.1, 0.1, size=position.shape)
     np.testing.assert_array_equal(without_spikes(noisy, 0.5), noisy)
     np.testing.assert_array_equal(without_spikes(speed[:, None], 0.5), speed[:, None])
@@ -38,7 +47,10 @@ def test_a_drive_stays_as_it_is(seed):
 
 def test_outliers_change_no_changepoint(encounter_of):
     time = np.arange(100) * 0.1
-    encounter = encounter_of(np.array([5.0 + np.minimum(time, 5.0), 12.0 - 1.5 * np.maximum(time - 5.0, 0.0)]), noise=0.05)
+    encounter = encounter_of(
+        np.array([5.0 + np.minimum(time, 5.0), 12.0 - 1.5 * np.maximum(time - 5.0, 0.0)]),
+        noise=0.05,
+    )
     position, speed = encounter.position.copy(), encounter.speed.copy()
     position[0, 30] += 40.0
     speed[1, [20, 60]] += 15.0
@@ -53,4 +65,7 @@ def test_a_long_stretch_without_a_changepoint_is_said():
     quiet = Segmentation(np.zeros(400, np.int64), np.zeros(0, np.int64), np.zeros(400), ("",))
     assert "no changepoint in 40 s" in quiet.remark(40.0)
     assert quiet.remark(15.0) == ""
-    assert Segmentation(np.repeat([0, 1], 200), np.array([200]), np.zeros(400), ("", "")).remark(40.0) == ""
+    assert (
+        Segmentation(np.repeat([0, 1], 200), np.array([200]), np.zeros(400), ("", "")).remark(40.0)
+        == ""
+    )

@@ -29,7 +29,9 @@ def test_matching_is_the_best_one():
     rng = np.random.default_rng(0)
     samples, reference = rng.integers(0, 4, (20, 60)), rng.integers(0, 4, 60)
     for row, found in zip(samples, matched_labels(samples, reference, 4), strict=True):
-        assert (found == reference).sum() == max((np.array(p)[row] == reference).sum() for p in permutations(range(4)))
+        assert (found == reference).sum() == max(
+            (np.array(p)[row] == reference).sum() for p in permutations(range(4))
+        )
         assert len({(a, b) for a, b in zip(row, found, strict=True)}) == len(set(row))
 
 
@@ -39,7 +41,9 @@ def test_a_chain_goes_on_from_the_labels_it_ended_with():
     config, ends = SamplerConfig(), np.array([60])
     problem = Problem.build(x, ends, config, np.zeros(2))
     start = Place(np.repeat([2, 5], 30), problem.observed)
-    place, _, samples, _ = problem.run(config, Prior(np.eye(2), 25.0, 0.1), start, new_top(8), 0, 1, 3)
+    place, _, samples, _ = problem.run(
+        config, Prior(np.eye(2), 25.0, 0.1), start, new_top(8), 0, 1, 3
+    )
     np.testing.assert_array_equal(place.labels, samples[-1])
 
 

@@ -19,14 +19,21 @@ START = 10**18
 @pytest.fixture
 def samples(encounter_of):
     t = np.arange(400) * 0.1
-    speeds = np.array([np.full(400, 8.0), np.interp(t, [0, 10, 15, 25, 30, 40], [10, 10, 2, 2, 12, 12])])
+    speeds = np.array(
+        [np.full(400, 8.0), np.interp(t, [0, 10, 15, 25, 30, 40], [10, 10, 2, 2, 12, 12])]
+    )
     made = encounter_of(speeds, noise=0.1, seed=3)
-    return [Sample(START + k * TICK, made.vehicles, made.position[:, k], made.speed[:, k]) for k in range(400)]
+    return [
+        Sample(START + k * TICK, made.vehicles, made.position[:, k], made.speed[:, k])
+        for k in range(400)
+    ]
 
 
 def found_in(samples):
     live = LiveSegmenter(TICK)
-    return [(sample.stamp_ns, found) for sample in samples if (found := live.push(sample)) is not None]
+    return [
+        (sample.stamp_ns, found) for sample in samples if (found := live.push(sample)) is not None
+    ]
 
 
 def test_changepoints_come_soon_with_the_states_there(samples):
@@ -44,7 +51,9 @@ def test_changepoints_come_soon_with_the_states_there(samples):
         assert np.abs(f.heading).max() < 0.2
         assert (f.probability > 0.9).all()
         message = trajectory.decode(encode_live_changepoints(f), "changepoints/live")
-        assert np.array_equal(message.time_ns, f.time_ns) and np.array_equal(message.position, f.position)
+        assert np.array_equal(message.time_ns, f.time_ns) and np.array_equal(
+            message.position, f.position
+        )
         assert (message.stamp_ns, message.frame_id) == (START, "local_enu")
 
 
@@ -53,7 +62,9 @@ def test_another_set_of_vehicles_or_a_gap_begins_a_new_stretch(samples):
 
     def joined(sample):
         place = np.vstack([sample.position, [[0.0, 50.0]]])
-        return Sample(sample.stamp_ns, (*sample.vehicles, third), place, np.append(sample.speed, 0.0))
+        return Sample(
+            sample.stamp_ns, (*sample.vehicles, third), place, np.append(sample.speed, 0.0)
+        )
 
     starts = {f.start_ns for _, f in found_in([*samples[:200], *map(joined, samples[200:])])}
     assert starts == {START, START + 200 * TICK}

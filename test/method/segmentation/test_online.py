@@ -12,16 +12,28 @@ from scenario_gen.method.segmentation import OnlineConfig, OnlineSegmenter
 
 def found_in(encounter):
     online = OnlineSegmenter(len(encounter.vehicles), encounter.dt)
-    return [c for t in range(len(encounter.time)) for c in online.push(encounter.position[:, t], encounter.speed[:, t])]
+    return [
+        c
+        for t in range(len(encounter.time))
+        for c in online.push(encounter.position[:, t], encounter.speed[:, t])
+    ]
 
 
 def test_finds_changes_soon_after_them(encounter_of):
     t = np.arange(400) * 0.1
-    speeds = np.array([np.full(400, 8.0), np.interp(t, [0, 10, 15, 25, 30, 40], [10, 10, 2, 2, 12, 12])])
+    speeds = np.array(
+        [np.full(400, 8.0), np.interp(t, [0, 10, 15, 25, 30, 40], [10, 10, 2, 2, 12, 12])]
+    )
     found = found_in(encounter_of(speeds, noise=0.1, seed=3))
     assert [round(c.sample / 50) * 50 for c in found] == [100, 150, 250, 300]
-    assert max(abs(c.sample - truth) for c, truth in zip(found, [100, 150, 250, 300], strict=True)) <= 4
-    assert max(c.confirmed - truth for c, truth in zip(found, [100, 150, 250, 300], strict=True)) <= 15
+    assert (
+        max(abs(c.sample - truth) for c, truth in zip(found, [100, 150, 250, 300], strict=True))
+        <= 4
+    )
+    assert (
+        max(c.confirmed - truth for c, truth in zip(found, [100, 150, 250, 300], strict=True))
+        <= 15
+    )
 
 
 def test_steady_noise_gives_nothing(encounter_of):
@@ -35,7 +47,9 @@ def test_memory_is_bounded():
     assert len(online._samples) <= 300
 
 
-@pytest.mark.parametrize("bad", [(np.zeros((2, 2)), np.array([1.0, np.nan])), (np.zeros((3, 2)), np.zeros(3))])
+@pytest.mark.parametrize(
+    "bad", [(np.zeros((2, 2)), np.array([1.0, np.nan])), (np.zeros((3, 2)), np.zeros(3))]
+)
 def test_refuses_bad_samples(bad):
     with pytest.raises(InputError, match="sample 0"):
         OnlineSegmenter(2, 0.1).push(*bad)
@@ -47,13 +61,21 @@ def drive(behaviours, seed=1, seconds=5.0):
     true = np.repeat(behaviours, round(seconds * 10))
     speed = 12.0 + np.cumsum(np.array([0.0, -1.5, 1.5, 0.0])[true]) * 0.1
     heading = np.cumsum(np.array([0.0, 0.0, 0.0, 0.25])[true]) * 0.1
-    position = np.cumsum(np.column_stack([speed * np.cos(heading), speed * np.sin(heading)]) * 0.1, axis=0)
-    return position + rng.normal(size=position.shape) * 0.1, speed + rng.normal(size=len(speed)) * 0.1
+    position = np.cumsum(
+        np.column_stack([speed * np.cos(heading), speed * np.sin(heading)]) * 0.1, axis=0
+    )
+    return position + rng.normal(size=position.shape) * 0.1, speed + rng.normal(
+        size=len(speed)
+    ) * 0.1
 
 
 def pushed(position, speed, **options):
     online = OnlineSegmenter(1, 0.1, **options)
-    return [c for xy, v in zip(position, speed, strict=True) for c in online.push(xy[None], np.array([v]))]
+    return [
+        c
+        for xy, v in zip(position, speed, strict=True)
+        for c in online.push(xy[None], np.array([v]))
+    ]
 
 
 def test_single_outliers_change_nothing():
@@ -73,8 +95,15 @@ def test_probability_rises_with_the_change():
     for change in (0.1, 0.2, 1.5):
         speed = 12.0 + np.where(np.arange(300) < 150, 0.0, (np.arange(300) - 150) * 0.1 * change)
         rng = np.random.default_rng(3)
-        position = np.column_stack([np.cumsum(speed) * 0.1, np.zeros(300)]) + rng.normal(size=(300, 2)) * 0.1
-        found = pushed(position, speed + rng.normal(size=300) * 0.1, config=OnlineConfig(significance_level=0.05))
+        position = (
+            np.column_stack([np.cumsum(speed) * 0.1, np.zeros(300)])
+            + rng.normal(size=(300, 2)) * 0.1
+        )
+        found = pushed(
+            position,
+            speed + rng.normal(size=300) * 0.1,
+            config=OnlineConfig(significance_level=0.05),
+        )
         near = [c.probability for c in found if abs(c.sample - 150) <= 15]
         least[change] = max(near, default=0.0)
     assert least[0.1] < least[0.2] < least[1.5]

@@ -18,10 +18,16 @@ ODDS = np.array([0.2, 0.5, 0.3])
 
 def draw_prior(rng, samples, d, order):
     """Draw concentrations, transitions, emissions, labels and a series from the model; returns labels, x, top, means, scales."""
-    gamma, total, rho = rng.gamma(HYPER[0]) / HYPER[1], rng.gamma(HYPER[2]) / HYPER[3], rng.beta(HYPER[4], HYPER[5])
+    gamma, total, rho = (
+        rng.gamma(HYPER[0]) / HYPER[1],
+        rng.gamma(HYPER[2]) / HYPER[3],
+        rng.beta(HYPER[4], HYPER[5]),
+    )
     beta = np.maximum(rng.dirichlet(np.full(STATES, gamma / STATES)), 1e-12)
     own = rho * total * np.eye(STATES)
-    pi = np.array([rng.dirichlet(np.maximum((1 - rho) * total * beta + own[j], 1e-9)) for j in range(STATES)])
+    pi = np.array(
+        [rng.dirichlet(np.maximum((1 - rho) * total * beta + own[j], 1e-9)) for j in range(STATES)]
+    )
     first = rng.dirichlet(np.maximum((1 - rho) * total * beta, 1e-9))
     labels = np.empty(samples, np.int64)
     labels[0] = rng.choice(STATES, p=first)
@@ -75,7 +81,11 @@ def draw_series(rng, labels, regressions, roots, mass, order):
 
 def gibbs(v, labels, top, mass, chosen, d, order, dof, moves, gaps, hidden, seed):
     """One sweep of the chain; returns labels, concentrations and regressions; `mass`, `v` and `chosen` are updated."""
-    samples, trace, emissions = np.empty((1, len(v)), np.int64), np.empty((1, 5)), np.empty((STATES, d, v.shape[1]))
+    samples, trace, emissions = (
+        np.empty((1, len(v)), np.int64),
+        np.empty((1, 5)),
+        np.empty((STATES, d, v.shape[1])),
+    )
     top = top.copy()
     run_chain(
         Data(v, np.ascontiguousarray(v.T), gaps, hidden, mass, np.array([len(v)])),
@@ -131,14 +141,20 @@ def test_geweke(case):
     for _ in range(draws):
         labels, regressions, roots, top, chosen = draw_prior(rng, samples, d, order)
         mass = draw_masses(rng, samples, dof, gaps)
-        forward.append(statistics(labels, draw_series(rng, labels, regressions, roots, mass, order), top, chosen, d))
+        forward.append(
+            statistics(
+                labels, draw_series(rng, labels, regressions, roots, mass, order), top, chosen, d
+            )
+        )
     labels, regressions, roots, top, chosen = draw_prior(rng, samples, d, order)
     mass = draw_masses(rng, samples, dof, gaps)
     chain = []
     for sweep in range(4 * draws):
         v = draw_series(rng, labels, regressions, roots, mass, order)
         chain.append(statistics(labels, v, top, chosen, d))
-        labels, top, regressions, roots = gibbs(v, labels, top, mass, chosen, d, order, dof, moves, gaps, hidden, 1000 + sweep)
+        labels, top, regressions, roots = gibbs(
+            v, labels, top, mass, chosen, d, order, dof, moves, gaps, hidden, 1000 + sweep
+        )
     forward, chain = np.array(forward), np.array(chain)
     batches = chain[: len(chain) // 40 * 40].reshape(40, -1, chain.shape[1]).mean(axis=1)
     error = np.sqrt(forward.var(axis=0) / len(forward) + batches.var(axis=0) / len(batches))

@@ -44,7 +44,9 @@ def test_steady_drive_is_one_primitive(encounter_of):
 @pytest.mark.parametrize("samples", [4, 7, 30, 200])
 def test_short_encounters(encounter_of, preset, samples):
     rng = np.random.default_rng(samples)
-    found = segment(encounter_of(np.abs(rng.normal(5.0, 2.0, (3, samples)))), SegmentationConfig(preset=preset))
+    found = segment(
+        encounter_of(np.abs(rng.normal(5.0, 2.0, (3, samples)))), SegmentationConfig(preset=preset)
+    )
     assert found.labels.shape == (samples,)
 
 
@@ -54,11 +56,21 @@ def test_too_short(encounter_of):
 
 
 @settings(max_examples=100 if LONG else 8)
-@given(st.integers(10, 120), st.integers(2, 4), st.integers(0, 10_000), st.sampled_from([0.1, 0.5, 2.0]))
+@given(
+    st.integers(10, 120),
+    st.integers(2, 4),
+    st.integers(0, 10_000),
+    st.sampled_from([0.1, 0.5, 2.0]),
+)
 def test_rules_of_the_result(encounter_of, samples, vehicles, seed, rate):
     rng = np.random.default_rng(seed)
     knots = np.linspace(0, samples, 6)
-    speeds = np.array([np.interp(np.arange(samples), knots, np.abs(rng.normal(4.0, 5.0, 6))) for _ in range(vehicles)])
+    speeds = np.array(
+        [
+            np.interp(np.arange(samples), knots, np.abs(rng.normal(4.0, 5.0, 6)))
+            for _ in range(vehicles)
+        ]
+    )
     encounter = encounter_of(speeds, noise=0.1, seed=seed)
     found = segment(encounter, SegmentationConfig(max_rate=rate), seed=seed)
     points = found.changepoints
@@ -96,7 +108,10 @@ def test_not_a_number(encounter_of, field):
 def test_short_segments_and_small_clusters_are_merged(encounter_of, preset, shortest):
     rng = np.random.default_rng(5)
     speeds = np.abs(np.cumsum(rng.standard_t(2, (2, 150)), axis=1)) * 0.3
-    found = segment(encounter_of(speeds, noise=0.2), SegmentationConfig(preset=preset, min_segment=shortest, max_rate=10.0))
+    found = segment(
+        encounter_of(speeds, noise=0.2),
+        SegmentationConfig(preset=preset, min_segment=shortest, max_rate=10.0),
+    )
     lengths = np.diff([0, *found.changepoints, 150])
     assert lengths.min() >= round(shortest / 0.1)
     assert np.bincount(found.labels).min() >= 2
@@ -109,8 +124,14 @@ def lone_drive(seed=0):
     turn = np.repeat([0.0, 0.0, 0.0, 0.2], [60, 67, 40, 60])
     speed = np.maximum(10.0 + np.cumsum(acceleration) * dt, 0.0)
     heading = np.cumsum(turn) * dt
-    position = np.cumsum(np.column_stack([speed * np.cos(heading), speed * np.sin(heading)]) * dt, axis=0)
-    return position + rng.normal(size=position.shape) * 0.1, np.maximum(speed + rng.normal(size=len(speed)) * 0.1, 0.0), dt
+    position = np.cumsum(
+        np.column_stack([speed * np.cos(heading), speed * np.sin(heading)]) * dt, axis=0
+    )
+    return (
+        position + rng.normal(size=position.shape) * 0.1,
+        np.maximum(speed + rng.normal(size=len(speed)) * 0.1, 0.0),
+        dt,
+    )
 
 
 def test_one_vehicle_alone_can_be_segmented():
@@ -140,8 +161,15 @@ def test_a_track_that_cannot_be_used_is_refused(position, speed, dt):
 
 def test_a_vehicle_that_comes_and_goes_makes_no_changepoint(encounter_of):
     t = np.arange(200) * 0.1
-    speed = np.array([np.interp(t, [0, 10, 20], [10, 10, 2]), np.full(200, 8.0), np.full(200, 12.0)])
-    found = segment(replace(encounter_of(speed, noise=0.05), present=np.array([[0, 199], [45, 199], [0, 150]])), seed=1)
+    speed = np.array(
+        [np.interp(t, [0, 10, 20], [10, 10, 2]), np.full(200, 8.0), np.full(200, 12.0)]
+    )
+    found = segment(
+        replace(
+            encounter_of(speed, noise=0.05), present=np.array([[0, 199], [45, 199], [0, 150]])
+        ),
+        seed=1,
+    )
     assert np.abs(found.changepoints - [100]).max() <= 5
     assert "vehicle 1 arrives after 4.5 s and drives at" in found.descriptions[0]
     assert found.descriptions[1].endswith("leaves after 5.0 s")
@@ -149,8 +177,14 @@ def test_a_vehicle_that_comes_and_goes_makes_no_changepoint(encounter_of):
 
 @pytest.mark.parametrize("preset", ["driving", "paper"])
 def test_what_is_held_outside_of_a_presence_does_not_count(encounter_of, preset):
-    whole = encounter_of(np.array([np.full(80, 8.0), np.linspace(8.0, 4.0, 80), np.full(80, 5.0)]), noise=0.05)
-    found = segment(replace(whole, present=np.array([[0, 79], [0, 40], [41, 79]])), SegmentationConfig(preset=preset), seed=2)
+    whole = encounter_of(
+        np.array([np.full(80, 8.0), np.linspace(8.0, 4.0, 80), np.full(80, 5.0)]), noise=0.05
+    )
+    found = segment(
+        replace(whole, present=np.array([[0, 79], [0, 40], [41, 79]])),
+        SegmentationConfig(preset=preset),
+        seed=2,
+    )
     assert "has left" in found.descriptions[-1] or len(found.descriptions) == 1
     assert np.isfinite(found.changepoint_probability).all()
 
@@ -167,4 +201,7 @@ def test_steps_of_a_pedestrian_are_no_changepoints_and_its_halt_is_seen():
         found = segment(alone, seed=1)
         assert all(min(abs(0.1 * found.changepoints - change)) < 0.5 for change in changes)
         assert len(changes) <= len(found.changepoints) <= 2 * len(changes)
-    assert any("stands" in words for words in found.descriptions) and "walks at 1.3 m/s" in found.descriptions[0]
+    assert (
+        any("stands" in words for words in found.descriptions)
+        and "walks at 1.3 m/s" in found.descriptions[0]
+    )

@@ -77,7 +77,9 @@ def test_channel_that_varies_less_than_it_is_known_hides_nothing(tremble):
     """A vehicle that stands throughout: blown up to unit variance, its trembling drowned every other channel's changes."""
     x, labels = two_states(8)
     still = tremble * np.random.default_rng(1).normal(size=(240, 2))
-    posterior = segment_series(np.column_stack([x, still]), seed=0, blur=np.array([0.2, 0.2, 0.2, 0.4]))
+    posterior = segment_series(
+        np.column_stack([x, still]), seed=0, blur=np.array([0.2, 0.2, 0.2, 0.4])
+    )
     assert np.mean(posterior.labels != labels) <= 0.02
     assert posterior.labels.max() == 1
 
@@ -89,7 +91,12 @@ def test_refuses_what_it_cannot_use(bad):
 
 
 @settings(max_examples=200 if LONG else 12)
-@given(st.integers(4, 40), st.integers(1, 8), st.integers(0, 1000), st.sampled_from(["gaussian", "autoregressive"]))
+@given(
+    st.integers(4, 40),
+    st.integers(1, 8),
+    st.integers(0, 1000),
+    st.sampled_from(["gaussian", "autoregressive"]),
+)
 def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
     rng = np.random.default_rng(seed)
     x = rng.standard_t(2, size=(samples, dimensions)) * 10.0 ** rng.integers(-6, 6, dimensions)
@@ -109,7 +116,10 @@ def test_states_whose_means_lie_close_are_told_apart():
     rng = np.random.default_rng(9)
     labels = np.repeat([0, 1, 2, 0, 1, 2], 50)
     means = rng.normal(size=(3, 6))
-    x = rng.normal(size=(300, 6)) + 2.2 * means[labels] / np.linalg.norm(means, axis=1)[labels][:, None]
+    x = (
+        rng.normal(size=(300, 6))
+        + 2.2 * means[labels] / np.linalg.norm(means, axis=1)[labels][:, None]
+    )
     posterior = segment_series(x, seed=2)
     assert posterior.labels.max() == 2
     assert np.mean(posterior.labels != labels) <= 0.05
@@ -121,7 +131,10 @@ def test_probability_within_counts_each_sample_once():
     wide = posterior.probability_within(5)
     for t in (0, 58, 66, 235, 244, 479):
         low, high = max(t - 5, 0), min(t + 6, 480)
-        near = [any(low <= c < high and c != 240 for c in np.flatnonzero(np.diff(row)) + 1) for row in posterior.samples]
+        near = [
+            any(low <= c < high and c != 240 for c in np.flatnonzero(np.diff(row)) + 1)
+            for row in posterior.samples
+        ]
         assert wide[t] == pytest.approx(np.mean(near))
 
 
@@ -196,7 +209,9 @@ def test_heavy_tails_are_told_from_states():
     x, labels = many_states(5)
     rng = np.random.default_rng(0)
     means = np.array([x[labels == k].mean(axis=0) for k in range(6)])
-    heavy = means[labels] + (x - means[labels]) / np.sqrt(rng.chisquare(3.0, size=(len(x), 1)) / 3.0)
+    heavy = means[labels] + (x - means[labels]) / np.sqrt(
+        rng.chisquare(3.0, size=(len(x), 1)) / 3.0
+    )
     posterior = segment_series(heavy, seed=0)
     assert 0.0 < posterior.dof <= 6.0
     assert found_as_drawn(posterior, labels)
@@ -211,11 +226,16 @@ def test_single_outliers_are_no_states():
 
 
 def test_outliers_are_told_by_their_own_sequence():
-    x = np.random.default_rng(2).normal(size=(100, 1)) + np.where(np.arange(100) < 50, 0.0, 100.0)[:, None]
+    x = (
+        np.random.default_rng(2).normal(size=(100, 1))
+        + np.where(np.arange(100) < 50, 0.0, 100.0)[:, None]
+    )
     x[49] = 60.0  # the last of the first sequence, on the way to the second
     for ends, hidden in (([50, 100], [49]), ([100], [])):
         usual = usual_distances(x, np.array(ends))
-        assert np.flatnonzero(np.isnan(without_outliers(x, usual, np.array(ends)))).tolist() == hidden
+        assert (
+            np.flatnonzero(np.isnan(without_outliers(x, usual, np.array(ends)))).tolist() == hidden
+        )
 
 
 def test_sequences_that_do_not_vary_keep_their_ends():
@@ -225,7 +245,9 @@ def test_sequences_that_do_not_vary_keep_their_ends():
 
 def test_a_sequence_shorter_than_the_order_is_named():
     x, _ = two_states(7)
-    with pytest.raises(InputError, match="sequence 1 has 3 samples; an autoregressive emission of order 2 needs 4"):
+    with pytest.raises(
+        InputError, match="sequence 1 has 3 samples; an autoregressive emission of order 2 needs 4"
+    ):
         segment_series(x, SamplerConfig(emission="autoregressive", order=2), ends=(100, 103, 240))
 
 

@@ -26,7 +26,9 @@ def open_road(size=200.0, resolution=0.25):
 
 def scenario_of(tracks, time, vehicles=None):
     """A scenario from (position (T, 2), heading (T,), speed (T,)) per vehicle; the acceleration is the mean of each step."""
-    position, heading, speed = (np.array(values, dtype=float) for values in zip(*tracks, strict=True))
+    position, heading, speed = (
+        np.array(values, dtype=float) for values in zip(*tracks, strict=True)
+    )
     rate = np.diff(speed, axis=1) / np.diff(time)
     acceleration = np.concatenate((rate, rate[:, -1:]), axis=1)
     vehicles = vehicles or tuple(Vehicle(f"v{i}") for i in range(len(tracks)))
@@ -36,23 +38,41 @@ def scenario_of(tracks, time, vehicles=None):
 def straight(x, y, yaw, speed, time):
     """A steady straight drive."""
     s = speed * time
-    return np.stack((x + s * np.cos(yaw), y + s * np.sin(yaw)), axis=-1), np.full(time.size, yaw), np.full(time.size, speed)
+    return (
+        np.stack((x + s * np.cos(yaw), y + s * np.sin(yaw)), axis=-1),
+        np.full(time.size, yaw),
+        np.full(time.size, speed),
+    )
 
 
 def arc(x, y, yaw, speed, yaw_rate, time):
     """A steady circular drive."""
     heading, radius = yaw + yaw_rate * time, speed / yaw_rate
-    position = np.stack((x + radius * (np.sin(heading) - np.sin(yaw)), y - radius * (np.cos(heading) - np.cos(yaw))), axis=-1)
+    position = np.stack(
+        (
+            x + radius * (np.sin(heading) - np.sin(yaw)),
+            y - radius * (np.cos(heading) - np.cos(yaw)),
+        ),
+        axis=-1,
+    )
     return position, heading, np.full(time.size, speed)
 
 
 def wander(rng, time, spread, max_speed=12.0):
     """A smooth random drive: speed and yaw rate are random sums of sines."""
     fine = np.linspace(time[0], time[-1], 40 * (time.size - 1) + 1)
-    waves = [rng.normal(size=3) @ np.sin(np.outer(rng.uniform(0.1, 1.0, 3), fine) + rng.uniform(0, 6, (3, 1))) for _ in range(2)]
+    waves = [
+        rng.normal(size=3)
+        @ np.sin(np.outer(rng.uniform(0.1, 1.0, 3), fine) + rng.uniform(0, 6, (3, 1)))
+        for _ in range(2)
+    ]
     speed = np.clip(rng.uniform(0, max_speed) + 2.0 * waves[0], 0.0, None)
-    heading = rng.uniform(-np.pi, np.pi) + np.concatenate(([0.0], np.cumsum(0.4 * waves[1][1:] * np.diff(fine))))
+    heading = rng.uniform(-np.pi, np.pi) + np.concatenate(
+        ([0.0], np.cumsum(0.4 * waves[1][1:] * np.diff(fine)))
+    )
     velocity = speed[:, None] * np.stack((np.cos(heading), np.sin(heading)), axis=-1)
     steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(fine)[:, None]
-    position = rng.uniform(-spread, spread, 2) + np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
+    position = rng.uniform(-spread, spread, 2) + np.concatenate(
+        (np.zeros((1, 2)), np.cumsum(steps, axis=0))
+    )
     return position[::40], heading[::40], speed[::40]

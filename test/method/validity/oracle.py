@@ -42,7 +42,10 @@ def footprints(position: Floats, heading: Floats, length: float, width: float) -
     """(M,) polygons at positions (M, 2) and headings (M,)."""
     ahead = np.stack((np.cos(heading), np.sin(heading)), axis=-1) * 0.5 * length
     aside = np.stack((-np.sin(heading), np.cos(heading)), axis=-1) * 0.5 * width
-    corners = np.stack((ahead + aside, aside - ahead, -ahead - aside, ahead - aside), axis=1) + position[:, None]
+    corners = (
+        np.stack((ahead + aside, aside - ahead, -ahead - aside, ahead - aside), axis=1)
+        + position[:, None]
+    )
     return shapely.polygons(corners)
 
 
@@ -61,7 +64,9 @@ def overlapping(scenario: Scenario, limits: Limits, dt: float) -> set[tuple[int,
     """Pairs that meet while both are there, each for `presence_margin` more than it is shown, as far as there are instants."""
     time, wide = scenario.time, []
     for first, last in scenario.present:
-        before = time[time < time[first] - limits.presence_margin + 1e-9]  # the margin is whole: it ends at an instant, or later
+        before = time[
+            time < time[first] - limits.presence_margin + 1e-9
+        ]  # the margin is whole: it ends at an instant, or later
         after = time[time > time[last] + limits.presence_margin - 1e-9]
         wide.append((before[-1] if len(before) else time[0], after[0] if len(after) else time[-1]))
     found = set()
@@ -84,9 +89,14 @@ def off_road(scenario: Scenario, road: Road, dt: float) -> set[int]:
 def boxes_beyond(scenario: Scenario, n: int, instants: Floats, edge: float = 0.0) -> np.ndarray:
     """Footprints (M,) of a vehicle, smaller by `edge` on each side; before and after it is shown it drives on along a circle."""
     first, last = scenario.present[n]
-    time, heading, speed = (values[first : last + 1] for values in (scenario.time, scenario.heading[n], scenario.speed[n]))
+    time, heading, speed = (
+        values[first : last + 1]
+        for values in (scenario.time, scenario.heading[n], scenario.speed[n])
+    )
     direction = np.stack((np.cos(heading), np.sin(heading)), axis=-1)
-    spline = CubicHermiteSpline(time, scenario.position[n, first : last + 1], speed[:, None] * direction)
+    spline = CubicHermiteSpline(
+        time, scenario.position[n, first : last + 1], speed[:, None] * direction
+    )
     place, yaw = spline(np.clip(instants, time[0], time[-1])), np.interp(instants, time, heading)
     for end, inner, beyond in ((0, 1, instants < time[0]), (-1, -2, instants > time[-1])):
         rate = (heading[end] - heading[inner]) / (time[end] - time[inner])
@@ -95,4 +105,6 @@ def boxes_beyond(scenario: Scenario, n: int, instants: Floats, edge: float = 0.0
             turned = heading[end] + rate * (fine - time[end])
             place[k] += speed[end] * np.trapezoid(np.stack((np.cos(turned), np.sin(turned))), fine)
             yaw[k] = turned[-1]
-    return footprints(place, yaw, scenario.vehicles[n].length - 2 * edge, scenario.vehicles[n].width - 2 * edge)
+    return footprints(
+        place, yaw, scenario.vehicles[n].length - 2 * edge, scenario.vehicles[n].width - 2 * edge
+    )

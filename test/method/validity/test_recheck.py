@@ -23,14 +23,30 @@ LENGTH = 100.0
 
 def crossing(delay=3.0):
     """Two cars that cross: the one from the west first, the other `delay` seconds later."""
-    return scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(0.0, -50.0 - 10.0 * delay, np.pi / 2, 10.0, TIME)), TIME)
+    return scenario_of(
+        (
+            straight(-50.0, 0.0, 0.0, 10.0, TIME),
+            straight(0.0, -50.0 - 10.0 * delay, np.pi / 2, 10.0, TIME),
+        ),
+        TIME,
+    )
 
 
 def recheck_of(scenario, road=None, changepoints=True):
     encounter = Encounter(
-        "t", scenario.vehicles, 0, 100_000_000, scenario.position, scenario.heading, scenario.speed, present=scenario.present
+        "t",
+        scenario.vehicles,
+        0,
+        100_000_000,
+        scenario.position,
+        scenario.heading,
+        scenario.speed,
+        present=scenario.present,
     )
-    ends = (np.column_stack([scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k]]) for k in (0, -1))
+    ends = (
+        np.column_stack([scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k]])
+        for k in (0, -1)
+    )
     return Recheck(encounter, road or open_road(), BoundaryStates(*ends), changepoints)
 
 
@@ -47,7 +63,9 @@ def test_a_sound_scenario_is_sound():
     assert (account.scenarios, account.vehicles, account.orders) == (2, 4, 2)
 
 
-@pytest.mark.parametrize(("delay", "hit"), [(0.0, True), (0.66, True), (0.68, False), (-0.66, True), (-0.68, False)])
+@pytest.mark.parametrize(
+    ("delay", "hit"), [(0.0, True), (0.66, True), (0.68, False), (-0.66, True), (-0.68, False)]
+)
 def test_contact_between_two_samples_is_found_to_the_millisecond(delay, hit):
     """At right angles the sweeps are clear once the delay exceeds 0.67 s: (4.8 + 1.9) / 10."""
     account = found(recheck_of(crossing()), crossing(delay))
@@ -62,7 +80,10 @@ def test_the_wrong_order_is_found():
 
 def test_a_wrong_order_in_a_queue_is_found():
     def queue(gap):
-        return scenario_of((straight(-40.0, 0.0, 0.0, 8.0, TIME), straight(-40.0 + gap, 0.0, 0.0, 8.0, TIME)), TIME)
+        return scenario_of(
+            (straight(-40.0, 0.0, 0.0, 8.0, TIME), straight(-40.0 + gap, 0.0, 0.0, 8.0, TIME)),
+            TIME,
+        )
 
     assert found(recheck_of(queue(-15.0)), queue(-8.0)).found["passing_order"] == 0
     assert found(recheck_of(queue(-15.0)), queue(15.0)).found["passing_order"] == 1
@@ -72,7 +93,9 @@ def test_leaving_the_road_between_two_samples_is_found():
     drivable = np.ones((200, 1000), dtype=bool)
     drivable[105, 500] = False  # one cell, 1.05 to 1.2 m to the left of the way
     road = road_of(drivable, 0.2, (-100.0, -20.0))
-    scenario = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(-50.0, 10.0, 0.0, 10.0, TIME)), TIME)
+    scenario = scenario_of(
+        (straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(-50.0, 10.0, 0.0, 10.0, TIME)), TIME
+    )
     recheck = recheck_of(scenario, road)
     assert found(recheck, scenario).found == {}
     nearer = scenario.position.copy()
@@ -87,7 +110,9 @@ def test_a_wait_that_moves_and_ends_that_are_missed_are_found():
     recheck = recheck_of(scenario)
     assert recheck.waits == [(0, 0), (1, 1)]
     assert found(recheck, scenario).found == {}
-    creeping = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(5.0, 20.0, 0.0, 0.3, TIME)), TIME)
+    creeping = scenario_of(
+        (straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(5.0, 20.0, 0.0, 0.3, TIME)), TIME
+    )
     account = found(recheck, creeping)
     assert account.found["stop_not_kept"] == 1
     assert account.found["boundary_state"] >= 1
@@ -101,7 +126,9 @@ def test_it_agrees_with_brute_force_on_random_motions():
     road, time, agreed = road_of(drivable, 0.25, (-37.5, -37.5)), np.arange(31) * 0.1, 0
     for _ in range(12):
         scenario = scenario_of(
-            [wander(rng, time, 15.0) for _ in range(2)], time, (Vehicle("a", 4.0, 1.8), Vehicle("b", 4.0, 1.8))
+            [wander(rng, time, 15.0) for _ in range(2)],
+            time,
+            (Vehicle("a", 4.0, 1.8), Vehicle("b", 4.0, 1.8)),
         )
         meet, off = len(overlapping(scenario, FREE, 1e-3)), len(off_road(scenario, road, 1e-3))
         account = found(recheck_of(scenario, road), scenario)
@@ -112,7 +139,9 @@ def test_it_agrees_with_brute_force_on_random_motions():
 
 @pytest.mark.parametrize(("comes", "clear"), [(42, False), (60, False), (62, True)])
 def test_nobody_stands_where_another_one_has_just_vanished(comes, clear):
-    scenario = scenario_of([straight(0.0, 0.0, 0.0, 0.0, TIME), straight(1.0, 0.0, 0.2, 0.0, TIME)], TIME)
+    scenario = scenario_of(
+        [straight(0.0, 0.0, 0.0, 0.0, TIME), straight(1.0, 0.0, 0.2, 0.0, TIME)], TIME
+    )
     scenario = replace(scenario, present=np.array([[0, 40], [comes, 100]]))
     account = found(recheck_of(scenario), scenario)
     assert account.found == ({} if clear else {"overlap": 1})
@@ -120,12 +149,16 @@ def test_nobody_stands_where_another_one_has_just_vanished(comes, clear):
 
 def test_who_is_not_there_is_in_nobody_s_way():
     """The second comes where the first drove long ago; before, it neither stands there nor is it first, and it does not wait."""
-    scenario = scenario_of([straight(-40.0, 0.0, 0.0, 10.0, TIME), straight(-20.0, -20.0, np.pi / 2, 4.0, TIME)], TIME)
+    scenario = scenario_of(
+        [straight(-40.0, 0.0, 0.0, 10.0, TIME), straight(-20.0, -20.0, np.pi / 2, 4.0, TIME)], TIME
+    )
     late = replace(scenario, present=np.array([[0, 100], [40, 100]]))
     recheck = recheck_of(late)
     account = found(recheck, late)
     assert (account.found, account.orders, recheck.orders) == ({}, 1, {(0, 1): 1})
-    standing = scenario_of([straight(-40.0, 9.0, 0.0, 0.0, TIME), straight(-20.0, -20.0, np.pi / 2, 4.0, TIME)], TIME)
+    standing = scenario_of(
+        [straight(-40.0, 9.0, 0.0, 0.0, TIME), straight(-20.0, -20.0, np.pi / 2, 4.0, TIME)], TIME
+    )
     short = recheck_of(replace(standing, present=np.array([[50, 55], [0, 100]])))
     assert short.waits == [(0, 0), (0, 0)], "half a second is no wait"
 

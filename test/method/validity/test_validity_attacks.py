@@ -30,7 +30,13 @@ def states(scenario, k):
 
 
 def causes(scenario, **known):
-    given = {"road": None, "requested": None, "conflicts": None, "waits": None, "limits": Limits()} | known
+    given = {
+        "road": None,
+        "requested": None,
+        "conflicts": None,
+        "waits": None,
+        "limits": Limits(),
+    } | known
     (verdict,) = Checker(**given).check([scenario])
     return [violation.cause for violation in verdict.violations]
 
@@ -47,7 +53,9 @@ def test_what_was_asked_is_never_near_to_nan(column, end):
 
 def test_nan_frees_no_state():
     scenario = passing()
-    asked = BoundaryStates(states(scenario, 0) + 5.0, states(scenario, -1), np.full((2, 2, 2), np.nan))
+    asked = BoundaryStates(
+        states(scenario, 0) + 5.0, states(scenario, -1), np.full((2, 2, 2), np.nan)
+    )
     assert Cause.BOUNDARY_STATE in causes(scenario, requested=asked)
 
 
@@ -65,25 +73,46 @@ def test_a_wait_or_a_conflict_of_nobody_is_refused(index):
         causes(passing(), conflicts=[Conflict(0, index, False, 1.0, 2.0, 3.0)])
 
 
-@pytest.mark.parametrize(("present", "ends"), [([0, 1], "goes"), ([99, 100], "comes"), ([50, 51], "comes")])
+@pytest.mark.parametrize(
+    ("present", "ends"), [([0, 1], "goes"), ([99, 100], "comes"), ([50, 51], "comes")]
+)
 def test_who_stands_in_the_way_does_not_vanish(present, ends):
     """Its first and last state are as asked, it never moves, and it is gone when the other one drives through its place."""
     template = scenario_of([straight(0, 0, 0, 0.0, TIME), straight(-25, 9, 0, 5.0, TIME)], TIME)
-    names = (template.vehicles, 0, 100_000_000, template.position, template.heading, template.speed)
-    encounter, asked = Encounter("t", *names), BoundaryStates(states(template, 0), states(template, -1))
+    names = (
+        template.vehicles,
+        0,
+        100_000_000,
+        template.position,
+        template.heading,
+        template.speed,
+    )
+    encounter, asked = (
+        Encounter("t", *names),
+        BoundaryStates(states(template, 0), states(template, -1)),
+    )
     own = Checker.of_template(encounter, open_road(), asked, find_waits(encounter), FREE)
     assert not own.check([template])[0].violations
     (verdict,) = own.check([replace(template, present=np.array([present, [0, 100]]))])
     assert Cause.BOUNDARY_STATE in {violation.cause for violation in verdict.violations}
-    assert f"vehicle 0: {ends} at {0.1 * present[ends == 'goes']:.3f} s" in verdict.violations[0].message
+    assert (
+        f"vehicle 0: {ends} at {0.1 * present[ends == 'goes']:.3f} s"
+        in verdict.violations[0].message
+    )
     late = replace(encounter, present=np.array([[20, 80], [0, 100]]))
     own = Checker.of_template(late, open_road(), asked, find_waits(late), FREE)
-    assert not own.check([replace(template, present=np.array([[10, 90], [0, 100]]))])[0].violations, "who comes late may"
+    assert not own.check([replace(template, present=np.array([[10, 90], [0, 100]]))])[
+        0
+    ].violations, "who comes late may"
     (verdict,) = own.check([replace(template, present=np.array([[20, 21], [0, 100]]))])
-    assert [violation.cause for violation in verdict.violations] == [Cause.STOP_NOT_KEPT], "but it waits"
+    assert [violation.cause for violation in verdict.violations] == [Cause.STOP_NOT_KEPT], (
+        "but it waits"
+    )
 
 
-@pytest.mark.parametrize("rows", [[[0.9, 50.7], [51, 100]], [[np.nan, 50], [51, 100]], [["0", "50"], ["51", "100"]]])
+@pytest.mark.parametrize(
+    "rows", [[[0.9, 50.7], [51, 100]], [[np.nan, 50], [51, 100]], [["0", "50"], ["51", "100"]]]
+)
 def test_a_presence_is_of_whole_numbers(rows):
     with pytest.raises(InputError, match="whole numbers"):
         replace(passing(), present=np.array(rows))
@@ -95,7 +124,10 @@ def test_nobody_drives_over_who_has_just_gone_however_long_the_steps(step):
     time = np.arange(11) * step
     gone = time[4]
     behind = straight(-5.5 - 8.0 * gone, 0, 0, 8.0, time)
-    scenario = replace(scenario_of([straight(0, 0, 0, 0.0, time), behind], time), present=np.array([[0, 4], [0, 10]]))
+    scenario = replace(
+        scenario_of([straight(0, 0, 0, 0.0, time), behind], time),
+        present=np.array([[0, 4], [0, 10]]),
+    )
     assert causes(scenario) == [Cause.OVERLAP]
     assert causes(scenario, limits=Limits(presence_margin=0.0)) == []
 
@@ -108,7 +140,10 @@ def test_the_margin_is_whole_at_every_instant(step, margin):
     for at in range(1, 99):
         scenario = replace(passing(time), present=np.array([[at, 100], [0, at]]))
         (first, _), (_, last) = time[driven_on(scenario, margin)[3]]
-        for reached, whole in ((time[at] - first, time[at]), (last - time[at], time[-1] - time[at])):
+        for reached, whole in (
+            (time[at] - first, time[at]),
+            (last - time[at], time[-1] - time[at]),
+        ):
             assert min(margin, whole) - 1e-8 <= reached < margin + step - 1e-8
 
 
@@ -125,11 +160,15 @@ def test_who_stands_does_not_turn_in_many_short_steps():
 @pytest.mark.parametrize("far", [2.0 * LARGEST, 1e15, 1e300])
 def test_where_coordinates_are_too_coarse_nothing_is_proven(far):
     time = np.array([0.0, 1.0, 2.0])
-    crossing = scenario_of([straight(far - 30, 0, 0, 40, time), straight(far, -30, np.pi / 2, 40, time)], time)
+    crossing = scenario_of(
+        [straight(far - 30, 0, 0, 40, time), straight(far, -30, np.pi / 2, 40, time)], time
+    )
     assert causes(crossing, limits=FREE) == [Cause.NOT_FINITE]
 
 
-@pytest.mark.parametrize("size", [(0.0, 1.0), (-1.0, 1.0), (np.nan, 1.0), (5.0, np.nan), (np.inf, 1.0), (1e-12, 1e-12)])
+@pytest.mark.parametrize(
+    "size", [(0.0, 1.0), (-1.0, 1.0), (np.nan, 1.0), (5.0, np.nan), (np.inf, 1.0), (1e-12, 1e-12)]
+)
 def test_no_size_lets_two_stand_in_one_place(size):
     standing = [straight(0, 0, 0, 0.0, TIME)] * 2
     scenario = scenario_of(standing, TIME, (Vehicle("a", *size), Vehicle("b", *size)))
@@ -141,7 +180,11 @@ def test_no_size_lets_two_stand_in_one_place(size):
 
 
 def test_a_jump_there_and_back_is_refused():
-    for field, at, value in (("position", (0, 50, 0), 300.0), ("heading", (0, 50), np.pi), ("speed", (0, 50), 40.0)):
+    for field, at, value in (
+        ("position", (0, 50, 0), 300.0),
+        ("heading", (0, 50), np.pi),
+        ("speed", (0, 50), 40.0),
+    ):
         values = getattr(passing(), field).copy()
         values[at] = value
         assert causes(replace(passing(), **{field: values}))

@@ -41,9 +41,13 @@ def box_at(scenario, i, time):
 @pytest.mark.parametrize("offset", [0.0, 3.0, -4.0])
 def test_cars_that_cross_between_two_samples_overlap(offset):
     """At 40 m/s and one sample per second the cars are 20 m apart at every sample, and meet in between."""
-    crossing = scenario_of([straight(-60, 0, 0, 40, COARSE), straight(0, -60 + offset, np.pi / 2, 40, COARSE)], COARSE)
+    crossing = scenario_of(
+        [straight(-60, 0, 0, 40, COARSE), straight(0, -60 + offset, np.pi / 2, 40, COARSE)], COARSE
+    )
     assert causes(crossing) == [Cause.OVERLAP]
-    later = scenario_of([straight(-60, 0, 0, 40, COARSE), straight(0, -68, np.pi / 2, 40, COARSE)], COARSE)
+    later = scenario_of(
+        [straight(-60, 0, 0, 40, COARSE), straight(0, -68, np.pi / 2, 40, COARSE)], COARSE
+    )
     assert causes(later) == []
 
 
@@ -60,11 +64,21 @@ def test_rotation_alone_can_touch():
 
 def test_touching_is_overlap_and_a_millimetre_is_not():
     cars = (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0))
-    for gap, expected in ((0.0, [Cause.OVERLAP]), (-1e-6, [Cause.OVERLAP]), (1e-3, []), (1e-6, [])):
-        side = scenario_of([straight(0, 0, 0, 10, FINE), straight(1, 2.0 + gap, 0, 8, FINE)], FINE, cars)
+    for gap, expected in (
+        (0.0, [Cause.OVERLAP]),
+        (-1e-6, [Cause.OVERLAP]),
+        (1e-3, []),
+        (1e-6, []),
+    ):
+        side = scenario_of(
+            [straight(0, 0, 0, 10, FINE), straight(1, 2.0 + gap, 0, 8, FINE)], FINE, cars
+        )
         assert causes(side) == expected
         queue = scenario_of(
-            [straight(0, 0, 0.5, 10, FINE), straight(*((4.0 + gap) * np.array([np.cos(0.5), np.sin(0.5)])), 0.5, 10, FINE)],
+            [
+                straight(0, 0, 0.5, 10, FINE),
+                straight(*((4.0 + gap) * np.array([np.cos(0.5), np.sin(0.5)])), 0.5, 10, FINE),
+            ],
             FINE,
             cars,
         )
@@ -89,7 +103,9 @@ def test_a_post_of_one_cell_between_two_samples_is_seen(resolution):
     drivable[drivable.shape[0] // 2, int(65 / resolution)] = False
     assert causes(drive, road_of(drivable, resolution)) == [Cause.OFF_ROAD]
     drivable[:] = True
-    drivable[int((5 + 0.96 + resolution) / resolution), int(65 / resolution)] = False  # just beside the car
+    drivable[int((5 + 0.96 + resolution) / resolution), int(65 / resolution)] = (
+        False  # just beside the car
+    )
     assert causes(drive, road_of(drivable, resolution)) == []
 
 
@@ -97,13 +113,21 @@ def test_a_lane_as_wide_as_the_car_suffices_and_a_hair_less_does_not():
     road = road_of(np.pad(np.ones((8, 400), dtype=bool), 2), 0.25)
     fits = scenario_of([straight(5, 1.5, 0, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),))
     assert causes(fits, road) == []
-    assert causes(scenario_of([straight(5, 1.5, 0, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0 + 1e-6),)), road) == [Cause.OFF_ROAD]
-    assert causes(scenario_of([straight(5, 1.5, 1e-3, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),)), road) == [Cause.OFF_ROAD]
+    assert causes(
+        scenario_of([straight(5, 1.5, 0, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0 + 1e-6),)), road
+    ) == [Cause.OFF_ROAD]
+    assert causes(
+        scenario_of([straight(5, 1.5, 1e-3, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),)), road
+    ) == [Cause.OFF_ROAD]
 
 
 def test_outside_the_grid_is_off_road():
     road = road_of(np.ones((100, 100), dtype=bool), 0.25)
-    for track in (straight(5, 12, 0, 6, FINE), straight(12, 3, -np.pi / 2, 1, FINE), straight(-500, 9, 0.1, 0, FINE)):
+    for track in (
+        straight(5, 12, 0, 6, FINE),
+        straight(12, 3, -np.pi / 2, 1, FINE),
+        straight(-500, 9, 0.1, 0, FINE),
+    ):
         assert causes(scenario_of([track], FINE), road) == [Cause.OFF_ROAD]
 
 
@@ -111,7 +135,11 @@ def test_the_cubic_between_samples_counts_not_the_chord():
     """Both samples of a wide swerve lie on a straight corridor; the motion between them leaves it."""
     time = np.array([0.0, 4.0])
     road = road_of(np.pad(np.ones((16, 300), dtype=bool), 40), 0.25)
-    swerve = (np.array([[15.0, 12.0], [55.0, 12.0]]), np.array([0.3, -0.3]), np.array([11.0, 11.0]))
+    swerve = (
+        np.array([[15.0, 12.0], [55.0, 12.0]]),
+        np.array([0.3, -0.3]),
+        np.array([11.0, 11.0]),
+    )
     assert causes(scenario_of([swerve], time, (Vehicle("a", 1.0, 0.5),)), road) == [Cause.OFF_ROAD]
     steady = (np.array([[15.0, 12.0], [55.0, 12.0]]), np.zeros(2), np.array([10.0, 10.0]))
     assert causes(scenario_of([steady], time, (Vehicle("a", 1.0, 0.5),)), road) == []
@@ -141,9 +169,13 @@ def random_road(rng):
 def random_case(seed):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 5))
-    time = np.concatenate(([0.0], np.cumsum(rng.choice([0.1, 0.3, 1.0]) * rng.uniform(0.5, 1.5, 10))))
+    time = np.concatenate(
+        ([0.0], np.cumsum(rng.choice([0.1, 0.3, 1.0]) * rng.uniform(0.5, 1.5, 10)))
+    )
     vehicles = tuple(Vehicle(str(i), *rng.uniform((1.5, 0.5), (12.0, 2.6))) for i in range(n))
-    return scenario_of([wander(rng, time, 25.0) for _ in range(n)], time, vehicles), random_road(rng)
+    return scenario_of([wander(rng, time, 25.0) for _ in range(n)], time, vehicles), random_road(
+        rng
+    )
 
 
 def compare(seed):
@@ -153,13 +185,17 @@ def compare(seed):
     refused = {(violation.cause, violation.vehicles) for violation in answer.violations}
     assert {(Cause.OVERLAP, pair) for pair in overlapping(scenario, FREE, 0.01)} <= refused
     assert {(Cause.OFF_ROAD, (i,)) for i in off_road(scenario, road, 0.01)} <= refused
-    for violation in answer.violations:  # never refused without reason: at the instant it names, it is so
+    for (
+        violation
+    ) in answer.violations:  # never refused without reason: at the instant it names, it is so
         if violation.cause is Cause.OVERLAP:
             a, b = (box_at(scenario, i, violation.time) for i in violation.vehicles)
             assert shapely.distance(a, b) < 0.02, violation
         elif violation.cause is Cause.OFF_ROAD:
             (i,) = violation.vehicles
-            assert not shapely.covers(drivable_area(road), shapely.buffer(box_at(scenario, i, violation.time), 0.02)), violation
+            assert not shapely.covers(
+                drivable_area(road), shapely.buffer(box_at(scenario, i, violation.time), 0.02)
+            ), violation
     return answer.valid
 
 
@@ -194,7 +230,13 @@ def test_two_turning_cars_agree_with_the_oracle_near_contact(seed):
     rng = np.random.default_rng(seed)
     time = np.arange(6) * rng.choice([0.1, 0.5, 1.0])
     tracks = [
-        arc(*rng.uniform(-8, 8, 2), rng.uniform(-3, 3), rng.uniform(0, 12), rng.choice([-1, 1]) * rng.uniform(0.1, 0.6), time)
+        arc(
+            *rng.uniform(-8, 8, 2),
+            rng.uniform(-3, 3),
+            rng.uniform(0, 12),
+            rng.choice([-1, 1]) * rng.uniform(0.1, 0.6),
+            time,
+        )
         for _ in range(2)
     ]
     angle = rng.uniform(-np.pi, np.pi)
@@ -212,11 +254,17 @@ def test_two_turning_cars_agree_with_the_oracle_near_contact(seed):
         low, high = (middle, high) if gap(middle) <= 0.01 else (low, middle)
     for shift in (high, max(low - 0.03, 0.0), high + 0.2):
         scenario = shifted(shift)
-        overlaps = [violation.time for violation in verdict(scenario).violations if violation.cause is Cause.OVERLAP]
+        overlaps = [
+            violation.time
+            for violation in verdict(scenario).violations
+            if violation.cause is Cause.OVERLAP
+        ]
         if overlaps:
             assert shapely.distance(*boxes_at(scenario, np.array(overlaps)))[0] < 1e-4
         else:
-            assert shapely.distance(*boxes_at(scenario, np.linspace(0, time[-1], 2000))).min() > 0.0
+            assert (
+                shapely.distance(*boxes_at(scenario, np.linspace(0, time[-1], 2000))).min() > 0.0
+            )
 
 
 def test_far_from_the_origin_nothing_changes():
@@ -225,7 +273,10 @@ def test_far_from_the_origin_nothing_changes():
     near = open_road(60.0)
     far = road_of(near.drivable, near.resolution, near.origin + shift)
     for gap, expected in ((1.9, [Cause.OVERLAP]), (1.91, [])):
-        tracks = [straight(-15, 0, 0.3, 5, FINE), straight(-15 - gap * np.sin(0.3), gap * np.cos(0.3), 0.3, 6, FINE)]
+        tracks = [
+            straight(-15, 0, 0.3, 5, FINE),
+            straight(-15 - gap * np.sin(0.3), gap * np.cos(0.3), 0.3, 6, FINE),
+        ]
         assert causes(scenario_of(tracks, FINE), near) == expected
         tracks = [(position + shift, heading, speed) for position, heading, speed in tracks]
         assert causes(scenario_of(tracks, FINE), far) == expected

@@ -27,7 +27,11 @@ def speed_profile(x, y, yaw, knots, speeds):
     whole = np.concatenate(([0.0], np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * np.diff(knots))))
     piece = np.clip(np.searchsorted(knots, TIME, side="right") - 1, 0, knots.size - 2)
     s = whole[piece] + 0.5 * (speeds[piece] + v) * (TIME - knots[piece])
-    return np.stack((x + s * np.cos(yaw), y + s * np.sin(yaw)), axis=-1), np.full(TIME.size, yaw), v
+    return (
+        np.stack((x + s * np.cos(yaw), y + s * np.sin(yaw)), axis=-1),
+        np.full(TIME.size, yaw),
+        v,
+    )
 
 
 def good(*tracks):
@@ -37,14 +41,19 @@ def good(*tracks):
 
 
 def asked_of(scenario):
-    start, end = (np.column_stack((scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k])) for k in (0, -1))
+    start, end = (
+        np.column_stack((scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k]))
+        for k in (0, -1)
+    )
     return BoundaryStates(start, end)
 
 
 def causes(scenario, *, road=ROAD, requested=None, conflicts=None, waits=None, limits=None):
     """Causes found by the checker."""
     (verdict,) = Checker(road, requested, conflicts, waits, limits).check([scenario])
-    assert all(violation.message and np.isfinite(violation.time) for violation in verdict.violations)
+    assert all(
+        violation.message and np.isfinite(violation.time) for violation in verdict.violations
+    )
     return [violation.cause for violation in verdict.violations]
 
 
@@ -70,7 +79,9 @@ def test_each_limit_refuses_with_its_cause(dynamics, cause):
 
 
 def test_values_exactly_at_their_limits_are_kept():
-    limits = Limits(car=Dynamics(max_speed=9.0, max_lateral_acceleration=1.2, max_curvature=0.15 / 8 + 1e-4))
+    limits = Limits(
+        car=Dynamics(max_speed=9.0, max_lateral_acceleration=1.2, max_curvature=0.15 / 8 + 1e-4)
+    )
     assert causes(good(), limits=limits) == []
 
 
@@ -96,7 +107,9 @@ def test_the_message_carries_vehicle_time_and_figures():
     scenario = good()
     acceleration = np.array(scenario.acceleration)
     acceleration[0, 10] = 6.0
-    (verdict,) = Checker(ROAD, None, None, None).check([replace(scenario, acceleration=acceleration)])
+    (verdict,) = Checker(ROAD, None, None, None).check(
+        [replace(scenario, acceleration=acceleration)]
+    )
     (violation,) = (v for v in verdict.violations if "5.000" in v.message)
     assert (violation.time, violation.vehicles) == (1.0, (0,))
     assert "6.000 m/s²" in violation.message
@@ -110,7 +123,9 @@ def test_sliding_sideways_is_found():
 
 def test_positions_that_zigzag_within_the_tolerance_of_the_heading_are_found():
     position, heading, speed = straight(-90, 0, 0, 8, TIME)
-    zigzag = position + np.stack((0 * TIME, 0.02 * (-1.0) ** np.arange(TIME.size)), axis=-1)  # 0.4 m/s sideways, 8 m/s²
+    zigzag = position + np.stack(
+        (0 * TIME, 0.02 * (-1.0) ** np.arange(TIME.size)), axis=-1
+    )  # 0.4 m/s sideways, 8 m/s²
     assert set(causes(good((zigzag, heading, speed)))) == {Cause.LATERAL_ACCELERATION}
     jerky = position + np.stack((0.02 * (-1.0) ** np.arange(TIME.size), 0 * TIME), axis=-1)
     assert set(causes(good((jerky, heading, speed)))) == {Cause.LONGITUDINAL_ACCELERATION}
@@ -123,7 +138,9 @@ def test_moving_faster_than_the_published_speed_is_found():
 
 def test_an_acceleration_that_does_not_change_the_speed_is_found():
     scenario = good(straight(-50, 0, 0, 5, TIME))
-    assert set(causes(replace(scenario, acceleration=np.full((1, 201), 1.0)))) == {Cause.LONGITUDINAL_ACCELERATION}
+    assert set(causes(replace(scenario, acceleration=np.full((1, 201), 1.0)))) == {
+        Cause.LONGITUDINAL_ACCELERATION
+    }
 
 
 @pytest.mark.parametrize("field", ["position", "heading", "speed", "acceleration"])
@@ -145,11 +162,21 @@ def test_time_must_increase():
 def test_asked_states_are_kept_within_the_tolerances():
     scenario = good()
     asked = asked_of(scenario)
-    for column, off, expected in ((0, 0.099, 0), (0, 0.101, 1), (1, -0.101, 1), (3, 0.099, 0), (3, -0.101, 1), (2, 0.5, 0)):
+    for column, off, expected in (
+        (0, 0.099, 0),
+        (0, 0.101, 1),
+        (1, -0.101, 1),
+        (3, 0.099, 0),
+        (3, -0.101, 1),
+        (2, 0.5, 0),
+    ):
         for name in ("start", "end"):
             states = np.array(getattr(asked, name))
             states[1, column] += off
-            assert causes(scenario, requested=replace(asked, **{name: states})) == [Cause.BOUNDARY_STATE] * expected
+            assert (
+                causes(scenario, requested=replace(asked, **{name: states}))
+                == [Cause.BOUNDARY_STATE] * expected
+            )
 
 
 CROSSING = (straight(-90, 0, 0, 9, TIME), straight(0, -60, np.pi / 2, 7, TIME))
@@ -164,14 +191,18 @@ def test_passing_order_is_that_of_the_template():
 
 
 def test_a_conflict_that_the_scenario_does_not_have_is_counted_not_refused():
-    lanes = scenario_of([straight(-90, 0, 0, 9, TIME), straight(90, 4, np.pi, 9, TIME), CROSSING[1]], TIME)
+    lanes = scenario_of(
+        [straight(-90, 0, 0, 9, TIME), straight(90, 4, np.pi, 9, TIME), CROSSING[1]], TIME
+    )
     conflicts = tuple(Conflict(a, b, False, 0.0, 1.0, 2.0) for a, b in ((1, 0), (2, 0)))
     (verdict,) = Checker(ROAD, None, conflicts, None).check([lanes])
     assert (verdict.valid, verdict.conflicts, verdict.not_applicable) == (True, 1, 1)
 
 
 def stopping(stop, crawl=0.0):
-    return good(speed_profile(-90, 0, 0, [0, 5, 8, 8 + stop, 12 + stop, 20], [9, 9, crawl, crawl, 8, 8]))
+    return good(
+        speed_profile(-90, 0, 0, [0, 5, 8, 8 + stop, 12 + stop, 20], [9, 9, crawl, crawl, 8, 8])
+    )
 
 
 def test_a_wait_must_stand_for_a_second():
@@ -205,7 +236,9 @@ def test_creeping_under_a_published_standstill_is_no_stand():
     position = np.array(scenario.position)
     position[0, 80:93, 0] += 0.015 * np.arange(13)  # 0.15 m/s, while the speed says 0
     position[0, 93:, 0] += 0.18
-    assert causes(replace(scenario, position=position), waits=(Wait(0, 7.0, 8.2),)) == [Cause.STOP_NOT_KEPT]
+    assert causes(replace(scenario, position=position), waits=(Wait(0, 7.0, 8.2),)) == [
+        Cause.STOP_NOT_KEPT
+    ]
 
 
 def test_a_vehicle_that_waits_throughout_never_moves():
@@ -241,7 +274,9 @@ def test_what_does_not_suit_the_request_is_an_error():
     with pytest.raises(InputError, match="shape"):
         Checker(None, None, None, None).check([replace(scenario, speed=scenario.speed[:, :-1])])
     with pytest.raises(InputError, match="positive"):
-        Checker(None, None, None, None).check([replace(scenario, vehicles=(Vehicle("a"), Vehicle("b", 0.0)))])
+        Checker(None, None, None, None).check(
+            [replace(scenario, vehicles=(Vehicle("a"), Vehicle("b", 0.0)))]
+        )
     with pytest.raises(InputError, match="max_speed"):
         Dynamics(max_speed=-1.0)
 
@@ -254,10 +289,25 @@ def test_a_batch_is_answered_in_order():
 
 def test_the_least_gap_follows_the_template_unless_it_is_given():
     time = np.arange(51) * 0.1
-    position = np.stack([np.column_stack([5.0 * time, np.zeros(51)]), np.column_stack([5.0 * time, np.full(51, 2.5)])])
-    beside = Encounter("beside", (Vehicle("a"), Vehicle("b")), 0, 100_000_000, position, np.zeros((2, 51)), np.full((2, 51), 5.0))
+    position = np.stack(
+        [
+            np.column_stack([5.0 * time, np.zeros(51)]),
+            np.column_stack([5.0 * time, np.full(51, 2.5)]),
+        ]
+    )
+    beside = Encounter(
+        "beside",
+        (Vehicle("a"), Vehicle("b")),
+        0,
+        100_000_000,
+        position,
+        np.zeros((2, 51)),
+        np.full((2, 51), 5.0),
+    )
     assert Limits().clearance == 0.0  # nothing is known of a template
-    assert Limits().for_template(beside).clearance == pytest.approx(0.3)  # half of 2.5 m less the width
+    assert Limits().for_template(beside).clearance == pytest.approx(
+        0.3
+    )  # half of 2.5 m less the width
     far = replace(beside, position=position + np.array([[[0.0, 0.0]], [[0.0, 8.0]]]))
     assert Limits().for_template(far).clearance == 0.5
     overlapping = replace(beside, position=position * np.array([1.0, 0.2]))

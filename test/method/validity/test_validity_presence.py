@@ -28,11 +28,20 @@ ROAD = open_road()
 
 def together(present):
     """Two cars on the same place at 5 s; they meet from 4 s to 6 s."""
-    return replace(scenario_of([straight(-25, 0, 0, 5, TIME), straight(25, 0, np.pi, 5, TIME)], TIME), present=np.array(present))
+    return replace(
+        scenario_of([straight(-25, 0, 0, 5, TIME), straight(25, 0, np.pi, 5, TIME)], TIME),
+        present=np.array(present),
+    )
 
 
 def causes(scenario, **known):
-    given = {"road": ROAD, "requested": None, "conflicts": None, "waits": None, "limits": FREE} | known
+    given = {
+        "road": ROAD,
+        "requested": None,
+        "conflicts": None,
+        "waits": None,
+        "limits": FREE,
+    } | known
     (verdict,) = Checker(**given).check([scenario])
     return [violation.cause for violation in verdict.violations], verdict
 
@@ -59,7 +68,9 @@ def test_footprints_overlap_while_both_are_there_and_a_little_longer(present, sh
             first, last = max(first for first, _ in present), min(last for _, last in present)
             time = verdict.violations[0].time
             assert 0.1 * first - margin - 1e-9 <= time <= 0.1 * last + margin + 1e-9
-            assert ("more than it is shown" in verdict.violations[0].message) == (not 0.1 * first <= time <= 0.1 * last)
+            assert ("more than it is shown" in verdict.violations[0].message) == (
+                not 0.1 * first <= time <= 0.1 * last
+            )
 
 
 @pytest.mark.parametrize(("comes", "valid"), [(42, False), (55, False), (60, False), (62, True)])
@@ -71,7 +82,9 @@ def test_nobody_stands_where_another_one_has_just_vanished(comes, valid):
 
 def test_who_follows_may_come_where_the_leader_drove():
     """Half a second behind at 10 m/s: the leader has driven on."""
-    scenario = scenario_of([straight(-50, 0, 0, 10.0, TIME), straight(-60, 0, 0, 10.0, TIME)], TIME)
+    scenario = scenario_of(
+        [straight(-50, 0, 0, 10.0, TIME), straight(-60, 0, 0, 10.0, TIME)], TIME
+    )
     assert causes(replace(scenario, present=np.array([[0, 50], [55, 100]])))[0] == []
 
 
@@ -90,7 +103,9 @@ def random_case(seed, group=0):
     rng = np.random.default_rng(seed)
     n = group or int(rng.integers(2, 6))
     room = 3.0 * group or 12.0
-    time = np.concatenate(([0.0], np.cumsum(rng.choice([0.1, 0.3, 1.0]) * rng.uniform(0.5, 1.5, 12))))
+    time = np.concatenate(
+        ([0.0], np.cumsum(rng.choice([0.1, 0.3, 1.0]) * rng.uniform(0.5, 1.5, 12)))
+    )
     tracks = [wander(rng, time, room, rng.choice([0.0, 12.0], p=[0.2, 0.8])) for _ in range(n)]
     vehicles = tuple(Vehicle(str(i), *rng.uniform((1.5, 0.5), (12.0, 2.6))) for i in range(n))
     present = np.array([np.sort(rng.choice(len(time), 2, replace=False)) for _ in range(n)])
@@ -98,20 +113,32 @@ def random_case(seed, group=0):
         at = int(np.clip(present[0, 1] + rng.integers(-2, 2), 0, len(time) - 2))
         present[1] = at, rng.integers(at + 1, len(time))
     margin = float(rng.choice([0.0, 0.25, 1.0]))
-    return replace(scenario_of(tracks, time, vehicles), present=present), replace(FREE, presence_margin=margin)
+    return replace(scenario_of(tracks, time, vehicles), present=present), replace(
+        FREE, presence_margin=margin
+    )
 
 
 def compare(seed, group=0):
     """Assert that checker and oracle agree about overlaps; return (valid, spans in common of 0, 1, 2 and more samples)."""
     scenario, limits = random_case(seed, group)
     _, verdict = causes(scenario, road=None, limits=limits)
-    refused = {violation.vehicles: violation for violation in verdict.violations if violation.cause is Cause.OVERLAP}
+    refused = {
+        violation.vehicles: violation
+        for violation in verdict.violations
+        if violation.cause is Cause.OVERLAP
+    }
     assert overlapping(scenario, limits, 0.02) <= set(refused), "what the oracle finds is refused"
-    for pair, violation in refused.items():  # and what is refused is so, at the instant that is named
+    for (
+        pair,
+        violation,
+    ) in refused.items():  # and what is refused is so, at the instant that is named
         boxes = [boxes_beyond(scenario, i, np.array([violation.time]))[0] for i in pair]
         assert shapely.distance(*boxes) < 0.02, violation
     first, last = scenario.present.T
-    spans = {int(np.clip(min(last[[i, j]]) - max(first[[i, j]]) + 1, 0, 3)) for i, j in combinations(range(len(first)), 2)}
+    spans = {
+        int(np.clip(min(last[[i, j]]) - max(first[[i, j]]) + 1, 0, 3))
+        for i, j in combinations(range(len(first)), 2)
+    }
     return not refused, spans
 
 
@@ -132,13 +159,22 @@ def test_each_vehicle_is_checked_as_if_cut_out(seed):
     present = np.sort(np.array([rng.choice(101, 2, replace=False) for _ in range(3)]), axis=1)
     whole = scenario_of(tracks, TIME)
     road = open_road(60.0)
-    found, _ = causes(replace(whole, present=present), road=road, limits=replace(FREE, car=Dynamics(12.0, 1e6, 1e6, 1e6, 1e6)))
+    found, _ = causes(
+        replace(whole, present=present),
+        road=road,
+        limits=replace(FREE, car=Dynamics(12.0, 1e6, 1e6, 1e6, 1e6)),
+    )
     expected = []
     for row, (first, last) in enumerate(present):
         own = slice(first, last + 1)
-        values = (getattr(whole, name)[[row], own] for name in ("position", "heading", "speed", "acceleration"))
+        values = (
+            getattr(whole, name)[[row], own]
+            for name in ("position", "heading", "speed", "acceleration")
+        )
         part = Scenario((whole.vehicles[row],), TIME[own] - TIME[first], *values)
-        expected += causes(part, road=road, limits=replace(FREE, car=Dynamics(12.0, 1e6, 1e6, 1e6, 1e6)))[0]
+        expected += causes(
+            part, road=road, limits=replace(FREE, car=Dynamics(12.0, 1e6, 1e6, 1e6, 1e6))
+        )[0]
     assert sorted(cause for cause in found if cause != Cause.OVERLAP) == sorted(expected)
 
 
@@ -156,13 +192,20 @@ def test_states_are_asked_of_a_vehicle_s_own_first_and_last_instant():
 
 def test_who_waits_from_its_arrival_on_to_its_end_stands_throughout():
     stands = straight(10, 30, 0, 0.0, TIME)
-    scenario = replace(scenario_of([straight(-25, 0, 0, 5, TIME), stands], TIME), present=np.array([[0, 100], [20, 80]]))
-    state = np.column_stack((scenario.position[:, 0], scenario.heading[:, 0], scenario.speed[:, 0]))
+    scenario = replace(
+        scenario_of([straight(-25, 0, 0, 5, TIME), stands], TIME),
+        present=np.array([[0, 100], [20, 80]]),
+    )
+    state = np.column_stack(
+        (scenario.position[:, 0], scenario.heading[:, 0], scenario.speed[:, 0])
+    )
     asked = BoundaryStates(state, state + np.array([[50, 0, 0, 0], [0, 0, 0, 0]]))
     assert causes(scenario, requested=asked, waits=[Wait(1, 2.0, 8.0)])[0] == []
     speed = scenario.speed.copy()
     speed[1, 50] = 0.4
-    assert causes(replace(scenario, speed=speed), requested=asked, waits=[Wait(1, 2.0, 8.0)])[0] == [Cause.STOP_NOT_KEPT]
+    assert causes(replace(scenario, speed=speed), requested=asked, waits=[Wait(1, 2.0, 8.0)])[
+        0
+    ] == [Cause.STOP_NOT_KEPT]
 
 
 def test_who_drives_against_its_lane_does_so_while_it_is_there():
@@ -171,7 +214,8 @@ def test_who_drives_against_its_lane_does_so_while_it_is_there():
     lane = Lane("west", *(np.column_stack((x, np.full(2, y))) for y in (-2.0, 2.0)))
     road = replace(ROAD, lanes=LaneNetwork("one lane", (lane,)))
     scenario = replace(
-        scenario_of([straight(-25, 0, 0, 5, TIME), straight(0, 30, 0, 5, TIME)], TIME), present=[[20, 60], [0, 100]]
+        scenario_of([straight(-25, 0, 0, 5, TIME), straight(0, 30, 0, 5, TIME)], TIME),
+        present=[[20, 60], [0, 100]],
     )
     found, verdict = causes(scenario, road=road)
     assert found == [Cause.WRONG_WAY]

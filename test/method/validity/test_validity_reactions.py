@@ -29,8 +29,18 @@ def as_scenario(encounter):
 
 
 def refusals(scenario, template, limits=None):
-    conflicts = find_conflicts(template.vehicles, template.time, template.position, template.heading)
-    checker = Checker(None, None, conflicts, None, limits, reactions=reactions_of(template).edges, lane_gaps=lane_gaps(template))
+    conflicts = find_conflicts(
+        template.vehicles, template.time, template.position, template.heading
+    )
+    checker = Checker(
+        None,
+        None,
+        conflicts,
+        None,
+        limits,
+        reactions=reactions_of(template).edges,
+        lane_gaps=lane_gaps(template),
+    )
     (verdict,) = checker.check([scenario])
     return [one for one in verdict.violations if one.cause == Cause.REACTION]
 
@@ -40,7 +50,16 @@ CLEARS = reactions_of(TEMPLATE).edges[0].clears
 
 
 @pytest.mark.parametrize(
-    ("lag", "kept"), [(-1.5, False), (-1.2, False), (-0.7, True), (0.0, True), (2.0, True), (3.0, True), (5.0, False)]
+    ("lag", "kept"),
+    [
+        (-1.5, False),
+        (-1.2, False),
+        (-0.7, True),
+        (0.0, True),
+        (2.0, True),
+        (3.0, True),
+        (5.0, False),
+    ],
 )
 def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(lag, kept):
     """It is seen to leave 0.25 s after its speed begins to rise."""
@@ -50,7 +69,9 @@ def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(la
     assert (found == []) == kept
     if not kept:
         assert found[0].vehicles == (1, 0)
-        assert ("leaves" if lag < 0.0 else "enters") in found[0].message and "vehicle 1 has cleared" in found[0].message
+        assert ("leaves" if lag < 0.0 else "enters") in found[
+            0
+        ].message and "vehicle 1 has cleared" in found[0].message
 
 
 def test_the_bounds_of_a_lag_are_parameters():
@@ -72,7 +93,10 @@ LEADER = wander(np.random.default_rng(3), 200)
 LANE = lane_encounter(LEADER, answering(LEADER, 1.2, 0.9))
 
 
-@pytest.mark.parametrize(("ahead", "kept"), [(0.0, True), (2.0, True), (5.0, False), (12.0, False), (-3.0, True), (-25.0, False)])
+@pytest.mark.parametrize(
+    ("ahead", "kept"),
+    [(0.0, True), (2.0, True), (5.0, False), (12.0, False), (-3.0, True), (-25.0, False)],
+)
 def test_a_follower_keeps_its_own_drivers_gaps(ahead, kept):
     moved = LANE.position.copy()
     moved[1, :, 0] += ahead
@@ -87,10 +111,16 @@ def test_nobody_drives_nearer_than_half_a_second_even_without_a_reaction():
     for gap, kept in ((12.0, True), (9.0, False)):  # between centres, at 12 m/s
         found = refusals(as_scenario(lane_encounter(LEADER, LEADER, gap)), far)
         assert (found == []) == kept
-    assert refusals(as_scenario(lane_encounter(LEADER, LEADER, 9.0)), far, Limits(least_headway=0.2)) == []
-    assert refusals(as_scenario(lane_encounter(LEADER, LEADER, 9.0)), lane_encounter(LEADER, LEADER, 9.5)) == [], (
-        "it does so, too"
+    assert (
+        refusals(as_scenario(lane_encounter(LEADER, LEADER, 9.0)), far, Limits(least_headway=0.2))
+        == []
     )
+    assert (
+        refusals(
+            as_scenario(lane_encounter(LEADER, LEADER, 9.0)), lane_encounter(LEADER, LEADER, 9.5)
+        )
+        == []
+    ), "it does so, too"
 
 
 @pytest.mark.parametrize("kind", REACTIONS)

@@ -46,4 +46,7 @@ def test_rules_that_are_ignored_are_not_checked_and_that_is_said():
     assert causes(scenario_of([straight(-25, 0, 0, 5, TIME)], TIME), road=road)[0] == []
     said = Checker(road, None, None, None).not_applicable
     assert "traffic_rule: the request ignores the map's rules" in said
-    assert not any(sentence.startswith("traffic_rule") for sentence in Checker(road_with(), None, None, None).not_applicable)
+    assert not any(
+        sentence.startswith("traffic_rule")
+        for sentence in Checker(road_with(), None, None, None).not_applicable
+    )

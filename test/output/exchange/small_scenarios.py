@@ -20,11 +20,30 @@ def moving(rows, *, vehicles=None, step=0.1, count=61, present=None, index=0):
     v = np.maximum(rows[:, 3:4] + rows[:, 4:5] * fine, 0.0)
     h = rows[:, 2:3] + rows[:, 5:6] * fine
     steps = np.diff(fine)
-    way = [np.cumsum(0.5 * steps * (f[:, 1:] + f[:, :-1]), axis=1) for f in (v * np.cos(h), v * np.sin(h))]
-    place = np.stack([np.concatenate([np.zeros((len(rows), 1)), w], axis=1)[:, ::50] for w in way], axis=-1) + rows[:, None, :2]
-    names = vehicles or [Vehicle(str(n + 1), 4.8 - 0.3 * n, 1.9 - 0.05 * n) for n in range(len(rows))]
+    way = [
+        np.cumsum(0.5 * steps * (f[:, 1:] + f[:, :-1]), axis=1)
+        for f in (v * np.cos(h), v * np.sin(h))
+    ]
+    place = (
+        np.stack(
+            [np.concatenate([np.zeros((len(rows), 1)), w], axis=1)[:, ::50] for w in way], axis=-1
+        )
+        + rows[:, None, :2]
+    )
+    names = vehicles or [
+        Vehicle(str(n + 1), 4.8 - 0.3 * n, 1.9 - 0.05 * n) for n in range(len(rows))
+    ]
     more = {} if present is None else {"present": np.array(present)}
-    return Scenario(tuple(names), t, place, heading, speed, np.repeat(rows[:, 4:5], count, axis=1), index=index, **more)
+    return Scenario(
+        tuple(names),
+        t,
+        place,
+        heading,
+        speed,
+        np.repeat(rows[:, 4:5], count, axis=1),
+        index=index,
+        **more,
+    )
 
 
 def observed(path):
@@ -34,9 +53,15 @@ def observed(path):
 
 def crossing(present=None, index=0):
     """One drives east and brakes, one comes from the south in a bend."""
-    return moving([[-30.0, 1.0, 0.1, 9.0, -0.7, 0.02], [5.0, -40.0, 1.5, 6.0, 0.4, -0.05]], present=present, index=index)
+    return moving(
+        [[-30.0, 1.0, 0.1, 9.0, -0.7, 0.02], [5.0, -40.0, 1.5, 6.0, 0.4, -0.05]],
+        present=present,
+        index=index,
+    )
 
 
 def one_vehicle():
     """One alone, 0.1 s longer than the others."""
-    return moving([[0.0, 30.0, -1.2, 7.0, 0.2, 0.04]], vehicles=[Vehicle("ego", 5.1, 2.0)], count=62)
+    return moving(
+        [[0.0, 30.0, -1.2, 7.0, 0.2, 0.04]], vehicles=[Vehicle("ego", 5.1, 2.0)], count=62
+    )

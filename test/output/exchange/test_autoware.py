@@ -14,7 +14,10 @@ from small_scenarios import crossing, one_vehicle
 from scenario_gen.bags.recordings.autoware import autoware_messages, TYPES
 from scenario_gen.bags.storage.definitions import definition, PREDICTED, TRACKED, type_store
 
-OBJECTS, TRACKS = "/perception/object_recognition/objects", "/perception/object_recognition/tracking/objects"
+OBJECTS, TRACKS = (
+    "/perception/object_recognition/objects",
+    "/perception/object_recognition/tracking/objects",
+)
 EGO = "/localization/kinematic_state"
 PACKAGE = "autoware_perception_msgs"
 START = 1_700_000_000_000_000_000
@@ -48,15 +51,30 @@ def test_every_message_is_what_the_scenario_says():
         assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
         for n, thing in enumerate(message.objects):
             pose = thing.kinematics.initial_pose_with_covariance.pose
-            assert np.allclose([pose.position.x, pose.position.y], scenario.position[n, k], atol=1e-12)  # the shape's centre
-            assert abs(np.angle(np.exp(1j * (yaw_of(pose.orientation) - scenario.heading[n, k])))) < 1e-9
-            assert thing.kinematics.initial_twist_with_covariance.twist.linear.x == scenario.speed[n, k]
+            assert np.allclose(
+                [pose.position.x, pose.position.y], scenario.position[n, k], atol=1e-12
+            )  # the shape's centre
+            assert (
+                abs(np.angle(np.exp(1j * (yaw_of(pose.orientation) - scenario.heading[n, k]))))
+                < 1e-9
+            )
+            assert (
+                thing.kinematics.initial_twist_with_covariance.twist.linear.x
+                == scenario.speed[n, k]
+            )
             assert thing.shape.dimensions.x == scenario.vehicles[n].length
             (path,) = thing.kinematics.predicted_paths
             assert path.time_step.nanosec == 500_000_000
-            ahead = [scenario.position[n, i] for i in range(k, min(k + 101, len(scenario.time)), 5)]
-            assert np.allclose([[p.position.x, p.position.y] for p in path.path], ahead, atol=1e-12)
-    ids = {tuple(bytes(thing.object_id.uuid) for thing in message.objects) for _, message in found[OBJECTS] + found[TRACKS]}
+            ahead = [
+                scenario.position[n, i] for i in range(k, min(k + 101, len(scenario.time)), 5)
+            ]
+            assert np.allclose(
+                [[p.position.x, p.position.y] for p in path.path], ahead, atol=1e-12
+            )
+    ids = {
+        tuple(bytes(thing.object_id.uuid) for thing in message.objects)
+        for _, message in found[OBJECTS] + found[TRACKS]
+    }
     assert len(ids) == 1 and len(set(*ids)) == len(scenario.vehicles)
 
 
@@ -67,7 +85,9 @@ def test_the_ego_is_at_its_rear_axle():
         pose, yaw = message.pose.pose, ego.heading[0, k]
         back = 0.3 * ego.vehicles[0].length
         axle = ego.position[0, k] - back * np.array([np.cos(yaw), np.sin(yaw)])
-        assert np.allclose([pose.position.x, pose.position.y, pose.position.z], [*axle, 0.0], atol=1e-9)
+        assert np.allclose(
+            [pose.position.x, pose.position.y, pose.position.z], [*axle, 0.0], atol=1e-9
+        )
         assert message.twist.twist.linear.x == ego.speed[0, k]
 
 
@@ -80,11 +100,15 @@ def test_a_vehicle_that_is_not_there_is_in_no_message():
 def test_hashes_are_those_that_rosidl_computes(tmp_path):
     """The second way: the generator of a Jazzy build, from the texts to IDL to the hash of REP 2011."""
     share = Path(sys.prefix) / "share"
-    adapter = pytest.importorskip("rosidl_adapter.msg", reason="the ROS wheels are not installed: make install")
+    adapter = pytest.importorskip(
+        "rosidl_adapter.msg", reason="the ROS wheels are not installed: make install"
+    )
     from rosidl_generator_type_description import generate_type_hash
 
     if not (share / "geometry_msgs" / "msg" / "Pose.json").is_file():
-        pytest.skip("the ROS wheels are not installed: a sourced Jazzy has its type descriptions elsewhere")
+        pytest.skip(
+            "the ROS wheels are not installed: a sourced Jazzy has its type descriptions elsewhere"
+        )
     (tmp_path / "msg").mkdir()
     texts = {}
     for kind in (PREDICTED, TRACKED):
@@ -100,12 +124,20 @@ def test_hashes_are_those_that_rosidl_computes(tmp_path):
         "output_dir": str(tmp_path / "out"),
         "idl_tuples": [f"{tmp_path}:{file.relative_to(tmp_path)}" for file in idl],
         "include_paths": [
-            f"{name}:{share / name}" for name in ("std_msgs", "geometry_msgs", "builtin_interfaces", "unique_identifier_msgs")
+            f"{name}:{share / name}"
+            for name in (
+                "std_msgs",
+                "geometry_msgs",
+                "builtin_interfaces",
+                "unique_identifier_msgs",
+            )
         ],
     }
     (tmp_path / "arguments.json").write_text(json.dumps(arguments))
     generate_type_hash(str(tmp_path / "arguments.json"))
     for kind in (PREDICTED, TRACKED):
-        made = json.loads((tmp_path / "out" / f"{kind.removeprefix(PACKAGE + '/')}.json").read_text())
+        made = json.loads(
+            (tmp_path / "out" / f"{kind.removeprefix(PACKAGE + '/')}.json").read_text()
+        )
         hashes = {entry["type_name"]: entry["hash_string"] for entry in made["type_hashes"]}
         assert hashes[kind] == definition(kind)[1]

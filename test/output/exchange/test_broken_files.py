@@ -53,6 +53,8 @@ def test_what_is_no_file_is_refused(tmp_path, name):
 def test_what_a_file_calls_its_road_users_is_kept(tmp_path):
     path = tmp_path / "one.xml"
     for kind, types in ((b"pedestrian", ["pedestrian", "car"]), (b"animal", [None, "car"])):
-        path.write_bytes(GOOD["xml"].replace(b"<type>car</type>", b"<type>" + kind + b"</type>", 1))
+        path.write_bytes(
+            GOOD["xml"].replace(b"<type>car</type>", b"<type>" + kind + b"</type>", 1)
+        )
         made = observed(path)
         assert [type_called(seen.kind) for seen in made.vehicles] == types

@@ -42,15 +42,34 @@ def number(element, way):
 def test_the_structure_is_that_of_2020a(tmp_path):
     _, root, notes = written(tmp_path, crossing())
     assert notes == ()
-    assert root.attrib["commonRoadVersion"] == "2020a" and root.attrib["benchmarkID"] == "ZAM_SomeRoad-1_4_T-1"
+    assert (
+        root.attrib["commonRoadVersion"] == "2020a"
+        and root.attrib["benchmarkID"] == "ZAM_SomeRoad-1_4_T-1"
+    )
     assert root.attrib["date"] == "2026-01-01" and float(root.attrib["timeStepSize"]) == 0.1
     tags = list(dict.fromkeys(child.tag for child in root))
-    assert tags == ["location", "scenarioTags", "lanelet", "dynamicObstacle", "planningProblem"]  # the schema's sequence
+    assert tags == [
+        "location",
+        "scenarioTags",
+        "lanelet",
+        "dynamicObstacle",
+        "planningProblem",
+    ]  # the schema's sequence
     ids = [element.attrib["id"] for element in root if "id" in element.attrib]
-    assert len(ids) == len(set(ids)) and {element.attrib["ref"] for element in root.iter() if "ref" in element.attrib} <= set(ids)
+    assert len(ids) == len(set(ids)) and {
+        element.attrib["ref"] for element in root.iter() if "ref" in element.attrib
+    } <= set(ids)
     for lanelet in root.iter("lanelet"):
-        assert len(lanelet.findall("leftBound/point")) == len(lanelet.findall("rightBound/point")) >= 2
-    assert all("e" not in element.text.lower() for element in root.iter() if element.tag in ("x", "y", "exact"))  # xs:decimal
+        assert (
+            len(lanelet.findall("leftBound/point"))
+            == len(lanelet.findall("rightBound/point"))
+            >= 2
+        )
+    assert all(
+        "e" not in element.text.lower()
+        for element in root.iter()
+        if element.tag in ("x", "y", "exact")
+    )  # xs:decimal
 
 
 def test_obstacles_are_at_the_centre_of_their_shape_at_every_step(tmp_path):
@@ -59,13 +78,17 @@ def test_obstacles_are_at_the_centre_of_their_shape_at_every_step(tmp_path):
     for n, obstacle in enumerate(root.iter("dynamicObstacle")):
         states = [obstacle.find("initialState"), *obstacle.findall("trajectory/state")]
         assert len(states) == scenario.present[n, 1] + 1  # who leaves early is gone then
-        assert number(obstacle, "shape/rectangle/length") == pytest.approx(scenario.vehicles[n].length, abs=1e-9)
+        assert number(obstacle, "shape/rectangle/length") == pytest.approx(
+            scenario.vehicles[n].length, abs=1e-9
+        )
         for k, state in enumerate(states):
             assert int(state.find("time/exact").text) == k
             found = [number(state, f"position/point/{axis}") for axis in "xy"]
             assert np.allclose(found, scenario.position[n, k], atol=1e-9)
             assert number(state, "velocity/exact") == pytest.approx(scenario.speed[n, k], abs=1e-9)
-            assert number(state, "orientation/exact") == pytest.approx(scenario.heading[n, k], abs=1e-9)
+            assert number(state, "orientation/exact") == pytest.approx(
+                scenario.heading[n, k], abs=1e-9
+            )
 
 
 def test_the_ego_has_a_problem_with_a_wide_window_of_time(tmp_path):
@@ -73,13 +96,27 @@ def test_the_ego_has_a_problem_with_a_wide_window_of_time(tmp_path):
     _, root, _ = written(tmp_path, crossing(), ego)
     (problem,) = root.iter("planningProblem")
     start = problem.find("initialState")
-    assert [child.tag for child in start if child.tag in ("yawRate", "slipAngle")] == ["yawRate", "slipAngle"]  # demanded
-    assert np.allclose([number(start, f"position/point/{axis}") for axis in "xy"], ego.position[0, 0], atol=1e-9)
+    assert [child.tag for child in start if child.tag in ("yawRate", "slipAngle")] == [
+        "yawRate",
+        "slipAngle",
+    ]  # demanded
+    assert np.allclose(
+        [number(start, f"position/point/{axis}") for axis in "xy"], ego.position[0, 0], atol=1e-9
+    )
     goal = problem.find("goalState")
-    assert number(goal, "time/intervalStart") <= 1 and number(goal, "time/intervalEnd") * 0.1 >= 2.0 * ego.time[-1]
+    assert (
+        number(goal, "time/intervalStart") <= 1
+        and number(goal, "time/intervalEnd") * 0.1 >= 2.0 * ego.time[-1]
+    )
     rectangle = goal.find("position/rectangle")
-    assert np.allclose([number(rectangle, f"center/{axis}") for axis in "xy"], ego.position[0, -1], atol=1e-9)
-    assert number(goal, "orientation/intervalStart") < number(rectangle, "orientation") < number(goal, "orientation/intervalEnd")
+    assert np.allclose(
+        [number(rectangle, f"center/{axis}") for axis in "xy"], ego.position[0, -1], atol=1e-9
+    )
+    assert (
+        number(goal, "orientation/intervalStart")
+        < number(rectangle, "orientation")
+        < number(goal, "orientation/intervalEnd")
+    )
     assert "placeholder" not in (tmp_path / "one.xml").read_text()
 
 
@@ -95,7 +132,9 @@ def test_without_an_ego_the_placeholder_says_so_and_is_in_nobodys_way(tmp_path):
 
 def test_uneven_steps_are_resampled_and_that_is_said(tmp_path):
     fine = crossing()
-    uneven = at_times(fine, np.concatenate([np.linspace(0.0, 3.0, 31), np.linspace(3.08, 5.96, 37)]))
+    uneven = at_times(
+        fine, np.concatenate([np.linspace(0.0, 3.0, 31), np.linspace(3.08, 5.96, 37)])
+    )
     path, _, notes = written(tmp_path, uneven)
     assert "resampled at 0.1 s" in notes[0] and "0.060 s are left out" in notes[0]
     tracks = observed(path).vehicles
@@ -128,17 +167,25 @@ def test_the_goal_of_an_ego_that_leaves_early_is_where_it_leaves(tmp_path):
     ego = replace(one_vehicle(), present=np.array([[0, 40]]))
     _, root, _ = written(tmp_path, crossing(), ego)
     goal = root.find("planningProblem/goalState/position/rectangle")
-    assert np.allclose([number(goal, f"center/{axis}") for axis in "xy"], ego.position[0, 40], atol=1e-9)
+    assert np.allclose(
+        [number(goal, f"center/{axis}") for axis in "xy"], ego.position[0, 40], atol=1e-9
+    )
 
 
 def test_signs_lights_and_stop_lines_of_a_vector_map_are_written_and_read_again(tmp_path):
     """The light is off: no state of it is known. The schema wants signs before lights."""
     x = np.linspace(-60.0, 60.0, 30)
     border = [np.column_stack((x, np.full(30, y))) for y in (-2.0, 2.0)]
-    lanes = (Lane("in", border[1], border[0], (1,), (), 12.5), Lane("on", border[1] + (120.0, 0.0), border[0] + (120.0, 0.0)))
+    lanes = (
+        Lane("in", border[1], border[0], (1,), (), 12.5),
+        Lane("on", border[1] + (120.0, 0.0), border[0] + (120.0, 0.0)),
+    )
     line = np.array([(50.0, 2.0), (50.0, 0.0), (50.0, -2.0)])
     kinds = (RuleKind.TRAFFIC_LIGHT, RuleKind.STOP, RuleKind.GIVE_WAY, RuleKind.PRIORITY)
-    rules = tuple(TrafficRule(kind, kind, (k % 2,), (), line if k == 1 else np.zeros((0, 2))) for k, kind in enumerate(kinds))
+    rules = tuple(
+        TrafficRule(kind, kind, (k % 2,), (), line if k == 1 else np.zeros((0, 2)))
+        for k, kind in enumerate(kinds)
+    )
     network = LaneNetwork("town", lanes, (), rules)
     data, _ = write_commonroad(*case_of(crossing(), lane_map=LaneMap(network, 0, "town")))
     root = ET.fromstring(data)
@@ -146,9 +193,13 @@ def test_signs_lights_and_stop_lines_of_a_vector_map_are_written_and_read_again(
     assert tags[:5] == ["location", "scenarioTags", "lanelet", "trafficSign", "trafficLight"]
     assert [number.text for number in root.iter("trafficSignID")] == ["206", "205", "301", "274"]
     assert {color.text for color in root.iter("color")} == {"inactive"}
-    assert [float(value.text) for value in root.find(".//stopLine").iter() if value.tag in "xy"] == [50.0, 2.0, 50.0, -2.0]
+    assert [
+        float(value.text) for value in root.find(".//stopLine").iter() if value.tag in "xy"
+    ] == [50.0, 2.0, 50.0, -2.0]
     path = tmp_path / "again.xml"
     path.write_bytes(data)
     again = read_network(path)
-    assert sorted((rule.kind, rule.lanes) for rule in again.rules) == sorted((rule.kind, rule.lanes) for rule in rules)
+    assert sorted((rule.kind, rule.lanes) for rule in again.rules) == sorted(
+        (rule.kind, rule.lanes) for rule in rules
+    )
     assert again.lanes[0].speed_limit == 12.5

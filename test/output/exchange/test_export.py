@@ -27,7 +27,11 @@ from scenario_gen.pipeline import generate
 
 
 def bytes_of(folder):
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
 @pytest.mark.parametrize("target", EXPORTS.built_in)
@@ -36,11 +40,15 @@ def test_the_same_bag_gives_the_same_bytes(small_bag, tmp_path, target):
         made = export_bag(small_bag, tmp_path / name, target)
         assert made.scenarios == 4
     first, second = (bytes_of(tmp_path / name) for name in ("one", "two"))
-    assert first.keys() == second.keys() and all(first[name] == second[name] for name in first if "metadata" not in name)
+    assert first.keys() == second.keys() and all(
+        first[name] == second[name] for name in first if "metadata" not in name
+    )
     manifest = json.loads(first[MANIFEST])
     assert [entry["lanes"] for entry in manifest["scenarios"]] == ["true"] * 4
     assert {entry["sha256"] for entry in manifest["scenarios"]} == {
-        sha256 for namespace in read_recording(small_bag).namespaces.values() for sha256 in namespace.hashes
+        sha256
+        for namespace in read_recording(small_bag).namespaces.values()
+        for sha256 in namespace.hashes
     }
     for entry in manifest["scenarios"]:
         assert all((tmp_path / "one" / name).exists() for name in entry["files"])
@@ -48,7 +56,18 @@ def test_the_same_bag_gives_the_same_bytes(small_bag, tmp_path, target):
 
 def test_a_chosen_one_with_an_ego_by_the_command(small_bag, tmp_path):
     out = tmp_path / "out"
-    arguments = ["export", str(small_bag), "--to", "autoware", "--out", str(out), "--index", "1", "--namespace", "t"]
+    arguments = [
+        "export",
+        str(small_bag),
+        "--to",
+        "autoware",
+        "--out",
+        str(out),
+        "--index",
+        "1",
+        "--namespace",
+        "t",
+    ]
     result = CliRunner().invoke(app, [*arguments, "--ego", "2"], catch_exceptions=False)
     assert result.exit_code == 0 and "1 scenarios" in result.output
     (folder,) = [path for path in out.iterdir() if path.is_dir()]
@@ -74,7 +93,11 @@ def test_lanes_do_not_depend_on_what_is_chosen(small_bag):
 
 
 def test_round_trips_close(small_bag, tmp_path):
-    scenarios = {(case.namespace, one.index): one for case in read_cases(small_bag) for one in case.scenarios}
+    scenarios = {
+        (case.namespace, one.index): one
+        for case in read_cases(small_bag)
+        for one in case.scenarios
+    }
     for target in ("commonroad", "openscenario"):
         out = tmp_path / target
         export_bag(small_bag, out, target)
@@ -93,8 +116,14 @@ def test_round_trips_close(small_bag, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--to", "lanelet2"], "choose one of commonroad, openscenario, osi, autoware, scenarionet"),
-        (["--to", "commonroad", "--ego", "9"], "has no vehicle '9' to be the ego; there are: 1, 2"),
+        (
+            ["--to", "lanelet2"],
+            "choose one of commonroad, openscenario, osi, autoware, scenarionet",
+        ),
+        (
+            ["--to", "commonroad", "--ego", "9"],
+            "has no vehicle '9' to be the ego; there are: 1, 2",
+        ),
         (["--to", "commonroad", "--index", "77"], "no scenario 77; there are"),
         (["--to", "commonroad", "--namespace", "x"], "no scenarios in namespace 'x'"),
         (["--to", "commonroad", "--set", "run_out=-1"], "run_out"),
@@ -102,7 +131,11 @@ def test_round_trips_close(small_bag, tmp_path):
 )
 def test_what_cannot_be_is_refused_by_name(small_bag, tmp_path, options, said):
     with pytest.raises(InputError) as error:
-        CliRunner().invoke(app, ["export", str(small_bag), "--out", str(tmp_path / "o"), *options], catch_exceptions=False)
+        CliRunner().invoke(
+            app,
+            ["export", str(small_bag), "--out", str(tmp_path / "o"), *options],
+            catch_exceptions=False,
+        )
     assert said in str(error.value)
     assert not (tmp_path / "o").exists()
 
@@ -153,15 +186,22 @@ def geographic_town(tmp_path_factory):
         ("local", "", None),
     ],
 )
-def test_a_map_in_degrees_is_driven_in_the_frame_in_which_others_load_it(geographic_town, tmp_path, projection, origin, zero):
+def test_a_map_in_degrees_is_driven_in_the_frame_in_which_others_load_it(
+    geographic_town, tmp_path, projection, origin, zero
+):
     path, bag = geographic_town
     config = ExportConfig(map=str(path), projection=projection, projection_origin=origin)
     made = export_bag(bag, tmp_path / "out", "openscenario", config)
     assert ("positions in " in made.notes[0]) == (projection != "local" or bool(origin))
-    (one, *_), (entry, *_) = read_cases(bag)[0].scenarios, json.loads((tmp_path / "out" / MANIFEST).read_text())["scenarios"]
+    (one, *_), (entry, *_) = (
+        read_cases(bag)[0].scenarios,
+        json.loads((tmp_path / "out" / MANIFEST).read_text())["scenarios"],
+    )
     tracks = observed(tmp_path / "out" / entry["files"][0]).vehicles
     utm = pyproj.Transformer.from_crs(4326, 32632)
-    near = pyproj.Transformer.from_crs(4326, f"+proj=aeqd +lat_0={origin[:2]} +lon_0={origin[3:]}" if origin else 32632)
+    near = pyproj.Transformer.from_crs(
+        4326, f"+proj=aeqd +lat_0={origin[:2]} +lon_0={origin[3:]}" if origin else 32632
+    )
     for n, track in enumerate(tracks):
         degrees = geodetic(one.others.position[n], ORIGIN)
         wanted = np.stack((near if projection == "local" else utm).transform(*degrees), axis=-1)
@@ -171,18 +211,33 @@ def test_a_map_in_degrees_is_driven_in_the_frame_in_which_others_load_it(geograp
             wanted = one.others.position[n]
         assert np.abs(track.fix - (wanted - zero)).max() < 1e-3
         step = np.gradient(wanted, axis=0)
-        assert np.abs(np.sin(track.heading - np.arctan2(step[:, 1], step[:, 0])))[1:-1].max() < 5e-3
+        assert (
+            np.abs(np.sin(track.heading - np.arctan2(step[:, 1], step[:, 0])))[1:-1].max() < 5e-3
+        )
 
 
 def test_autoware_gets_the_frame_of_the_map_without_being_given_it(geographic_town, tmp_path):
     _, bag = geographic_town
     made = export_bag(bag, tmp_path / "out", "autoware")
-    assert "positions in the MGRS square at 200000 m east and 6600000 m north of UTM zone 32 north" in made.notes[0]
+    assert (
+        "positions in the MGRS square at 200000 m east and 6600000 m north of UTM zone 32 north"
+        in made.notes[0]
+    )
     with Reader(tmp_path / "out" / "case_1_0") as reader:
-        _, _, data = next(reader.messages([c for c in reader.connections if c.topic.endswith("/tracking/objects")]))
-    thing = type_store().deserialize_cdr(data, "autoware_perception_msgs/msg/TrackedObjects").objects[0]
+        _, _, data = next(
+            reader.messages(
+                [c for c in reader.connections if c.topic.endswith("/tracking/objects")]
+            )
+        )
+    thing = (
+        type_store()
+        .deserialize_cdr(data, "autoware_perception_msgs/msg/TrackedObjects")
+        .objects[0]
+    )
     place = thing.kinematics.pose_with_covariance.pose.position
-    latitude, longitude = pyproj.Transformer.from_crs(32632, 4326).transform(place.x + 200_000.0, place.y + 6_600_000.0)
+    latitude, longitude = pyproj.Transformer.from_crs(32632, 4326).transform(
+        place.x + 200_000.0, place.y + 6_600_000.0
+    )
     first = geodetic(read_cases(bag)[0].scenarios[0].others.position[0, 0], ORIGIN)
     assert np.allclose((latitude, longitude), first, atol=1e-8)
     with pytest.raises(InputError, match="projection_origin: the squares of MGRS"):
@@ -196,16 +251,26 @@ def test_scenarios_are_exported_on_the_map_of_the_user(town, tmp_path):
     assert sorted(file.name for file in (tmp_path / "out").glob("*.xodr")) == ["town.xodr"]
     assert (tmp_path / "out" / "town.xodr").read_bytes() == path.read_bytes()
     files = sorted((tmp_path / "out").glob("*.xosc"))
-    assert [ET.parse(file).find("RoadNetwork/LogicFile").attrib["filepath"] for file in files] == ["town.xodr"] * 2
-    assert {entry["lanes"] for entry in json.loads((tmp_path / "out" / MANIFEST).read_text())["scenarios"]} == {"true"}
+    assert [ET.parse(file).find("RoadNetwork/LogicFile").attrib["filepath"] for file in files] == [
+        "town.xodr"
+    ] * 2
+    assert {
+        entry["lanes"]
+        for entry in json.loads((tmp_path / "out" / MANIFEST).read_text())["scenarios"]
+    } == {"true"}
 
 
 def test_another_map_is_refused(town, small_bag, tmp_path):
     path, bag = town
-    with pytest.raises(InputError, match=r"town\.xodr: \d+ % of the positions of .* lie on its lanes; name the map"):
+    with pytest.raises(
+        InputError,
+        match=r"town\.xodr: \d+ % of the positions of .* lie on its lanes; name the map",
+    ):
         export_bag(small_bag, tmp_path / "out", "openscenario", ExportConfig(map=str(path)))
     with pytest.raises(InputError, match="a map can be given with --to openscenario"):
         export_bag(bag, tmp_path / "out", "commonroad", ExportConfig(map=str(path)))
     with pytest.raises(InputError, match=r"OpenDRIVE \(\.xodr\) or Lanelet2"):
-        export_bag(bag, tmp_path / "out", "openscenario", ExportConfig(map=str(bag / "metadata.yaml")))
+        export_bag(
+            bag, tmp_path / "out", "openscenario", ExportConfig(map=str(bag / "metadata.yaml"))
+        )
     assert not (tmp_path / "out").exists()

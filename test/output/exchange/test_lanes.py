@@ -46,7 +46,10 @@ def test_true_lanes_lie_on_the_road_and_fill_its_arms(name, side):
     assert area.difference(cells.buffer(2.0 * road.resolution)).area < 0.1  # m²
     arms = area_of([lane for lane in lanes if not lane.junction])
     assert arms.area > (0.4 if name == "roundabout" else 0.7) * cells.area
-    assert cells.difference(area_of(lanes)).area < (0.1 if name == "roundabout" else 0.04) * cells.area  # a wider ring
+    assert (
+        cells.difference(area_of(lanes)).area
+        < (0.1 if name == "roundabout" else 0.04) * cells.area
+    )  # a wider ring
 
 
 @pytest.mark.parametrize("name", ["t_intersection", "four_way", "merge", "roundabout"])
@@ -54,7 +57,9 @@ def test_true_lanes_lie_on_the_road_and_fill_its_arms(name, side):
 def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
     road, lane_map = lanes_on(name, RoadConfig(lanes=2, traffic_side=side))
     lanes = lane_map.network.lanes
-    starts, ends = ([lanes[k] for k in which] for which in (lane_map.network.entries, lane_map.network.exits))
+    starts, ends = (
+        [lanes[k] for k in which] for which in (lane_map.network.entries, lane_map.network.exits)
+    )
     for poses, which, at in ((road.entries, starts, 0), (road.exits, ends, -1)):
         assert len(which) == len(poses)
         for x, y, yaw in poses:
@@ -66,7 +71,9 @@ def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
             assert step @ ahead > 0.99 * np.hypot(*step)
     lanes_each = 1 if name == "roundabout" else 2
     arms = len(road.exits) // lanes_each
-    more = {"merge": 1, "roundabout": arms}.get(name, 0)  # the ramp leads to the outermost lane; one may turn back
+    more = {"merge": 1, "roundabout": arms}.get(
+        name, 0
+    )  # the ramp leads to the outermost lane; one may turn back
     ways = lanes_each * arms * (arms - 1) + more
     assert sum(bool(lane_map.turn(k)) for k in range(len(lanes))) == ways
     for k, lane in enumerate(lanes):
@@ -75,7 +82,9 @@ def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
             assert np.allclose(lane.right[-1], lanes[other].right[0], atol=1e-4)
         if "left" in lane_map.neighbours(k):
             other, same = lane_map.neighbours(k)["left"]
-            assert np.array_equal(lane.left, lanes[other].right if same else lanes[other].left[::-1])
+            assert np.array_equal(
+                lane.left, lanes[other].right if same else lanes[other].left[::-1]
+            )
         (ax, ay), (bx, by) = lane.right[0] - lane.left[0], lane.centre[1] - lane.centre[0]
         assert ax * by - ay * bx > 0.0  # left is left
 
@@ -85,9 +94,17 @@ def test_who_leaves_the_true_lanes_gets_a_lane_and_that_is_said(side):
     config = RoadConfig(traffic_side=side)
     road = build_road("straight", None, config)
     y = float(road.entries[0, 1])
-    scenario = moving([[10.0, y, 0.0, 8.0, 0.0, 0.0], [10.0, y - 3.0 if side == "right" else y + 3.0, 0.0, 8.0, 0.0, 0.0]])
+    scenario = moving(
+        [
+            [10.0, y, 0.0, 8.0, 0.0, 0.0],
+            [10.0, y - 3.0 if side == "right" else y + 3.0, 0.0, 8.0, 0.0, 0.0],
+        ]
+    )
     lane_map = lane_map_of(road, [scenario], 3.5, 5.0)
-    assert lane_map.added == 1 and "along the path of vehicle 2, which does not keep to them" in lane_map.origin
+    assert (
+        lane_map.added == 1
+        and "along the path of vehicle 2, which does not keep to them" in lane_map.origin
+    )
     area = area_of(lane_map.network.lanes)
     for n in range(2):
         assert all(area.covers(Polygon(corners)) for corners in footprints(scenario, n))
@@ -107,7 +124,9 @@ def test_a_vector_maps_own_lanes_are_written():
     road = replace(road, lanes=LaneNetwork("town", own))
     scenario = moving([[10.0, y, 0.0, 8.0, 0.0, 0.0], [40.0, y - 3.0, 0.0, 8.0, 0.0, 0.0]])
     made = lane_map_of(road, [scenario], 3.5, 5.0)
-    assert made.origin.startswith("the lanes of map town, and a derived one along the path of vehicle 2,")
+    assert made.origin.startswith(
+        "the lanes of map town, and a derived one along the path of vehicle 2,"
+    )
     assert [(made.is_derived(k), lane.successors) for k, lane in enumerate(made.network.lanes)] == [
         (False, ()), (False, (2,)), (False, ()), (True, ()),
     ]  # fmt: skip
@@ -118,15 +137,26 @@ def test_a_vector_maps_own_lanes_are_written():
 @pytest.mark.parametrize(("gap", "added"), [(0.15, 0), (0.5, 2)])
 def test_seams_between_lanes_are_no_edge_of_the_road(gap, added):
     road = build_road("straight", None, RoadConfig())
-    borders = [np.column_stack((np.array(x), np.full(2, y))) for x in ((0.0, 50.0), (50.0 + gap, 100.0)) for y in (1.75, -1.75)]
-    lanes = (VectorLane("a", borders[0], borders[1], (1,)), VectorLane("b", borders[2], borders[3]))
+    borders = [
+        np.column_stack((np.array(x), np.full(2, y)))
+        for x in ((0.0, 50.0), (50.0 + gap, 100.0))
+        for y in (1.75, -1.75)
+    ]
+    lanes = (
+        VectorLane("a", borders[0], borders[1], (1,)),
+        VectorLane("b", borders[2], borders[3]),
+    )
     scenario = moving([[30.0, 0.0, 0.0, 8.0, 0.0, 0.0], [5.0, 0.0, 0.0, 8.0, 0.0, 0.0]])
     made = lane_map_of(replace(road, lanes=LaneNetwork("town", lanes)), [scenario], 3.5, 5.0)
     assert made.added == added
 
 
 def test_derived_lanes_hold_every_footprint_and_followers_share_one():
-    rows = [[0.0, 0.0, 0.3, 8.0, 0.0, 0.05], [-15.0, -4.64, 0.3, 8.0, 0.0, 0.0], [60.0, 40.0, -2.0, 5.0, -1.2, 0.1]]
+    rows = [
+        [0.0, 0.0, 0.3, 8.0, 0.0, 0.05],
+        [-15.0, -4.64, 0.3, 8.0, 0.0, 0.0],
+        [60.0, 40.0, -2.0, 5.0, -1.2, 0.1],
+    ]
     scenarios = [moving(rows), moving([[x, y + 0.4, *rest] for x, y, *rest in rows])]
     lanes = derived_lanes(scenarios, None, 3.5, 20.0).network.lanes
     area = area_of(lanes)
@@ -134,7 +164,10 @@ def test_derived_lanes_hold_every_footprint_and_followers_share_one():
         for n, vehicle in enumerate(scenario.vehicles):
             for (x, y), yaw in zip(scenario.position[n], scenario.heading[n], strict=True):
                 turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-                half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (vehicle.length / 2.0, vehicle.width / 2.0)
+                half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (
+                    vehicle.length / 2.0,
+                    vehicle.width / 2.0,
+                )
                 assert area.covers(Polygon(half @ turn.T + (x, y)))
     assert all(lane.successors == () for lane in lanes)
     platoon = moving([[0.0, 0.0, 0.0, 8.0, 0.0, 0.0], [-12.0, 0.0, 0.0, 8.0, 0.0, 0.0]])
@@ -148,23 +181,33 @@ def written(tmp_path, lane_map, ending):
     """Return the lanes of what is written of a lane map, as they are read again."""
     path = tmp_path / f"again.{ending}"
     case = case_of(STANDING, lane_map=lane_map)
-    path.write_bytes(write_opendrive(lane_map, "t", 0) if ending == "xodr" else write_commonroad(*case)[0])
+    path.write_bytes(
+        write_opendrive(lane_map, "t", 0) if ending == "xodr" else write_commonroad(*case)[0]
+    )
     return read_network(path)
 
 
 @pytest.mark.parametrize("ending", ["xodr", "xml"])
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("name", ["straight", "t_intersection", "four_way"])
-def test_cycle_lanes_and_crossings_are_read_again_as_they_were_written(tmp_path, name, side, ending):
+def test_cycle_lanes_and_crossings_are_read_again_as_they_were_written(
+    tmp_path, name, side, ending
+):
     config = RoadConfig(cycle_lane=1.8, crossing="zebra", traffic_side=side)
     road, lane_map = lanes_on(name, config)
     again = written(tmp_path, lane_map, ending)
     for users, crossing in (({"bicycle"}, False), ({"pedestrian"}, True)):
         own, read = (
-            [x for x in y if x.users == users and x.crossing == crossing] for y in (lane_map.network.lanes, again.others)
+            [x for x in y if x.users == users and x.crossing == crossing]
+            for y in (lane_map.network.lanes, again.others)
         )
-        assert len(own) == len(read) > 0 and area_of(own).symmetric_difference(area_of(read)).area < 0.02
-        assert sum(len(lane.successors) for lane in own) == sum(len(lane.successors) for lane in read)
+        assert (
+            len(own) == len(read) > 0
+            and area_of(own).symmetric_difference(area_of(read)).area < 0.02
+        )
+        assert sum(len(lane.successors) for lane in own) == sum(
+            len(lane.successors) for lane in read
+        )
     assert len(again.lanes) == len(road.lanes.lanes) and again.traffic_side == side
 
 
@@ -172,15 +215,29 @@ def test_cycle_lanes_and_crossings_are_read_again_as_they_were_written(tmp_path,
 @pytest.mark.parametrize("users", ["bus", "car,van,truck,bus,motorcycle", "pedestrian", "bicycle"])
 def test_users_of_the_lanes_of_a_map_are_read_again(tmp_path, users, ending):
     line = np.array([[0.0, 0.0], [40.0, 0.0]])
-    lanes = [VectorLane("a", line, line - (0.0, 3.0)), VectorLane("b", line - (0.0, 3.0), line - (0.0, 6.0))]
-    network = LaneNetwork("m", ()).with_lanes([lanes[0], replace(lanes[1], users=frozenset(users.split(",")))])
+    lanes = [
+        VectorLane("a", line, line - (0.0, 3.0)),
+        VectorLane("b", line - (0.0, 3.0), line - (0.0, 6.0)),
+    ]
+    network = LaneNetwork("m", ()).with_lanes(
+        [lanes[0], replace(lanes[1], users=frozenset(users.split(",")))]
+    )
     again = written(tmp_path, LaneMap(network.whole, 0, "m"), ending)
-    assert sorted(",".join(sorted(lane.users)) for lane in again.whole.lanes) == ["", ",".join(sorted(users.split(",")))]
+    assert sorted(",".join(sorted(lane.users)) for lane in again.whole.lanes) == [
+        "",
+        ",".join(sorted(users.split(","))),
+    ]
 
 
 def test_scenarionet_names_cycle_lanes_and_crossings():
     _, lane_map = lanes_on("four_way", RoadConfig(cycle_lane=1.8, crossing="zebra"))
-    features = description(*case_of(STANDING, lane_map=lane_map), ExportConfig())["map_features"].values()
+    features = description(*case_of(STANDING, lane_map=lane_map), ExportConfig())[
+        "map_features"
+    ].values()
     kinds = [feature["type"] for feature in features]
-    assert {kind: kinds.count(kind) for kind in kinds} == {"LANE_SURFACE_STREET": 20, "LANE_BIKE_LANE": 20, "CROSSWALK": 4}
+    assert {kind: kinds.count(kind) for kind in kinds} == {
+        "LANE_SURFACE_STREET": 20,
+        "LANE_BIKE_LANE": 20,
+        "CROSSWALK": 4,
+    }
     assert sum(lane.open_to(DRIVERS) for lane in lane_map.network.lanes) == 40

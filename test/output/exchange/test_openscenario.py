@@ -30,13 +30,21 @@ def written(scenario, ego=None, export=ExportConfig()):
 def test_every_reference_leads_somewhere_and_no_condition_waits_for_an_edge():
     _, root = written(crossing(present=[[0, 60], [9, 44]]), one_vehicle())
     header = root.find("FileHeader").attrib
-    assert (header["revMajor"], header["revMinor"], header["date"]) == ("1", "2", "2026-01-01T00:00:00")
+    assert (header["revMajor"], header["revMinor"], header["date"]) == (
+        "1",
+        "2",
+        "2026-01-01T00:00:00",
+    )
     assert root.find("RoadNetwork/LogicFile").attrib["filepath"] == "road.xodr"
     names = {entity.attrib["name"] for entity in root.iter("ScenarioObject")}
     assert names == {"vehicle_1", "vehicle_2", "Ego"}
-    assert {element.attrib["entityRef"] for element in root.iter() if "entityRef" in element.attrib} == names
+    assert {
+        element.attrib["entityRef"] for element in root.iter() if "entityRef" in element.attrib
+    } == names
     conditions = list(root.iter("Condition"))
-    assert conditions and {condition.attrib["conditionEdge"] for condition in conditions} == {"none"}
+    assert conditions and {condition.attrib["conditionEdge"] for condition in conditions} == {
+        "none"
+    }
     assert {float(condition.attrib["delay"]) for condition in conditions} == {0.0}
 
 
@@ -46,20 +54,40 @@ def test_vertices_are_the_rear_axle_in_absolute_time(mode):
     _, root = written(scenario, export=ExportConfig(following=mode))
     for n, follow in enumerate(root.iter("FollowTrajectoryAction")):
         assert follow.find("TrajectoryFollowingMode").attrib["followingMode"] == mode
-        assert follow.find("TimeReference/Timing").attrib == {"domainAbsoluteRelative": "absolute", "scale": "1", "offset": "0"}
-        center = root.findall("Entities/ScenarioObject")[n].find("Vehicle/BoundingBox/Center").attrib
+        assert follow.find("TimeReference/Timing").attrib == {
+            "domainAbsoluteRelative": "absolute",
+            "scale": "1",
+            "offset": "0",
+        }
+        center = (
+            root.findall("Entities/ScenarioObject")[n].find("Vehicle/BoundingBox/Center").attrib
+        )
         ahead = float(center["x"])
-        assert ahead == pytest.approx(0.3 * scenario.vehicles[n].length) and float(center["y"]) == 0.0
+        assert (
+            ahead == pytest.approx(0.3 * scenario.vehicles[n].length) and float(center["y"]) == 0.0
+        )
         axles = root.findall("Entities/ScenarioObject")[n].find("Vehicle/Axles")
         assert float(axles.find("RearAxle").attrib["positionX"]) == 0.0
         for k, vertex in enumerate(follow.iter("Vertex")):
-            world = {key: float(value) for key, value in vertex.find("Position/WorldPosition").attrib.items()}
+            world = {
+                key: float(value)
+                for key, value in vertex.find("Position/WorldPosition").attrib.items()
+            }
             assert float(vertex.attrib["time"]) == pytest.approx(scenario.time[k], abs=1e-9)
             assert world["h"] == pytest.approx(scenario.heading[n, k], abs=1e-9)
-            centre = world["x"] + ahead * np.cos(world["h"]), world["y"] + ahead * np.sin(world["h"])
+            centre = (
+                world["x"] + ahead * np.cos(world["h"]),
+                world["y"] + ahead * np.sin(world["h"]),
+            )
             assert np.allclose(centre, scenario.position[n, k], atol=1e-8)
-    places = [private.find(".//TeleportAction/Position/WorldPosition").attrib for private in root.iter("Private")]
-    first = [follow.find(".//Vertex/Position/WorldPosition").attrib for follow in root.iter("FollowTrajectoryAction")]
+    places = [
+        private.find(".//TeleportAction/Position/WorldPosition").attrib
+        for private in root.iter("Private")
+    ]
+    first = [
+        follow.find(".//Vertex/Position/WorldPosition").attrib
+        for follow in root.iter("FollowTrajectoryAction")
+    ]
     assert places == first  # everybody starts where its trajectory does
 
 
@@ -68,10 +96,15 @@ def test_who_is_not_there_is_added_and_deleted():
     _, root = written(scenario)
     assert [private.attrib["entityRef"] for private in root.iter("Private")] == ["vehicle_1"]
     times = {
-        condition.attrib["name"]: float(condition.find("ByValueCondition/SimulationTimeCondition").attrib["value"])
+        condition.attrib["name"]: float(
+            condition.find("ByValueCondition/SimulationTimeCondition").attrib["value"]
+        )
         for condition in root.iter("Condition")
     }
-    assert times["vehicle_2_arrival"] == times["vehicle_2_start"] == 0.9 and times["vehicle_2_departure"] == 4.4
+    assert (
+        times["vehicle_2_arrival"] == times["vehicle_2_start"] == 0.9
+        and times["vehicle_2_departure"] == 4.4
+    )
     assert root.find(".//EntityAction[@entityRef='vehicle_2']/AddEntityAction") is not None
     assert root.find(".//EntityAction[@entityRef='vehicle_2']/DeleteEntityAction") is not None
 
@@ -79,11 +112,16 @@ def test_who_is_not_there_is_added_and_deleted():
 def test_the_ego_is_placed_and_has_a_goal_but_no_trajectory():
     ego = one_vehicle()
     _, root = written(crossing(), ego)
-    assert {ref.attrib["entityRef"] for ref in root.iter("EntityRef")} == {"vehicle_1", "vehicle_2"}
+    assert {ref.attrib["entityRef"] for ref in root.iter("EntityRef")} == {
+        "vehicle_1",
+        "vehicle_2",
+    }
     (private,) = [one for one in root.iter("Private") if one.attrib["entityRef"] == "Ego"]
     goal = private.find(".//AcquirePositionAction/Position/WorldPosition").attrib
     back = 0.3 * ego.vehicles[0].length
-    end = ego.position[0, -1] - back * np.array([np.cos(ego.heading[0, -1]), np.sin(ego.heading[0, -1])])
+    end = ego.position[0, -1] - back * np.array(
+        [np.cos(ego.heading[0, -1]), np.sin(ego.heading[0, -1])]
+    )
     assert np.allclose([float(goal["x"]), float(goal["y"])], end, atol=1e-8)
 
 
@@ -113,7 +151,9 @@ def test_trailers_are_named(tmp_path):
     made = observed(path)
     assert len(made.vehicles) == 2
     said = [note for note in made.notes if note.startswith("trailer")]
-    assert any("trailer 1 belongs to " in note for note in said) and any("trailer box of " in note for note in said)
+    assert any("trailer 1 belongs to " in note for note in said) and any(
+        "trailer box of " in note for note in said
+    )
 
 
 THEIRS = {  # what others write in place of what we write, and by how many seconds it is later
@@ -133,13 +173,23 @@ def test_what_others_write_is_read_as_it_is_meant(tmp_path, kind):
     theirs, ours, later = (THEIRS[kind][k] for k in (1, 0, 2))
     assert ours in data
     names = b'<ParameterDeclaration name="later" value="$half"/><ParameterDeclaration name="half" value="0.5"/>'
-    data = data.replace(b"<ParameterDeclarations", b"<ParameterDeclarations>" + names + b"</ParameterDeclarations><Gone", 1)
+    data = data.replace(
+        b"<ParameterDeclarations",
+        b"<ParameterDeclarations>" + names + b"</ParameterDeclarations><Gone",
+        1,
+    )
     path = tmp_path / "one.xosc"
-    path.write_bytes(data.replace(ours, theirs).replace(b"speed_mps", b"theirs").replace(b"AbsoluteTargetSpeed", b"Gone"))
+    path.write_bytes(
+        data.replace(ours, theirs)
+        .replace(b"speed_mps", b"theirs")
+        .replace(b"AbsoluteTargetSpeed", b"Gone")
+    )
     made = observed(path)
     for n, track in enumerate(made.vehicles):
         assert np.allclose(track.fix_ns * 1e-9, scenario.time + later, atol=1e-9)
-        assert np.abs(track.fix - scenario.position[n]).max() < (0.2 if kind == "no heading" else 1e-6)
+        assert np.abs(track.fix - scenario.position[n]).max() < (
+            0.2 if kind == "no heading" else 1e-6
+        )
     assert len(made.vehicles) == 2 and (kind == "no time reference") == any(
         "without a time reference" in note for note in made.notes
     )
@@ -148,7 +198,13 @@ def test_what_others_write_is_read_as_it_is_meant(tmp_path, kind):
 def test_without_times_a_first_speed_is_kept(tmp_path):
     data, _ = written(crossing())
     path = tmp_path / "one.xosc"
-    path.write_bytes(re.sub(rb' time="[^"]*"', b"", data.replace(b"<Timing", b"<None").replace(b"speed_mps", b"theirs")))
+    path.write_bytes(
+        re.sub(
+            rb' time="[^"]*"',
+            b"",
+            data.replace(b"<Timing", b"<None").replace(b"speed_mps", b"theirs"),
+        )
+    )
     for track, speed in zip(observed(path).vehicles, (9.0, 6.0), strict=True):
         driven = np.hypot(*np.diff(track.fix, axis=0).T)
         assert np.allclose(driven / np.diff(track.fix_ns * 1e-9), speed, rtol=0.02)
@@ -157,18 +213,22 @@ def test_without_times_a_first_speed_is_kept(tmp_path):
 def test_vehicles_may_stand_in_a_catalog(tmp_path):
     data, _ = written(crossing())
     first = data.index(b"<Vehicle "), data.index(b"</Vehicle>") + len(b"</Vehicle>")
-    entry = data[slice(*first)].replace(b'name="car"', b'name="mine"', 1).replace(b'length="4.8"', b'length="$long"')
+    entry = (
+        data[slice(*first)]
+        .replace(b'name="car"', b'name="mine"', 1)
+        .replace(b'length="4.8"', b'length="$long"')
+    )
     (tmp_path / "catalogs").mkdir()
     (tmp_path / "catalogs" / "ours.xosc").write_bytes(
         b'<OpenSCENARIO><Catalog name="Cars">' + entry + b"</Catalog></OpenSCENARIO>"
     )
     (tmp_path / "catalogs" / "broken.xosc").write_bytes(b"<OpenSCENARIO>")
-    reference = (
-        b'<CatalogReference catalogName="Cars" entryName="mine"><ParameterAssignments><ParameterAssignment parameterRef="long" '
-    )
+    reference = b'<CatalogReference catalogName="Cars" entryName="mine"><ParameterAssignments><ParameterAssignment parameterRef="long" '
     reference += b'value="${2 * 2.6}"/></ParameterAssignments></CatalogReference>'
     folder = b'<CatalogLocations><VehicleCatalog><Directory path="catalogs"/></VehicleCatalog></CatalogLocations><Gone'
-    text = (data[: first[0]] + reference + data[first[1] :]).replace(b"<CatalogLocations", folder, 1)
+    text = (data[: first[0]] + reference + data[first[1] :]).replace(
+        b"<CatalogLocations", folder, 1
+    )
     (tmp_path / "one.xosc").write_bytes(text)
     assert [track.length for track in observed(tmp_path / "one.xosc").vehicles] == [5.2, 4.5]
     text = text.replace(b'vehicleCategory="car"', b'vehicleCategory="bicycle"')
@@ -200,7 +260,9 @@ def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
     assert data == write_opendrive(lane_map, "t", 0)
     root = ET.fromstring(data)
     roads = {road.attrib["id"]: road for road in root.iter("road")}
-    assert {road.attrib["rule"] for road in roads.values()} == {"RHT" if side == "right" else "LHT"}
+    assert {road.attrib["rule"] for road in roads.values()} == {
+        "RHT" if side == "right" else "LHT"
+    }
     edges = {}
     for road in roads.values():
         s, end = 0.0, None
@@ -218,13 +280,21 @@ def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
         assert float(road.attrib["length"]) == pytest.approx(s, abs=1e-6)
         edges[road.attrib["id"]] = end
         for link in road.findall("link/*"):
-            assert link.attrib["elementId"] in roads if link.attrib["elementType"] == "road" else True
+            assert (
+                link.attrib["elementId"] in roads if link.attrib["elementType"] == "road" else True
+            )
     junction = root.find("junction")
     for connection in junction.iter("connection"):
-        lanes = {lane.attrib["id"] for lane in roads[connection.attrib["connectingRoad"]].iter("lane")}
-        arms = {lane.attrib["id"] for lane in roads[connection.attrib["incomingRoad"]].iter("lane")}
+        lanes = {
+            lane.attrib["id"] for lane in roads[connection.attrib["connectingRoad"]].iter("lane")
+        }
+        arms = {
+            lane.attrib["id"] for lane in roads[connection.attrib["incomingRoad"]].iter("lane")
+        }
         links = connection.findall("laneLink")
-        assert len(links) == 1 and all(one.attrib["to"] in lanes and one.attrib["from"] in arms for one in links)
+        assert len(links) == 1 and all(
+            one.attrib["to"] in lanes and one.attrib["from"] in arms for one in links
+        )
     driving = [lane for lane in root.iter("lane") if lane.attrib["type"] == "driving"]
     assert len(driving) == len(lane_map.network.lanes)
 
@@ -257,4 +327,6 @@ def test_how_a_maps_lanes_are_joined_and_signed_comes_back(tmp_path):
         for a, b in zip(again.lanes, lanes, strict=True)
     )
     (stop,) = again.rules
-    assert (stop.kind, stop.lanes) == (RuleKind.STOP, (0,)) and np.abs(stop.line[:, 0] - 48.0).max() < 3.0
+    assert (stop.kind, stop.lanes) == (RuleKind.STOP, (0,)) and np.abs(
+        stop.line[:, 0] - 48.0
+    ).max() < 3.0

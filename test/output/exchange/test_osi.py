@@ -42,15 +42,27 @@ def test_the_motion_is_that_of_the_bag(small_bag, exported):
         assert np.allclose(stamps, scenario.time, atol=1e-9) and stamps[0] == 0.0
         for k, message in enumerate(found):
             things = {thing.id.value: thing for thing in message.moving_object}
-            assert set(things) == {int(scenario.vehicles[n].id) for n in np.flatnonzero(scenario.there[:, k])}
+            assert set(things) == {
+                int(scenario.vehicles[n].id) for n in np.flatnonzero(scenario.there[:, k])
+            }
             for n, vehicle in enumerate(scenario.vehicles):
                 if not scenario.there[n, k]:
                     continue
                 base = things[int(vehicle.id)].base
-                assert np.allclose((base.position.x, base.position.y), scenario.position[n, k], atol=1e-6)
-                assert abs(np.hypot(base.velocity.x, base.velocity.y) - scenario.speed[n, k]) < 1e-6
-                assert abs(np.angle(np.exp(1j * (base.orientation.yaw - scenario.heading[n, k])))) < 1e-6
-                assert (base.dimension.length, base.dimension.width) == (vehicle.length, vehicle.width)
+                assert np.allclose(
+                    (base.position.x, base.position.y), scenario.position[n, k], atol=1e-6
+                )
+                assert (
+                    abs(np.hypot(base.velocity.x, base.velocity.y) - scenario.speed[n, k]) < 1e-6
+                )
+                assert (
+                    abs(np.angle(np.exp(1j * (base.orientation.yaw - scenario.heading[n, k]))))
+                    < 1e-6
+                )
+                assert (base.dimension.length, base.dimension.width) == (
+                    vehicle.length,
+                    vehicle.width,
+                )
                 assert base.position.z == base.dimension.height / 2.0 > 0.0
 
 
@@ -62,7 +74,11 @@ def test_the_road_is_in_the_file_and_beside_it(exported):
 
 
 def test_the_host_is_the_ego_or_else_the_first_vehicle(small_bag, exported, tmp_path):
-    assert {message.host_vehicle_id.value for path in exported.glob("*.mcap") for message in messages(path)} == {1}
+    assert {
+        message.host_vehicle_id.value
+        for path in exported.glob("*.mcap")
+        for message in messages(path)
+    } == {1}
     export_bag(small_bag, tmp_path / "out", "osi", ExportConfig(ego="2"))
     for path in (tmp_path / "out").glob("*.mcap"):
         assert {message.host_vehicle_id.value for message in messages(path)} == {2}
@@ -83,7 +99,10 @@ def test_ids_that_are_no_numbers_are_counted_and_that_is_said(small_bag, tmp_pat
     from scenario_gen.output.exchange.osi import object_numbers
 
     _, scenario = next(scenarios(small_bag))
-    vehicles = tuple(replace(vehicle, id=name) for vehicle, name in zip(scenario.vehicles, ("a", "7"), strict=True))
+    vehicles = tuple(
+        replace(vehicle, id=name)
+        for vehicle, name in zip(scenario.vehicles, ("a", "7"), strict=True)
+    )
     one = Exported(0, 0, "ab" * 32, replace(scenario, vehicles=vehicles), None, driven=False)
     assert object_numbers(one) == ((1, 2), ("ids are numbers in OSI: a is 1, 7 is 2",))
 

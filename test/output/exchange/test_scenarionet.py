@@ -28,8 +28,19 @@ def described(folder):
 
 def test_each_scenario_has_what_the_description_asks(exported):
     for whole in described(exported).values():
-        assert {"tracks", "version", "id", "dynamic_map_states", "map_features", "length", "metadata"} == set(whole)
-        assert whole["metadata"]["ts"].shape == (whole["length"],) and whole["metadata"]["sdc_id"] in whole["tracks"]
+        assert {
+            "tracks",
+            "version",
+            "id",
+            "dynamic_map_states",
+            "map_features",
+            "length",
+            "metadata",
+        } == set(whole)
+        assert (
+            whole["metadata"]["ts"].shape == (whole["length"],)
+            and whole["metadata"]["sdc_id"] in whole["tracks"]
+        )
         for name, track in whole["tracks"].items():
             assert track["metadata"]["object_id"] == name and track["type"] == "VEHICLE"
             state, valid = track["state"], track["state"]["valid"]
@@ -45,23 +56,42 @@ def test_the_motion_is_that_of_the_bag(small_bag, exported):
     for case in read_cases(small_bag):
         for one in case.scenarios:
             whole = wholes[f"sd_scenario_gen_1_case_{case.number}_{one.index}.pkl"]
-            ends = [track["state"]["position"][track["state"]["valid"]][0, :2] for track in whole["tracks"].values()]
-            starts = [one.others.position[n, one.others.present[n, 0]] for n in range(len(one.others.vehicles))]
+            ends = [
+                track["state"]["position"][track["state"]["valid"]][0, :2]
+                for track in whole["tracks"].values()
+            ]
+            starts = [
+                one.others.position[n, one.others.present[n, 0]]
+                for n in range(len(one.others.vehicles))
+            ]
             np.testing.assert_allclose(ends[: len(starts)], starts, atol=1e-4)
 
 
 def test_the_folder_is_a_data_set(exported):
     names = sorted(described(exported))
-    summary, mapping = (pickle.loads((exported / name).read_bytes()) for name in (SUMMARY, MAPPING))
+    summary, mapping = (
+        pickle.loads((exported / name).read_bytes()) for name in (SUMMARY, MAPPING)
+    )
     assert sorted(summary) == sorted(mapping) == names
-    assert all(entry["number_summary"]["num_objects"] == len(entry["object_summary"]) for entry in summary.values())
+    assert all(
+        entry["number_summary"]["num_objects"] == len(entry["object_summary"])
+        for entry in summary.values()
+    )
 
 
 def test_a_pickle_names_nothing_but_arrays(exported):
     """Every version of NumPy reads it, and it can run nothing."""
     for path in exported.glob("*.pkl"):
-        texts = [argument for opcode, argument, _ in pickletools.genops(path.read_bytes()) if opcode.name == "SHORT_BINUNICODE"]
-        modules = {text for text in texts if text.split(".")[0] in ("numpy", "builtins", "scenario_gen", "os", "pathlib")}
+        texts = [
+            argument
+            for opcode, argument, _ in pickletools.genops(path.read_bytes())
+            if opcode.name == "SHORT_BINUNICODE"
+        ]
+        modules = {
+            text
+            for text in texts
+            if text.split(".")[0] in ("numpy", "builtins", "scenario_gen", "os", "pathlib")
+        }
         assert modules - {DATASET} <= {"numpy", "builtins"}
     array = pickle.loads(pickled({"a": np.arange(6.0).reshape(2, 3)}))["a"]
     assert array.tolist() == [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]] and array.flags.writeable

@@ -19,7 +19,10 @@ from scenario_gen.types import Vehicle, VEHICLE_TYPES
 KINDS = {name: kind for name, kind in VEHICLE_TYPES.built_in.items() if name != "other"}
 ALL = moving(
     [[15.0 * k, 0.0, 0.0, 4.0, 0.0, 0.0] for k in range(len(KINDS))],
-    vehicles=[Vehicle(str(k), kind.length, kind.width, name) for k, (name, kind) in enumerate(KINDS.items())],
+    vehicles=[
+        Vehicle(str(k), kind.length, kind.width, name)
+        for k, (name, kind) in enumerate(KINDS.items())
+    ],
 )
 
 
@@ -33,9 +36,13 @@ def test_what_is_written_is_read_again(tmp_path, ending):
     path = tmp_path / f"all.{ending}"
     path.write_bytes(data)
     read = observed(path).vehicles
-    same = {name: name for name in KINDS} | ({"van": "car"} if ending == "xml" else {})  # CommonRoad has no vans
+    same = {name: name for name in KINDS} | (
+        {"van": "car"} if ending == "xml" else {}
+    )  # CommonRoad has no vans
     assert [type_called(seen.kind) for seen in read] == list(same.values())
-    assert [(seen.length, seen.width) for seen in read] == [(kind.length, kind.width) for kind in KINDS.values()]
+    assert [(seen.length, seen.width) for seen in read] == [
+        (kind.length, kind.width) for kind in KINDS.values()
+    ]
     for n, seen in enumerate(read):
         assert np.allclose(seen.fix[0], ALL.position[n, 0], atol=1e-6)
 
@@ -44,6 +51,11 @@ def test_autoware_and_scenarionet_are_told_the_type():
     _, first = decoded(ALL)[TRACKS][0]
     assert [entry.classification[0].label for entry in first.objects] == [1, 1, 2, 3, 5, 6, 7]
     described = description(*case_of(ALL), ExportConfig())
-    assert [track["type"] for track in described["tracks"].values()] == [*["VEHICLE"] * 4, "CYCLIST", "CYCLIST", "PEDESTRIAN"]
+    assert [track["type"] for track in described["tracks"].values()] == [
+        *["VEHICLE"] * 4,
+        "CYCLIST",
+        "CYCLIST",
+        "PEDESTRIAN",
+    ]
     counted = described["metadata"]["number_summary"]["num_objects_each_type"]
     assert counted == {"CYCLIST": 2, "PEDESTRIAN": 1, "VEHICLE": 4}

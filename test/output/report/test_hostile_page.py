@@ -68,12 +68,17 @@ def hostile_case(names):
     ids = names[1:3]
 
     def renamed(vehicles):
-        return tuple(replace(vehicle, id=known) for vehicle, known in zip(vehicles, ids, strict=True))
+        return tuple(
+            replace(vehicle, id=known) for vehicle, known in zip(vehicles, ids, strict=True)
+        )
 
     def made(group):
         return replace(
             group,
-            scenarios=tuple(replace(s, vehicles=renamed(s.vehicles), frame_id=names[0]) for s in group.scenarios),
+            scenarios=tuple(
+                replace(s, vehicles=renamed(s.vehicles), frame_id=names[0])
+                for s in group.scenarios
+            ),
             adaptations=names,
         )
 
@@ -102,7 +107,12 @@ def hostile_case(names):
 
 
 def hostile_report():
-    return ReportInput([hostile_case(HOSTILE), hostile_case(HOSTILE[3:])], HOSTILE[0], HOSTILE, {name: name for name in HOSTILE})
+    return ReportInput(
+        [hostile_case(HOSTILE), hostile_case(HOSTILE[3:])],
+        HOSTILE[0],
+        HOSTILE,
+        {name: name for name in HOSTILE},
+    )
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +122,11 @@ def pages(tmp_path_factory):
     if not LONG:
         return folder
     case = run_case(read_log([bundled("c")]).encounters[0], count=2, seed=7)
-    case = replace(case, encounter=replace(case.encounter, name=HOSTILE[0]), refused={name: name for name in HOSTILE})
+    case = replace(
+        case,
+        encounter=replace(case.encounter, name=HOSTILE[0]),
+        refused={name: name for name in HOSTILE},
+    )
     write_page(folder, [case], quality=HOSTILE, provenance={name: name for name in HOSTILE})
     return folder
 
@@ -124,14 +138,21 @@ def test_the_policy_names_each_script_and_allows_no_other(pages, name):
     (data,) = (text for kind, text in found.scripts if kind == "application/json")
     assert "<" not in data
     allowed = re.search(r"script-src ([^;]*)", found.policy).group(1).split()
-    assert allowed == [f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in ours]
+    assert allowed == [
+        f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in ours
+    ]
     assert "unsafe-eval" not in found.policy and "default-src 'none'" in found.policy
-    assert not [key for key, _ in found.attributes if key.startswith("on")], "no event handler stands in the page"
+    assert not [key for key, _ in found.attributes if key.startswith("on")], (
+        "no event handler stands in the page"
+    )
     assert not {"img", "svg", "iframe", "a", "object", "embed", "base", "form"} & set(found.tags)
 
 
 def test_the_policy_depends_on_nothing_of_the_log():
-    policies = {Elements(render(report)).policy for report in (ReportInput([report_case(2)]), hostile_report())}
+    policies = {
+        Elements(render(report)).policy
+        for report in (ReportInput([report_case(2)]), hostile_report())
+    }
     assert len(policies) == 1
 
 
@@ -172,7 +193,10 @@ def test_hostile_names_run_nothing_and_the_page_works(browser, pages, name):
 def test_a_script_that_gets_in_all_the_same_is_not_run(browser, pages, tmp_path):
     """Were escaping forgotten somewhere, the policy would stop what comes in: a script, a handler, an address, eval."""
     text = (pages / "report.html").read_text(encoding="utf-8")
-    inside = "".join(HOSTILE[:6]) + f'<img src="data:," onerror="{RUNS}"><button id="b" onclick="{RUNS}">b</button>'
+    inside = (
+        "".join(HOSTILE[:6])
+        + f'<img src="data:," onerror="{RUNS}"><button id="b" onclick="{RUNS}">b</button>'
+    )
     page = tmp_path / "broken.html"
     page.write_text(text.replace("<main>", f"<main>{inside}", 1), encoding="utf-8")
     tab = Watched(browser, page, DESKTOP)

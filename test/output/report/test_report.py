@@ -32,7 +32,9 @@ from scenario_gen.types.fit import Loss
 @pytest.fixture(scope="module")
 def page():
     cases = [report_case(), report_case(4, "a <script>alert(1)</script> name", without=False)]
-    return render(ReportInput(cases, "Title & more", ("12 rows dropped",), {"log": "demo.mcap", "seed": "7"}))
+    return render(
+        ReportInput(cases, "Title & more", ("12 rows dropped",), {"log": "demo.mcap", "seed": "7"})
+    )
 
 
 def test_the_page_asks_for_nothing_outside_itself(page):
@@ -43,7 +45,13 @@ def test_the_page_asks_for_nothing_outside_itself(page):
 
 def test_names_are_escaped_and_figures_are_there(page):
     assert "alert(1)</script>" not in page and "Title &amp; more" in page
-    for text in ("12 rows dropped", "demo.mcap", "anchor 1 moved by 0.12 m", "the clock was stretched", "lateral acceleration"):
+    for text in (
+        "12 rows dropped",
+        "demo.mcap",
+        "anchor 1 moved by 0.12 m",
+        "the clock was stretched",
+        "lateral acceleration",
+    ):
         assert text in page
     assert "There is no such set: no route exists." in page
     assert "<b>16</b> of 16 requested scenarios are valid, of 26 candidates" in page
@@ -52,15 +60,22 @@ def test_names_are_escaped_and_figures_are_there(page):
 def test_the_same_input_gives_the_same_bytes(tmp_path, page):
     case = report_case(3)
     write_report(tmp_path / "a.html", ReportInput([case]))
-    assert (tmp_path / "a.html").read_text(encoding="utf-8") == render(ReportInput([report_case(3)]))
+    assert (tmp_path / "a.html").read_text(encoding="utf-8") == render(
+        ReportInput([report_case(3)])
+    )
     assert (tmp_path / "a.html").stat().st_size < 2_000_000
 
 
 def test_the_data_can_be_read_back(page):
     data = json.loads(re.search(r'id="data">(.*?)</script>', page, flags=re.S).group(1))
-    assert [list(case["arms"]) for case in data] == [["with", "without", "replay"], ["with", "replay"]]
+    assert [list(case["arms"]) for case in data] == [
+        ["with", "without", "replay"],
+        ["with", "replay"],
+    ]
     assert data[0]["arms"]["with"]["states"]["shape"][:2] == [12, 2]
-    assert data[0]["template"]["bounds"] == [0.0, 4.0, 8.0, 12.0] and data[0]["template"]["labels"] == [0, 1, 0]
+    assert data[0]["template"]["bounds"] == [0.0, 4.0, 8.0, 12.0] and data[0]["template"][
+        "labels"
+    ] == [0, 1, 0]
 
 
 @given(arrays(np.float64, (5, 3, 4), elements=st.floats(-1000, 1000)))
@@ -81,24 +96,44 @@ def test_runs_give_the_mask_back(mask):
 def test_matrices_are_the_mean_feature():
     case = report_case(3)
     entry = case_data(case, 50)["features"][0]
-    found = np.frombuffer(b64decode(entry["position"]["with"]), np.uint8).reshape(MATRIX_SIZE, MATRIX_SIZE) / 255
+    found = (
+        np.frombuffer(b64decode(entry["position"]["with"]), np.uint8).reshape(
+            MATRIX_SIZE, MATRIX_SIZE
+        )
+        / 255
+    )
     motions = [at_count(scenario, MATRIX_SIZE) for scenario in case.generated.scenarios]
-    np.testing.assert_allclose(found, np.mean([feature_matrix(*m.position) for m in motions], axis=0), atol=0.003)
+    np.testing.assert_allclose(
+        found, np.mean([feature_matrix(*m.position) for m in motions], axis=0), atol=0.003
+    )
 
 
 def test_a_fine_road_is_made_coarse():
     road = cross_road()
-    fine = type(road)("fine", np.kron(road.drivable, np.ones((4, 4), bool)), 0.125, road.origin, road.entries, road.exits)
+    fine = type(road)(
+        "fine",
+        np.kron(road.drivable, np.ones((4, 4), bool)),
+        0.125,
+        road.origin,
+        road.entries,
+        road.exits,
+    )
     case = report_case(2)
     drawn = case_data(type(case)(**{**vars(case), "road": fine}), 1)["road"]
-    assert max(drawn["size"]) <= 900 and drawn["cell"] * drawn["size"][0] == pytest.approx(140.0, abs=0.5)
+    assert max(drawn["size"]) <= 900 and drawn["cell"] * drawn["size"][0] == pytest.approx(
+        140.0, abs=0.5
+    )
     share = sum(drawn["runs"][1::2]) / sum(drawn["runs"])
     assert share == pytest.approx(road.drivable.mean(), abs=0.01)
 
 
 def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path):
     case = report_case(3)
-    lost = Loss("conflict", ("west", "south"), "vehicles west and south have crossing paths in the template only")
+    lost = Loss(
+        "conflict",
+        ("west", "south"),
+        "vehicles west and south have crossing paths in the template only",
+    )
     fitted = tuple(replace(one, turned=(0.1, 0.35)) for one in case.fit.fitted)
     routes = (
         replace(case.routes[0], joined=3, searched=0, farthest=0.04),
@@ -110,14 +145,23 @@ def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path)
     write_results(tmp_path, [case], title="", quality=(), provenance={})
     figures = json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]
     for text in (console.export_text(), (tmp_path / "report.html").read_text(encoding="utf-8")):
-        assert lost.message in text and "vehicle south: its route passes 2.2 m from its fitted path" in text
-        assert "5 legs joined at once, 1 searched for, at most 2.25 m from the fitted paths" in text
+        assert (
+            lost.message in text
+            and "vehicle south: its route passes 2.2 m from its fitted path" in text
+        )
+        assert (
+            "5 legs joined at once, 1 searched for, at most 2.25 m from the fitted paths" in text
+        )
     assert "6°, 20°" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert figures["fit"]["lost"] == [{"kind": "conflict", "vehicles": ["west", "south"], "said": lost.message}]
+    assert figures["fit"]["lost"] == [
+        {"kind": "conflict", "vehicles": ["west", "south"], "said": lost.message}
+    ]
     assert figures["fit"]["vehicles"]["west"]["turned_on_road_deg"] == 20.1
     assert figures["routes"]["south"]["farthest_from_fit_m"] == 2.25
     read = read_recording(tmp_path / "bag").namespaces[""]
-    assert read.fit[0].losses == (lost,) and read.fit[0].notes == case.fit.notes  # a remark about a route is not a note
+    assert (
+        read.fit[0].losses == (lost,) and read.fit[0].notes == case.fit.notes
+    )  # a remark about a route is not a note
     assert [route.figures() for route in read.fit[1]] == [route.figures() for route in routes]
 
 
@@ -125,18 +169,31 @@ def test_the_summary_fits_on_a_screen():
     console = Console(width=110, record=True, file=io.StringIO())
     console.print(summary([report_case(5), report_case(4, "with [brackets]", without=False)]))
     text = console.export_text()
-    assert "5 of 5 scenarios" in text and "E position" not in text and "with [brackets]" in text and "3 overlap" in text
+    assert (
+        "5 of 5 scenarios" in text
+        and "E position" not in text
+        and "with [brackets]" in text
+        and "3 overlap" in text
+    )
     assert len(text.splitlines()) < 15 and max(map(len, text.splitlines())) <= 110
 
 
 def test_the_verdict_says_how_critical_the_set_is_and_a_cap_is_no_measurement():
     case = report_case()
     case = replace(case, coverage=coverage_of(case.encounter, case.generated.scenarios))
-    metrics = tuple(replace(metric, cap=1000.0 if metric.id == "min_ttc" else None) for metric in case.evaluation.metrics)
+    metrics = tuple(
+        replace(metric, cap=1000.0 if metric.id == "min_ttc" else None)
+        for metric in case.evaluation.metrics
+    )
     uncapped = replace(case, evaluation=replace(case.evaluation, metrics=metrics))
     least = min(filter(math.isfinite, case.coverage.spreads["ttc"].values), default=math.inf)
-    assert math.isfinite(least) and f"minimum time to collision {least:.1f} s" in render(ReportInput([uncapped]))
-    low = tuple(replace(metric, cap=least / 2 if metric.id == "min_ttc" else None) for metric in case.evaluation.metrics)
+    assert math.isfinite(least) and f"minimum time to collision {least:.1f} s" in render(
+        ReportInput([uncapped])
+    )
+    low = tuple(
+        replace(metric, cap=least / 2 if metric.id == "min_ttc" else None)
+        for metric in case.evaluation.metrics
+    )
     page = render(ReportInput([replace(case, evaluation=replace(case.evaluation, metrics=low))]))
     assert f"time to collision: none below {least / 2:g} s" in page
     assert formatted(Interval(10.0, 10.0, 10.0), "s", cap=10.0) == "none below 10 s"
@@ -145,18 +202,29 @@ def test_the_verdict_says_how_critical_the_set_is_and_a_cap_is_no_measurement():
 
 def test_refused_candidates_are_drawn_with_their_causes():
     case = report_case(3)
-    examples = tuple((cause, case.generated[k]) for k, cause in enumerate((Cause.OVERLAP, Cause.STOP_NOT_KEPT)))
-    page = render(ReportInput([replace(case, generated=replace(case.generated, examples=examples))]))
+    examples = tuple(
+        (cause, case.generated[k]) for k, cause in enumerate((Cause.OVERLAP, Cause.STOP_NOT_KEPT))
+    )
+    page = render(
+        ReportInput([replace(case, generated=replace(case.generated, examples=examples))])
+    )
     (data,) = json.loads(re.search(r'id="data">(.*?)</script>', page, flags=re.S).group(1))
-    assert data["causes"] == ["overlap", "stop not kept"] and data["arms"]["refused"]["states"]["shape"][0] == 2
+    assert (
+        data["causes"] == ["overlap", "stop not kept"]
+        and data["arms"]["refused"]["states"]["shape"][0] == 2
+    )
 
 
 def test_the_record_is_turned_as_it_lies_on_the_road():
     case = report_case(2)
     angle = 0.7
-    turned = tuple(replace(one, anchors=np.add(one.anchors, [0.0, 0.0, angle])) for one in case.fit.fitted)
+    turned = tuple(
+        replace(one, anchors=np.add(one.anchors, [0.0, 0.0, angle])) for one in case.fit.fitted
+    )
     before, after = (
         json.loads(re.search(r'"turn":([-\d.]+)', render(ReportInput([made]))).group(1))
         for made in (case, replace(case, fit=replace(case.fit, fitted=turned)))
     )
-    assert (after - before - angle + math.pi) % (2 * math.pi) - math.pi == pytest.approx(0.0, abs=2e-3)
+    assert (after - before - angle + math.pi) % (2 * math.pi) - math.pi == pytest.approx(
+        0.0, abs=2e-3
+    )

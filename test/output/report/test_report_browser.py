@@ -22,7 +22,8 @@ def report(tmp_path_factory):
     write_report(
         path,
         ReportInput(
-            [report_case(6), report_case(4, "a_name_without_any_space_" * 4, without=False)], provenance={"log": "a" * 64}
+            [report_case(6), report_case(4, "a_name_without_any_space_" * 4, without=False)],
+            provenance={"log": "a" * 64},
         ),
     )
     return path
@@ -61,7 +62,9 @@ def test_it_loads_without_errors_or_requests(tab, report):
     tab.page.wait_for_timeout(300)
     assert tab.troubles == []
     assert tab.asked() == [report.as_uri()]
-    assert tab.page.locator('[data-case="0"] .plot').count() == 11  # shown scenario, recording, two arms, motion, six matrices
+    assert (
+        tab.page.locator('[data-case="0"] .plot').count() == 11
+    )  # shown scenario, recording, two arms, motion, six matrices
     for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
         pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
         assert len(pixels.getcolors(1_000_000)) > 10, role
@@ -71,7 +74,9 @@ def test_the_table_of_figures_fits_a_desktop(tab):
     table = tab.page.locator('[data-case="0"] .metrics')
     assert table.evaluate("t => t.scrollWidth <= t.parentElement.clientWidth")
     heading = table.locator("tr.group th").first
-    assert heading.evaluate("t => t.clientWidth > 0.9 * t.closest('table').clientWidth")  # spans all columns
+    assert heading.evaluate(
+        "t => t.clientWidth > 0.9 * t.closest('table').clientWidth"
+    )  # spans all columns
 
 
 def test_it_plays_pauses_and_stops_at_the_end(tab):
@@ -94,7 +99,9 @@ def test_scrubbing_moves_the_cars_and_names_the_primitive(tab):
     tab.part("scrub").fill("500")
     assert tab.time() == 6.0
     assert tab.picture("stage") != before
-    assert tab.part("primitive").inner_text() == "segment 2 of 3: west drives on, south drives slowly"
+    assert (
+        tab.part("primitive").inner_text() == "segment 2 of 3: west drives on, south drives slowly"
+    )
     assert "10.0 m/s" in tab.part("readout").inner_text()
 
 
@@ -142,7 +149,10 @@ def test_a_folded_part_is_opened_by_the_contents_and_drawn(tab):
 
 def test_another_case_opens(tab):
     tab.page.locator('[data-show="1"] button').click()
-    assert tab.page.locator('[data-case="1"]').is_visible() and not tab.page.locator('[data-case="0"]').is_visible()
+    assert (
+        tab.page.locator('[data-case="1"]').is_visible()
+        and not tab.page.locator('[data-case="0"]').is_visible()
+    )
     assert "There is no such set" in tab.page.locator('[data-case="1"]').inner_text()
     tab.part("scrub", 1).fill("250")
     assert tab.time(1) == 3.0 and tab.troubles == []
@@ -168,9 +178,16 @@ def test_a_phone_shows_all_of_it(browser, report):
         tab.page.locator(f'[data-show="{case}"] button').click()
         tab.page.wait_for_timeout(100)
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
-        assert tab.page.locator("section:not([hidden])").locator("canvas, .chart svg, button, select").evaluate_all(wide) == []
+        assert (
+            tab.page.locator("section:not([hidden])")
+            .locator("canvas, .chart svg, button, select")
+            .evaluate_all(wide)
+            == []
+        )
     tab.page.set_viewport_size({"width": 800, "height": 600})  # turned
-    tab.wait(lambda: abs(tab.part("stage", 1).evaluate("c => c.width / c.clientWidth") - 1.0) < 0.02)
+    tab.wait(
+        lambda: abs(tab.part("stage", 1).evaluate("c => c.width / c.clientWidth") - 1.0) < 0.02
+    )
     tab.page.close()
 
 
@@ -181,7 +198,10 @@ def test_an_ego_is_drawn_as_its_witness(browser, tmp_path):
     tab = Report(browser, path, DESKTOP)
     tab.page.wait_for_timeout(300)
     assert tab.troubles == []
-    assert "Vehicle west is left out for a planner under test" in tab.page.locator("main").inner_text()
+    assert (
+        "Vehicle west is left out for a planner under test"
+        in tab.page.locator("main").inner_text()
+    )
     before = tab.picture("stage")
     tab.part("play").click()
     tab.wait(lambda: tab.picture("stage") != before)
@@ -199,7 +219,8 @@ def test_who_arrives_late_is_not_shown_before(browser, tmp_path):
 
     made = replace(case.generated, scenarios=tuple(map(late, case.generated.scenarios)))
     write_report(
-        tmp_path / "late.html", ReportInput([replace(case, encounter=late(case.encounter), generated=made, replay=None)])
+        tmp_path / "late.html",
+        ReportInput([replace(case, encounter=late(case.encounter), generated=made, replay=None)]),
     )
     tab = Report(browser, tmp_path / "late.html", DESKTOP)
     tab.page.wait_for_timeout(300)
@@ -214,7 +235,11 @@ def test_the_record_plays_beside_the_scenario(tab):
     tab.part("scrub").fill("500")
     assert tab.picture("record") != before
     left, right = (tab.part(role).bounding_box() for role in ("record", "stage"))
-    assert left["y"] == right["y"] and min(left["width"], right["width"]) > 400 and min(left["height"], right["height"]) > 300
+    assert (
+        left["y"] == right["y"]
+        and min(left["width"], right["width"]) > 400
+        and min(left["height"], right["height"]) > 300
+    )
 
 
 def test_a_scenario_is_downloaded_and_its_command_copied(browser, tmp_path):
@@ -229,24 +254,34 @@ def test_a_scenario_is_downloaded_and_its_command_copied(browser, tmp_path):
     assert csv.value.suggested_filename == "scenario_1.csv"
     (tmp_path / "scenario_1.csv").write_text(tab.page.evaluate("given.text()"))
     (encounter,) = read_log(str(tmp_path / "scenario_1.csv")).encounters  # our own reader takes it
-    assert {vehicle.id for vehicle in encounter.vehicles} == {"west", "south"} and encounter.duration == pytest.approx(
-        12.0, abs=0.5
-    )
+    assert {vehicle.id for vehicle in encounter.vehicles} == {
+        "west",
+        "south",
+    } and encounter.duration == pytest.approx(12.0, abs=0.5)
     with tab.page.expect_download() as png:
         tab.part("png").click()
     assert png.value.suggested_filename == "scenario_1.png"
     drawn = tab.page.evaluate("given.arrayBuffer().then((bytes) => [...new Uint8Array(bytes)])")
     assert Image.open(io.BytesIO(bytes(drawn))).size[0] > 400
     tab.part("copy").click()
-    assert tab.part("said").inner_text() == "copied: scenario-gen regenerate 'my bag' 1 --out scenario_1"
+    assert (
+        tab.part("said").inner_text()
+        == "copied: scenario-gen regenerate 'my bag' 1 --out scenario_1"
+    )
     assert tab.troubles == []
     tab.page.close()
 
 
-@pytest.mark.parametrize(("scheme", "size"), [("dark", PHONE), pytest.param("light", DESKTOP, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("scheme", "size"), [("dark", PHONE), pytest.param("light", DESKTOP, marks=pytest.mark.long)]
+)
 def test_axe_finds_nothing_wrong(browser, report, scheme, size):
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
-    context = browser.new_context(bypass_csp=True, color_scheme=scheme, viewport=size)  # axe runs in the page
+    axe = pytest.importorskip(
+        "axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed"
+    )
+    context = browser.new_context(
+        bypass_csp=True, color_scheme=scheme, viewport=size
+    )  # axe runs in the page
     page = context.new_page()
     page.goto(report.as_uri())
     page.wait_for_timeout(200)

@@ -46,7 +46,9 @@ def real_run():
     (encounter,) = read_log([bundled("c")]).encounters
     config = PipelineConfig()
     road = build_road("straight", encounter, config.road)
-    return Chain(encounter, segment(encounter, config.segmentation, 7), road, config, count=3, seed=7).run()
+    return Chain(
+        encounter, segment(encounter, config.segmentation, 7), road, config, count=3, seed=7
+    ).run()
 
 
 def test_the_figures_survive_the_bag(tmp_path):
@@ -58,19 +60,33 @@ def test_the_figures_survive_the_bag(tmp_path):
         assert evaluation.changepoints == 2
         for key in ("e_position", "e_speed", "js_speed", "min_distance", "pet", "diversity"):
             expected = case.evaluation.value("with changepoints", key)
-            assert evaluation.value("scenarios", key) == pytest.approx(expected, rel=1e-6, abs=1e-9), key
+            assert evaluation.value("scenarios", key) == pytest.approx(
+                expected, rel=1e-6, abs=1e-9
+            ), key
         assert 0.0 <= evaluation.value("scenarios", "acceptance") <= 1.0
 
 
 def test_the_intervals_survive_it_too_where_candidates_were_refused(tmp_path):
     """Which scenarios mirror each other follows from their indices, not from their places in the bag."""
     case = report_case(6)
-    numbered = [replace(s, index=k) for s, k in zip(case.generated.scenarios, (1, 2, 5, 8, 9, 3), strict=True)]
+    numbered = [
+        replace(s, index=k)
+        for s, k in zip(case.generated.scenarios, (1, 2, 5, 8, 9, 3), strict=True)
+    ]
     case = replace(case, generated=replace(case.generated, scenarios=tuple(numbered)))
-    (found,) = (one.evaluation for one in bag_results(write_recording(tmp_path / "run", case), QUICK))
-    measure = partial(evaluate_scenarios, case.encounter, changepoints=len(case.segmentation.changepoints), config=QUICK)
+    (found,) = (
+        one.evaluation for one in bag_results(write_recording(tmp_path / "run", case), QUICK)
+    )
+    measure = partial(
+        evaluate_scenarios,
+        case.encounter,
+        changepoints=len(case.segmentation.changepoints),
+        config=QUICK,
+    )
     direct = measure(numbered)
-    (row,), (expected,) = ([row for row in e.rows if row.name == "scenarios"] for e in (found, direct))
+    (row,), (expected,) = (
+        [row for row in e.rows if row.name == "scenarios"] for e in (found, direct)
+    )
     places = [replace(scenario, index=k) for k, scenario in enumerate(numbered)]
     (other,) = measure(places).rows[1:]
     for key in ("e_position", "e_speed", "diversity"):
@@ -90,7 +106,9 @@ def test_a_bag_without_scenarios_is_refused(tmp_path):
 
 def only(bag, folder, topics):
     """Copy the messages of these topics to another bag, as somebody else might have recorded it."""
-    return copied(bag, folder, lambda message: message.data if message.topic.strip("/") in topics else None)
+    return copied(
+        bag, folder, lambda message: message.data if message.topic.strip("/") in topics else None
+    )
 
 
 def test_a_bag_becomes_a_page_with_all_its_scenarios_valid_or_not(tmp_path):
@@ -99,7 +117,10 @@ def test_a_bag_becomes_a_page_with_all_its_scenarios_valid_or_not(tmp_path):
     assert case.valid == 0 and case.published == 0 and len(case.generated.scenarios) == 5
     page = render(ReportInput([case]))
     assert "<b>0</b> of 5 requested scenarios" in page and ">0 / 5</td>" in page
-    assert "the bag holds one set of scenarios" in page and "<h3>Without changepoints</h3>" not in page
+    assert (
+        "the bag holds one set of scenarios" in page
+        and "<h3>Without changepoints</h3>" not in page
+    )
     assert "<h3>Scenarios</h3>" in page
 
 
@@ -113,10 +134,16 @@ def test_the_page_of_our_own_bag_shows_the_template_as_that_of_the_run(tmp_path)
         for key in ("anchors", "moved", "stands"):
             assert np.array_equal(getattr(found, key), getattr(known, key)), key
     for found, known in zip(case.routes, run.routes, strict=True):
-        assert np.array_equal(found.points, known.points) and np.array_equal(found.anchor, known.anchor)
+        assert np.array_equal(found.points, known.points) and np.array_equal(
+            found.anchor, known.anchor
+        )
     assert case.segmentation.descriptions == run.segmentation.descriptions
     assert np.array_equal(case.segmentation.labels, run.segmentation.labels)
-    assert np.allclose(case.segmentation.changepoint_probability, run.segmentation.changepoint_probability, atol=1e-6)
+    assert np.allclose(
+        case.segmentation.changepoint_probability,
+        run.segmentation.changepoint_probability,
+        atol=1e-6,
+    )
     assert case.road.name == run.road.name
     page = render(ReportInput([case]))
     assert "Fitted to the road" in page and run.segmentation.descriptions[0] in page
@@ -131,7 +158,9 @@ def test_that_page_in_a_browser(browser, tmp_path):
     for size in (DESKTOP, PHONE):
         tab = Tab(browser, page, size)
         routes = tab.page.locator('[data-case="0"] [data-role="routes"]')
-        pixels = Image.open(io.BytesIO(b64decode(routes.evaluate("c => c.toDataURL()").partition(",")[2])))
+        pixels = Image.open(
+            io.BytesIO(b64decode(routes.evaluate("c => c.toDataURL()").partition(",")[2]))
+        )
         assert len(pixels.getcolors(1_000_000)) > 10
         for case in (0, 1):
             tab.page.locator(f'[data-show="{case}"] button').click()
@@ -153,12 +182,18 @@ def test_what_nodes_say_on_one_topic_is_told_apart_by_their_namespaces(tmp_path)
             stamp, statuses = decode_diagnostics(message.data)
             for namespace, note in (("/here", None), ("/there", "of another suite")):
                 said = [
-                    replace(s, name=namespace + s.name, values=s.values if note is None else dict.fromkeys(s.values, note))
+                    replace(
+                        s,
+                        name=namespace + s.name,
+                        values=s.values if note is None else dict.fromkeys(s.values, note),
+                    )
                     for s in statuses
                 ]
                 for later in (1, 2):  # every second, with the time of the message
                     now = stamp + later * 10**9
-                    copy.write(topic, encode_diagnostics([of_template(s, stamp) for s in said], now), now)
+                    copy.write(
+                        topic, encode_diagnostics([of_template(s, stamp) for s in said], now), now
+                    )
     (case,) = bag_results(tmp_path / "recorded", QUICK)
     assert case.fit is not None and case.fit.notes == run.fit.notes
     assert case.segmentation.descriptions == run.segmentation.descriptions
@@ -169,9 +204,16 @@ def test_the_bag_says_how_its_scenarios_were_made_and_what_was_refused(tmp_path)
     refused = replace(first.generated, candidates=5, refused=Counter({Cause.OVERLAP: 2}))
     second = replace(first, seed=8, generated=refused, provenance={"sampling.sigma": "1.0"})
     bag = write_recording(tmp_path / "run", {"/one": first, "/two": second})
-    assert read_recording(bag).provenance == {"log c": "sha256 12", "sampling.sigma": "1.0", "seed": "7 | 8"}
+    assert read_recording(bag).provenance == {
+        "log c": "sha256 12",
+        "sampling.sigma": "1.0",
+        "seed": "7 | 8",
+    }
     cases = bag_results(bag, QUICK)
-    assert "by its own summary request 1 published 3 of 3 from 3 candidates" in cases[0].generated.adaptations
+    assert (
+        "by its own summary request 1 published 3 of 3 from 3 candidates"
+        in cases[0].generated.adaptations
+    )
     told = "by its own summary request 1 published 3 of 3 from 5 candidates, refused: overlap 2"
     assert told in cases[1].generated.adaptations and told in render(ReportInput(cases))
 
@@ -186,9 +228,16 @@ def test_a_bag_with_half_of_it_shows_what_it_has(tmp_path):
 
 
 def test_what_a_bag_does_not_hold_is_left_out_and_said(tmp_path):
-    bag = only(write_recording(tmp_path / "run", report_case(5)), tmp_path / "bare", ("tracks", "scenarios"))
+    bag = only(
+        write_recording(tmp_path / "run", report_case(5)),
+        tmp_path / "bare",
+        ("tracks", "scenarios"),
+    )
     (case,) = bag_results(bag, QUICK)
     assert case.road is None and case.evaluation.changepoints == 0
     page = render(ReportInput([case]))
-    assert "whether vehicles leave the road was not checked" in page and "counts as one primitive" in page
+    assert (
+        "whether vehicles leave the road was not checked" in page
+        and "counts as one primitive" in page
+    )
     assert '"road":null,' in page

@@ -42,7 +42,9 @@ def run():
     (encounter,) = read_log([bundled("c")]).encounters
     config = PipelineConfig(sampling=SamplingConfig(variety="narrow"))
     road = build_road("straight", encounter, config.road)
-    return Chain(encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7).run()
+    return Chain(
+        encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7
+    ).run()
 
 
 def rewritten(bag, target, change=lambda _, data: data, without=()):
@@ -52,7 +54,11 @@ def rewritten(bag, target, change=lambda _, data: data, without=()):
     def changed(message):
         if message.topic.rpartition("/")[2] in without:
             return None
-        return change(next(index), message.data) if message.topic.endswith("/scenarios") else message.data
+        return (
+            change(next(index), message.data)
+            if message.topic.endswith("/scenarios")
+            else message.data
+        )
 
     return copied(bag, target, changed)
 
@@ -68,11 +74,18 @@ def test_each_fault_is_found_with_its_cause_and_place(run, tmp_path):
     moved = [s.position.copy() for s in good]
     moved[1][:] += (0.0, 400.0)  # far off the road, and off what was asked
     moved[2][1] = moved[2][0]  # one on top of the other
-    bad = [replace(scenario, position=position) for scenario, position in zip(good, moved, strict=True)]
+    bad = [
+        replace(scenario, position=position)
+        for scenario, position in zip(good, moved, strict=True)
+    ]
     elsewhere = replace(good[3], frame_id="elsewhere")
     stamp = run.encounter.start_ns
     messages = [encode_scenario(s, stamp) for s in (*bad[:3], elsewhere)]
-    bag = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "bad", lambda k, _: messages[k])
+    bag = rewritten(
+        write_recording(tmp_path / "run", {"/here": run}),
+        tmp_path / "bad",
+        lambda k, _: messages[k],
+    )
     (found,) = validate_bag(bag)
     assert (found.scenarios, found.invalid) == (4, 3)
     assert found.found["off_road"].scenario == 1
@@ -87,7 +100,9 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     (encounter,) = read_log([bundled("b")]).encounters
     config = PipelineConfig()
     road = build_road("t_intersection", encounter, config.road)
-    made = Chain(encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7).run()
+    made = Chain(
+        encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7
+    ).run()
     assert [edge.name("12") for edge in made.generated.reactions] == ["2 yields to 1"]
     bag = write_recording(tmp_path / "b", {"/here": made})
     (kept,) = validate_bag(bag)
@@ -99,7 +114,12 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     (measured,) = bag_results(bag)  # evaluate holds them to the same
     assert measured.published == 4 and measured.generated.reactions == (edge,)
     assert measured.reacting["edges"] == [edge.document(made.encounter.vehicles) | {"kept": True}]
-    assert bag_results(bag, limits=Limits(anticipation=0.0, patience=0.0))[0].generated.refused["reaction"] >= 1
+    assert (
+        bag_results(bag, limits=Limits(anticipation=0.0, patience=0.0))[0].generated.refused[
+            "reaction"
+        ]
+        >= 1
+    )
     (summary,) = read_recording(bag).namespaces["/here"].summaries
     assert summary.reactions == tuple(made.reacting["edges"])
     assert "has cleared; allowed are" in found.found["reaction"].message
@@ -107,7 +127,9 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
 
 def test_what_the_bag_does_not_say_is_said(run, tmp_path):
     silent = ("tracks", "map", "fit", "info")  # scenarios/info knows what was asked, too
-    bag = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "bare", without=silent)
+    bag = rewritten(
+        write_recording(tmp_path / "run", {"/here": run}), tmp_path / "bare", without=silent
+    )
     (found,) = validate_bag(bag)
     assert found.invalid == 0
     assert sorted(sentence.partition(":")[0] for sentence in found.left_out) == [
@@ -123,41 +145,65 @@ def test_what_the_bag_does_not_say_is_said(run, tmp_path):
 def test_a_scenario_is_held_against_what_was_asked_of_itself(run, tmp_path):
     """A request with states of its own does not change `fit`: its `scenarios/info` says what they were."""
     fit = replace(
-        run.fit, requested=BoundaryStates(run.fit.requested.start + np.array((0.0, 5.0, 0.0, 0.0)), run.fit.requested.end)
+        run.fit,
+        requested=BoundaryStates(
+            run.fit.requested.start + np.array((0.0, 5.0, 0.0, 0.0)), run.fit.requested.end
+        ),
     )
     (found,) = validate_bag(write_recording(tmp_path / "other", replace(run, fit=fit)))
     assert found.found["boundary_state"].count == 4
     without_fit = rewritten(tmp_path / "other", tmp_path / "info", without=("fit",))
     assert validate_bag(without_fit)[0].found["boundary_state"].count == 4
-    own = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "own", without=("fit",))
+    own = rewritten(
+        write_recording(tmp_path / "run", {"/here": run}), tmp_path / "own", without=("fit",)
+    )
     assert validate_bag(own)[0].found == {} and validate_bag(own)[0].left_out == {}
 
 
 def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_path):
     def swapped(k, _data):
         scenario, order = run.generated.scenarios[k], [1, 0] if k else [1]
-        arrays = {name: getattr(scenario, name)[order] for name in ("position", "heading", "speed", "acceleration", "present")}
+        arrays = {
+            name: getattr(scenario, name)[order]
+            for name in ("position", "heading", "speed", "acceleration", "present")
+        }
         vehicles = tuple(np.array(scenario.vehicles, dtype=object)[order])
-        return encode_scenario(replace(scenario, vehicles=vehicles, **arrays), run.encounter.start_ns)
+        return encode_scenario(
+            replace(scenario, vehicles=vehicles, **arrays), run.encounter.start_ns
+        )
 
-    (found,) = validate_bag(rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "ego", swapped, ("info",)))
-    unknown = ("sha256: there is no entry on scenarios/info", "boundary_state: the requested states are not known")
+    (found,) = validate_bag(
+        rewritten(
+            write_recording(tmp_path / "run", {"/here": run}), tmp_path / "ego", swapped, ("info",)
+        )
+    )
+    unknown = (
+        "sha256: there is no entry on scenarios/info",
+        "boundary_state: the requested states are not known",
+    )
     assert found.found == {} and found.left_out == dict.fromkeys(unknown, 4)
 
 
 def test_scenarios_that_are_not_as_published_are_named(run, tmp_path):
     """A scenario moved by a nanometre is still valid by itself; only its account knows better."""
     bag = write_recording(tmp_path / "run", {"/here": run})
-    other = replace(run.generated.scenarios[2], position=run.generated.scenarios[2].position + 1e-9)
+    other = replace(
+        run.generated.scenarios[2], position=run.generated.scenarios[2].position + 1e-9
+    )
     changed = rewritten(
-        bag, tmp_path / "changed", lambda k, data: encode_scenario(other, run.encounter.start_ns) if k == 2 else data
+        bag,
+        tmp_path / "changed",
+        lambda k, data: encode_scenario(other, run.encounter.start_ns) if k == 2 else data,
     )
     (found,) = validate_bag(changed)
     assert (found.scenarios, found.invalid) == (4, 1)
     assert list(found.found) == [ALTERED]
     assert (found.found[ALTERED].count, found.found[ALTERED].scenario) == (1, 2)
     index = run.generated.scenarios[2].index
-    assert f"message 2 has SHA-256 {digest(encode_scenario(other, run.encounter.start_ns))[:12]}" in found.found[ALTERED].message
+    assert (
+        f"message 2 has SHA-256 {digest(encode_scenario(other, run.encounter.start_ns))[:12]}"
+        in found.found[ALTERED].message
+    )
     assert f"scenario {index} of request 1 was published as" in found.found[ALTERED].message
     answer = CliRunner().invoke(app, ["validate", str(changed)])
     assert answer.exit_code == 1 and ALTERED in answer.output
@@ -166,8 +212,13 @@ def test_scenarios_that_are_not_as_published_are_named(run, tmp_path):
 def several_maps(run, target):
     """A bag in which the road moved by 1 km after the first set; the stamps are the same."""
     far = replace(run.road, origin=run.road.origin + np.array((0.0, 1000.0)))
-    moved = tuple(replace(s, position=s.position + np.array((0.0, 1000.0))) for s in run.generated.scenarios)
-    states = [s + np.array((0.0, 1000.0, 0.0, 0.0)) for s in (run.fit.requested.start, run.fit.requested.end)]
+    moved = tuple(
+        replace(s, position=s.position + np.array((0.0, 1000.0))) for s in run.generated.scenarios
+    )
+    states = [
+        s + np.array((0.0, 1000.0, 0.0, 0.0))
+        for s in (run.fit.requested.start, run.fit.requested.end)
+    ]
     later = replace(run, road=far, generated=replace(run.generated, scenarios=moved))
     later = replace(later, fit=replace(run.fit, requested=BoundaryStates(*states)))
     with atomic_bag(target) as writer:
@@ -196,12 +247,25 @@ def test_a_scenario_whose_entry_was_lost_is_unaccounted(run, tmp_path):
     answer = CliRunner().invoke(app, ["validate", str(cut)])
     assert answer.exit_code == 0 and "2 without an entry" in answer.output
     (case,) = bag_results(cut)
-    assert any("2 of 4 scenarios are unaccounted" in note for note in case.evaluation.row("scenarios").notes)
+    assert any(
+        "2 of 4 scenarios are unaccounted" in note
+        for note in case.evaluation.row("scenarios").notes
+    )
     assert "unaccounted" in case.evaluation.to_json()
-    first = without_infos(bag, tmp_path / "first", infos[:1])  # one in the middle, beside one that was altered
-    other = encode_scenario(replace(run.generated.scenarios[2], seed=1, frame_id="elsewhere"), run.encounter.start_ns)
-    (found,) = validate_bag(rewritten(first, tmp_path / "altered", lambda k, data: other if k == 2 else data))
-    assert (found.unaccounted, found.found[ALTERED].count, found.found[ALTERED].scenario) == (1, 1, 2)
+    first = without_infos(
+        bag, tmp_path / "first", infos[:1]
+    )  # one in the middle, beside one that was altered
+    other = encode_scenario(
+        replace(run.generated.scenarios[2], seed=1, frame_id="elsewhere"), run.encounter.start_ns
+    )
+    (found,) = validate_bag(
+        rewritten(first, tmp_path / "altered", lambda k, data: other if k == 2 else data)
+    )
+    assert (found.unaccounted, found.found[ALTERED].count, found.found[ALTERED].scenario) == (
+        1,
+        1,
+        2,
+    )
 
 
 def test_a_scenario_without_account_is_held_against_no_map_where_there_are_several(run, tmp_path):
@@ -214,7 +278,11 @@ def test_a_scenario_without_account_is_held_against_no_map_where_there_are_sever
 
 def without_infos(bag, target, infos):
     """Copy a bag without these messages of `scenarios/info`."""
-    return copied(bag, target, lambda m: None if m.topic.endswith("/scenarios/info") and m.data in infos else m.data)
+    return copied(
+        bag,
+        target,
+        lambda m: None if m.topic.endswith("/scenarios/info") and m.data in infos else m.data,
+    )
 
 
 def test_the_command_answers_with_its_exit_code(run, tmp_path):
@@ -232,12 +300,24 @@ def test_the_command_answers_with_its_exit_code(run, tmp_path):
 
 def test_an_ego_is_checked_with_its_witness(run, tmp_path):
     """The witness is a part of what is proven: one that hits another is found, one that is lost or altered is said."""
-    slot = Chain(run.encounter, run.segmentation, run.road, PipelineConfig(), Request(ego="2"), count=3, seed=4).run()
+    slot = Chain(
+        run.encounter,
+        run.segmentation,
+        run.road,
+        PipelineConfig(),
+        Request(ego="2"),
+        count=3,
+        seed=4,
+    ).run()
     whole = validate_bag(write_recording(tmp_path / "whole", slot))[0]
     assert (whole.scenarios, whole.found, whole.left_out) == (3, {}, {})
 
     def bag_with(name, change):
-        return copied(tmp_path / "whole", tmp_path / name, lambda m: change(m.data) if m.topic == "/ego/witness" else m.data)
+        return copied(
+            tmp_path / "whole",
+            tmp_path / name,
+            lambda m: change(m.data) if m.topic == "/ego/witness" else m.data,
+        )
 
     (lost,) = validate_bag(bag_with("lost", lambda _: None))
     assert (lost.found, lost.left_out) == ({}, {NO_WITNESS: 3})
@@ -247,12 +327,21 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
         regenerate_scenario(tmp_path / "lost", slot.generated.scenarios[0].index)
     with pytest.raises(InputError, match="whose reference drive is not in the bag"):
         read_trials(tmp_path / "lost")
-    hitting = tuple(replace(one, reference_drive=on_top_of(one)) for one in slot.generated.scenarios)
-    (hit,) = validate_bag(write_recording(tmp_path / "hit", replace(slot, generated=replace(slot.generated, scenarios=hitting))))
+    hitting = tuple(
+        replace(one, reference_drive=on_top_of(one)) for one in slot.generated.scenarios
+    )
+    (hit,) = validate_bag(
+        write_recording(
+            tmp_path / "hit", replace(slot, generated=replace(slot.generated, scenarios=hitting))
+        )
+    )
     assert hit.found["overlap"].count == 3
 
 
 def on_top_of(scenario):
     """The scenario's witness where its first vehicle is."""
-    arrays = {name: getattr(scenario, name)[:1] for name in ("position", "heading", "speed", "acceleration", "present")}
+    arrays = {
+        name: getattr(scenario, name)[:1]
+        for name in ("position", "heading", "speed", "acceleration", "present")
+    }
     return replace(scenario.reference_drive, time=scenario.time, **arrays)

@@ -22,7 +22,9 @@ def run_on(*directions):
     for k, direction in enumerate(directions):
         x = np.array([-10.0, 50.0])[::direction]
         low, high = (np.column_stack((x, np.full(2, 4.0 * (k - 1) + y))) for y in (0.0, 4.0))
-        lanes.append(Lane(str(k), *((high, low) if direction > 0 else (low, high)), speed_limit=8.5))
+        lanes.append(
+            Lane(str(k), *((high, low) if direction > 0 else (low, high)), speed_limit=8.5)
+        )
     run = hand_made_run()
     return replace(run, road=replace(run.road, lanes=LaneNetwork("two lanes", tuple(lanes))))
 
@@ -34,7 +36,9 @@ def test_a_wrong_way_driver_is_seen_in_a_bag(tmp_path, directions, wrong):
     (found,) = validate_bag(bag)
     assert (found.found[Cause.WRONG_WAY].count if Cause.WRONG_WAY in found.found else 0) == wrong
     road = read_recording(bag).namespaces[""].road
-    assert [lane.id for lane in road.lanes.lanes] == ["0", "1"] and road.lanes.lanes[0].speed_limit == 8.5
+    assert [lane.id for lane in road.lanes.lanes] == ["0", "1"] and road.lanes.lanes[
+        0
+    ].speed_limit == 8.5
 
 
 def test_a_bag_of_a_grid_has_no_lanes(tmp_path):

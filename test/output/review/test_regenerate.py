@@ -28,18 +28,26 @@ from scenario_gen.types.lanes import MIRRORED
 from scenario_gen.types.request import Request
 
 LOG, ROAD, SEED = bundled("b"), "t_intersection", 7
-REQUESTS = {"plain": Request(), "ego": Request(ego="1"), "moved": Request(goals="1: 24.0 8.07 3.14159 11", ego="2")}
+REQUESTS = {
+    "plain": Request(),
+    "ego": Request(ego="1"),
+    "moved": Request(goals="1: 24.0 8.07 3.14159 11", ego="2"),
+}
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
     """One bag, a namespace for each request."""
     (encounter,) = read_log([LOG]).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10), sampling=SamplingConfig(variety="narrow"))
+    config = PipelineConfig(
+        evaluation=EvaluationConfig(resamples=10), sampling=SamplingConfig(variety="narrow")
+    )
     runs = {}
     for name, request in REQUESTS.items():
         case = generate(encounter, ROAD, config, count=3, seed=SEED, request=request)
-        runs[f"/{name}"] = replace(case, provenance=provenance_of([LOG], SEED, 3, [ROAD], config, request))
+        runs[f"/{name}"] = replace(
+            case, provenance=provenance_of([LOG], SEED, 3, [ROAD], config, request)
+        )
     return write_recording(tmp_path_factory.mktemp("regenerate") / "bag", runs)
 
 
@@ -57,7 +65,9 @@ def mirrored_bag(tmp_path_factory):
         road.write_text(map_builders.lanelet2())
     log = bundled("a")
     (encounter,) = read_log([log]).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10), sampling=SamplingConfig(variety="narrow"))
+    config = PipelineConfig(
+        evaluation=EvaluationConfig(resamples=10), sampling=SamplingConfig(variety="narrow")
+    )
     case = generate(encounter, str(road), config, count=2, seed=SEED)
     provenance = provenance_of([log], SEED, 2, [str(road)], config, Request())
     return write_recording(folder / "bag", {"/left": replace(case, provenance=provenance)}), log
@@ -72,7 +82,9 @@ def test_a_mirrored_template_says_so_and_comes_again_from_the_log(mirrored_bag):
 
 
 def published(bag, namespace):
-    return [message.data for message in read_messages(bag) if message.topic == f"{namespace}/scenarios"]
+    return [
+        message.data for message in read_messages(bag) if message.topic == f"{namespace}/scenarios"
+    ]
 
 
 @pytest.mark.parametrize("name", REQUESTS)
@@ -95,21 +107,34 @@ def test_a_bag_of_its_own(bag, name, tmp_path):
     (found,) = validate_bag(folder)
     assert (found.scenarios, found.invalid, found.left_out) == (1, 0, {})
     topics = {message.topic for message in read_messages(folder)}
-    assert {f"/{name}/tracks", f"/{name}/map", f"/{name}/fit", f"/{name}/vehicle_1/route"} <= topics
+    assert {
+        f"/{name}/tracks",
+        f"/{name}/map",
+        f"/{name}/fit",
+        f"/{name}/vehicle_1/route",
+    } <= topics
     assert (f"/{name}/ego/witness" in topics) == (name != "plain")
     assert regenerate_scenario(folder, 2).data == published(bag, f"/{name}")[2], "again from there"
 
 
 def test_what_is_ambiguous_or_missing_is_said(bag, tmp_path):
-    with pytest.raises(InputError, match="3 scenarios have number 0; choose one: --namespace '/ego' --request 1; "):
+    with pytest.raises(
+        InputError, match="3 scenarios have number 0; choose one: --namespace '/ego' --request 1; "
+    ):
         regenerate_scenario(bag, 0)
     with pytest.raises(InputError, match="no scenario 77; there are: 0, 1, 2"):
         regenerate_scenario(bag, 77)
     with pytest.raises(InputError, match="has no fit, vehicle_2/route with"):
-        bare = copied(bag, tmp_path / "bare", lambda m: None if m.topic.endswith(("/fit", "/vehicle_2/route")) else m.data)
+        bare = copied(
+            bag,
+            tmp_path / "bare",
+            lambda m: None if m.topic.endswith(("/fit", "/vehicle_2/route")) else m.data,
+        )
         regenerate_scenario(bare, 0, namespace="/plain")
     with pytest.raises(InputError, match="no scenario has an entry"):
-        silent = copied(bag, tmp_path / "silent", lambda m: None if m.topic.endswith("/info") else m.data)
+        silent = copied(
+            bag, tmp_path / "silent", lambda m: None if m.topic.endswith("/info") else m.data
+        )
         regenerate_scenario(silent, 0)
 
 
@@ -121,17 +146,29 @@ def with_summary(change):
             return message.data
         stamp, statuses = decode_diagnostics(message.data)
         return encode_diagnostics(
-            [replace(s, values=change(dict(s.values))) if "published" in s.values else s for s in statuses], stamp
+            [
+                replace(s, values=change(dict(s.values))) if "published" in s.values else s
+                for s in statuses
+            ],
+            stamp,
         )
 
     return changed
 
 
 def test_other_parameters_or_versions_are_said(bag, tmp_path):
-    other = with_summary(lambda values: values | {"sampling.lateral_sigma": "0.31", "numpy": "1.0"})
-    with pytest.raises(ScenarioGenError, match=r"scenario 1 comes out differently: numpy 1\.0 there"):
+    other = with_summary(
+        lambda values: values | {"sampling.lateral_sigma": "0.31", "numpy": "1.0"}
+    )
+    with pytest.raises(
+        ScenarioGenError, match=r"scenario 1 comes out differently: numpy 1\.0 there"
+    ):
         regenerate_scenario(copied(bag, tmp_path / "other", other), 1, namespace="/plain")
-    less = with_summary(lambda values: {name: text for name, text in values.items() if name != "sampling.time_sigma"})
+    less = with_summary(
+        lambda values: {
+            name: text for name, text in values.items() if name != "sampling.time_sigma"
+        }
+    )
     with pytest.raises(InputError, match=r"parameter sampling\.time_sigma is not there"):
         regenerate_scenario(copied(bag, tmp_path / "less", less), 1, namespace="/plain")
 

@@ -7,7 +7,12 @@ from html import escape
 import math
 
 HALF, ARM, WIDTH = 8.0, 60.0, 3.5  # metres: half the junction, the arms' ends, a lane
-ARMS = {"w": (1, 0), "e": (-1, 0), "s": (0, 1), "n": (0, -1)}  # by which traffic comes in, and where it then heads
+ARMS = {
+    "w": (1, 0),
+    "e": (-1, 0),
+    "s": (0, 1),
+    "n": (0, -1),
+}  # by which traffic comes in, and where it then heads
 LEADS = {  # where one comes out
     "straight": {"w": "e", "e": "w", "s": "n", "n": "s"},
     "right": {"w": "s", "s": "e", "e": "n", "n": "w"},
@@ -38,7 +43,10 @@ def lanes():
                 side = 1.0 if way == "right" else -1.0
                 turn = [k * math.pi / 20.0 for k in range(11)]
                 borders = [
-                    [at(arm, -HALF + r * math.sin(a), side * (HALF - r * math.cos(a))) for a in turn]
+                    [
+                        at(arm, -HALF + r * math.sin(a), side * (HALF - r * math.cos(a)))
+                        for a in turn
+                    ]
                     for r in (HALF, HALF - side * WIDTH)
                 ]
             found[f"{arm}_{way}"] = (*borders, [f"{lead[arm]}_out"])
@@ -54,14 +62,21 @@ def commonroad(offset=(0.0, 0.0), extra="", signs=None):
     def bound(tag, points):
         return (
             f"<{tag}>"
-            + "".join(f"<point><x>{x + offset[0]!r}</x><y>{y + offset[1]!r}</y></point>" for x, y in points)
+            + "".join(
+                f"<point><x>{x + offset[0]!r}</x><y>{y + offset[1]!r}</y></point>"
+                for x, y in points
+            )
             + f"</{tag}>"
         )
 
     def signed(name):
         kind = (signs or {}).get(name.removesuffix("_in"))
         tag = "trafficLightRef" if kind == "light" else "trafficSignRef"
-        return f'<{tag} ref="{50 + list(ARMS).index(name[0])}"/>' if kind and name.endswith("_in") else ""
+        return (
+            f'<{tag} ref="{50 + list(ARMS).index(name[0])}"/>'
+            if kind and name.endswith("_in")
+            else ""
+        )
 
     text = "".join(
         f'<lanelet id="{number[name]}">{bound("leftBound", left)}{bound("rightBound", right)}'
@@ -71,7 +86,9 @@ def commonroad(offset=(0.0, 0.0), extra="", signs=None):
         for name, (left, right, after) in found.items()
     )
     sign = "<trafficSign id='7'><trafficSignElement><trafficSignID>274</trafficSignID>"
-    sign += f"<additionalValue>{LIMIT / 3.6!r}</additionalValue></trafficSignElement></trafficSign>"
+    sign += (
+        f"<additionalValue>{LIMIT / 3.6!r}</additionalValue></trafficSignElement></trafficSign>"
+    )
     for arm, kind in (signs or {}).items():
         number_of = f"id='{50 + list(ARMS).index(arm)}'"
         if kind == "light":
@@ -92,7 +109,11 @@ def commonroad(offset=(0.0, 0.0), extra="", signs=None):
 
 
 def lanelet2(
-    place=lambda x, y: f'lat="0.0" lon="0.0"><tag k="local_x" v="{x!r}"/><tag k="local_y" v="{y!r}"/>', tags="", signs=None
+    place=lambda x, y: (
+        f'lat="0.0" lon="0.0"><tag k="local_x" v="{x!r}"/><tag k="local_y" v="{y!r}"/>'
+    ),
+    tags="",
+    signs=None,
 ):
     """Return the crossroads as Lanelet2; `place` writes a node's coordinates; every second border is written backwards.
 
@@ -106,7 +127,11 @@ def lanelet2(
 
     def way(points, backwards):
         refs = [node(point) for point in points][:: -1 if backwards else 1]
-        ways.append(f'<way id="{1000 + len(ways)}">' + "".join(f'<nd ref="{ref}"/>' for ref in refs) + "</way>")
+        ways.append(
+            f'<way id="{1000 + len(ways)}">'
+            + "".join(f'<nd ref="{ref}"/>' for ref in refs)
+            + "</way>"
+        )
         return 999 + len(ways)
 
     elements = []
@@ -118,7 +143,9 @@ def lanelet2(
             element = f'<member type="relation" ref="{3000 + k}" role="regulatory_element"/>'
             line = way([left[-1], right[-1]], False)
             sign = way([right[-1], right[-2]], False)
-            ways[-1] = ways[-1].replace("</way>", f'<tag k="type" v="traffic_sign"/><tag k="subtype" v="de{kind}"/></way>')
+            ways[-1] = ways[-1].replace(
+                "</way>", f'<tag k="type" v="traffic_sign"/><tag k="subtype" v="de{kind}"/></way>'
+            )
             elements.append(
                 f'<relation id="{3000 + k}"><member type="way" ref="{line}" role="ref_line"/>'
                 f'<member type="way" ref="{sign}" role="refers"/><tag k="type" v="regulatory_element"/>'
@@ -131,7 +158,9 @@ def lanelet2(
             + f'<tag k="type" v="lanelet"/><tag k="subtype" v="road"/><tag k="location" v="urban"/><tag k="one_way" v="yes"/>'
             f'<tag k="speed_limit" v="{LIMIT:g}"/>{tags}</relation>'
         )
-    text = "".join(f'<node id="{number}" {place(*point)}</node>' for number, point in nodes.values())
+    text = "".join(
+        f'<node id="{number}" {place(*point)}</node>' for number, point in nodes.values()
+    )
     return f'<?xml version="1.0"?><osm version="0.6">{text}{"".join(ways)}{"".join(relations + elements)}</osm>'
 
 
@@ -150,7 +179,11 @@ def opendrive(reference="", signs=None):
     def road(number, junction, link, start, heading, length, shape, left, right, extra=""):
         sides = "".join(
             f"<{tag}>{text}</{tag}>"
-            for tag, text in (("left", left), ("center", '<lane id="0" type="none"/>'), ("right", right))
+            for tag, text in (
+                ("left", left),
+                ("center", '<lane id="0" type="none"/>'),
+                ("right", right),
+            )
             if text
         )
         roads.append(
@@ -164,7 +197,17 @@ def opendrive(reference="", signs=None):
         heading = math.atan2(dy, dx)
         to = '<successor elementType="junction" elementId="5"/>'
         sides = lane.format(1, ""), lane.format(-1, "")
-        road(k, -1, to, at(arm, -ARM, 0.0), heading, ARM - HALF, "<line/>", *sides, signal(arm, ARM - HALF))
+        road(
+            k,
+            -1,
+            to,
+            at(arm, -ARM, 0.0),
+            heading,
+            ARM - HALF,
+            "<line/>",
+            *sides,
+            signal(arm, ARM - HALF),
+        )
         for j, (way, lead) in enumerate(LEADS.items()):
             number, out = 10 + 3 * k + j, list(ARMS).index(lead[arm])
             link = "".join(
@@ -173,17 +216,28 @@ def opendrive(reference="", signs=None):
             )
             shape, length = ("<line/>", 2.0 * HALF)
             if way != "straight":
-                shape, length = f'<arc curvature="{(1.0 if way == "left" else -1.0) / HALF!r}"/>', math.pi * HALF / 2.0
+                shape, length = (
+                    f'<arc curvature="{(1.0 if way == "left" else -1.0) / HALF!r}"/>',
+                    math.pi * HALF / 2.0,
+                )
             links = '<predecessor id="-1"/><successor id="1"/>'
-            road(number, 5, link, at(arm, -HALF, 0.0), heading, length, shape, "", lane.format(-1, links))
+            road(
+                number,
+                5,
+                link,
+                at(arm, -HALF, 0.0),
+                heading,
+                length,
+                shape,
+                "",
+                lane.format(-1, links),
+            )
             connections.append(
                 f'<connection id="{number}" incomingRoad="{k}" connectingRoad="{number}" contactPoint="start">'
                 '<laneLink from="-1" to="-1"/>'
                 "</connection>"
             )
-    header = (
-        f'<header revMajor="1" revMinor="6">{f"<geoReference>{escape(reference)}</geoReference>" if reference else ""}</header>'
-    )
+    header = f'<header revMajor="1" revMinor="6">{f"<geoReference>{escape(reference)}</geoReference>" if reference else ""}</header>'
     junction = f'<junction name="" id="5">{"".join(connections)}</junction>'
     return f'<?xml version="1.0"?><OpenDRIVE>{header}{"".join(roads)}{junction}</OpenDRIVE>'
 

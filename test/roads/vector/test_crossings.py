@@ -27,13 +27,22 @@ def left_turn(median, start):
     speed = np.stack((np.full(STEPS, 4.0), np.where(np.arange(STEPS) < 39, 8.0, 0.0)))
     heading = np.stack((yaw, np.full(STEPS, np.pi)))
     vehicles = (Vehicle("turns", 4.0, 1.8), Vehicle("oncoming", 4.0, 1.8))
-    return Encounter("left turn", vehicles, 0, round(DT * 1e9), np.stack((turning, oncoming)), heading, speed)
+    return Encounter(
+        "left turn", vehicles, 0, round(DT * 1e9), np.stack((turning, oncoming)), heading, speed
+    )
 
 
 def meet(tracks):
     """Whether two are in conflict."""
     poses = np.stack([track.poses for track in tracks])
-    return bool(find_conflicts(tuple(t.vehicle for t in tracks), np.arange(poses.shape[1]) * DT, poses[..., :2], poses[..., 2]))
+    return bool(
+        find_conflicts(
+            tuple(t.vehicle for t in tracks),
+            np.arange(poses.shape[1]) * DT,
+            poses[..., :2],
+            poses[..., 2],
+        )
+    )
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -48,10 +57,14 @@ def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
 
 
 @pytest.mark.recorded
-@pytest.mark.parametrize("name", ["simple_4way_intersection", "fabriksgatan", "multi_intersections"])
+@pytest.mark.parametrize(
+    "name", ["simple_4way_intersection", "fabriksgatan", "multi_intersections"]
+)
 def test_a_recorded_left_turn_crosses_the_oncoming_lane(recorded, name):
     """Of a wide crossroads: as one piece it resembles right turns of a narrow one more."""
     log = next((recorded / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
     tracks = clean_tracks(read_log(log).encounters[0])
-    match, _ = next(placements(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr"), tracks))
+    match, _ = next(
+        placements(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr"), tracks)
+    )
     assert meet(tracks_on(match, tracks))

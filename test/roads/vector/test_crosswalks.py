@@ -8,8 +8,13 @@ import pytest
 import shapely
 from test_reported_maps import lane, read, road, section
 
-ROUND = "".join(f'<cornerLocal u="{u}" v="{v}" z="0"/>' for u, v in ((2, 4), (-2, 4), (-2.5, 0), (-2, -4), (2, -4), (2.5, 0)))
-ALONG = "".join(f'<cornerRoad s="{s}" t="{t}"/>' for s, t in ((52, 4), (48, 4), (48, -4), (52, -4), (52, 4)))
+ROUND = "".join(
+    f'<cornerLocal u="{u}" v="{v}" z="0"/>'
+    for u, v in ((2, 4), (-2, 4), (-2.5, 0), (-2, -4), (2, -4), (2.5, 0))
+)
+ALONG = "".join(
+    f'<cornerRoad s="{s}" t="{t}"/>' for s, t in ((52, 4), (48, 4), (48, -4), (52, -4), (52, 4))
+)
 
 
 def crossing(more="", attributes='hdg="0"', kind="crosswalk"):
@@ -30,11 +35,17 @@ def test_a_crosswalk_leads_from_the_right_of_its_road_to_the_left(tmp_path, obje
     (walk,) = network.others
     assert (walk.id, walk.crossing, sorted(walk.users)) == ("crosswalk 1.7", True, ["pedestrian"])
     assert np.allclose(walk.centre[[0, -1]], [[50.0, -4.0], [50.0, 4.0]], atol=1e-6)
-    assert np.allclose(walk.yaw, np.pi / 2.0) and shapely.Polygon(walk.outline).area == pytest.approx(area)
+    assert np.allclose(walk.yaw, np.pi / 2.0) and shapely.Polygon(
+        walk.outline
+    ).area == pytest.approx(area)
     assert walk.left[0, 0] < walk.right[0, 0]
 
 
 def test_one_without_a_size_is_left_out_and_named(tmp_path):
-    network = read(tmp_path, road(section(right=lane(-1)), more=crossing(attributes='length="0" width="0"')))
-    assert not network.others and any("1 faulty crosswalk left out (crosswalk 1.7)" in note for note in network.notes)
+    network = read(
+        tmp_path, road(section(right=lane(-1)), more=crossing(attributes='length="0" width="0"'))
+    )
+    assert not network.others and any(
+        "1 faulty crosswalk left out (crosswalk 1.7)" in note for note in network.notes
+    )
     assert not read(tmp_path, road(section(right=lane(-1)), more=crossing(kind="tree"))).others

@@ -21,8 +21,17 @@ from scenario_gen.types import RuleKind
 LINE = '<geometry s="0" x="{}" y="{}" hdg="{}" length="{}"><line/></geometry>'
 
 
-def lane(number, kind="driving", links="", more="", width='<width sOffset="0" a="3.5" b="0" c="0" d="0"/>', attributes=""):
-    return f'<lane id="{number}" type="{kind}" {attributes}><link>{links}</link>{width}{more}</lane>'
+def lane(
+    number,
+    kind="driving",
+    links="",
+    more="",
+    width='<width sOffset="0" a="3.5" b="0" c="0" d="0"/>',
+    attributes="",
+):
+    return (
+        f'<lane id="{number}" type="{kind}" {attributes}><link>{links}</link>{width}{more}</lane>'
+    )
 
 
 def section(s=0, left="", right="", attributes=""):
@@ -30,7 +39,17 @@ def section(s=0, left="", right="", attributes=""):
     return f'<laneSection s="{s}" {attributes}>{sides[0]}<center><lane id="0" type="none"/></center>{sides[1]}</laneSection>'
 
 
-def road(sections, number=1, at=(0, 0, 0), length=100, link="", offsets="", elevation=0, plan=LINE, more=""):
+def road(
+    sections,
+    number=1,
+    at=(0, 0, 0),
+    length=100,
+    link="",
+    offsets="",
+    elevation=0,
+    plan=LINE,
+    more="",
+):
     return (
         f'<road length="{length}" id="{number}" junction="-1"><link>{link}</link><planView>{plan.format(*at, length)}</planView>'
         f'<elevationProfile><elevation s="0" a="{elevation}" b="0" c="0" d="0"/></elevationProfile>'
@@ -39,7 +58,13 @@ def road(sections, number=1, at=(0, 0, 0), length=100, link="", offsets="", elev
 
 
 def read(folder, *roads):
-    return read_network(write(folder, ".xodr", f'<OpenDRIVE><header revMajor="1" revMinor="7"/>{"".join(roads)}</OpenDRIVE>'))
+    return read_network(
+        write(
+            folder,
+            ".xodr",
+            f'<OpenDRIVE><header revMajor="1" revMinor="7"/>{"".join(roads)}</OpenDRIVE>',
+        )
+    )
 
 
 def by_id(network):
@@ -97,20 +122,27 @@ def test_a_section_for_one_side_leaves_the_other_as_it_is(tmp_path):
         50, right=lane(-1, links='<predecessor id="-1"/>') + lane(-2), attributes=one
     )
     network = read(tmp_path, road(sections))
-    assert {name: float(np.ptp(lane.centre[:, 0])) for name, lane in by_id(network).items()} == pytest.approx(
-        {"1.0.1": 100.0, "1.0.-1": 50.0, "1.1.-1": 50.0, "1.1.-2": 50.0}
-    )
+    assert {
+        name: float(np.ptp(lane.centre[:, 0])) for name, lane in by_id(network).items()
+    } == pytest.approx({"1.0.1": 100.0, "1.0.-1": 50.0, "1.1.-1": 50.0, "1.1.-2": 50.0})
     assert after(network)["1.0.-1"] == ["1.1.-1"]
 
 
 def test_a_road_without_length_joins_those_beside_it(tmp_path):
     def between(before, next_one):
         ends = (("predecessor", before, "end"), ("successor", next_one, "start"))
-        return "".join(f'<{tag} elementType="road" elementId="{k}" contactPoint="{at}"/>' for tag, k, at in ends if k)
+        return "".join(
+            f'<{tag} elementType="road" elementId="{k}" contactPoint="{at}"/>'
+            for tag, k, at in ends
+            if k
+        )
 
     both = lane(-1, links='<predecessor id="-1"/><successor id="-1"/>')
     pieces = [(1, 0, 50, between(0, 2)), (2, 50, 0, between(1, 3)), (3, 50, 50, between(2, 0))]
-    network = read(tmp_path, *(road(section(right=both), k, (x, 0, 0), length, link) for k, x, length, link in pieces))
+    network = read(
+        tmp_path,
+        *(road(section(right=both), k, (x, 0, 0), length, link) for k, x, length, link in pieces),
+    )
     assert after(network) == {"1.0.-1": ["2.0.-1"], "2.0.-1": ["3.0.-1"], "3.0.-1": []}
 
 
@@ -122,18 +154,26 @@ def test_a_road_without_length_joins_those_beside_it(tmp_path):
         ('<access rule="deny"><restriction type="passengerCar"/></access>', False),
         ('<access rule="deny" restriction="truck"/>', True),
         ('<access rule="deny" restriction="none"/>', True),
-        ('<access rule="allow" restriction="bus"/><access rule="allow" restriction="passengerCar"/>', True),
+        (
+            '<access rule="allow" restriction="bus"/><access rule="allow" restriction="passengerCar"/>',
+            True,
+        ),
     ],
 )
 def test_access_says_whether_cars_may_use_a_lane(tmp_path, access, open_to_cars):
     network = read(tmp_path, road(section(right=lane(-1) + lane(-2, more=access))))
     assert set(by_id(network)) == {"1.0.-1", "1.0.-2"} - (set() if open_to_cars else {"1.0.-2"})
-    assert open_to_cars != any("1 lanes are for others than cars" in note for note in network.notes)
+    assert open_to_cars != any(
+        "1 lanes are for others than cars" in note for note in network.notes
+    )
 
 
 def test_a_lane_says_in_which_directions_it_is_driven(tmp_path):
     lanes = lane(-1, attributes='direction="both"') + lane(-2, attributes='direction="reversed"')
-    east = {name: float(np.cos(one.yaw[0])) for name, one in by_id(read(tmp_path, road(section(right=lanes)))).items()}
+    east = {
+        name: float(np.cos(one.yaw[0]))
+        for name, one in by_id(read(tmp_path, road(section(right=lanes)))).items()
+    }
     assert east == pytest.approx({"1.0.-1": 1.0, "1.0.-1r": -1.0, "1.0.-2": -1.0})
 
 
@@ -153,13 +193,20 @@ def test_a_mark_may_be_crossed_one_way_only(tmp_path, mark, side, outwards, inwa
     sign = 1 if side == "left" else -1
     lanes = lane(sign, more=f'<roadMark sOffset="0" {mark}/>') + lane(2 * sign)
     found = by_id(read(tmp_path, road(section(**{side: lanes}))))
-    assert (bool(found[f"1.0.{sign}"].beside), bool(found[f"1.0.{2 * sign}"].beside)) == (outwards, inwards)
+    assert (bool(found[f"1.0.{sign}"].beside), bool(found[f"1.0.{2 * sign}"].beside)) == (
+        outwards,
+        inwards,
+    )
 
 
-@pytest.mark.parametrize(("factor", "more"), [(100.0, ""), (1.0, ""), (100.0, 'pRange="normalized"')])
+@pytest.mark.parametrize(
+    ("factor", "more"), [(100.0, ""), (1.0, ""), (100.0, 'pRange="normalized"')]
+)
 def test_a_cubic_without_a_range_is_read_as_long_as_it_is_said_to_be(tmp_path, factor, more):
     shape = f'<paramPoly3 aU="0" bU="{factor}" cU="0" dU="0" aV="0" bV="0" cV="{20.0 * (factor / 100.0) ** 2}" dV="0" {more}/>'
-    network = read(tmp_path, road(section(right=lane(-1)), plan=LINE.replace("<line/>", shape), length=100))
+    network = read(
+        tmp_path, road(section(right=lane(-1)), plan=LINE.replace("<line/>", shape), length=100)
+    )
     assert np.allclose(network.lanes[0].left[-1], (100.0, 20.0))
 
 
@@ -182,7 +229,9 @@ def test_a_sign_is_read_by_its_country(sign, kind):
 
 def test_a_stop_line_may_have_a_name_alone(tmp_path):
     signal = '<signal s="{}" t="-4" id="{}" name="{}" dynamic="no" orientation="+" country="{}" type="{}" subtype="{}"/>'
-    signals = signal.format(90, "stop", "", "US", "R1", "1") + signal.format(88, "line", "StopLine", "", "-1", "-1")
+    signals = signal.format(90, "stop", "", "US", "R1", "1") + signal.format(
+        88, "line", "StopLine", "", "-1", "-1"
+    )
     signals += signal.format(30, "limit", "", "US", "R2", "1")
     network = read(tmp_path, road(section(right=lane(-1)), more=f"<signals>{signals}</signals>"))
     (rule,) = network.rules
@@ -191,16 +240,29 @@ def test_a_stop_line_may_have_a_name_alone(tmp_path):
 
 
 def test_a_marked_stop_line_of_autoware_is_one_to_stop_at(tmp_path):
-    text = lanelet2(signs={"s": "205"}).replace('v="traffic_sign"/></relation>', 'v="road_marking"/></relation>')
+    text = lanelet2(signs={"s": "205"}).replace(
+        'v="traffic_sign"/></relation>', 'v="road_marking"/></relation>'
+    )
     text = text.replace('v="traffic_sign"/><tag k="subtype" v="de205"/>', 'v="stop_line"/>')
     (rule,) = read_network(write(tmp_path, ".osm", text)).rules
     assert rule.kind == RuleKind.STOP and np.allclose(rule.line[0], (3.5, -8.0))
 
 
 def test_users_of_a_lanelet_of_commonroad_say_whether_it_is_for_cars(tmp_path):
-    text, users = FORMATS[".xml"](), ("<userOneWay>bicycle</userOneWay>", "<userBidirectional>vehicle</userBidirectional>")
-    first, second = (text.index("<laneletType>", text.index(f'<lanelet id="{k}"')) for k in (100, 101))
-    network = read_network(write(tmp_path, ".xml", f"{text[:first]}{users[0]}{text[first:second]}{users[1]}{text[second:]}"))
+    text, users = (
+        FORMATS[".xml"](),
+        ("<userOneWay>bicycle</userOneWay>", "<userBidirectional>vehicle</userBidirectional>"),
+    )
+    first, second = (
+        text.index("<laneletType>", text.index(f'<lanelet id="{k}"')) for k in (100, 101)
+    )
+    network = read_network(
+        write(
+            tmp_path,
+            ".xml",
+            f"{text[:first]}{users[0]}{text[first:second]}{users[1]}{text[second:]}",
+        )
+    )
     assert {"101", "101r", "102"} <= set(by_id(network)) and "100" not in by_id(network)
     assert np.allclose(by_id(network)["101r"].centre, by_id(network)["101"].centre[::-1])
 
@@ -209,19 +271,30 @@ def bridge(folder, suffix, height):
     """Two roads of a lane each way that cross, one of them so many metres above the other."""
     if suffix == ".xodr":
         both = section(left=lane(1), right=lane(-1))
-        return read(folder, road(both, 1, (-80, 0, 0), 160), road(both, 2, (0, -80, math.pi / 2.0), 160, elevation=height))
+        return read(
+            folder,
+            road(both, 1, (-80, 0, 0), 160),
+            road(both, 2, (0, -80, math.pi / 2.0), 160, elevation=height),
+        )
     nodes, ways, relations = "", "", ""
     for k, (turned, z) in enumerate(((False, 0.0), (True, height))):
         for j, aside in enumerate((-3.5, 0.0, 3.5)):
             for i, along in enumerate((-80.0, 80.0)):
                 x, y = (-aside, along) if turned else (along, aside)
-                tags = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in (("local_x", x), ("local_y", y), ("ele", z)))
+                tags = "".join(
+                    f'<tag k="{key}" v="{value}"/>'
+                    for key, value in (("local_x", x), ("local_y", y), ("ele", z))
+                )
                 nodes += f'<node id="{100 * k + 10 * j + i + 1}" lat="0" lon="0">{tags}</node>'
             ways += f'<way id="{1000 + 10 * k + j}"><nd ref="{100 * k + 10 * j + 1}"/><nd ref="{100 * k + 10 * j + 2}"/></way>'
         for j in (0, 1):
-            sides = ((f"{1000 + 10 * k + 1}", f"{1000 + 10 * k}"), (f"{1000 + 10 * k + 2}", f"{1000 + 10 * k + 1}"))[j]
+            sides = (
+                (f"{1000 + 10 * k + 1}", f"{1000 + 10 * k}"),
+                (f"{1000 + 10 * k + 2}", f"{1000 + 10 * k + 1}"),
+            )[j]
             members = "".join(
-                f'<member type="way" role="{r}" ref="{ref}"/>' for r, ref in zip(("left", "right"), sides, strict=True)
+                f'<member type="way" role="{r}" ref="{ref}"/>'
+                for r, ref in zip(("left", "right"), sides, strict=True)
             )
             relations += f'<relation id="{2000 + 10 * k + j}">{members}<tag k="type" v="lanelet"/></relation>'
     return read_network(write(folder, ".osm", f"<osm>{nodes}{ways}{relations}</osm>"))
@@ -230,11 +303,15 @@ def bridge(folder, suffix, height):
 @pytest.mark.parametrize("suffix", [".xodr", ".osm"])
 def test_who_drives_on_a_bridge_meets_nobody_under_it(tmp_path, suffix):
     flat, above = (bridge(tmp_path, suffix, height) for height in (1.0, 8.0))
-    assert {lane.junction for lane in flat.lanes} == {"1"} and {lane.junction for lane in above.lanes} == {""}
+    assert {lane.junction for lane in flat.lanes} == {"1"} and {
+        lane.junction for lane in above.lanes
+    } == {""}
     tracks = clean_tracks(template(crossing()))
     match, _ = next(placements(flat, tracks))
     assert meet(tracks_on(match, tracks))
-    with pytest.raises(RefusedError, match="vehicles 1 and 2 would be above each other, as on a bridge"):
+    with pytest.raises(
+        RefusedError, match="vehicles 1 and 2 would be above each other, as on a bridge"
+    ):
         next(placements(above, tracks))
 
 
@@ -247,8 +324,12 @@ def test_a_map_on_the_180th_meridian_is_one_map(tmp_path):
     assert np.allclose(network.box, [[-60.0, -60.0], [60.0, 60.0]], atol=0.02)
 
 
-def test_places_beyond_the_shortlist_are_looked_at_where_nobody_takes_those_on_it(tmp_path, monkeypatch):
+def test_places_beyond_the_shortlist_are_looked_at_where_nobody_takes_those_on_it(
+    tmp_path, monkeypatch
+):
     network, tracks = read_network(write(tmp_path, ".xodr")), clean_tracks(template(crossing()))
     everywhere = {match.courses[0].lanes for match, _ in placements(network, tracks)}
     monkeypatch.setattr("scenario_gen.roads.vector.place._SPOTS", 1)
-    assert {match.courses[0].lanes for match, _ in placements(network, tracks)} == everywhere and len(everywhere) > 3
+    assert {
+        match.courses[0].lanes for match, _ in placements(network, tracks)
+    } == everywhere and len(everywhere) > 3

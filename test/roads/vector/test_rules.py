@@ -15,7 +15,12 @@ from scenario_gen.template import clean_tracks, find_conflicts
 from scenario_gen.types import Encounter, RuleKind, Scenario, Vehicle
 
 DT = 0.1
-KINDS = {"206": RuleKind.STOP, "205": RuleKind.GIVE_WAY, "306": RuleKind.PRIORITY, "light": RuleKind.TRAFFIC_LIGHT}
+KINDS = {
+    "206": RuleKind.STOP,
+    "205": RuleKind.GIVE_WAY,
+    "306": RuleKind.PRIORITY,
+    "light": RuleKind.TRAFFIC_LIGHT,
+}
 
 
 def drive(arm, speeds, start):
@@ -29,7 +34,9 @@ def crossing(first="w", second="s", stands=True):
     """Return the motion of two: the second one waits before the crossroads for the first one, or slows down for it."""
     steps = np.arange(120)
     slow = np.interp(
-        steps * DT, [0.0, 2.0, 5.0, 5.5, 9.0, 12.0], [7.0, 6.0, 0.0 if stands else 3.0, 0.0 if stands else 3.0, 7.0, 7.0]
+        steps * DT,
+        [0.0, 2.0, 5.0, 5.5, 9.0, 12.0],
+        [7.0, 6.0, 0.0 if stands else 3.0, 0.0 if stands else 3.0, 7.0, 7.0],
     )
     drives = [drive(first, np.full(120, 8.0), -35.0), drive(second, slow, -33.5)]
     position, heading, speed = (np.stack(part) for part in zip(*drives, strict=True))
@@ -48,7 +55,9 @@ def network_with(folder, suffix, signs):
 
 
 def broken(network, motion):
-    return RuleCheck(network).breaches(motion, find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading))
+    return RuleCheck(network).breaches(
+        motion, find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading)
+    )
 
 
 def arm_of(point):
@@ -94,8 +103,17 @@ def test_rounding_does_not_choose_between_places_that_are_alike(tmp_path):
     network, motion = network_with(tmp_path, ".xodr", {"s": "205"}), crossing()
     paths = []
     for seed in range(4):
-        rounded = motion.position + 1e-12 * np.random.default_rng(seed).standard_normal(motion.position.shape)
-        paths.append([place.paths[1][0] for place in places(network, clean_tracks(template(replace(motion, position=rounded))))])
+        rounded = motion.position + 1e-12 * np.random.default_rng(seed).standard_normal(
+            motion.position.shape
+        )
+        paths.append(
+            [
+                place.paths[1][0]
+                for place in places(
+                    network, clean_tracks(template(replace(motion, position=rounded)))
+                )
+            ]
+        )
     assert all(np.abs(np.subtract(other, paths[0])).max() < 1e-6 for other in paths[1:])
 
 
@@ -124,7 +142,11 @@ def test_who_goes_first_though_he_has_to_give_way_takes_the_right_of_way(tmp_pat
 def test_who_goes_long_before_the_other_one_takes_nothing(tmp_path):
     network = network_with(tmp_path, ".xodr", {"w": "205"})
     motion = crossing(stands=False)
-    late = replace(motion, position=motion.position - np.array([[[0.0, 0.0]], [[0.0, 40.0]]]), speed=np.full((2, 120), 7.0))
+    late = replace(
+        motion,
+        position=motion.position - np.array([[[0.0, 0.0]], [[0.0, 40.0]]]),
+        speed=np.full((2, 120), 7.0),
+    )
     assert broken(network, late) == []
 
 

@@ -17,9 +17,19 @@ def oncoming(side):
     """Two vehicles that pass each other, each 1.75 m on its own side of the middle: 1 for the right."""
     time = np.arange(81) * 0.1
     way = 10.0 * time - 40.0
-    position = np.stack([np.column_stack([sign * way, np.full(81, -1.75 * side * sign)]) for sign in (1.0, -1.0)])
+    position = np.stack(
+        [np.column_stack([sign * way, np.full(81, -1.75 * side * sign)]) for sign in (1.0, -1.0)]
+    )
     heading = np.stack([np.zeros(81), np.full(81, np.pi)])
-    return Encounter("o", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, np.full((2, 81), 10.0))
+    return Encounter(
+        "o",
+        (Vehicle("1"), Vehicle("2")),
+        0,
+        100_000_000,
+        position,
+        heading,
+        np.full((2, 81), 10.0),
+    )
 
 
 @pytest.fixture(params=["right", "left"])
@@ -27,7 +37,10 @@ def crossroads(request, tmp_path, monkeypatch):
     """A map, and the side on which its traffic drives."""
     plain = map_builders.lanes()
     if request.param == "left":
-        image = {k: ([(x, -y) for x, y in right], [(x, -y) for x, y in left], after) for k, (left, right, after) in plain.items()}
+        image = {
+            k: ([(x, -y) for x, y in right], [(x, -y) for x, y in left], after)
+            for k, (left, right, after) in plain.items()
+        }
         monkeypatch.setattr(map_builders, "lanes", lambda: image)
     path = tmp_path / "crossroads.osm"
     path.write_text(map_builders.lanelet2())
@@ -41,7 +54,14 @@ def test_a_template_is_mirrored_on_a_map_of_the_other_side(crossroads):
         road, driven = road_and_template(path, encounter)
         assert road.lanes.traffic_side == side
         if own == side:
-            assert driven is encounter and not any(note.startswith(MIRRORED) for note in road.lanes.notes)
+            assert driven is encounter and not any(
+                note.startswith(MIRRORED) for note in road.lanes.notes
+            )
         else:
-            assert road.lanes.notes[0] == f"{MIRRORED}: traffic on road {road.name} keeps to the {side}"
-            assert driven.name == "o mirrored" and np.array_equal(driven.position, mirrored(encounter).position)
+            assert (
+                road.lanes.notes[0]
+                == f"{MIRRORED}: traffic on road {road.name} keeps to the {side}"
+            )
+            assert driven.name == "o mirrored" and np.array_equal(
+                driven.position, mirrored(encounter).position
+            )

@@ -9,7 +9,15 @@ import pytest
 from test_reported_maps import lane, read, road, section
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.roads import build_road, cells_of, ground_for, placements, read_network, RoadConfig, users_of
+from scenario_gen.roads import (
+    build_road,
+    cells_of,
+    ground_for,
+    placements,
+    read_network,
+    RoadConfig,
+    users_of,
+)
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.template import clean_tracks
 from scenario_gen.types import Encounter, lanes_for, Vehicle, VEHICLE_TYPES
@@ -31,21 +39,31 @@ def users(network):
         ({"subtype": "shared_walkway"}, "bicycle,pedestrian"),
         ({"subtype": "highway"}, "bus,car,motorcycle,truck,van"),
         ({"subtype": "road", "participant:vehicle": "yes"}, ""),
-        ({"subtype": "road", "participant:vehicle": "yes", "participant:bicycle": "no"}, "bus,car,motorcycle,truck,van"),
+        (
+            {"subtype": "road", "participant:vehicle": "yes", "participant:bicycle": "no"},
+            "bus,car,motorcycle,truck,van",
+        ),
         ({"subtype": "walkway", "participant:bicycle": "yes"}, "bicycle"),
-        ({"subtype": "road", "participant:vehicle:truck": "no", "participant:vehicle": "yes"}, "bicycle,bus,car,motorcycle,van"),
+        (
+            {"subtype": "road", "participant:vehicle:truck": "no", "participant:vehicle": "yes"},
+            "bicycle,bus,car,motorcycle,van",
+        ),
     ],
 )
 def test_subtypes_and_participants_of_lanelets_name_users(tmp_path, tags, own):
     text = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
-    network = read_network(write(tmp_path, ".osm", lanelet2().replace('<tag k="subtype" v="road"/>', text, 1)))
+    network = read_network(
+        write(tmp_path, ".osm", lanelet2().replace('<tag k="subtype" v="road"/>', text, 1))
+    )
     assert users(network) == ({"2000": own} if own else {})
     assert ("2000" in [one.id for one in network.lanes]) == ("car" in own or not own)
 
 
 def test_ways_of_people_neither_move_a_map_nor_make_junctions(tmp_path):
     def known(subtype):
-        text = lanelet2().replace('<tag k="subtype" v="road"/>', f'<tag k="subtype" v="{subtype}"/>', 1)
+        text = lanelet2().replace(
+            '<tag k="subtype" v="road"/>', f'<tag k="subtype" v="{subtype}"/>', 1
+        )
         return read_network(write(tmp_path, ".osm", text))
 
     walk, plain = known("crosswalk"), known("rail")
@@ -59,11 +77,20 @@ def test_ways_of_people_neither_move_a_map_nor_make_junctions(tmp_path):
     ("inner", "own"),
     [
         ("<laneletType>bicycleLane</laneletType>", {"100": "bicycle"}),
-        ("<laneletType>crosswalk</laneletType><userBidirectional>pedestrian</userBidirectional>", {"100": "pedestrian"}),
+        (
+            "<laneletType>crosswalk</laneletType><userBidirectional>pedestrian</userBidirectional>",
+            {"100": "pedestrian"},
+        ),
         ("<laneletType>urban</laneletType><userOneWay>bus</userOneWay>", {"100": "bus"}),
         ("<laneletType>urban</laneletType><userOneWay>car</userOneWay>", {}),
-        ("<laneletType>urban</laneletType><userOneWay>car</userOneWay><userOneWay>bus</userOneWay>", {"100": "bus,car,van"}),
-        ("<laneletType>interstate</laneletType><userOneWay>vehicle</userOneWay>", {"100": "bus,car,motorcycle,truck,van"}),
+        (
+            "<laneletType>urban</laneletType><userOneWay>car</userOneWay><userOneWay>bus</userOneWay>",
+            {"100": "bus,car,van"},
+        ),
+        (
+            "<laneletType>interstate</laneletType><userOneWay>vehicle</userOneWay>",
+            {"100": "bus,car,motorcycle,truck,van"},
+        ),
         (
             "<laneletType>urban</laneletType><userOneWay>vehicle</userOneWay><userBidirectional>bicycle</userBidirectional>",
             {"100r": "bicycle"},
@@ -75,7 +102,9 @@ def test_types_and_users_of_commonroad_lanelets(tmp_path, inner, own):
     text = commonroad().replace("<laneletType>urban</laneletType>", inner, 1)
     network = read_network(write(tmp_path, ".xml", text))
     assert users(network) == own
-    assert any("1 lanes are for none of the types" in note for note in network.notes) == ("restricted" in inner)
+    assert any("1 lanes are for none of the types" in note for note in network.notes) == (
+        "restricted" in inner
+    )
 
 
 @pytest.mark.parametrize(
@@ -87,8 +116,16 @@ def test_types_and_users_of_commonroad_lanelets(tmp_path, inner, own):
         ("shared", "", "bicycle,pedestrian"),
         ("onRamp", "", "bus,car,motorcycle,truck,van"),
         ("driving", '<access rule="allow" restriction="bus"/>', "bus"),
-        ("driving", '<access rule="deny" restriction="trucks"/>', "bicycle,bus,car,motorcycle,van"),
-        ("driving", '<access rule="deny"><restriction type="passengerCar"/></access>', "bicycle,bus,motorcycle,truck"),
+        (
+            "driving",
+            '<access rule="deny" restriction="trucks"/>',
+            "bicycle,bus,car,motorcycle,van",
+        ),
+        (
+            "driving",
+            '<access rule="deny"><restriction type="passengerCar"/></access>',
+            "bicycle,bus,motorcycle,truck",
+        ),
         ("driving", '<access rule="allow" restriction="emergency"/>', None),
         ("shoulder", "", None),
     ],
@@ -102,7 +139,12 @@ def test_types_and_access_of_opendrive_lanes(tmp_path, kind, access, own):
 def beside(kind):
     """A car, and another road user that drives beside it on its right."""
     time = np.arange(80) * 0.1
-    position = np.stack([np.column_stack((x + 5.0 * time, np.full(80, y))) for x, y in ((10.0, -1.75), (14.0, -5.25))])
+    position = np.stack(
+        [
+            np.column_stack((x + 5.0 * time, np.full(80, y)))
+            for x, y in ((10.0, -1.75), (14.0, -5.25))
+        ]
+    )
     size = VEHICLE_TYPES[kind]
     vehicles = (Vehicle("a", 4.5, 1.8), Vehicle("b", size.length, size.width, kind))
     states = {"position": position, "heading": np.zeros((2, 80)), "speed": np.full((2, 80), 5.0)}
@@ -117,7 +159,13 @@ def street(tmp_path, kind, access=""):
 
 @pytest.mark.parametrize(
     ("kind", "lanes", "placed"),
-    [("bus", "bus", "-2"), ("truck", "bus", "-3"), ("car", "bus", "-3"), ("bicycle", "biking", "-2"), ("car", "biking", "-3")],
+    [
+        ("bus", "bus", "-2"),
+        ("truck", "bus", "-3"),
+        ("car", "bus", "-3"),
+        ("bicycle", "biking", "-2"),
+        ("car", "biking", "-3"),
+    ],
 )
 def test_who_drives_is_placed_where_its_type_may_and_kept_there(tmp_path, kind, lanes, placed):
     encounter = beside(kind)
@@ -125,7 +173,10 @@ def test_who_drives_is_placed_where_its_type_may_and_kept_there(tmp_path, kind, 
     tracks = clean_tracks(encounter)
     network = lanes_for(built.lanes, users_of(tracks))
     placement, _ = next(placements(network, tracks))
-    assert [[network.lanes[k].id for k in course.lanes] for course in placement.courses] == [["1.0.-1"], [f"1.0.{placed}"]]
+    assert [[network.lanes[k].id for k in course.lanes] for course in placement.courses] == [
+        ["1.0.-1"],
+        [f"1.0.{placed}"],
+    ]
     ground, there = ground_for(built, encounter.vehicles[1]), np.array([50.0, -5.25])
     assert ground.drivable_at(there) == (placed == "-2") and not built.drivable_at(there)
     assert (ground is built) == (placed == "-3")
@@ -133,14 +184,21 @@ def test_who_drives_is_placed_where_its_type_may_and_kept_there(tmp_path, kind, 
 
 def test_an_obstacle_on_a_cycle_lane_is_in_the_way_of_bicycles(tmp_path):
     built = build_road(street(tmp_path, "biking"), None, RoadConfig(obstacles="50 -5.25 0 2 1"))
-    assert not ground_for(built, Vehicle("b", 1.8, 0.65, "bicycle")).drivable_at(np.array([50.0, -5.25]))
+    assert not ground_for(built, Vehicle("b", 1.8, 0.65, "bicycle")).drivable_at(
+        np.array([50.0, -5.25])
+    )
     plain = build_road(street(tmp_path, "biking"))
-    assert with_obstacles(plain, read_obstacles("50 -5.25 0 2 1"), cells_of(plain, plain.lanes.others)).obstructed.any()
+    assert with_obstacles(
+        plain, read_obstacles("50 -5.25 0 2 1"), cells_of(plain, plain.lanes.others)
+    ).obstructed.any()
 
 
 def test_who_may_use_no_lane_is_refused(tmp_path):
     denied = '<access rule="deny" restriction="bicycle"/>'
     read(tmp_path, road(section(right=lane(-1, more=denied))))
     built = build_road(str(tmp_path / "crossroads.xodr"))
-    with pytest.raises(RefusedError, match="all lanes of road crossroads are closed to a bicycle; choose another road"):
+    with pytest.raises(
+        RefusedError,
+        match="all lanes of road crossroads are closed to a bicycle; choose another road",
+    ):
         ground_for(built, Vehicle("b", 1.8, 0.65, "bicycle"))

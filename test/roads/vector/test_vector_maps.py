@@ -23,7 +23,9 @@ from scenario_gen.roads.vector.read import read_network
 
 def middles(network):
     """Return {begin and end of a lane, rounded: the lane}."""
-    return {tuple(np.round(lane.centre[[0, -1]], 3).ravel().tolist()): lane for lane in network.lanes}
+    return {
+        tuple(np.round(lane.centre[[0, -1]], 3).ravel().tolist()): lane for lane in network.lanes
+    }
 
 
 def wanted():
@@ -45,7 +47,9 @@ def test_the_crossroads_is_read_with_its_lanes_what_follows_and_its_limits(tmp_p
         key_of[name] = matches[0]
     for name, after in wanted().values():
         lane = known[key_of[name]]
-        assert {id(network.lanes[k]) for k in lane.successors} == {id(known[key_of[other]]) for other in after}, name
+        assert {id(network.lanes[k]) for k in lane.successors} == {
+            id(known[key_of[other]]) for other in after
+        }, name
         assert lane.speed_limit == pytest.approx(LIMIT / 3.6)
         assert bool(lane.junction) == (not name.endswith(("_in", "_out"))), name
 
@@ -60,7 +64,10 @@ def test_the_grid_is_free_in_the_lanes_and_nowhere_else(tmp_path, suffix):
     polygons = [Polygon([*left, *right[::-1]]) for left, right, _ in lanes().values()]
     area = unary_union([polygon.buffer(1e-6) for polygon in polygons])
     rows, columns = np.indices(road.drivable.shape)
-    x, y = (road.origin[axis] + (index + 0.5) * road.resolution for axis, index in ((0, columns), (1, rows)))
+    x, y = (
+        road.origin[axis] + (index + 0.5) * road.resolution
+        for axis, index in ((0, columns), (1, rows))
+    )
     sure, outside = area.buffer(-road.resolution), area.buffer(1.5 * road.resolution)
     assert road.drivable[contains_xy(sure, x, y)].all()
     assert not road.drivable[~contains_xy(outside, x, y)].any()
@@ -94,7 +101,9 @@ def test_a_lanelet_for_both_directions_is_two_lanes_and_others_are_left_out(tmp_
 def test_a_pose_is_along_a_lane_if_it_lies_in_one_about_its_way(tmp_path):
     road = build_road(str(write(tmp_path, ".xodr")))
     x, y = at("w", -30.0, 1.75)
-    poses = np.array([[x, y, 0.0], [x, y, 0.9], [x, y, math.pi / 2.0], [x, y, math.pi], [x, 3.6, math.pi]])
+    poses = np.array(
+        [[x, y, 0.0], [x, y, 0.9], [x, y, math.pi / 2.0], [x, y, math.pi], [x, 3.6, math.pi]]
+    )
     assert along_lanes(road, poses).tolist() == [True, True, False, False, False]
     assert along_lanes(replace(road, lanes=None), poses).all()
 
@@ -103,11 +112,18 @@ def test_a_pose_is_along_a_lane_if_it_lies_in_one_about_its_way(tmp_path):
 def test_a_part_is_cut_at_its_box(tmp_path, suffix):
     path = write(tmp_path, suffix)
     road = build_road(f"{path}#box=-30,-20,0,20")
-    assert road.drivable.shape == (200, 150) and road.origin.tolist() == pytest.approx([-30.0, -20.0])
-    assert len(road.entries) == 5 and {tuple(np.round(e, 1)) for e in road.entries} >= {(-30.0, -1.8, 0.0)}
+    assert road.drivable.shape == (200, 150) and road.origin.tolist() == pytest.approx(
+        [-30.0, -20.0]
+    )
+    assert len(road.entries) == 5 and {tuple(np.round(e, 1)) for e in road.entries} >= {
+        (-30.0, -1.8, 0.0)
+    }
     network = read_network(path)
     junction = next(lane.junction for lane in network.lanes if lane.junction)
-    assert build_road(f"{path}#junction={junction}").drivable.sum() == build_road(f"{path}#box=-48,-48,48,48").drivable.sum()
+    assert (
+        build_road(f"{path}#junction={junction}").drivable.sum()
+        == build_road(f"{path}#box=-48,-48,48,48").drivable.sum()
+    )
     assert build_road(f"{path}#lanelet={network.lanes[0].id}").lanes.lanes
 
 
@@ -129,9 +145,13 @@ def test_a_part_that_is_not_there_is_refused(tmp_path, part, said):
         build_road(f"{write(tmp_path, '.xml')}#{part}")
 
 
-@pytest.mark.parametrize("name", ["t_intersection#box=0,0,9,9", "depot.yaml#junction=1", "a.osm#box=0,0,9,9#lanelet=1"])
+@pytest.mark.parametrize(
+    "name", ["t_intersection#box=0,0,9,9", "depot.yaml#junction=1", "a.osm#box=0,0,9,9#lanelet=1"]
+)
 def test_a_part_of_what_has_none_is_refused(name):
-    with pytest.raises(InputError, match="one part behind one # can be named of a vector map alone"):
+    with pytest.raises(
+        InputError, match="one part behind one # can be named of a vector map alone"
+    ):
         build_road(name)
 
 
@@ -140,7 +160,9 @@ def test_a_map_too_large_to_draw_is_refused(tmp_path):
         build_road(str(write(tmp_path, ".xodr")), None, RoadConfig(max_cells=1000))
 
 
-BOMB = '<!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]><osm>&b;</osm>'
+BOMB = (
+    '<!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]><osm>&b;</osm>'
+)
 BROKEN = [  # suffix, text, what is said, with its place
     (".osm", BOMB, r"line 1, column \d+: the document type 'osm' is not read"),
     (".xodr", BOMB.replace("osm", "OpenDRIVE"), "document type"),
@@ -154,7 +176,11 @@ BROKEN = [  # suffix, text, what is said, with its place
     (".xml", "<osm/>", "the root of a CommonRoad file is <commonRoad>"),
     (".xml", "<commonRoad/>", "no lane that cars may use"),
     (".xodr", "<OpenDRIVE><header/></OpenDRIVE>", "no <road>"),
-    (".osm", lanelet2(lambda x, y: ">"), r"line 1, <node>: node \d+ has neither tags local_x and local_y nor lat and lon"),
+    (
+        ".osm",
+        lanelet2(lambda x, y: ">"),
+        r"line 1, <node>: node \d+ has neither tags local_x and local_y nor lat and lon",
+    ),
     (".osm", lanelet2(lambda x, y: f'lat="{91 + x}" lon="{y}">'), "degrees up to 90 are needed"),
     (".osm", lanelet2(lambda x, y: f'lat="{x / 10}" lon="{y / 10}">'), "km from their middle"),
     (".osm", lanelet2(lambda x, y: 'lat="1" lon="2">'), "no length"),
@@ -162,16 +188,32 @@ BROKEN = [  # suffix, text, what is said, with its place
 
 
 ODD = [  # one odd element: suffix, text, the note with its reason
-    (".osm", lanelet2().replace('<tag k="local_x"', '<tag k="local_z"', 1), "two frames cannot be mixed"),
-    (".osm", lanelet2().replace('<nd ref="1"/>', '<nd ref="77777"/>', 1), "goes through node 77777, which is not in the map"),
-    (".osm", lanelet2().replace('role="left"', 'role="middle"', 1), "has 0 members with role left"),
+    (
+        ".osm",
+        lanelet2().replace('<tag k="local_x"', '<tag k="local_z"', 1),
+        "two frames cannot be mixed",
+    ),
+    (
+        ".osm",
+        lanelet2().replace('<nd ref="1"/>', '<nd ref="77777"/>', 1),
+        "goes through node 77777, which is not in the map",
+    ),
+    (
+        ".osm",
+        lanelet2().replace('role="left"', 'role="middle"', 1),
+        "has 0 members with role left",
+    ),
     (".osm", lanelet2().replace('ref="1000"', 'ref="4000"'), "way 4000 is not in the map"),
     (".osm", lanelet2().replace('v="60.0"', 'v="nan"', 1), "is no number"),
     (".osm", lanelet2().replace('<node id="2"', '<node id="1"', 1), "node 1 is there twice"),
     (".xodr", opendrive().replace('curvature="0.125"', 'curvature="1e9"', 1), "curvature"),
     (".xodr", opendrive().replace("<line/>", "<helix/>", 1), "holds none of line, arc, spiral"),
     (".xodr", opendrive().replace('a="3.5"', 'a="inf"', 1), "is no number"),
-    (".xodr", opendrive().replace('incomingRoad="0"', 'incomingRoad="99"', 1), "road '99' is not in the map"),
+    (
+        ".xodr",
+        opendrive().replace('incomingRoad="0"', 'incomingRoad="99"', 1),
+        "road '99' is not in the map",
+    ),
     (".xodr", opendrive().replace('length="52.0"', 'length="-1"'), "length -1"),
     (".xodr", opendrive().replace('<lane id="1"', '<lane id="2"', 1), "missing"),
     (".xodr", opendrive().replace('<lane id="1"', '<lane id="one"', 1), "whole numbers above 0"),
@@ -180,15 +222,29 @@ ODD = [  # one odd element: suffix, text, the note with its reason
         FORMATS[".xml"]().replace('<successor ref="102"/>', '<successor ref="9999"/>', 1),
         "leads to lanelet 9999, which is not there",
     ),
-    (".xml", FORMATS[".xml"]().replace("<x>-60.0</x>", "<x>west</x>", 1), r"line 1, <x>: 'west' is no number"),
+    (
+        ".xml",
+        FORMATS[".xml"]().replace("<x>-60.0</x>", "<x>west</x>", 1),
+        r"line 1, <x>: 'west' is no number",
+    ),
     (".xml", FORMATS[".xml"]().replace("leftBound", "left", 2), "has no <leftBound>"),
     (
         ".osm",
-        lanelet2().replace("</relation>", '<member type="way" ref="1002" role="left"/></relation>', 1),
+        lanelet2().replace(
+            "</relation>", '<member type="way" ref="1002" role="left"/></relation>', 1
+        ),
         r"1 faulty lanelet left out \(2000\), first: .*lanelet 2000 has 2 members with role left",
     ),
-    (".xml", FORMATS[".xml"]().replace("8.333333333333334", "fast"), "faulty speed sign left out .*'fast' is no speed"),
-    (".xodr", opendrive().replace('id="1" junction', 'id="0" junction', 1), "road 0 is there twice"),
+    (
+        ".xml",
+        FORMATS[".xml"]().replace("8.333333333333334", "fast"),
+        "faulty speed sign left out .*'fast' is no speed",
+    ),
+    (
+        ".xodr",
+        opendrive().replace('id="1" junction', 'id="0" junction', 1),
+        "road 0 is there twice",
+    ),
 ]
 
 
@@ -196,7 +252,10 @@ ODD = [  # one odd element: suffix, text, the note with its reason
 def test_one_odd_element_is_left_out_and_said(tmp_path, suffix, text, said):
     """As the formats' own libraries do, which open the rest."""
     (tmp_path / "odd").mkdir()
-    whole, rest = read_network(write(tmp_path, suffix, FORMATS[suffix]())), read_network(write(tmp_path / "odd", suffix, text))
+    whole, rest = (
+        read_network(write(tmp_path, suffix, FORMATS[suffix]())),
+        read_network(write(tmp_path / "odd", suffix, text)),
+    )
     assert [note for note in rest.notes if re.search(said, note)], rest.notes
     assert 0.5 * len(whole.lanes) <= len(rest.lanes) <= len(whole.lanes)
     assert not [note for note in whole.notes if "left out" in note]
@@ -205,12 +264,18 @@ def test_one_odd_element_is_left_out_and_said(tmp_path, suffix, text, said):
 @pytest.mark.parametrize("unit", ["kmh", " km/h", "KMH"])
 def test_a_speed_sign_may_have_a_unit(tmp_path, unit):
     """As converters of data sets write them."""
-    network = read_network(write(tmp_path, ".xml", FORMATS[".xml"]().replace("8.333333333333334", f"50{unit}")))
-    assert [lane.speed_limit for lane in network.lanes] == pytest.approx([50.0 / 3.6] * len(network.lanes))
+    network = read_network(
+        write(tmp_path, ".xml", FORMATS[".xml"]().replace("8.333333333333334", f"50{unit}"))
+    )
+    assert [lane.speed_limit for lane in network.lanes] == pytest.approx(
+        [50.0 / 3.6] * len(network.lanes)
+    )
 
 
 def test_what_is_asked_for_and_was_left_out_is_refused_with_the_reason(tmp_path):
-    text = lanelet2().replace("</relation>", '<member type="way" ref="1002" role="left"/></relation>', 1)
+    text = lanelet2().replace(
+        "</relation>", '<member type="way" ref="1002" role="left"/></relation>', 1
+    )
     path = write(tmp_path, ".osm", text)
     assert build_road(f"{path}#lanelet=2001").lanes is not None
     with pytest.raises(InputError, match=r"no lanelet '2000' .*2 members with role left"):
@@ -245,7 +310,10 @@ def across(count, length):
         x, y = math.cos(k * math.pi / count), math.sin(k * math.pi / count)
         bounds = (
             f"<{tag}>"
-            + "".join(f"<point><x>{a * x - b * y}</x><y>{a * y + b * x}</y></point>" for a in (-length, length))
+            + "".join(
+                f"<point><x>{a * x - b * y}</x><y>{a * y + b * x}</y></point>"
+                for a in (-length, length)
+            )
             + f"</{tag}>"
             for tag, b in (("leftBound", 1.0), ("rightBound", -1.0))
         )
@@ -261,13 +329,25 @@ def across(count, length):
         (".xodr", opendrive(), ("MOST_LANES", 10), "more than 10 lanes"),
         (".xodr", opendrive(), ("MOST_SECTIONS", 300), "lanes of more than 300 points"),
         (".osm", lanelet2(), ("MOST_SECTIONS", 50), "lanes of more than 50 points"),
-        (".osm", STACKED, ("MOST_LINKS", 100), "lane 0: 149 lanes follow it; at most 100 are read"),
-        (".xml", across(30, 40.0), ("_MOST_COMPARED", 100), "lie upon each other in more than 100 places, as at lane 0"),
+        (
+            ".osm",
+            STACKED,
+            ("MOST_LINKS", 100),
+            "lane 0: 149 lanes follow it; at most 100 are read",
+        ),
+        (
+            ".xml",
+            across(30, 40.0),
+            ("_MOST_COMPARED", 100),
+            "lie upon each other in more than 100 places, as at lane 0",
+        ),
         (".xodr", opendrive().replace('d="0"', 'd="9e7"'), None, "km; check the coordinates"),
     ],
     ids=("lanes", "lanes", "lanes", "points", "points", "links", "crossings", "lengths"),
 )
-def test_what_would_take_too_much_time_or_memory_is_refused(tmp_path, monkeypatch, suffix, text, limit, said):
+def test_what_would_take_too_much_time_or_memory_is_refused(
+    tmp_path, monkeypatch, suffix, text, limit, said
+):
     if limit:
         monkeypatch.setattr(f"scenario_gen.roads.vector.network.{limit[0]}", limit[1])
     with pytest.raises(InputError, match=said) as error:
@@ -294,9 +374,15 @@ def test_a_missing_map_is_named(tmp_path):
 
 SHAPES = {
     "<line/>": lambda s: (s, 0.0 * s),
-    '<arc curvature="0.02"/>': lambda s: (np.sin(0.02 * s) / 0.02, (1.0 - np.cos(0.02 * s)) / 0.02),
+    '<arc curvature="0.02"/>': lambda s: (
+        np.sin(0.02 * s) / 0.02,
+        (1.0 - np.cos(0.02 * s)) / 0.02,
+    ),
     '<poly3 a="0" b="0" c="0.001" d="0"/>': None,
-    '<paramPoly3 aU="0" bU="1" cU="0" dU="0" aV="0" bV="0" cV="0.001" dV="0" pRange="arcLength"/>': lambda s: (s, 0.001 * s**2),
+    '<paramPoly3 aU="0" bU="1" cU="0" dU="0" aV="0" bV="0" cV="0.001" dV="0" pRange="arcLength"/>': lambda s: (
+        s,
+        0.001 * s**2,
+    ),
 }
 
 
@@ -316,8 +402,14 @@ def test_reference_lines(shape):
         x = poses[:, 0]
         y = 0.001 * x**2
         slope = 0.002 * x
-        assert np.allclose(s, (slope * np.sqrt(1 + slope**2) + np.arcsinh(slope)) / 0.004, atol=1e-5)
+        assert np.allclose(
+            s, (slope * np.sqrt(1 + slope**2) + np.arcsinh(slope)) / 0.004, atol=1e-5
+        )
     else:
         x, y = SHAPES[shape](s)
     assert np.allclose(poses[:, 0], x, atol=1e-9) and np.allclose(poses[:, 1], y, atol=1e-9)
-    assert np.allclose(np.diff(poses[:, 1]) / np.diff(poses[:, 0]), np.tan((poses[1:, 2] + poses[:-1, 2]) / 2.0), atol=1e-3)
+    assert np.allclose(
+        np.diff(poses[:, 1]) / np.diff(poses[:, 0]),
+        np.tan((poses[1:, 2] + poses[:-1, 2]) / 2.0),
+        atol=1e-3,
+    )

@@ -16,9 +16,18 @@ from scenario_gen.numerics.kernels import F, kernel, named
 
 LSL, RSR, LSR, RSL, RLR, LRL = 0, 1, 2, 3, 4, 5
 TURNS = np.array(  # by word and part: 1 left, -1 right, 0 straight
-    [[1.0, 0.0, 1.0], [-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, 1.0]]
+    [
+        [1.0, 0.0, 1.0],
+        [-1.0, 0.0, -1.0],
+        [1.0, 0.0, -1.0],
+        [-1.0, 0.0, 1.0],
+        [-1.0, 1.0, -1.0],
+        [1.0, -1.0, 1.0],
+    ]
 )
-REVERSED = np.array([RSR, LSL, LSR, RSL, LRL, RLR])  # the words driven the other way round, by a car that was turned
+REVERSED = np.array(
+    [RSR, LSL, LSR, RSL, LRL, RLR]
+)  # the words driven the other way round, by a car that was turned
 FULL = 2.0 * np.pi
 CLOSED = 1e-9  # [rad] an arc this near to a full circle is none
 
@@ -66,13 +75,21 @@ def shortest(start: Pose, end: Pose, radius: float) -> Curve:  # noqa: PLR0912
 
     square = 2.0 + d * d - 2.0 * cab + 2.0 * d * (sa - sb)
     across = np.arctan2(cb - ca, d + sa - sb)
-    first, middle, last = _turned(across - alpha), np.sqrt(max(square, 0.0)), _turned(beta - across)
+    first, middle, last = (
+        _turned(across - alpha),
+        np.sqrt(max(square, 0.0)),
+        _turned(beta - across),
+    )
     if first + middle + last < best:
         best, word, t, p, q = first + middle + last, LSL, first, middle, last
 
     square = 2.0 + d * d - 2.0 * cab + 2.0 * d * (sb - sa)
     across = np.arctan2(ca - cb, d - sa + sb)
-    first, middle, last = _turned(alpha - across), np.sqrt(max(square, 0.0)), _turned(across - beta)
+    first, middle, last = (
+        _turned(alpha - across),
+        np.sqrt(max(square, 0.0)),
+        _turned(across - beta),
+    )
     if first + middle + last < best:
         best, word, t, p, q = first + middle + last, RSR, first, middle, last
 
@@ -128,10 +145,15 @@ def part_of(curve: Curve, part: int) -> float:
 def onward(pose: Pose, turn: float, length: float, radius: float) -> Pose:
     """The pose `length` farther on, by an arc (turn 1 left, -1 right) or straight on (0)."""
     if turn == 0.0:
-        return Pose(pose.x + length * np.cos(pose.yaw), pose.y + length * np.sin(pose.yaw), pose.yaw)
+        return Pose(
+            pose.x + length * np.cos(pose.yaw), pose.y + length * np.sin(pose.yaw), pose.yaw
+        )
     end = pose.yaw + turn * length / radius
     side = turn * radius
-    x, y = pose.x + side * (np.sin(end) - np.sin(pose.yaw)), pose.y - side * (np.cos(end) - np.cos(pose.yaw))
+    x, y = (
+        pose.x + side * (np.sin(end) - np.sin(pose.yaw)),
+        pose.y - side * (np.cos(end) - np.cos(pose.yaw)),
+    )
     return Pose(x, y, end)
 
 

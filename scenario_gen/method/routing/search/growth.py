@@ -48,7 +48,9 @@ def _has_room(tree: Tree) -> bool:
 
 
 @kernel(inline=True)
-def _grow_greedily(root: int, target: Pose, scene: Scene, rules: Rules, tree: Tree) -> tuple[int, int]:
+def _grow_greedily(
+    root: int, target: Pose, scene: Scene, rules: Rules, tree: Tree
+) -> tuple[int, int]:
     """Haste before the first path: nodes a step apart along the edge to a pose as far as it is free; returns as `_extend`."""
     m = nearest_node(root, target, scene.body, tree)
     here = pose_of(m, tree.node)
@@ -63,8 +65,16 @@ def _grow_greedily(root: int, target: Pose, scene: Scene, rules: Rules, tree: Tr
         if to >= length - SAME - rules.snap:
             to = length
         first = piece(edge, gone, to)
-        there = end_of_first(here, target, first, length - gone, scene.body) if to < length else target
-        cost = length_of(first) if to < free else np.inf if free > 0.0 else price(here, there, first, scene.body, scene)
+        there = (
+            end_of_first(here, target, first, length - gone, scene.body) if to < length else target
+        )
+        cost = (
+            length_of(first)
+            if to < free
+            else np.inf
+            if free > 0.0
+            else price(here, there, first, scene.body, scene)
+        )
         if cost == np.inf:
             break
         new = insert(root, there, tree)
@@ -81,7 +91,9 @@ def _cheapest_parent(
     node, near = tree.node, tree.near
     best = node[parent, COST] + cost
     for k in range(count):
-        near[k].least = node[near[k].id, COST] + near[k].gap  # no edge is shorter than the straight line
+        near[k].least = (
+            node[near[k].id, COST] + near[k].gap
+        )  # no edge is shorter than the straight line
     while True:
         candidate, cheapest = -1, best - GAIN
         for k in range(count):
@@ -142,7 +154,9 @@ def _rewire(new: int, count: int, skip: bool, scene: Scene, tree: Tree) -> None:
 
 
 @kernel(inline=True)
-def _extend(root: int, target: Pose, nearest: int, scene: Scene, rules: Rules, tree: Tree) -> tuple[int, int]:
+def _extend(
+    root: int, target: Pose, nearest: int, scene: Scene, rules: Rules, tree: Tree
+) -> tuple[int, int]:
     """Algorithm 2: one step of a tree towards a pose; returns what came of it, and the node.
 
     `nearest` is the tree's node nearest to the pose where that is known, else -1.
@@ -150,10 +164,14 @@ def _extend(root: int, target: Pose, nearest: int, scene: Scene, rules: Rules, t
     state, far = tree.state[0], rules.goal if root == 0 else rules.start
     curved = tree.node.shape[1] > LINE
     density = float(max(state.nodes[root], 2))
-    density = np.sqrt(np.log(density) / density)  # eq 10 with exponent 1/d: d = 2, or 4 of poses (Karaman & Frazzoli 2013)
+    density = np.sqrt(
+        np.log(density) / density
+    )  # eq 10 with exponent 1/d: d = 2, or 4 of poses (Karaman & Frazzoli 2013)
     reach = min(rules.gamma * (np.sqrt(density) if curved else density), rules.zeta)
     count, m = 0, nearest
-    if m < 0 and reach <= rules.step and not curved:  # nearly always the nearest node is near: one search for both
+    if (
+        m < 0 and reach <= rules.step and not curved
+    ):  # nearly always the nearest node is near: one search for both
         count, k = near_nodes(root, target, reach, tree), 0
         for other in range(1, count):
             k = other if tree.near[other].gap < tree.near[k].gap else k
@@ -224,7 +242,11 @@ def _grow(iterations: int, scene: Scene, rules: Rules, tree: Tree) -> None:
         if state.chunks + 8 >= tree.chunk.shape[0]:
             return
         root = state.active
-        target = (rules.goal if root == 0 else rules.start) if state.iteration == 0 else next_sample(scene, rules, tree)
+        target = (
+            (rules.goal if root == 0 else rules.start)
+            if state.iteration == 0
+            else next_sample(scene, rules, tree)
+        )
         target = _turned(target, root)
         state.iteration += 1
         state.active = 1 - root

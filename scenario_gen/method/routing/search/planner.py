@@ -92,7 +92,9 @@ RETRY_FACTOR = 100
 """Times the iterations that a search may go on for a first path, where connected components have shown that there is a way."""
 
 
-def plan_with_retry(planner: Planner, road: Road, query: Query, iterations: int, seed: int) -> Plan:
+def plan_with_retry(
+    planner: Planner, road: Road, query: Query, iterations: int, seed: int
+) -> Plan:
     """Return the best path found in so many iterations; where there is none yet, the first that more patience finds.
 
     Raises:
@@ -114,7 +116,9 @@ def check_query(road: Road, query: Query) -> int:
     if label:  # both ends move freely to a cell of it
         return label
     ends = np.stack((query.start, query.goal))
-    for end, xy, free in zip(("start", "goal"), ends, segments_free(road, ends, ends, query.radius), strict=True):
+    for end, xy, free in zip(
+        ("start", "goal"), ends, segments_free(road, ends, ends, query.radius), strict=True
+    ):
         if not free:
             raise BlockedError(
                 end,

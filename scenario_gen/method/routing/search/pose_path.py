@@ -5,7 +5,18 @@
 
 import numpy as np
 
-from scenario_gen.method.routing.search.dubins import Curve, length_of, LSL, onward, part_of, Pose, REVERSED, RSR, shortest, TURNS
+from scenario_gen.method.routing.search.dubins import (
+    Curve,
+    length_of,
+    LSL,
+    onward,
+    part_of,
+    Pose,
+    REVERSED,
+    RSR,
+    shortest,
+    TURNS,
+)
 from scenario_gen.method.routing.search.growth import SAME
 from scenario_gen.method.routing.search.sweep import CAR_SCENE, follow, Scene
 from scenario_gen.method.routing.search.tree import edge_to, pose_of
@@ -42,7 +53,9 @@ def _lay(pose: Pose, curve: Curve, radius: float, spacing: float, path: Floats, 
 
 
 @kernel(I1, I1, F2, F, F, OUT2)
-def trace(ours: Ints, theirs: Ints, node: Floats, radius: float, spacing: float, path: Floats) -> int:
+def trace(
+    ours: Ints, theirs: Ints, node: Floats, radius: float, spacing: float, path: Floats
+) -> int:
     """Write a path into `path` (p, 5): poses x, y, yaw, and curvature and length of the piece that leads to each.
 
     Args:
@@ -89,7 +102,9 @@ def _shift(rows: Floats, first: int, last: int, by: int) -> None:
 
 
 @kernel(I, I, F, CAR_SCENE, STATES, OUT2)
-def shorten(n: int, tries: int, spacing: float, scene: Scene, state: States, path: Floats) -> tuple[int, float]:
+def shorten(
+    n: int, tries: int, spacing: float, scene: Scene, state: States, path: Floats
+) -> tuple[int, float]:
     """Put shorter curves between poses of a path, chosen at random; string pulling for cars.
 
     Source: shortcuts as in Geraerts & Overmars 2007, with Dubins curves.

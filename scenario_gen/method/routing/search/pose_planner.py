@@ -11,20 +11,41 @@ import numpy as np
 
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.routing.search.dubins import Pose
-from scenario_gen.method.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError, Query
+from scenario_gen.method.routing.search.planner import (
+    BlockedError,
+    Budget,
+    BudgetSpentError,
+    NoWayError,
+    Query,
+)
 from scenario_gen.method.routing.search.pose_path import shorten, trace
-from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig, string_pulled
+from scenario_gen.method.routing.search.rrt_star_connect import (
+    RrtStarConnect,
+    RrtStarConnectConfig,
+    string_pulled,
+)
 from scenario_gen.method.routing.search.sweep import car_scene, NOWHERE, Prices
 from scenario_gen.method.routing.search.tree_samples import Rules
 from scenario_gen.method.routing.search.two_trees import Search
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
-from scenario_gen.roads import clearance_in_cells, common_component, component_cells, footprint_fits, to_cells, to_metres
+from scenario_gen.roads import (
+    clearance_in_cells,
+    common_component,
+    component_cells,
+    footprint_fits,
+    to_cells,
+    to_metres,
+)
 from scenario_gen.types import Road
 
 PIECE = 0.5  # [m] longest piece of a path
 BATCH = 64  # iterations between two looks at the clock
-DISCS = (0.0, 0.25, 0.05)  # [m] by which the discs are wider than the footprint whose paths are sampled about, one after another
+DISCS = (
+    0.0,
+    0.25,
+    0.05,
+)  # [m] by which the discs are wider than the footprint whose paths are sampled about, one after another
 DISC_BUDGET = 5000  # iterations for such a path
 ANOTHER = 512  # iterations after which another one is taken, if there is no path yet
 DISC = RrtStarConnect(RrtStarConnectConfig(pull=False))
@@ -35,18 +56,34 @@ DIMENSIONS = 4  # d of eq 10, of a ball that small Dubins curves reach: along 1,
 class PoseSearchConfig(Parameters):
     """Settings of RRT*-Connect in the vehicle's own space."""
 
-    step: float = parameter(4.0, "longest new edge before the first path", unit="m", low=0.5, high=100.0)
-    stride: float = parameter(15.0, "longest new edge from then on", unit="m", low=0.5, high=100.0)
-    zeta: float = parameter(15.0, "largest near radius, zeta of eq 10", unit="m", low=0.5, high=100.0)
-    gamma_factor: float = parameter(
-        1.1, "gamma of eq 10 as a multiple of the minimum that is asymptotically optimal", low=1.0, high=10.0
+    step: float = parameter(
+        4.0, "longest new edge before the first path", unit="m", low=0.5, high=100.0
     )
-    about: float = parameter(0.7, "share of samples about a path that is known, a disc's or the best so far", low=0.0, high=0.95)
+    stride: float = parameter(15.0, "longest new edge from then on", unit="m", low=0.5, high=100.0)
+    zeta: float = parameter(
+        15.0, "largest near radius, zeta of eq 10", unit="m", low=0.5, high=100.0
+    )
+    gamma_factor: float = parameter(
+        1.1,
+        "gamma of eq 10 as a multiple of the minimum that is asymptotically optimal",
+        low=1.0,
+        high=10.0,
+    )
+    about: float = parameter(
+        0.7,
+        "share of samples about a path that is known, a disc's or the best so far",
+        low=0.0,
+        high=0.95,
+    )
     spread: float = parameter(1.0, "how far from it", unit="m", low=0.05, high=20.0)
     yaw_spread: float = parameter(0.4, "and from its heading", unit="rad", low=0.01, high=3.2)
-    improve: int = parameter(50, "iterations for a better path, once there is one", low=0, high=10_000_000)
+    improve: int = parameter(
+        50, "iterations for a better path, once there is one", low=0, high=10_000_000
+    )
     shortcuts: int = parameter(
-        50, "pairs of poses between which a shorter curve is tried, whenever a better path is found", low=0
+        50,
+        "pairs of poses between which a shorter curve is tried, whenever a better path is found",
+        low=0,
     )
 
 
@@ -128,7 +165,9 @@ def _refuse_blocked(road: Road, query: PoseQuery) -> None:
 class PlansPoses(Protocol):
     """A planner that also plans for the vehicle itself: drivable routes are then searched for with this method."""
 
-    def plan_poses(self, road: Road, query: PoseQuery, budget: Budget, seed: int, wishes: Wishes = Wishes()) -> PosePlan:
+    def plan_poses(
+        self, road: Road, query: PoseQuery, budget: Budget, seed: int, wishes: Wishes = Wishes()
+    ) -> PosePlan:
         """Return the best path found within the budget.
 
         Raises:
@@ -148,7 +187,9 @@ class PoseRrtStarConnect:
     def __init__(self, config: PoseSearchConfig = PoseSearchConfig()) -> None:
         self.config = config
 
-    def plan(self, road: Road, query: PoseQuery, budget: Budget, seed: int, wishes: Wishes = Wishes()) -> PosePlan:
+    def plan(
+        self, road: Road, query: PoseQuery, budget: Budget, seed: int, wishes: Wishes = Wishes()
+    ) -> PosePlan:
         """Return the best path found within the budget: its iterations are those for a first path, `improve` more follow.
 
         With a budget in iterations the answer depends on the seed only.
@@ -160,12 +201,18 @@ class PoseRrtStarConnect:
         """
         _refuse_blocked(road, query)
         search = self._search(road, query, wishes, seed)
-        look, limit, known = 1, budget.iterations, np.inf  # look: when the way of a disc is looked for; limit: of iterations
+        look, limit, known = (
+            1,
+            budget.iterations,
+            np.inf,
+        )  # look: when the way of a disc is looked for; limit: of iterations
         search.grow(1)  # the direct curve
         while True:
             if search.best < known:
                 known = search.best
-                shortcuts = self.config.shortcuts if search.path is not None or not budget.first else 0
+                shortcuts = (
+                    self.config.shortcuts if search.path is not None or not budget.first else 0
+                )
                 path, cost = _shortened(search, shortcuts)
                 if search.keep(path, cost) and len(search.rules.about):
                     search.rules = search.rules._replace(about=np.ascontiguousarray(path[:, :3]))
@@ -187,7 +234,12 @@ class PoseRrtStarConnect:
         poses[0, :2], poses[-1, :2] = query.start[:2], query.goal[:2]
         cell = road.resolution
         return PosePlan(
-            poses, best[:, 3] / cell, best[:, 4] * cell, search.cost * cell, search.iteration, np.array(search.history)
+            poses,
+            best[:, 3] / cell,
+            best[:, 4] * cell,
+            search.cost * cell,
+            search.iteration,
+            np.array(search.history),
         )
 
     def _search(self, road: Road, query: PoseQuery, wishes: Wishes, seed: int) -> Search:
@@ -197,7 +249,13 @@ class PoseRrtStarConnect:
             wishes.room / cell, wishes.lack, wishes.left * cell, wishes.right * cell, wishes.most_left / cell,
             wishes.most_right / cell,
         )  # fmt: skip
-        scene = car_scene(road, (query.length, query.width), query.curvature, prices, _in_cells(road, wishes.guide))
+        scene = car_scene(
+            road,
+            (query.length, query.width),
+            query.curvature,
+            prices,
+            _in_cells(road, wishes.guide),
+        )
         start, goal = (Pose(*_in_cells(road, pose).tolist()) for pose in (query.start, query.goal))
         step, none = config.step / cell, np.empty(0, dtype=np.int64)
         rules = Rules(
@@ -214,7 +272,9 @@ class PoseRrtStarConnect:
         """
         road = search.road
         half = 0.5 * min(query.width, query.length)
-        last = max(half - 0.75 * road.resolution, 0.0)  # connected components may miss a gap between cells' centres
+        last = max(
+            half - 0.75 * road.resolution, 0.0
+        )  # connected components may miss a gap between cells' centres
         for radius in (half + DISCS[(search.iteration // ANOTHER) % len(DISCS)], half, last):
             disc = Query(query.start[:2], query.goal[:2], radius)
             try:
@@ -232,8 +292,12 @@ class PoseRrtStarConnect:
                     continue
                 line = np.stack((disc.start, disc.goal))
             break
-        taut = string_pulled(clearance_in_cells(road), to_cells(road, line), radius / road.resolution, 1)
-        cells = component_cells(road, radius, common_component(road, disc.start, disc.goal, radius) or 0)[0]
+        taut = string_pulled(
+            clearance_in_cells(road), to_cells(road, line), radius / road.resolution, 1
+        )
+        cells = component_cells(
+            road, radius, common_component(road, disc.start, disc.goal, radius) or 0
+        )[0]
         if not len(cells):
             cells = np.flatnonzero(road.drivable)
         about = wishes.about if len(wishes.about) else along(to_metres(road, taut), PIECE)
@@ -241,7 +305,9 @@ class PoseRrtStarConnect:
         volume = len(cells) * 2.0 * math.pi * (1.0 / (query.curvature * road.resolution)) ** 2
         root = ((1.0 + 1.0 / DIMENSIONS) * volume) ** (1.0 / DIMENSIONS)
         gamma = self.config.gamma_factor * 2.0 * root
-        search.rules = search.rules._replace(cells=cells, about=_in_cells(road, about), gamma=gamma)
+        search.rules = search.rules._replace(
+            cells=cells, about=_in_cells(road, about), gamma=gamma
+        )
 
 
 def _shortened(search: Search, shortcuts: int) -> tuple[Floats, float]:
@@ -249,7 +315,14 @@ def _shortened(search: Search, shortcuts: int) -> tuple[Floats, float]:
     (ours, theirs), spacing, room = search.chains(), PIECE / search.road.resolution, 256
     while True:
         path = np.empty((room, 5))
-        count = trace(np.array(ours), np.array(theirs), search.tree.node, search.scene.body.turn, spacing, path)
+        count = trace(
+            np.array(ours),
+            np.array(theirs),
+            search.tree.node,
+            search.scene.body.turn,
+            spacing,
+            path,
+        )
         if count < room // 2:
             break
         room *= 2
@@ -264,7 +337,9 @@ def along(line: Floats, spacing: float) -> Floats:
     at = np.concatenate(([0.0], np.cumsum(size)))
     s = np.linspace(0.0, at[-1], max(int(np.ceil(at[-1] / spacing)) + 1, 2))
     which = np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(yaw) - 1)
-    return np.column_stack((np.interp(s, at, line[:, 0]), np.interp(s, at, line[:, 1]), yaw[which]))
+    return np.column_stack(
+        (np.interp(s, at, line[:, 0]), np.interp(s, at, line[:, 1]), yaw[which])
+    )
 
 
 def _in_cells(road: Road, poses: Floats) -> Floats:

@@ -41,7 +41,9 @@ def _leave_out(clearance: Floats, path: Floats, n: int, radius: float) -> int:
         farthest, stride = i + 1, 2
         while stride >= 1:
             j = farthest + stride
-            if j < n and segment_free(clearance, path[i, 0], path[i, 1], path[j, 0], path[j, 1], radius):
+            if j < n and segment_free(
+                clearance, path[i, 0], path[i, 1], path[j, 0], path[j, 1], radius
+            ):
                 farthest, stride = j, 2 * stride
             else:
                 stride //= 2
@@ -64,7 +66,14 @@ def pull_string(clearance: Floats, n: int, radius: float, passes: int, path: Flo
         shorter = 0.0
         v = 1
         while v < n - 1:
-            ax, ay, vx, vy, bx, by = path[v - 1, 0], path[v - 1, 1], path[v, 0], path[v, 1], path[v + 1, 0], path[v + 1, 1]
+            ax, ay, vx, vy, bx, by = (
+                path[v - 1, 0],
+                path[v - 1, 1],
+                path[v, 0],
+                path[v, 1],
+                path[v + 1, 0],
+                path[v + 1, 1],
+            )
             before = np.hypot(vx - ax, vy - ay) + np.hypot(bx - vx, by - vy)
             if segment_free(clearance, ax, ay, bx, by, radius):
                 for k in range(v, n - 1):
@@ -74,14 +83,21 @@ def pull_string(clearance: Floats, n: int, radius: float, passes: int, path: Flo
                 continue
             moved = _slide(clearance, path, v - 1, v, v + 1, radius)
             moved |= _slide(clearance, path, v + 1, v, v - 1, radius)
-            after = np.hypot(path[v, 0] - ax, path[v, 1] - ay) + np.hypot(bx - path[v, 0], by - path[v, 1])
+            after = np.hypot(path[v, 0] - ax, path[v, 1] - ay) + np.hypot(
+                bx - path[v, 0], by - path[v, 1]
+            )
             if before - after < 1e-6 * before and n < path.shape[0]:
                 vx, vy = path[v, 0], path[v, 1]
                 free, blocked = 0.0, 1.0
                 for _ in range(BISECTIONS):
                     cut = 0.5 * (free + blocked)
                     if segment_free(
-                        clearance, vx + cut * (ax - vx), vy + cut * (ay - vy), vx + cut * (bx - vx), vy + cut * (by - vy), radius
+                        clearance,
+                        vx + cut * (ax - vx),
+                        vy + cut * (ay - vy),
+                        vx + cut * (bx - vx),
+                        vy + cut * (by - vy),
+                        radius,
                     ):
                         free = cut
                     else:
@@ -93,7 +109,11 @@ def pull_string(clearance: Floats, n: int, radius: float, passes: int, path: Flo
                     path[v, 0], path[v, 1] = vx + free * (ax - vx), vy + free * (ay - vy)
                     path[v + 1, 0], path[v + 1, 1] = vx + free * (bx - vx), vy + free * (by - vy)
                     v += 1
-                    saved = np.hypot(ax - vx, ay - vy) + np.hypot(bx - vx, by - vy) - np.hypot(bx - ax, by - ay)
+                    saved = (
+                        np.hypot(ax - vx, ay - vy)
+                        + np.hypot(bx - vx, by - vy)
+                        - np.hypot(bx - ax, by - ay)
+                    )
                     after -= free * saved
             shorter += before - after
             v += 1

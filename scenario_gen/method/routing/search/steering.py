@@ -16,11 +16,18 @@ import numpy as np
 
 from scenario_gen.method.routing.search.dubins import Curve, end_of, LSL, POSE, Pose, shortest
 from scenario_gen.method.routing.search.sweep import Car, CAR_SCENE, Disc, follow, Scene
-from scenario_gen.method.routing.search.tree_samples import Rules, sample_point, sample_pose, States
+from scenario_gen.method.routing.search.tree_samples import (
+    Rules,
+    sample_point,
+    sample_pose,
+    States,
+)
 from scenario_gen.numerics.kernels import kernel
 from scenario_gen.roads import free_length, segment_free
 
-_overload: Callable[..., Callable[[Callable[..., Any]], Any]] = partial(overload, jit_options={"forceinline": True}, strict=False)
+_overload: Callable[..., Callable[[Callable[..., Any]], Any]] = partial(
+    overload, jit_options={"forceinline": True}, strict=False
+)
 
 
 def _is_disc(body: Any) -> bool:
@@ -67,7 +74,11 @@ def _steer(start: Any, end: Any, body: Any) -> Any:
 @_overload(end_of_first)
 def _end_of_first(start: Any, end: Any, first: Any, length: Any, body: Any) -> Any:
     def line(start: Pose, end: Pose, first: Curve, length: float, body: Disc) -> Pose:
-        return Pose(start.x + (end.x - start.x) * first.b / length, start.y + (end.y - start.y) * first.b / length, 0.0)
+        return Pose(
+            start.x + (end.x - start.x) * first.b / length,
+            start.y + (end.y - start.y) * first.b / length,
+            0.0,
+        )
 
     def curve(start: Pose, end: Pose, first: Curve, length: float, body: Car) -> Pose:
         return end_of(start, first, body.turn)
@@ -78,7 +89,11 @@ def _end_of_first(start: Any, end: Any, first: Any, length: Any, body: Any) -> A
 @_overload(price)
 def _price(start: Any, end: Any, edge: Any, body: Any, scene: Any) -> Any:
     def line(start: Pose, end: Pose, edge: Curve, body: Disc, scene: Scene) -> float:
-        return edge.b if segment_free(scene.clearance, start.x, start.y, end.x, end.y, body.radius) else np.inf
+        return (
+            edge.b
+            if segment_free(scene.clearance, start.x, start.y, end.x, end.y, body.radius)
+            else np.inf
+        )
 
     def curve(start: Pose, end: Pose, edge: Curve, body: Car, scene: Scene) -> float:
         free, cost = follow(start, edge, body, scene)

@@ -102,7 +102,9 @@ class _Stance(NamedTuple):
 
 
 @kernel(inline=True)
-def _spread(ax: float, ay: float, bx: float, by: float, first: int, low: Floats, high: Floats) -> None:
+def _spread(
+    ax: float, ay: float, bx: float, by: float, first: int, low: Floats, high: Floats
+) -> None:
     """Widen the extents in x of the rows of cells from `first` on by the segment a-b."""
     if ay > by:
         ax, ay, bx, by = bx, by, ax, ay
@@ -117,7 +119,9 @@ def _spread(ax: float, ay: float, bx: float, by: float, first: int, low: Floats,
 
 
 @kernel(inline=True)
-def _swept_free(blocked: Counts, here: _Stance, there: _Stance, body: Car, bulge: float, rows: Floats) -> bool:
+def _swept_free(
+    blocked: Counts, here: _Stance, there: _Stance, body: Car, bulge: float, rows: Floats
+) -> bool:
     """Whether the hull of the footprints at two near stances covers drivable cells only; `bulge` is added on every side."""
     a, b = body.half_length + bulge, body.half_width + bulge
     reach0, reach1 = a * abs(here.sin) + b * abs(here.cos), a * abs(there.sin) + b * abs(there.cos)
@@ -142,7 +146,11 @@ def _swept_free(blocked: Counts, here: _Stance, there: _Stance, body: Car, bulge
         _spread(px, py, qx, qy, first, low, high)
     for k in range(count):
         begin, end = int(np.floor(low[k] + CONTACT)), int(np.ceil(high[k] - CONTACT))
-        if begin < 0 or end > width or (end > begin and blocked[first + k, end] != blocked[first + k, begin]):
+        if (
+            begin < 0
+            or end > width
+            or (end > begin and blocked[first + k, end] != blocked[first + k, begin])
+        ):
             return False
     return True
 
@@ -162,7 +170,13 @@ def _room_beside(clearance: Floats, at: _Stance, body: Car) -> tuple[float, floa
         ahead = (i + 0.5) * spacing - body.half_length
         px, py = at.x + ahead * at.cos, at.y + ahead * at.sin
         column, row = int(np.floor(px)), int(np.floor(py))
-        if row < 0 or column < 0 or row >= height or column >= width or clearance[row, column] == 0.0:
+        if (
+            row < 0
+            or column < 0
+            or row >= height
+            or column >= width
+            or clearance[row, column] == 0.0
+        ):
             return -FAR, -FAR
         dx, dy = px - column - 0.5, py - row - 0.5
         off = np.sqrt(dx * dx + dy * dy)
@@ -233,7 +247,14 @@ def follow(pose: Pose, curve: Curve, body: Car, scene: Scene) -> tuple[bool, flo
 
 
 @kernel(F2, N2, F2, F, F, OUT2)
-def check_sweep(clearance: Floats, blocked: Counts, poses: Floats, half_length: float, half_width: float, out: Floats) -> None:
+def check_sweep(
+    clearance: Floats,
+    blocked: Counts,
+    poses: Floats,
+    half_length: float,
+    half_width: float,
+    out: Floats,
+) -> None:
     """Whether the footprint can move from each of M near poses (M, 3) [cells, rad] to the next; all in cells.
 
     Writes `out` (M, 2): 1 where the way to the pose (for the first: the pose itself) is free, else 0; and about the room beside.
@@ -247,7 +268,9 @@ def check_sweep(clearance: Floats, blocked: Counts, poses: Floats, half_length: 
         there = _Stance(poses[m, 0], poses[m, 1], np.cos(poses[m, 2]), np.sin(poses[m, 2]))
         sure, out[m, 1] = _room_beside(clearance, there, body)
         dx, dy = there.x - here.x, there.y - here.y
-        moved = np.sqrt(dx * dx + dy * dy) + half_length * (abs(there.cos - here.cos) + abs(there.sin - here.sin))
+        moved = np.sqrt(dx * dx + dy * dy) + half_length * (
+            abs(there.cos - here.cos) + abs(there.sin - here.sin)
+        )
         free = sure >= moved
         if not free and sure > -FAR and moved < LONGEST:
             turned = np.sqrt((there.cos - here.cos) ** 2 + (there.sin - here.sin) ** 2)
@@ -272,17 +295,30 @@ def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Flo
     grid = np.column_stack((to_cells(road, poses[:, :2]), poses[:, 2]))
     out = np.empty((len(poses), 2))
     check_sweep(
-        clearance_in_cells(road), blocked_before(road), grid, 0.5 * length / road.resolution, 0.5 * width / road.resolution, out
+        clearance_in_cells(road),
+        blocked_before(road),
+        grid,
+        0.5 * length / road.resolution,
+        0.5 * width / road.resolution,
+        out,
     )
     out[:, 1] *= road.resolution
     return out
 
 
 def car_scene(
-    road: Road, size: tuple[float, float], curvature: float, prices: Prices = NO_PRICES, guide: Floats = NOWHERE
+    road: Road,
+    size: tuple[float, float],
+    curvature: float,
+    prices: Prices = NO_PRICES,
+    guide: Floats = NOWHERE,
 ) -> Scene:
     """The scene of a car of some length and width [m] that turns within a curvature [1/m]; prices and guide in cells."""
     half_length, half_width = (0.5 * extent / road.resolution for extent in size)
-    body = Car(1.0 / (curvature * road.resolution), half_length, half_width, SWEEP / road.resolution)
+    body = Car(
+        1.0 / (curvature * road.resolution), half_length, half_width, SWEEP / road.resolution
+    )
     rows = int(2.0 * np.hypot(half_length, half_width) + body.sweep) + 8
-    return Scene(clearance_in_cells(road), blocked_before(road), guide, body, prices, np.empty((2, rows)))
+    return Scene(
+        clearance_in_cells(road), blocked_before(road), guide, body, prices, np.empty((2, rows))
+    )

@@ -29,7 +29,9 @@ LINE, CURVE = 4, 9  # columns of nodes that straight lines join, or curves
 X, Y, COST, EDGE, YAW, WORD, PART_A, PART_B, PART_C = 0, 1, 2, 3, 4, 5, 6, 7, 8
 PARENT, CHILD, NEXT, PREVIOUS, PARTNER = 0, 1, 2, 3, 4
 
-NEIGHBOUR = np.dtype([("id", np.int64), ("gap", np.float64), ("least", np.float64)])  # distance; least cost as parent
+NEIGHBOUR = np.dtype(
+    [("id", np.int64), ("gap", np.float64), ("least", np.float64)]
+)  # distance; least cost as parent
 
 Links = NDArray[np.int32]
 
@@ -61,7 +63,9 @@ class Tree(NamedTuple):
 
 
 NEIGHBOURS = types.Array(from_dtype(NEIGHBOUR), 1, "C")
-TREE = named(Tree, OUT2, types.Array(types.int32, 2, "C"), OUTI2, OUTI2, STATES, OUT2, NEIGHBOURS, F, I)
+TREE = named(
+    Tree, OUT2, types.Array(types.int32, 2, "C"), OUTI2, OUTI2, STATES, OUT2, NEIGHBOURS, F, I
+)
 
 
 @kernel(inline=True, forced=True)
@@ -85,7 +89,12 @@ def nearest_node(root: int, pose: Pose, body: Disc | Car, tree: Tree) -> int:
     node, chunk, head, side, columns = tree.node, tree.chunk, tree.head, tree.side, tree.columns
     rows = head.shape[1] // columns
     row, column = int(pose.y / side), int(pose.x / side)
-    border = min(pose.x - column * side, (column + 1) * side - pose.x, pose.y - row * side, (row + 1) * side - pose.y)
+    border = min(
+        pose.x - column * side,
+        (column + 1) * side - pose.x,
+        pose.y - row * side,
+        (row + 1) * side - pose.y,
+    )
     best, nearest = np.inf, -1
     ring = 0
     while True:
@@ -99,7 +108,9 @@ def nearest_node(root: int, pose: Pose, body: Disc | Car, tree: Tree) -> int:
                     for m in range(k * CHUNK, k * CHUNK + chunk[k, 1]):
                         dx, dy = node[m, X] - pose.x, node[m, Y] - pose.y
                         square = dx * dx + dy * dy
-                        if square < best and node.shape[1] > LINE:  # no curve is shorter than the straight line
+                        if (
+                            square < best and node.shape[1] > LINE
+                        ):  # no curve is shorter than the straight line
                             square = length_of(steer(pose_of(m, node), pose, body)) ** 2
                         if square < best:
                             best, nearest = square, m
@@ -123,7 +134,9 @@ def near_nodes(root: int, pose: Pose, reach: float, tree: Tree) -> int:
     rows = head.shape[1] // columns
     count = 0
     for i in range(max(int((y - reach) / side), 0), min(int((y + reach) / side), rows - 1) + 1):
-        for j in range(max(int((x - reach) / side), 0), min(int((x + reach) / side), columns - 1) + 1):
+        for j in range(
+            max(int((x - reach) / side), 0), min(int((x + reach) / side), columns - 1) + 1
+        ):
             k = head[root, i * columns + j]
             while k >= 0:
                 for m in range(k * CHUNK, k * CHUNK + chunk[k, 1]):

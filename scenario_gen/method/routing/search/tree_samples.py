@@ -32,7 +32,9 @@ STATE = np.dtype(
 
 States = NDArray[np.void]
 STATES = types.Array(from_dtype(STATE), 1, "C")
-FINER = np.array([1.0, 0.5, 0.25, 0.125])  # shares of the spread: narrow gaps need samples that are near to the path
+FINER = np.array(
+    [1.0, 0.5, 0.25, 0.125]
+)  # shares of the spread: narrow gaps need samples that are near to the path
 TRIES = 20  # to draw a sample that serves
 
 
@@ -91,7 +93,10 @@ def uniform(state: States) -> float:
 @kernel(inline=True)
 def _bell(state: States) -> float:
     """A number of mean 0 and variance 1: the sum of four uniform ones."""
-    return float((uniform(state) + uniform(state) + uniform(state) + uniform(state) - 2.0) * 1.7320508075688772)
+    return float(
+        (uniform(state) + uniform(state) + uniform(state) + uniform(state) - 2.0)
+        * 1.7320508075688772
+    )
 
 
 @kernel(inline=True, forced=True)
@@ -128,7 +133,9 @@ def sample_pose(body: Car, scene: Scene, rules: Rules, state: States) -> Pose:
         else:
             x, y = _in_cell(rules.cells, scene.clearance.shape[1], state)
             pose = Pose(x, y, 2.0 * np.pi * uniform(state))
-        if detour(rules.start, rules.goal, pose) < state[0].bound and pose_is_free(pose, body, scene):
+        if detour(rules.start, rules.goal, pose) < state[0].bound and pose_is_free(
+            pose, body, scene
+        ):
             break
     return pose
 
@@ -141,7 +148,12 @@ def sample_point(clearance: Floats, rules: Rules, state: States) -> Pose:
     """
     start, goal = rules.start, rules.goal
     bound = state[0].bound
-    if rules.corners.size > 0 and rules.share > 0.0 and bound < np.inf and uniform(state) < rules.share:
+    if (
+        rules.corners.size > 0
+        and rules.share > 0.0
+        and bound < np.inf
+        and uniform(state) < rules.share
+    ):
         for _ in range(TRIES):
             pose = Pose(*_in_cell(rules.corners, clearance.shape[1], state), 0.0)
             if detour(start, goal, pose) < bound:
@@ -150,7 +162,9 @@ def sample_point(clearance: Floats, rules: Rules, state: States) -> Pose:
     dx, dy = goal.x - start.x, goal.y - start.y
     straight = np.sqrt(dx * dx + dy * dy)
     major = 0.5 * bound
-    minor = 0.5 * np.sqrt(max(bound * bound - straight * straight, 0.0)) if bound < np.inf else np.inf
+    minor = (
+        0.5 * np.sqrt(max(bound * bound - straight * straight, 0.0)) if bound < np.inf else np.inf
+    )
     small = np.pi * major * minor < rules.cells.size
     pose = goal
     for _ in range(100):
@@ -158,7 +172,11 @@ def sample_point(clearance: Floats, rules: Rules, state: States) -> Pose:
             angle, r = 2.0 * np.pi * uniform(state), np.sqrt(uniform(state))
             u, v = major * r * np.cos(angle), minor * r * np.sin(angle)
             c, s = (dx / straight, dy / straight) if straight > 0.0 else (1.0, 0.0)
-            pose = Pose(0.5 * (start.x + goal.x) + c * u - s * v, 0.5 * (start.y + goal.y) + s * u + c * v, 0.0)
+            pose = Pose(
+                0.5 * (start.x + goal.x) + c * u - s * v,
+                0.5 * (start.y + goal.y) + s * u + c * v,
+                0.0,
+            )
             i, j = int(np.floor(pose.y)), int(np.floor(pose.x))
             if 0 <= i < height and 0 <= j < width and clearance[i, j] > 0.0:
                 break

@@ -41,7 +41,9 @@ class Search:
     def __init__(self, road: Road, scene: Scene, rules: Rules, seed: int) -> None:
         self.road, self.scene, self.rules = road, scene, rules
         self.started = thread_time()
-        self.state = np.array([((0, 0), 0, 0, 0, -1, 0, 0, 0, np.inf, np.inf, seed % 2**64)], dtype=STATE)
+        self.state = np.array(
+            [((0, 0), 0, 0, 0, -1, 0, 0, 0, np.inf, np.inf, seed % 2**64)], dtype=STATE
+        )
         self.near, self.drawn = np.empty(NEAR, dtype=NEIGHBOUR), np.empty((0, 3))
         self.tree = self._pool(max(max(scene.clearance.shape) / 8.0, 1.0))
         self.path: Floats | None = None
@@ -55,7 +57,10 @@ class Search:
         nodes = ROOM * int(self.state["nodes"].sum())
         chunks = 256 + nodes // CHUNK + min(nodes, 2 * rows * columns)
         node = np.empty((chunks * CHUNK, CURVE if isinstance(self.scene.body, Car) else LINE))
-        link, chunk = np.empty((len(node), 5), dtype=np.int32), np.empty((chunks, 2), dtype=np.int64)
+        link, chunk = (
+            np.empty((len(node), 5), dtype=np.int32),
+            np.empty((chunks, 2), dtype=np.int64),
+        )
         head = np.full((2, rows * columns), -1)
         return Tree(node, link, chunk, head, self.state, self.drawn, self.near, side, columns)
 
@@ -115,7 +120,9 @@ class Search:
         if cost >= self.cost:
             return False
         self.path, self.cost = path, cost
-        self.history.append((self.iteration, thread_time() - self.started, cost * self.road.resolution))
+        self.history.append(
+            (self.iteration, thread_time() - self.started, cost * self.road.resolution)
+        )
         if self.rules.informed:
             self.state["bound"] = min(self.state["bound"][0], cost)
         return True

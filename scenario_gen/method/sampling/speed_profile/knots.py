@@ -114,7 +114,18 @@ def speed_knots(
     unknown = np.where(np.isnan(given), np.cumsum(np.isnan(given)) - 1, -1)
     fitted = _joined_lines(time, speed, knot, standing)
     inner = np.array(interior, dtype=np.int64)
-    return SpeedKnots(knot, piece, standing, slow, group, bounds, frozen(fitted), inner, unknown, np.nan_to_num(given))
+    return SpeedKnots(
+        knot,
+        piece,
+        standing,
+        slow,
+        group,
+        bounds,
+        frozen(fitted),
+        inner,
+        unknown,
+        np.nan_to_num(given),
+    )
 
 
 def _stands(t: float, clock: Floats, dwells: Bools, waits: list[tuple[float, float]]) -> bool:
@@ -123,11 +134,18 @@ def _stands(t: float, clock: Floats, dwells: Bools, waits: list[tuple[float, flo
     return bool(dwells[k]) or any(a <= t <= b for a, b in waits)
 
 
-def _ramps(clock: Floats, dwells: Bools, waits: list[tuple[float, float]], ends: tuple[float, float]) -> tuple[float, float]:
+def _ramps(
+    clock: Floats, dwells: Bools, waits: list[tuple[float, float]], ends: tuple[float, float]
+) -> tuple[float, float]:
     """Time until which, and from which on, a vehicle rolls that stands in the template but is asked to move at that end."""
     inside = 0.5 * SHORTEST
-    stands_there = [_stands(t, clock, dwells, waits) for t in (clock[0] + inside, clock[-1] - inside)]
-    rolls = [max(SHORTEST, v / _RAMP) if stands and v > STAND else 0.0 for stands, v in zip(stands_there, ends, strict=True)]
+    stands_there = [
+        _stands(t, clock, dwells, waits) for t in (clock[0] + inside, clock[-1] - inside)
+    ]
+    rolls = [
+        max(SHORTEST, v / _RAMP) if stands and v > STAND else 0.0
+        for stands, v in zip(stands_there, ends, strict=True)
+    ]
     return float(clock[0] + rolls[0]), float(clock[-1] - rolls[1])
 
 
@@ -180,7 +198,9 @@ def _joined_lines(time: Floats, speed: Floats, knot: Floats, still: Bools) -> Fl
     lines = np.where(free, np.interp(knot, time, speed), 0.0)
     moving = ~still[at]
     if free.any():  # changes to the speeds met at the knots: none where no sample says anything
-        lines[free] += np.linalg.lstsq(hats[np.ix_(moving, free)], (speed - hats @ lines)[moving], rcond=None)[0]
+        lines[free] += np.linalg.lstsq(
+            hats[np.ix_(moving, free)], (speed - hats @ lines)[moving], rcond=None
+        )[0]
     return np.asarray(np.maximum(lines, 0.0))
 
 

@@ -65,7 +65,9 @@ class Motion:
         u, du, ddu = spline.at_stations
         cubed = r * r * r
         acceleration = du / (r * r) - u * a / cubed
-        jerk = ddu / cubed - (3.0 * du * a + u * b) / (cubed * r) + 3.0 * u * a * a / (cubed * r * r)
+        jerk = (
+            ddu / cubed - (3.0 * du * a + u * b) / (cubed * r) + 3.0 * u * a * a / (cubed * r * r)
+        )
         return cls(rate, acceleration, jerk)
 
 
@@ -98,7 +100,9 @@ def fixed_coefficients(spline: SpeedSpline, ends: tuple[float, float]) -> tuple[
     return given, value
 
 
-def rounded_lines(spline: SpeedSpline, knots: SpeedKnots, time: Floats, speed: Floats, ends: tuple[float, float]) -> Floats:
+def rounded_lines(
+    spline: SpeedSpline, knots: SpeedKnots, time: Floats, speed: Floats, ends: tuple[float, float]
+) -> Floats:
     """Speeds (M,) [m/s] at the knots whose straight lines, once rounded by the smoothing, fit the template's best.
 
     Args:
@@ -126,7 +130,9 @@ def rounded_lines(spline: SpeedSpline, knots: SpeedKnots, time: Floats, speed: F
     sharp = SHARP_WEIGHT * np.array([np.interp(time, knots.knot, hat) for hat in hats]).T
     rest = speed - seen @ (base + rounded @ guess)
     sharp_rest = SHARP_WEIGHT * (speed - np.interp(time, knots.knot, lines))
-    lines[free] += np.linalg.lstsq(np.vstack([seen @ rounded, sharp]), np.concatenate([rest, sharp_rest]), rcond=None)[0]
+    lines[free] += np.linalg.lstsq(
+        np.vstack([seen @ rounded, sharp]), np.concatenate([rest, sharp_rest]), rcond=None
+    )[0]
     return np.asarray(np.maximum(lines, 0.0))
 
 
@@ -135,12 +141,16 @@ def _smoothness(spline: SpeedSpline) -> Floats:
     return np.asarray(spline.gram + SMOOTHING**4 * spline.bending)
 
 
-def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Bounds) -> Floats | None:
+def mean_speed(
+    spline: SpeedSpline, target: Target, motion: Motion, bounds: Bounds
+) -> Floats | None:
     """Coefficients (n,) [m/s] of the mean speed, None if none meets the bounds."""
     n, m = spline.size, len(spline.stations)
     reach = spline.driven(target.anchor_time)
     hessian = _smoothness(spline) + ANCHOR_WEIGHT * (reach.T @ reach)
-    linear = spline.projected(target.time, target.speed) + ANCHOR_WEIGHT * (reach.T @ target.anchor)
+    linear = spline.projected(target.time, target.speed) + ANCHOR_WEIGHT * (
+        reach.T @ target.anchor
+    )
     given, value = fixed_coefficients(spline, target.ends)
     known = np.flatnonzero(given)
     unit = np.eye(n)
@@ -163,13 +173,21 @@ def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Boun
     price = JERK_PRICE * np.gradient(spline.stations)
     constraints = np.vstack([np.hstack([a, b]) for a, b, _ in rows])
     right = np.concatenate([c for _, _, c in rows])
-    cones = [clarabel.ZeroConeT(len(known) + 1), clarabel.NonnegativeConeT(len(right) - len(known) - 1)]
+    cones = [
+        clarabel.ZeroConeT(len(known) + 1),
+        clarabel.NonnegativeConeT(len(right) - len(known) - 1),
+    ]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
     upper = sparse.csc_array(np.triu(quadratic))
     solver = clarabel.DefaultSolver(
-        upper, np.concatenate([-2.0 * linear, price]), sparse.csc_array(constraints), right, cones, settings
+        upper,
+        np.concatenate([-2.0 * linear, price]),
+        sparse.csc_array(constraints),
+        right,
+        cones,
+        settings,
     )
     solution = solver.solve()
     if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):

@@ -73,7 +73,9 @@ class SpeedModel:
         """(b, r) what each standard normal number adds to what is bounded."""
         return self.rows @ self.factor
 
-    def draw(self, z: Floats, longer: Floats, pace: Floats, ends: Floats, faster: Floats) -> tuple[Floats, Bools]:
+    def draw(
+        self, z: Floats, longer: Floats, pace: Floats, ends: Floats, faster: Floats
+    ) -> tuple[Floats, Bools]:
         """Coefficients (S, n) [m/s] and whether they keep what must hold (S,).
 
         Args:
@@ -88,13 +90,22 @@ class SpeedModel:
         ok = np.ones(len(z), dtype=np.bool_)
         coefficients = base + z @ self.factor.T
         if len(self.rows):
-            scale = np.select([self.order == 1.0, self.order == 2.0], [pace, pace * pace], pace * pace * pace)
+            scale = np.select(
+                [self.order == 1.0, self.order == 2.0], [pace, pace * pace], pace * pace * pace
+            )
             middle, seen = base @ self.rows.T, coefficients @ self.rows.T
             low, high = self.low * scale, self.high * scale
             sense = np.where(self.order < 3.0, 0, _SOFT).astype(np.intc)
             broken = ((seen < low - _TOLERANCE) | (seen > high + _TOLERANCE)).any(axis=1)
             for s in np.flatnonzero(broken).tolist():
-                x, _, flag, _ = daqp.solve(np.eye(self.size), -z[s], self.bounded, high[s] - middle[s], low[s] - middle[s], sense)
+                x, _, flag, _ = daqp.solve(
+                    np.eye(self.size),
+                    -z[s],
+                    self.bounded,
+                    high[s] - middle[s],
+                    low[s] - middle[s],
+                    sense,
+                )
                 ok[s] = flag > 0
                 if ok[s]:
                     coefficients[s] = base[s] + self.factor @ np.asarray(x)
@@ -128,17 +139,34 @@ def speed_model(
     unit, m = np.eye(spline.size), len(spline.stations)
     free = ~fixed_coefficients(spline, (0.0, 0.0))[0]
     rows = np.vstack([unit[free], motion.acceleration, motion.jerk])
-    low = np.concatenate([np.zeros(int(free.sum())), np.full(m, -bounds.braking), np.full(m, -bounds.jerk)])
-    high = np.concatenate([bounds.most[free], np.full(m, bounds.speeding), np.full(m, bounds.jerk)])
+    low = np.concatenate(
+        [np.zeros(int(free.sum())), np.full(m, -bounds.braking), np.full(m, -bounds.jerk)]
+    )
+    high = np.concatenate(
+        [bounds.most[free], np.full(m, bounds.speeding), np.full(m, bounds.jerk)]
+    )
     order = np.repeat([1.0, 2.0, 3.0], [int(free.sum()), m, m])
     at = np.concatenate([spline.middle[free], spline.stations, spline.stations])
     driven = rows @ mean
     jerky = order == 3.0
-    low = np.where(jerky, np.minimum(JERK_ROOM * low, driven), np.minimum(low, driven))  # the mean itself is always kept
+    low = np.where(
+        jerky, np.minimum(JERK_ROOM * low, driven), np.minimum(low, driven)
+    )  # the mean itself is always kept
     high = np.where(jerky, np.maximum(JERK_ROOM * high, driven), np.maximum(high, driven))
     spread = np.sqrt(np.square(rows @ factor).sum(axis=1))
     near = (driven - low < _NEAR * spread) | (high - driven < _NEAR * spread)
-    return SpeedModel(spline, mean, longer, faster, factor, rows[near], low[near], high[near], order[near], at[near])
+    return SpeedModel(
+        spline,
+        mean,
+        longer,
+        faster,
+        factor,
+        rows[near],
+        low[near],
+        high[near],
+        order[near],
+        at[near],
+    )
 
 
 def _spread_length(spline: SpeedSpline) -> tuple[Floats, Floats]:
@@ -169,7 +197,9 @@ def kernel_root(time: Floats, amplitude: Floats, length: float) -> Floats:
     return np.asarray(amplitude[:, None] * covariance_root((1.0 - x) * np.exp(-0.5 * x)))
 
 
-def _process(spline: SpeedSpline, mean: Floats, time: Floats, speed: Floats, sigma: float, length: float) -> Floats:
+def _process(
+    spline: SpeedSpline, mean: Floats, time: Floats, speed: Floats, sigma: float, length: float
+) -> Floats:
     """Square root (n, r) of the covariance of the coefficients, without conditions."""
     at = spline.middle
     inside = (time >= spline.breaks[0]) & (time <= spline.breaks[-1])
@@ -209,7 +239,9 @@ def _conditioned(spline: SpeedSpline, factor: Floats) -> Floats:
         parts.append(_tied(piece, known[np.abs(known).max(axis=1, initial=0.0) > 0.0]))
         parts[-1][given] = 0.0
     whole = np.hstack([np.zeros((spline.size, 0)), *parts])
-    root = principal(_tied(whole, (spline.length @ whole)[None] / float(spline.length.sum())), 1e-4)
+    root = principal(
+        _tied(whole, (spline.length @ whole)[None] / float(spline.length.sum())), 1e-4
+    )
     root[given] = 0.0  # to the last bit: a stand stands
     return root
 

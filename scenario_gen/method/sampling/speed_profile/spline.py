@@ -16,7 +16,9 @@ from scipy.interpolate import BSpline
 
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
 
-KNOT_SPACING = 0.25  # s; farther apart, the steps of jerk between knots are told from what a driver does
+KNOT_SPACING = (
+    0.25  # s; farther apart, the steps of jerk between knots are told from what a driver does
+)
 MOST_KNOTS = 600  # of long encounters the knots are farther apart
 DEGREE = 3
 _BEFORE = 1e-9  # s
@@ -43,8 +45,12 @@ class SpeedSpline:
         """The basis on [start, end] [s] for a vehicle that stands in the intervals `stands` [s], in order and apart."""
         spacing = max(KNOT_SPACING, (end - start) / MOST_KNOTS)
         cuts = sorted({start, end, *(t for stand in stands for t in stand if start < t < end)})
-        inner = [np.linspace(a, b, max(round((b - a) / spacing), 1) + 1)[:-1] for a, b in pairwise(cuts)]
-        knots = np.sort(np.concatenate([[start] * DEGREE, *inner, cuts[1:-1], [end] * (DEGREE + 1)]))
+        inner = [
+            np.linspace(a, b, max(round((b - a) / spacing), 1) + 1)[:-1] for a, b in pairwise(cuts)
+        ]
+        knots = np.sort(
+            np.concatenate([[start] * DEGREE, *inner, cuts[1:-1], [end] * (DEGREE + 1)])
+        )
         low, high = knots[: -DEGREE - 1], knots[DEGREE + 1 :]
         still = np.zeros(len(low), dtype=np.bool_)
         for a, b in stands:
@@ -64,13 +70,17 @@ class SpeedSpline:
     @cached_property
     def first(self) -> Ints:
         """(m,) the first of the four basis functions that are not zero between two breaks."""
-        return frozen_ints(np.searchsorted(self.knots, self.breaks[:-1], side="right") - 1 - DEGREE)
+        return frozen_ints(
+            np.searchsorted(self.knots, self.breaks[:-1], side="right") - 1 - DEGREE
+        )
 
     @cached_property
     def stations(self) -> Floats:
         """(b,) seconds at which a derivative of the speed can be largest: the breaks, and just before those where jerk jumps."""
         inner = self.knots[DEGREE + 1 : -DEGREE - 1]
-        return frozen(np.sort(np.concatenate([self.breaks, inner[1:][np.diff(inner) == 0.0] - _BEFORE])))
+        return frozen(
+            np.sort(np.concatenate([self.breaks, inner[1:][np.diff(inner) == 0.0] - _BEFORE]))
+        )
 
     @cached_property
     def at_stations(self) -> tuple[Floats, Floats, Floats]:
@@ -118,7 +128,9 @@ class SpeedSpline:
 
     def projected(self, at: Floats, values: Floats) -> Floats:
         """(n,) integrals of each basis function times the straight lines through `values` (q,) at times `at` (q,) [s]."""
-        t = np.unique(np.concatenate([self.breaks, at[(at > self.breaks[0]) & (at < self.breaks[-1])]]))
+        t = np.unique(
+            np.concatenate([self.breaks, at[(at > self.breaks[0]) & (at < self.breaks[-1])]])
+        )
         half, middle = 0.5 * np.diff(t), 0.5 * (t[1:] + t[:-1])
         points = (middle[:, None] + half[:, None] * _GAUSS_X).ravel()
         weight = (half[:, None] * _GAUSS_W).ravel()

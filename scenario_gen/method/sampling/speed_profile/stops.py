@@ -32,7 +32,11 @@ def standing_part(encounter: Encounter, wait: Wait) -> Wait:
 
 
 def standing_within(
-    times: Floats, dwells: Bools, stands: Sequence[tuple[float, float]], time: Floats, speed: Floats
+    times: Floats,
+    dwells: Bools,
+    stands: Sequence[tuple[float, float]],
+    time: Floats,
+    speed: Floats,
 ) -> tuple[list[tuple[float, float]], Bools]:
     """Replace dwells by the parts of them in which the template stands: a vehicle still rolls when a primitive begins.
 

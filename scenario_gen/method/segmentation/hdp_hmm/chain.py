@@ -31,11 +31,20 @@ from scenario_gen.method.segmentation.hdp_hmm.model import (
     States,
     Statistics,
 )
-from scenario_gen.method.segmentation.hdp_hmm.observed import draw_hidden, draw_masses, log_masses, observed_log_likelihood
+from scenario_gen.method.segmentation.hdp_hmm.observed import (
+    draw_hidden,
+    draw_masses,
+    log_masses,
+    observed_log_likelihood,
+)
 from scenario_gen.method.segmentation.hdp_hmm.prior import sample_prior, set_prior
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
 from scenario_gen.method.segmentation.hdp_hmm.split_merge import split_or_merge
-from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions, log_transitions, sample_transitions
+from scenario_gen.method.segmentation.hdp_hmm.transitions import (
+    count_transitions,
+    log_transitions,
+    sample_transitions,
+)
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import I, kernel
 
@@ -100,7 +109,15 @@ def backward_messages(data: Data, emitted: States, hyper: Hyper, pi: Floats, w: 
         start = max(0, stop - BLOCK)
         block_log_likelihood(vt, start, stop, emitted, weight, dof, block, best)
         while gap >= 0 and gaps[gap] >= start:
-            observed_log_likelihood(vt[:, gaps[gap]], hidden[gap], coef, shape, weight, dof, block[:, gaps[gap] - start])
+            observed_log_likelihood(
+                vt[:, gaps[gap]],
+                hidden[gap],
+                coef,
+                shape,
+                weight,
+                dof,
+                block[:, gaps[gap] - start],
+            )
             gap -= 1
         block_likelihood(block, stop - start, best, work, w[start:stop])
         for t in range(stop - 1, start - 1, -1):
@@ -136,7 +153,9 @@ def sample_labels(state: State, w: Floats, pi: Floats, ends: Ints, labels: Ints)
         u = uniform(state) * total
         if previous == states:
             previous = pick(share, u, -1)
-        elif u > share[previous]:  # most samples stay where the one before was: that is looked at first
+        elif (
+            u > share[previous]
+        ):  # most samples stay where the one before was: that is looked at first
             previous = pick(share, u - float(share[previous]), previous)
         labels[t] = previous
         if t + 1 == ends[sequence]:
@@ -145,7 +164,9 @@ def sample_labels(state: State, w: Floats, pi: Floats, ends: Ints, labels: Ints)
 
 
 @kernel(inline=True)
-def update_outer(v: Floats, before: Ints, labels: Ints, mass: Floats, outer: Floats, sums: Floats) -> None:
+def update_outer(
+    v: Floats, before: Ints, labels: Ints, mass: Floats, outer: Floats, sums: Floats
+) -> None:
     """Bring the statistics (see `accumulate`) from labels `before` (T,) to `labels`, few of which change in a sweep."""
     for t in range(len(labels)):
         a, b = before[t], labels[t]
@@ -161,7 +182,9 @@ def update_outer(v: Floats, before: Ints, labels: Ints, mass: Floats, outer: Flo
 
 
 @kernel(inline=True)
-def draw_samples(state: State, data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats, labels: Ints) -> None:
+def draw_samples(
+    state: State, data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats, labels: Ints
+) -> None:
     """Draw labels (T,), masses and hidden channels, given transitions pi (L + 1, L) and emissions; w (T, L) is work space."""
     backward_messages(data, emitted, hyper, pi, w)
     sample_labels(state, w, pi, data.ends, labels)
@@ -183,23 +206,36 @@ def draw_emissions(state: State, stats: Statistics, joint: Joint, emitted: State
     """Draw the emissions of all states from their posteriors."""
     for k in range(len(stats.own)):
         coef = emitted.coef[k]
-        emitted.shape[k, 0] = draw_emission(state, stats.factors[k], joint.weight * stats.sums[k, 0], joint, coef)
+        emitted.shape[k, 0] = draw_emission(
+            state, stats.factors[k], joint.weight * stats.sums[k, 0], joint, coef
+        )
         emitted.shape[k, 1] = blurred(coef, joint.blur)
 
 
 @kernel(inline=True)
-def write_trace(data: Data, hyper: Hyper, stats: Statistics, base: float, top: Floats, row: Floats) -> None:
+def write_trace(
+    data: Data, hyper: Hyper, stats: Statistics, base: float, top: Floats, row: Floats
+) -> None:
     """Fill row (5,), see TRACE; `base` is the log marginal likelihood of no samples."""
     used = stats.n.sum(axis=0) > 0
     row[0] = log_transitions(stats.n, top[1], top[2], top[3:]) + (stats.own[used] - base).sum()
-    row[0] += log_masses(data.mass, hyper.weight * len(hyper.blur), hyper.dof) if hyper.dof > 0.0 else 0.0
+    row[0] += (
+        log_masses(data.mass, hyper.weight * len(hyper.blur), hyper.dof)
+        if hyper.dof > 0.0
+        else 0.0
+    )
     row[1], row[2:] = used.sum(), top[:3]
 
 
 @kernel(DATA, GRID, HYPERS, START, OUTPUT, I)
 def run_chain(data: Data, grid: Grid, hyper: Hyper, start: Start, out: Out, seed: int) -> None:
     """Run one chain from `start`; every row of `out.trace` is one sweep, the last ones leave their labels, too."""
-    m, states, sweeps, burn = data.v.shape[1], len(out.emissions), len(out.trace), len(out.trace) - len(out.samples)
+    m, states, sweeps, burn = (
+        data.v.shape[1],
+        len(out.emissions),
+        len(out.trace),
+        len(out.trace) - len(out.samples),
+    )
     state = np.empty(1, np.uint64)
     state[0] = np.uint64(seed)
     labels, before = start.labels.copy(), start.labels.copy()
@@ -214,7 +250,9 @@ def run_chain(data: Data, grid: Grid, hyper: Hyper, start: Start, out: Out, seed
     pi, w = np.empty((states + 1, states)), np.empty((len(labels), states))
     g0, factor = np.empty((m, m)), np.empty((m, m))
     top, chosen = start.top, start.chosen
-    base, joint = set_prior(grid, grid.extras[chosen[0]], grid.worths[chosen[1]], hyper, g0, factor)
+    base, joint = set_prior(
+        grid, grid.extras[chosen[0]], grid.worths[chosen[1]], hyper, g0, factor
+    )
     for sweep in range(-1, sweeps):
         if sweep >= 0:
             draw_samples(state, data, emitted, hyper, pi, w, labels)
@@ -224,7 +262,9 @@ def run_chain(data: Data, grid: Grid, hyper: Hyper, start: Start, out: Out, seed
             update_outer(data.v, before, labels, data.mass, stats.outer, stats.sums)
         if sweep % PRIOR_EVERY == 0:
             sample_prior(state, stats, grid, hyper, chosen, g0, factor)
-            base, joint = set_prior(grid, grid.extras[chosen[0]], grid.worths[chosen[1]], hyper, g0, factor)
+            base, joint = set_prior(
+                grid, grid.extras[chosen[0]], grid.worths[chosen[1]], hyper, g0, factor
+            )
         fit_states(stats, joint)
         count_transitions(labels, data.ends, stats.n)
         if sweep >= 0:

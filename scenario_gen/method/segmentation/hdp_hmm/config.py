@@ -17,7 +17,9 @@ GAUSSIAN_DOF = 1000.0
 class SamplerConfig(Parameters):
     """The sticky HDP-HMM and its sampler; the defaults suit any series from D = 1 to D = 24."""
 
-    emission: str = parameter("gaussian", "what a state emits", choices=("gaussian", "autoregressive"))
+    emission: str = parameter(
+        "gaussian", "what a state emits", choices=("gaussian", "autoregressive")
+    )
     order: int = parameter(1, "past samples an autoregressive emission looks at", low=1, high=5)
     states: int = parameter(
         0,
@@ -26,11 +28,21 @@ class SamplerConfig(Parameters):
         high=200,
     )
     chains: int = parameter(3, "independent chains, each from a start of its own", low=1, high=16)
-    sweeps: int = parameter(600, "most Gibbs sweeps of each chain; it ends when the chains agree", low=10, high=100_000)
-    r_hat: float = parameter(1.1, "split R-hat below which, on every trace, chains agree; 1: run all sweeps", low=1.0, high=10.0)
+    sweeps: int = parameter(
+        600, "most Gibbs sweeps of each chain; it ends when the chains agree", low=10, high=100_000
+    )
+    r_hat: float = parameter(
+        1.1,
+        "split R-hat below which, on every trace, chains agree; 1: run all sweeps",
+        low=1.0,
+        high=10.0,
+    )
     moves: int = parameter(8, "split or merge moves tried in a sweep", low=0, high=100)
     dof: float = parameter(
-        0.0, "degrees of freedom of Student-t noise; 0: from the data; 1000 or more: Gaussian", low=0.0, high=1e9
+        0.0,
+        "degrees of freedom of Student-t noise; 0: from the data; 1000 or more: Gaussian",
+        low=0.0,
+        high=1e9,
     )
     mean_weight: float = parameter(
         0.05,
@@ -39,7 +51,10 @@ class SamplerConfig(Parameters):
         high=100.0,
     )
     weight: float = parameter(
-        0.0, "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data", low=0.0, high=1.0
+        0.0,
+        "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data",
+        low=0.0,
+        high=1.0,
     )
     gamma_shape: float = parameter(1.0, "shape of γ's Gamma prior", low=1e-3)
     gamma_rate: float = parameter(1.0, "rate of γ's Gamma prior", low=1e-6)
@@ -52,5 +67,12 @@ class SamplerConfig(Parameters):
     def hyper(self) -> Floats:
         """(6,) parameters of the hyperpriors, in the order in which the kernels read them."""
         return np.array(
-            [self.gamma_shape, self.gamma_rate, self.alpha_kappa_shape, self.alpha_kappa_rate, self.rho_a, self.rho_b]
+            [
+                self.gamma_shape,
+                self.gamma_rate,
+                self.alpha_kappa_shape,
+                self.alpha_kappa_rate,
+                self.rho_a,
+                self.rho_b,
+            ]
         )

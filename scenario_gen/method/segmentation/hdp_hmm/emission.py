@@ -154,7 +154,14 @@ def draw_emission(state: State, factor: Floats, n: float, joint: Joint, coef: Fl
 
 @kernel(inline=True)
 def block_log_likelihood(
-    vt: Floats, start: int, stop: int, emitted: States, weight: float, dof: float, out: Floats, row: Floats
+    vt: Floats,
+    start: int,
+    stop: int,
+    emitted: States,
+    weight: float,
+    dof: float,
+    out: Floats,
+    row: Floats,
 ) -> None:
     """Fill out (L, BLOCK) with log p(y_t | z_t, state) up to a constant.
 
@@ -182,9 +189,16 @@ def block_log_likelihood(
             for t in range(n):
                 row[t] = c[0] * x[t]
             j = 1
-            while j + 3 < used:  # four at a time: a partial sum is fetched and stored a quarter as often
+            while (
+                j + 3 < used
+            ):  # four at a time: a partial sum is fetched and stored a quarter as often
                 c0, c1, c2, c3 = c[j], c[j + 1], c[j + 2], c[j + 3]
-                x0, x1, x2, x3 = vt[j, start:stop], vt[j + 1, start:stop], vt[j + 2, start:stop], vt[j + 3, start:stop]
+                x0, x1, x2, x3 = (
+                    vt[j, start:stop],
+                    vt[j + 1, start:stop],
+                    vt[j + 2, start:stop],
+                    vt[j + 3, start:stop],
+                )
                 for t in range(n):
                     row[t] += (c0 * x0[t] + c1 * x1[t]) + (c2 * x2[t] + c3 * x3[t])
                 j += 4
@@ -203,7 +217,9 @@ def block_log_likelihood(
 
 
 @kernel(inline=True)
-def student(total: Floats, n: int, logdet: float, share: float, power: float, work: Floats) -> None:
+def student(
+    total: Floats, n: int, logdet: float, share: float, power: float, work: Floats
+) -> None:
     """Overwrite the first n squares of `total` (B,) with logdet - power log(1 + share × square); work (B,).
 
     The logarithm is 2 artanh((m - 1) / (m + 1)) of the mantissa, a series, which is vectorised; it is right to 1e-13.

@@ -7,7 +7,11 @@ import math
 
 import numpy as np
 
-from scenario_gen.method.segmentation.hdp_hmm.emission import accumulate, log_marginal, posterior_factor
+from scenario_gen.method.segmentation.hdp_hmm.emission import (
+    accumulate,
+    log_marginal,
+    posterior_factor,
+)
 from scenario_gen.method.segmentation.hdp_hmm.model import JOINT, Joint
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions
 from scenario_gen.numerics import Floats, Ints
@@ -30,14 +34,34 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
         if k not in (i, j):
             joint = n[i, k] + n[j, k]
             joint_row += joint
-            gain += math.lgamma(move + joint) - math.lgamma(move + n[i, k]) - math.lgamma(move + n[j, k]) + math.lgamma(move)
+            gain += (
+                math.lgamma(move + joint)
+                - math.lgamma(move + n[i, k])
+                - math.lgamma(move + n[j, k])
+                + math.lgamma(move)
+            )
             joint = n[k, i] + n[k, j]
-            gain += math.lgamma(move + joint) - math.lgamma(move + n[k, i]) - math.lgamma(move + n[k, j]) + math.lgamma(move)
+            gain += (
+                math.lgamma(move + joint)
+                - math.lgamma(move + n[k, i])
+                - math.lgamma(move + n[k, j])
+                + math.lgamma(move)
+            )
     home = n[i, i] + n[i, j] + n[j, i] + n[j, j]
     joint_row += home
     gain += math.lgamma(stay + home) - math.lgamma(stay)
-    gain -= math.lgamma(stay + n[i, i]) - math.lgamma(stay) + math.lgamma(stay + n[j, j]) - math.lgamma(stay)
-    gain -= math.lgamma(move + n[i, j]) - math.lgamma(move) + math.lgamma(move + n[j, i]) - math.lgamma(move)
+    gain -= (
+        math.lgamma(stay + n[i, i])
+        - math.lgamma(stay)
+        + math.lgamma(stay + n[j, j])
+        - math.lgamma(stay)
+    )
+    gain -= (
+        math.lgamma(move + n[i, j])
+        - math.lgamma(move)
+        + math.lgamma(move + n[j, i])
+        - math.lgamma(move)
+    )
     total = stay + states * move
     gain += math.lgamma(total) - math.lgamma(total + joint_row)
     gain += -2.0 * math.lgamma(total) + math.lgamma(total + row_i) + math.lgamma(total + row_j)
@@ -45,7 +69,9 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
 
 
 @kernel(inline=True)
-def joint_marginal(outer: Floats, sums: Floats, i: int, j: int, prior: Joint, factor: Floats) -> float:
+def joint_marginal(
+    outer: Floats, sums: Floats, i: int, j: int, prior: Joint, factor: Floats
+) -> float:
     """Log marginal likelihood of states i and j as one, or of i alone if they are the same; outer (L, M, M), sums (L, 2)."""
     count, total = sums[i, 0], sums[i, 1]
     both = outer[i].copy()
@@ -60,7 +86,9 @@ def joint_marginal(outer: Floats, sums: Floats, i: int, j: int, prior: Joint, fa
 
 
 @kernel(inline=True)
-def best_merge(data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, move: float) -> tuple[int, int]:
+def best_merge(
+    data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, move: float
+) -> tuple[int, int]:
     """Return the pair of states (i > j), of data (L, M, M), whose merge gains most, or (-1, -1) if none gains anything."""
     best, best_i, best_j = 0.0, -1, -1
     for i in range(len(own)):
@@ -73,7 +101,9 @@ def best_merge(data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, mo
 
 
 @kernel(F2, F1, I1, JOINT, F, F, OUTI1)
-def merge_states(v: Floats, mass: Floats, ends: Ints, prior: Joint, stay: float, move: float, labels: Ints) -> None:
+def merge_states(
+    v: Floats, mass: Floats, ends: Ints, prior: Joint, stay: float, move: float, labels: Ints
+) -> None:
     """Merge states greedily while the probability of the labels, emissions and transitions integrated out, grows.
 
     Gibbs sampling alone splits easily and merges with difficulty; this is run on the labels that a chain starts from.

@@ -6,7 +6,20 @@
 from typing import NamedTuple
 
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.kernels import B2, F, F1, F2, I, I1, named, OUT1, OUT2, OUT3, OUTI1, OUTI2
+from scenario_gen.numerics.kernels import (
+    B2,
+    F,
+    F1,
+    F2,
+    I,
+    I1,
+    named,
+    OUT1,
+    OUT2,
+    OUT3,
+    OUTI1,
+    OUTI2,
+)
 
 
 class Data(NamedTuple):

@@ -21,7 +21,9 @@ from scenario_gen.numerics.kernels import kernel
 
 
 @kernel(inline=True)
-def without_hidden(v: Floats, hidden: Bools, coef: Floats, factor: Floats, shift: Floats) -> tuple[float, float]:
+def without_hidden(
+    v: Floats, hidden: Bools, coef: Floats, factor: Floats, shift: Floats
+) -> tuple[float, float]:
     """Squared whitened residual of a sample's observed channels, and log|Λ|^(1/2), Λ the precision of the hidden given them.
 
     Args:
@@ -118,7 +120,9 @@ def draw_masses(state: State, data: Data, labels: Ints, emitted: States, hyper: 
                 seen = d
                 total = square(coef[k], v[t])
             total += shape[k, 1] * seen / d
-            mass[t] = np.exp(log_gamma_draw(state, 0.5 * (dof + weight * seen))) / (0.5 * (dof + weight * total))
+            mass[t] = np.exp(log_gamma_draw(state, 0.5 * (dof + weight * seen))) / (
+                0.5 * (dof + weight * total)
+            )
 
 
 @kernel(inline=True)

@@ -9,7 +9,11 @@ of its own costs, so neither is fixed: each is one of a grid, drawn given the la
 
 import numpy as np
 
-from scenario_gen.method.segmentation.hdp_hmm.emission import cholesky, log_marginal, posterior_factor
+from scenario_gen.method.segmentation.hdp_hmm.emission import (
+    cholesky,
+    log_marginal,
+    posterior_factor,
+)
 from scenario_gen.method.segmentation.hdp_hmm.model import Grid, Hyper, Joint, Statistics
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
 from scenario_gen.numerics import Floats, Ints
@@ -17,7 +21,9 @@ from scenario_gen.numerics.kernels import kernel
 
 
 @kernel(inline=True)
-def set_prior(grid: Grid, extra: float, worth: float, hyper: Hyper, g0: Floats, factor: Floats) -> tuple[float, Joint]:
+def set_prior(
+    grid: Grid, extra: float, worth: float, hyper: Hyper, g0: Floats, factor: Floats
+) -> tuple[float, Joint]:
     """Return the log marginal likelihood of no samples, and the prior.
 
     Args:
@@ -53,7 +59,15 @@ def set_prior(grid: Grid, extra: float, worth: float, hyper: Hyper, g0: Floats, 
 
 
 @kernel(inline=True)
-def sample_prior(state: State, stats: Statistics, grid: Grid, hyper: Hyper, chosen: Ints, g0: Floats, factor: Floats) -> None:
+def sample_prior(
+    state: State,
+    stats: Statistics,
+    grid: Grid,
+    hyper: Hyper,
+    chosen: Ints,
+    g0: Floats,
+    factor: Floats,
+) -> None:
     """Draw `chosen` (2,), which of the grid's `extras` and `worths` hold, one given the other, from the states' statistics."""
     for side in range(2):
         options = grid.extras if side == 0 else grid.worths
@@ -68,7 +82,9 @@ def sample_prior(state: State, stats: Statistics, grid: Grid, hyper: Hyper, chos
             for k in range(len(stats.own)):
                 if stats.sums[k, 0] > 0.0:
                     posterior_factor(stats.outer[k], stats.sums[k, 1], joint, factor)
-                    logs[option] += log_marginal(factor, hyper.weight * stats.sums[k, 0], joint) - base
+                    logs[option] += (
+                        log_marginal(factor, hyper.weight * stats.sums[k, 0], joint) - base
+                    )
         top = logs.max()
         total = 0.0
         for option in range(len(options)):

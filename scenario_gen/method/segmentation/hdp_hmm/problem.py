@@ -13,7 +13,13 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.segmentation.hdp_hmm.chain import run_chain, TRACE
 from scenario_gen.method.segmentation.hdp_hmm.config import GAUSSIAN_DOF, SamplerConfig
-from scenario_gen.method.segmentation.hdp_hmm.emission import accumulate, joint_prior, mean_emission, posterior_factor, square
+from scenario_gen.method.segmentation.hdp_hmm.emission import (
+    accumulate,
+    joint_prior,
+    mean_emission,
+    posterior_factor,
+    square,
+)
 from scenario_gen.method.segmentation.hdp_hmm.merge import merge_states
 from scenario_gen.method.segmentation.hdp_hmm.model import Data, Grid, Hyper, Joint, Out, Start
 from scenario_gen.numerics import Bools, Floats, Ints
@@ -24,12 +30,21 @@ def moving_mean(x: Floats, width: int) -> Floats:
     """Mean over `width` samples around each sample of x (T, ...); before the first and after the last one those repeat."""
     before = width // 2
     edges = [(before, width - 1 - before)] + [(0, 0)] * (x.ndim - 1)
-    return np.asarray(sliding_window_view(np.pad(x, edges, mode="edge"), width, axis=0).mean(axis=-1))
+    return np.asarray(
+        sliding_window_view(np.pad(x, edges, mode="edge"), width, axis=0).mean(axis=-1)
+    )
 
 
 @kernel(F2, F1, I1, F2, I, OUT2, OUT2, OUT1)
 def unexplained(
-    v: Floats, mass: Floats, labels: Ints, g0: Floats, regressors: int, residual: Floats, scatter: Floats, squares: Floats
+    v: Floats,
+    mass: Floats,
+    labels: Ints,
+    g0: Floats,
+    regressors: int,
+    residual: Floats,
+    scatter: Floats,
+    squares: Floats,
 ) -> None:
     """Fit y = A z in each state, ridged by the prior; no BLAS, whose idle threads cost more than they save here.
 
@@ -79,7 +94,14 @@ def unexplained(
 
 START = (1.0, 50.0, 0.9)
 MERGE_ROWS = (40.0, 0.1)
-MEAN_WORTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # log-normal beforehand, about 0.1, with a factor of 4.5
+MEAN_WORTHS = (
+    0.01,
+    0.03,
+    0.1,
+    0.3,
+    1.0,
+    3.0,
+)  # log-normal beforehand, about 0.1, with a factor of 4.5
 MEAN_ODDS = (-1.2, -0.3, 0.0, -0.3, -1.2, -2.6)
 EXTRA_DEGREES = (3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 300.0, 1000.0)
 FIT_RIDGE = 0.05  # K, in its units, where states are only described
@@ -186,7 +208,11 @@ class Problem:
         lost = np.isnan(x)
         if order:
             broken = np.array(
-                [lost[t - order : t + 1].any() for a, b in zip(starts, ends, strict=True) for t in range(a + order, b)]
+                [
+                    lost[t - order : t + 1].any()
+                    for a, b in zip(starts, ends, strict=True)
+                    for t in range(a + order, b)
+                ]
             )
             lost = np.repeat(broken[:, None], d, axis=1)
         gaps = np.flatnonzero(lost.any(axis=1)).astype(np.int64)
@@ -204,7 +230,9 @@ class Problem:
             odds=np.zeros(1) if order else np.array(MEAN_ODDS),
             lead=order,
             weight=config.weight or 1.0,
-            dof=GUESSED_DOF if config.dof == 0.0 else (0.0 if config.dof >= GAUSSIAN_DOF else config.dof),
+            dof=GUESSED_DOF
+            if config.dof == 0.0
+            else (0.0 if config.dof >= GAUSSIAN_DOF else config.dof),
             blur=blur,
             gaps=gaps,
             hidden=lost[gaps],
@@ -213,9 +241,15 @@ class Problem:
     def unexplained(self, place: Place) -> tuple[Floats, Floats, Floats]:
         """What the states' regressions leave: (T', D), its (D, D) scatter by mass, and its whitened squares (T',)."""
         d = self.dimensions
-        residual, scatter, squares = np.empty((len(self.v), d)), np.empty((d, d)), np.empty(len(self.v))
+        residual, scatter, squares = (
+            np.empty((len(self.v), d)),
+            np.empty((d, d)),
+            np.empty(len(self.v)),
+        )
         g0 = joint_prior(self.mean, FIT_RIDGE * self.precision, np.eye(d))
-        unexplained(self.v, place.mass, place.labels, g0, self.regressors, residual, scatter, squares)
+        unexplained(
+            self.v, place.mass, place.labels, g0, self.regressors, residual, scatter, squares
+        )
         return residual, scatter, squares
 
     def within(self, place: Place) -> Floats:
@@ -224,11 +258,20 @@ class Problem:
         samples = float((place.mass > 0.0).sum())
         freedom = max(samples - self.regressors * (place.labels.max() + 1), 0.5 * samples, 1.0)
         scatter = scatter / freedom + np.diag(self.blur)
-        result: Floats = scatter + np.eye(self.dimensions) * (1e-3 * np.trace(scatter) / self.dimensions + 1e-6)
+        result: Floats = scatter + np.eye(self.dimensions) * (
+            1e-3 * np.trace(scatter) / self.dimensions + 1e-6
+        )
         return result
 
     def run(
-        self, config: SamplerConfig, prior: Prior, place: Place, top: Floats, burn: int, keep: int, seed: int
+        self,
+        config: SamplerConfig,
+        prior: Prior,
+        place: Place,
+        top: Floats,
+        burn: int,
+        keep: int,
+        seed: int,
     ) -> tuple[Place, Prior, Ints, Floats]:
         """Run a chain from `place` for `burn` + `keep` sweeps.
 
@@ -249,7 +292,9 @@ class Problem:
         trace = np.empty((burn + keep, len(TRACE)))
         emissions = np.empty((len(top) - 3, self.dimensions, self.v.shape[1]))
         extras = np.array(EXTRA_DEGREES)
-        chosen = np.array([np.abs(extras - prior.extra).argmin(), np.abs(self.worths - prior.worth).argmin()])
+        chosen = np.array(
+            [np.abs(extras - prior.extra).argmin(), np.abs(self.worths - prior.worth).argmin()]
+        )
         v, mass = self.v.copy(), place.mass.copy()
         run_chain(
             Data(v, np.ascontiguousarray(v.T), self.gaps, self.hidden, mass, self.ends),
@@ -265,7 +310,9 @@ class Problem:
     def merge(self, prior: Prior, place: Place) -> Place:
         """Merge states greedily under `prior`; returns where that leads, labels 0 .. K - 1 without gaps."""
         labels = compact(place.labels)
-        g0 = joint_prior(self.mean, prior.worth * self.precision, prior.within * (prior.extra - 1.0))
+        g0 = joint_prior(
+            self.mean, prior.worth * self.precision, prior.within * (prior.extra - 1.0)
+        )
         joint = Joint(g0, self.dimensions + prior.extra, self.weight, self.blur)
         merge_states(self.v, place.mass, self.ends, joint, *MERGE_ROWS, labels)
         return Place(compact(labels), place.mass)

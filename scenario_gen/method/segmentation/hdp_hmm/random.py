@@ -31,8 +31,14 @@ def _layers() -> tuple[Floats, Floats]:
     In decimal numbers, whose functions are rounded correctly, so that every machine has the same table.
     """
     with localcontext(prec=30):
-        last, area = Decimal("3.6541528853610087963519472518"), Decimal("0.0049286732339746549315909")
-        edges, heights = [area / (-last * last / 2).exp(), last], [Decimal(0), (-last * last / 2).exp()]
+        last, area = (
+            Decimal("3.6541528853610087963519472518"),
+            Decimal("0.0049286732339746549315909"),
+        )
+        edges, heights = (
+            [area / (-last * last / 2).exp(), last],
+            [Decimal(0), (-last * last / 2).exp()],
+        )
         for _ in range(LAYERS - 2):
             heights.append(heights[-1] + area / edges[-1])
             edges.append((-2 * heights[-1].ln()).sqrt())
@@ -71,7 +77,9 @@ def normal(state: State) -> float:
         if x >= EDGES[layer + 1]:
             if layer == 0:
                 x = beyond(state)
-            elif HEIGHTS[layer] + uniform(state) * (HEIGHTS[layer + 1] - HEIGHTS[layer]) >= np.exp(-0.5 * x * x):
+            elif HEIGHTS[layer] + uniform(state) * (HEIGHTS[layer + 1] - HEIGHTS[layer]) >= np.exp(
+                -0.5 * x * x
+            ):
                 continue
         return x if bits & _SIGN else -x
 

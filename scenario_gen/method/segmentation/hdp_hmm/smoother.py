@@ -17,7 +17,9 @@ LEAST_LOG = -600.0
 
 
 @kernel(F2, B2, F3, F, F, OUT2)
-def log_densities(v: Floats, hidden: Bools, coef: Floats, weight: float, dof: float, out: Floats) -> None:
+def log_densities(
+    v: Floats, hidden: Bools, coef: Floats, weight: float, dof: float, out: Floats
+) -> None:
     """Fill out (T, K) with log p(y_t | z_t, state), hidden channels integrated out; 0 where none was observed.
 
     A weight below 1 tempers the density as the sampler does; then it is known up to a constant of each sample.
@@ -46,7 +48,11 @@ def log_densities(v: Floats, hidden: Bools, coef: Floats, weight: float, dof: fl
             n = weight * seen
             out[t, k] = weight * (whole - half) + log_radial(square, n, weight, dof)
             if dof > 0.0:
-                out[t, k] += math.lgamma(0.5 * (dof + n)) - math.lgamma(0.5 * dof) - 0.5 * n * np.log(math.pi * dof)
+                out[t, k] += (
+                    math.lgamma(0.5 * (dof + n))
+                    - math.lgamma(0.5 * dof)
+                    - 0.5 * n * np.log(math.pi * dof)
+                )
             else:
                 out[t, k] -= 0.5 * n * np.log(2.0 * math.pi)
 
@@ -72,7 +78,14 @@ def relative_likelihood(log_density: Floats, out: Floats) -> float:
 
 
 @kernel(F2, F2, F1, I1, OUT2, OUT1)
-def smooth(log_density: Floats, transition: Floats, initial: Floats, ends: Ints, out: Floats, changed: Floats) -> float:
+def smooth(
+    log_density: Floats,
+    transition: Floats,
+    initial: Floats,
+    ends: Ints,
+    out: Floats,
+    changed: Floats,
+) -> float:
     """Fill out (T, K) with the posterior probability of each state; returns log p(samples) (Rabiner 1989, III-A and V-A, scaled).
 
     Args:
@@ -125,7 +138,15 @@ def smooth(log_density: Floats, transition: Floats, initial: Floats, ends: Ints,
 
 
 @kernel(inline=True)
-def fill_hidden(hidden: Bools, factor: Floats, shift: Floats, share: float, inverse: Floats, y: Floats, outer: Floats) -> None:
+def fill_hidden(
+    hidden: Bools,
+    factor: Floats,
+    shift: Floats,
+    share: float,
+    inverse: Floats,
+    y: Floats,
+    outer: Floats,
+) -> None:
     """Put the hidden channels of y (D,) at their means given the others, and add `share` × their covariance to outer (D, D).
 
     Args:
@@ -173,7 +194,9 @@ class Rows(NamedTuple):
 
 
 @kernel(named(Rows, F2, B2, B2, F, F), F1, F2, OUT2, OUT1)
-def expected_statistics(rows: Rows, share: Floats, coef: Floats, outer: Floats, sums: Floats) -> None:
+def expected_statistics(
+    rows: Rows, share: Floats, coef: Floats, outer: Floats, sums: Floats
+) -> None:
     """Fill the expected statistics of one state: hidden channels and the masses of heavy-tailed noise at their conditional means.
 
     Args:
@@ -195,7 +218,9 @@ def expected_statistics(rows: Rows, share: Floats, coef: Floats, outer: Floats, 
         mass = 1.0
         if dof > 0.0:
             seen = weight * (d - unused[t].sum())
-            mass = (dof + seen) / (dof + weight * without_hidden(v[t], unused[t], coef, factor, shift)[0])
+            mass = (dof + seen) / (
+                dof + weight * without_hidden(v[t], unused[t], coef, factor, shift)[0]
+            )
         row[:] = v[t]
         if hidden[t].any():
             without_hidden(v[t], hidden[t], coef, factor, shift)

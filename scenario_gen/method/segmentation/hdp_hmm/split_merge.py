@@ -88,11 +88,18 @@ def group_of(labels: Ints, ends: Ints, i: int, j: int, stats: Statistics) -> Gro
         if t + 1 == ends[sequence]:
             sequence += 1
             before = -2
-    return Group(index[:count], opens[:count], stats.outer[i] + stats.outer[j], stats.sums[i] + stats.sums[j])
+    return Group(
+        index[:count],
+        opens[:count],
+        stats.outer[i] + stats.outer[j],
+        stats.sums[i] + stats.sums[j],
+    )
 
 
 @kernel(inline=True)
-def fit_side(data: Data, group: Group, side: Ints, which: int, outer: Floats, sums: Floats) -> None:
+def fit_side(
+    data: Data, group: Group, side: Ints, which: int, outer: Floats, sums: Floats
+) -> None:
     """Fill outer (M, M) and sums (2,) with the statistics of the samples on side `which`."""
     outer[:] = 0.0
     sums[:] = 0.0
@@ -118,7 +125,9 @@ def fit_sides(data: Data, group: Group, side: Ints, outer: Floats, sums: Floats)
 
 
 @kernel(inline=True)
-def likelihood_ratios(vt: Floats, mass: Floats, emitted: States, weight: float, work: Floats, ratio: Floats) -> None:
+def likelihood_ratios(
+    vt: Floats, mass: Floats, emitted: States, weight: float, work: Floats, ratio: Floats
+) -> None:
     """Fill ratio (n,) with the likelihood of side 1 over that of side 0.
 
     Args:
@@ -136,7 +145,11 @@ def likelihood_ratios(vt: Floats, mass: Floats, emitted: States, weight: float, 
         block_log_likelihood(vt, start, stop, emitted, weight, 0.0, work[:2], work[2])
         for r in range(start, stop):
             log_ratio = alike + mass[r] * (work[1, r - start] - work[0, r - start])
-            ratio[r] = np.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO)) if mass[r] > 0.0 else 1.0
+            ratio[r] = (
+                np.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO))
+                if mass[r] > 0.0
+                else 1.0
+            )
 
 
 @kernel(inline=True)
@@ -167,7 +180,9 @@ def best_sides(ratio: Floats, opens: Ints, stay: float, message: Floats, side: I
 
 
 @kernel(inline=True)
-def draw_sides(state: State, ratio: Floats, opens: Ints, stay: float, message: Floats, side: Ints, given: bool) -> float:
+def draw_sides(
+    state: State, ratio: Floats, opens: Ints, stay: float, message: Floats, side: Ints, given: bool
+) -> float:
     """Draw side (n,) forward in time, or take it as given; returns the log-probability of it."""
     ahead(ratio, opens, stay, message)
     jump = stay / (1.0 - stay)
@@ -205,7 +220,14 @@ def around_anchors(opens: Ints, anchors: tuple[int, int]) -> Ints:
 
 @kernel(inline=True)
 def log_sides(
-    state: State, data: Data, joint: Joint, stay: float, group: Group, anchors: tuple[int, int], side: Ints, given: bool
+    state: State,
+    data: Data,
+    joint: Joint,
+    stay: float,
+    group: Group,
+    anchors: tuple[int, int],
+    side: Ints,
+    given: bool,
 ) -> float:
     """Draw sides (n,) for the samples of a group, or take them as given; returns the log-probability of drawing them.
 
@@ -228,7 +250,9 @@ def log_sides(
             if turn == 0:
                 fit_side(data, group, work, s, outer[s], sums[s])
             posterior_factor(outer[s], sums[s, 1], joint, factor)
-            mean_emission(factor, joint.weight * sums[s, 0], joint, emitted.coef[s], emitted.shape[s])
+            mean_emission(
+                factor, joint.weight * sums[s, 0], joint, emitted.coef[s], emitted.shape[s]
+            )
         likelihood_ratios(members, masses, emitted, joint.weight, scratch, ratio)
         ratio[anchors[0]], ratio[anchors[1]] = 1.0 / CERTAIN, CERTAIN  # of these there is no doubt
         if turn < ROUNDS:
@@ -249,7 +273,9 @@ def predecessors(n: Ints, k: int) -> int:
 @kernel(inline=True)
 def log_share(a: float, first: int, second: int, log_first: float, log_second: float) -> float:
     """Dirichlet prior of a pair of β over the density its shares are drawn with, Beta(a + first, a + second); logarithm."""
-    value = math.lgamma(a + first) + math.lgamma(a + second) - math.lgamma(2.0 * a + first + second)
+    value = (
+        math.lgamma(a + first) + math.lgamma(a + second) - math.lgamma(2.0 * a + first + second)
+    )
     return value - first * log_first - second * log_second
 
 
@@ -308,7 +334,13 @@ def draw_merge(state: State, counts: Ints) -> tuple[int, int, int, int]:
 
 @kernel(inline=True)
 def propose_split(
-    state: State, data: Data, joint: Joint, stay: float, labels: Ints, stats: Statistics, drawn: tuple[int, int, int, int]
+    state: State,
+    data: Data,
+    joint: Joint,
+    stay: float,
+    labels: Ints,
+    stats: Statistics,
+    drawn: tuple[int, int, int, int],
 ) -> Proposal:
     """Divide state i into i and j, which was empty: see `draw_split`."""
     i, j, first, second = drawn
@@ -341,12 +373,20 @@ def propose_merge(joint: Joint, stats: Statistics, drawn: tuple[int, int, int, i
     n[:, j] = 0
     gain = -log_pair(members, counts[i], counts[j], used, len(counts) - used)
     none = np.empty(0, np.int64)
-    return Proposal(np.array([i, j]), Group(none, none, outer[0], sums[0]), none, n, outer, sums, gain)
+    return Proposal(
+        np.array([i, j]), Group(none, none, outer[0], sums[0]), none, n, outer, sums, gain
+    )
 
 
 @kernel(inline=True)
 def log_undone(
-    state: State, data: Data, joint: Joint, stay: float, labels: Ints, stats: Statistics, drawn: tuple[int, int, int, int]
+    state: State,
+    data: Data,
+    joint: Joint,
+    stay: float,
+    labels: Ints,
+    stats: Statistics,
+    drawn: tuple[int, int, int, int],
 ) -> float:
     """Log-probability of dividing what a merge makes one as it was divided before, by anchors numbered within both states."""
     group, numbers = group_of(labels, data.ends, drawn[0], drawn[1], stats), (drawn[2], drawn[3])
@@ -377,7 +417,9 @@ def relabel(labels: Ints, group: Group, side: Ints, i: int, j: int) -> None:
 
 
 @kernel(inline=True)
-def split_or_merge(state: State, data: Data, joint: Joint, top: Floats, labels: Ints, stats: Statistics) -> bool:
+def split_or_merge(
+    state: State, data: Data, joint: Joint, top: Floats, labels: Ints, stats: Statistics
+) -> bool:
     """Propose one move and accept or reject it (Metropolis-Hastings); returns whether it was accepted.
 
     Args:
@@ -395,7 +437,11 @@ def split_or_merge(state: State, data: Data, joint: Joint, top: Floats, labels: 
     drawn = draw_split(state, counts) if splits else draw_merge(state, counts)
     if drawn[1] < 0:
         return False
-    move = propose_split(state, data, joint, stay, labels, stats, drawn) if splits else propose_merge(joint, stats, drawn)
+    move = (
+        propose_split(state, data, joint, stay, labels, stats, drawn)
+        if splits
+        else propose_merge(joint, stats, drawn)
+    )
     i, j = drawn[0], drawn[1]
     beta, factors, own, gain = top[3:], np.empty_like(move.outer), np.empty(2), move.gain
     for s in range(2):
@@ -404,7 +450,9 @@ def split_or_merge(state: State, data: Data, joint: Joint, top: Floats, labels: 
     gain += own[0] + own[1] - stats.own[i] - stats.own[j]
     after = beta.copy()
     gain += draw_shares(state, top[0] / len(beta), stats.n, move, beta, after)
-    gain += log_transitions(move.n, top[1], top[2], after) - log_transitions(stats.n, top[1], top[2], beta)
+    gain += log_transitions(move.n, top[1], top[2], after) - log_transitions(
+        stats.n, top[1], top[2], beta
+    )
     if not splits and gain >= threshold:  # what costs most comes last
         gain += log_undone(state, data, joint, stay, labels, stats, drawn)
     if not gain >= threshold:
@@ -419,11 +467,16 @@ def split_or_merge(state: State, data: Data, joint: Joint, top: Floats, labels: 
 
 
 @kernel(inline=True)
-def draw_shares(state: State, a: float, n: Ints, move: Proposal, beta: Floats, after: Floats) -> float:
+def draw_shares(
+    state: State, a: float, n: Ints, move: Proposal, beta: Floats, after: Floats
+) -> float:
     """Draw how the pair shares its β after a move, into after (L,); returns the gain. `a` is γ / L, n the counts before."""
     i, j = move.pair[0], move.pair[1]
     both = beta[i] + beta[j]
-    here, there = (predecessors(n, j) if n[:, j].any() else 0), (predecessors(move.n, j) if move.n[:, j].any() else 0)
+    here, there = (
+        (predecessors(n, j) if n[:, j].any() else 0),
+        (predecessors(move.n, j) if move.n[:, j].any() else 0),
+    )
     share_i, share_j = log_beta_draw(state, a + predecessors(move.n, i), a + there)
     gain: float = log_share(a, predecessors(move.n, i), there, share_i, share_j)
     gain -= log_share(a, predecessors(n, i), here, np.log(beta[i] / both), np.log(beta[j] / both))

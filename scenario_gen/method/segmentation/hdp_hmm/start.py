@@ -11,7 +11,14 @@ from scipy import special
 from scipy.cluster.vq import kmeans2
 
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.method.segmentation.hdp_hmm.problem import compact, moving_mean, new_top, Place, Prior, Problem
+from scenario_gen.method.segmentation.hdp_hmm.problem import (
+    compact,
+    moving_mean,
+    new_top,
+    Place,
+    Prior,
+    Problem,
+)
 from scenario_gen.numerics import Floats
 
 WINDOWS = (9, 15, 5, 25)
@@ -47,9 +54,14 @@ def cluster(problem: Problem, clusters: int, window: int, rng: np.random.Generat
     signals = problem.y if problem.regressors == 1 else _dynamics(problem)
     low, high = np.quantile(signals, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
     margin = FAR_MARGIN * (high - low)
-    smooth = np.ascontiguousarray(moving_mean(np.clip(signals, low - margin, high + margin), window))
+    smooth = np.ascontiguousarray(
+        moving_mean(np.clip(signals, low - margin, high + margin), window)
+    )
     centres = min(clusters, max(2, len(smooth) // 4))
-    with warnings.catch_warnings(), np.errstate(invalid="ignore"):  # of clusters that run empty, of samples that are all the same
+    with (
+        warnings.catch_warnings(),
+        np.errstate(invalid="ignore"),
+    ):  # of clusters that run empty, of samples that are all the same
         warnings.simplefilter("ignore", UserWarning)
         _, labels = kmeans2(smooth, centres, iter=KMEANS_ROUNDS, minit="++", rng=rng)
     return Place(compact(labels), problem.observed)
@@ -74,18 +86,26 @@ def find_start(problem: Problem, config: SamplerConfig, rng: np.random.Generator
     clusters = config.states or CLUSTERS
     while True:
         start = _search(problem, config, clusters, rng)
-        if config.states or start.states < FULL * clusters or clusters >= min(MOST_STATES, len(problem.v) // 8):
+        if (
+            config.states
+            or start.states < FULL * clusters
+            or clusters >= min(MOST_STATES, len(problem.v) // 8)
+        ):
             return start
         clusters *= 2
 
 
-def _search(problem: Problem, config: SamplerConfig, clusters: int, rng: np.random.Generator) -> Start:
+def _search(
+    problem: Problem, config: SamplerConfig, clusters: int, rng: np.random.Generator
+) -> Start:
     place = cluster(problem, clusters, WINDOWS[0], rng)
     rough = _autocorrelation(problem, place)
     prior = Prior(problem.within(place), *GUESS)
     for stage, sweeps in enumerate(STAGES):
         top = new_top(max(clusters, place.labels.max() + 1))
-        place, held, _, _ = problem.run(config, prior, place, top, sweeps - 1, 1, int(rng.integers(2**62)))
+        place, held, _, _ = problem.run(
+            config, prior, place, top, sweeps - 1, 1, int(rng.integers(2**62))
+        )
         place = problem.merge(held, place)
         prior = replace(held, within=problem.within(place))
         if stage == 0:
@@ -102,11 +122,15 @@ def _search(problem: Problem, config: SamplerConfig, clusters: int, rng: np.rand
     return Start(problem, prior, place)
 
 
-def other_start(start: Start, config: SamplerConfig, index: int, rng: np.random.Generator) -> Place:
+def other_start(
+    start: Start, config: SamplerConfig, index: int, rng: np.random.Generator
+) -> Place:
     """Where chain number `index` > 0 starts: k-means with another window, a few sweeps, merges, under the prior of `start`."""
     problem, clusters = start.problem, start.states + MORE_STATES
     place = cluster(problem, clusters, WINDOWS[index % len(WINDOWS)], rng)
-    place = problem.run(config, start.prior, place, new_top(clusters), STAGES[1] - 1, 1, int(rng.integers(2**62)))[0]
+    place = problem.run(
+        config, start.prior, place, new_top(clusters), STAGES[1] - 1, 1, int(rng.integers(2**62))
+    )[0]
     return problem.merge(start.prior, place)
 
 
@@ -126,8 +150,14 @@ def tails(problem: Problem, place: Place) -> float:
         c = scale
         for _ in range(30):
             c = n * d / float(((dof + d) * squares / (dof + c * squares)).sum())
-        value = n * (special.gammaln(0.5 * (dof + d)) - special.gammaln(0.5 * dof) - 0.5 * d * np.log(0.5 * dof))
-        value += 0.5 * n * d * np.log(c) - 0.5 * (dof + d) * float(np.log(1.0 + c * squares / dof).sum())
+        value = n * (
+            special.gammaln(0.5 * (dof + d))
+            - special.gammaln(0.5 * dof)
+            - 0.5 * d * np.log(0.5 * dof)
+        )
+        value += 0.5 * n * d * np.log(c) - 0.5 * (dof + d) * float(
+            np.log(1.0 + c * squares / dof).sum()
+        )
         if value - gaussian > best:
             best, chosen = value - gaussian, dof
     return chosen
@@ -142,7 +172,11 @@ def sample_weight(problem: Problem, place: Place, rough: float) -> float:
     correlation too, so φ is the smaller of two: around k-means' labels (`rough`), and around those of `place`.
     """
     phi = min(rough, _autocorrelation(problem, place))
-    return 1.0 if phi < 2.0 / np.sqrt(len(problem.v)) else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT)
+    return (
+        1.0
+        if phi < 2.0 / np.sqrt(len(problem.v))
+        else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT)
+    )
 
 
 def _autocorrelation(problem: Problem, place: Place) -> float:
@@ -158,4 +192,6 @@ def _autocorrelation(problem: Problem, place: Place) -> float:
     residual[~seen] = 0.0  # what was filled in repeats its neighbours
     power = np.square(residual).sum(axis=0) / np.maximum(seen.sum(axis=0), 1) + 1e-300
     both = (seen[:-1] & seen[1:])[pairs].sum(axis=0)
-    return float(np.mean((residual[:-1] * residual[1:])[pairs].sum(axis=0) / np.maximum(both, 1) / power))
+    return float(
+        np.mean((residual[:-1] * residual[1:])[pairs].sum(axis=0) / np.maximum(both, 1) / power)
+    )

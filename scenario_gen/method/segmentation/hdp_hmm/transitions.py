@@ -114,7 +114,14 @@ def log_concentration(n: Ints, hyper: Floats, beta: Floats, x: float, y: float) 
 
 @kernel(inline=True)
 def slice_concentration(
-    state: State, n: Ints, hyper: Floats, beta: Floats, x: float, y: float, value: float, along: int
+    state: State,
+    n: Ints,
+    hyper: Floats,
+    beta: Floats,
+    x: float,
+    y: float,
+    value: float,
+    along: int,
 ) -> tuple[float, float, float]:
     """One slice-sampling step (Neal 2003, stepping out) in x (along = 0) or y (along = 1).
 
@@ -158,9 +165,15 @@ def slice_concentration(
 
 
 @kernel(inline=True)
-def along_density(n: Ints, hyper: Floats, beta: Floats, x: float, y: float, at: float, along: int) -> float:
+def along_density(
+    n: Ints, hyper: Floats, beta: Floats, x: float, y: float, at: float, along: int
+) -> float:
     """`log_concentration` of counts n (L + 1, L) and β (L,) with x or y replaced by `at`."""
-    return log_concentration(n, hyper, beta, at, y) if along == 0 else log_concentration(n, hyper, beta, x, at)
+    return (
+        log_concentration(n, hyper, beta, at, y)
+        if along == 0
+        else log_concentration(n, hyper, beta, x, at)
+    )
 
 
 @kernel(inline=True)
@@ -183,7 +196,9 @@ def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: F
 
 
 @kernel(inline=True)
-def sample_transitions(state: State, n: Ints, hyper: Floats, top: Floats, beta: Floats, pi: Floats) -> None:
+def sample_transitions(
+    state: State, n: Ints, hyper: Floats, top: Floats, beta: Floats, pi: Floats
+) -> None:
     """Draw α+κ, ρ, then γ and β, then π, given transition counts (Fox et al., algorithm 3, steps 3-5, and appendix).
 
     γ is drawn with β integrated out, exactly for the weak limit: each dish's tables are seated once more, in a

@@ -18,7 +18,14 @@ import numpy as np
 
 from scenario_gen.base.errors import needs
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
+from scenario_gen.method.routing.search.planner import (
+    Budget,
+    BudgetSpentError,
+    check_query,
+    path_length,
+    Plan,
+    Query,
+)
 from scenario_gen.numerics import Floats
 from scenario_gen.roads import clearance_in_cells, to_cells, to_metres
 from scenario_gen.types import Road
@@ -30,9 +37,17 @@ GLANCE = 0.05  # [s] between two looks at the child and at the caller's wish to 
 class OmplConfig(Parameters):
     """Settings of the planners from OMPL."""
 
-    step: float = parameter(0.0, "longest new edge; 0: OMPL's own choice", unit="cells", low=0.0, high=1e6)
+    step: float = parameter(
+        0.0, "longest new edge; 0: OMPL's own choice", unit="cells", low=0.0, high=1e6
+    )
     simplify: bool = parameter(True, "run OMPL's path simplifier at the end")
-    time_limit: float = parameter(30.0, "wall-clock time after which a search is ended by force", unit="s", low=0.1, high=3600.0)
+    time_limit: float = parameter(
+        30.0,
+        "wall-clock time after which a search is ended by force",
+        unit="s",
+        low=0.1,
+        high=3600.0,
+    )
 
 
 class OmplPlanner:
@@ -60,8 +75,18 @@ class OmplPlanner:
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["scenario_gen.method.routing.search.ompl.child"])
         ours, theirs = context.Pipe(duplex=False)
-        request = (clearance_in_cells(road), ends, query.radius / road.resolution, self.name, self.config)
-        child = context.Process(target=search, args=(theirs, request, budget.iterations, budget.seconds, seed), daemon=True)
+        request = (
+            clearance_in_cells(road),
+            ends,
+            query.radius / road.resolution,
+            self.name,
+            self.config,
+        )
+        child = context.Process(
+            target=search,
+            args=(theirs, request, budget.iterations, budget.seconds, seed),
+            daemon=True,
+        )
         child.start()
         theirs.close()
         try:
@@ -78,7 +103,12 @@ class OmplPlanner:
         metres = to_metres(road, path)
         metres[0], metres[-1] = query.start, query.goal
         cost = path_length(metres)
-        return Plan(metres, cost, iterations, np.array([[iterations, seconds + thread_time() - started, cost]]))
+        return Plan(
+            metres,
+            cost,
+            iterations,
+            np.array([[iterations, seconds + thread_time() - started, cost]]),
+        )
 
     def _await(self, ours: Connection, child: Any, budget: Budget) -> tuple[Floats, int, float]:
         """The child's answer; BudgetSpentError if it dies, takes too long or is no longer wanted."""
@@ -87,10 +117,14 @@ class OmplPlanner:
             if budget.cancelled and budget.cancelled():
                 raise BudgetSpentError(f"{self.name} was cancelled")
             if monotonic() > deadline:
-                raise BudgetSpentError(f"{self.name} did not answer within {self.config.time_limit:.0f} s and was ended")
+                raise BudgetSpentError(
+                    f"{self.name} did not answer within {self.config.time_limit:.0f} s and was ended"
+                )
         try:
             answer: tuple[Floats, int, float] = ours.recv()
         except EOFError:
             child.join(1.0)
-            raise BudgetSpentError(f"{self.name} ended without an answer (exit code {child.exitcode})") from None
+            raise BudgetSpentError(
+                f"{self.name} ended without an answer (exit code {child.exitcode})"
+            ) from None
         return answer

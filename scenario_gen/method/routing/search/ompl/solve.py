@@ -126,7 +126,9 @@ def _space(clearance: Floats, radius: float, *, state_by_state: bool) -> Any:
         return bool(segment_free(clearance, x, y, x, y, radius))
 
     def is_in_free_cell(state: Any) -> bool:
-        return bool(clearance[min(int(state[1]), height - 1), min(int(state[0]), width - 1)] > radius)
+        return bool(
+            clearance[min(int(state[1]), height - 1), min(int(state[0]), width - 1)] > radius
+        )
 
     if state_by_state:
         information.setStateValidityChecker(is_in_free_cell)
@@ -139,4 +141,6 @@ def _space(clearance: Floats, radius: float, *, state_by_state: bool) -> Any:
 
 
 def _vertices(path: Any) -> Floats:
-    return np.array([[path.getState(k)[0], path.getState(k)[1]] for k in range(path.getStateCount())])
+    return np.array(
+        [[path.getState(k)[0], path.getState(k)[1]] for k in range(path.getStateCount())]
+    )
