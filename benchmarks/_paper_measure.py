@@ -204,8 +204,8 @@ def similarity_of(encounter: Encounter, arm: Sampled, seed: int) -> dict[str, In
     values: dict[str, Interval] = {}
     for kind, pairs in (("position", places), ("speed", paces)):
         values[f"e_{kind}"] = bootstrap.interval(
-            lambda weights, pairs=pairs: mean_error(pairs, weights)
-        )  # type: ignore[misc]
+            lambda weights, pairs=pairs: mean_error(pairs, weights)  # type: ignore[misc]
+        )
         values[f"correlation_{kind}"] = bootstrap.interval(
             lambda weights, pairs=pairs: mean_correlation(pairs, weights)  # type: ignore[misc]
         )

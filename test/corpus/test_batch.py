@@ -196,9 +196,8 @@ def test_a_batch_of_two_processes_that_is_ended_leaves_only_what_is_done(corpus,
     ]
     words += ["--roads", ",".join(ROADS), "--workers", "2"]
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(
-        words, start_new_session=True, env=own, preexec_fn=interruptible, **pipes
-    ) as run:  # noqa: PLW1509
+    pipes |= {"start_new_session": True, "env": own}
+    with subprocess.Popen(words, preexec_fn=interruptible, **pipes) as run:  # noqa: PLW1509
         at_work(run, out, ".scenario_gen-*/new/*")
         os.kill(run.pid, number) if number == signal.SIGKILL else os.killpg(run.pid, number)
         said = run.stderr.read()  # up to the end of the last process

@@ -128,9 +128,8 @@ def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
                             {"data": other.data},
                             {"type": other.type},
                         )
-                        message = replace(
-                            message, **(changes[how] if how < len(changes) else {"data": content})
-                        )  # noqa: PLW2901
+                        changed = changes[how] if how < len(changes) else {"data": content}
+                        message = replace(message, **changed)  # noqa: PLW2901
                     bag.add_topic(message.topic, message.type)
                     bag.write(message.topic, message.data, message.stamp_ns)
             return (folder / "out" / "out_0.mcap").read_bytes()

@@ -127,13 +127,17 @@ def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -
         way = decode(data, topic)
         stamp, given_frame = 0, way.frame_id
         track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
-        command: Callable[[State], Command | Pose | None] = lambda state: track.command(
-            state.ego, state.time, period
-        )  # noqa: E731
+
+        def command(state: State) -> Command | Pose | None:
+            return track.command(state.ego, state.time, period)
+
     else:
         stamp, given_frame, _, state = decode_odometry(data, topic)
         pose = Pose(*state[:4].tolist())
-        command = lambda _: pose  # noqa: E731
+
+        def command(state: State) -> Command | Pose | None:
+            return pose
+
     if given_frame != frame:
         raise InputError(f"{topic}: frame {given_frame!r} is not that of the scenario, {frame!r}")
     return EgoCommand(topic, answered(stamp), stamp, command)
