@@ -20,7 +20,7 @@ from scenario_gen.method.routing import PAPER, plan_routes, PlanningConfig
 from scenario_gen.method.sampling import Features, Observations, Posterior, Regression, speed_knots
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads import build_road, draw, layout_for, RoadConfig
-from scenario_gen.template import clean_tracks, find_waits, Wait
+from scenario_gen.situation import clean_tracks, find_waits, Wait
 from scenario_gen.types import Dynamics, Encounter, Fit, Road, Route, Segmentation
 
 SIGMA, LENGTH, NOISE, DEGREE = 10.0, 100.0, 10.0, 3

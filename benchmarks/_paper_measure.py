@@ -22,7 +22,7 @@ from scenario_gen.method.evaluation import (
 from scenario_gen.method.sampling import Features, Observations, Regression
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.template import find_waits
+from scenario_gen.situation import find_waits
 from scenario_gen.types import (
     Encounter,
     Interval,

@@ -23,8 +23,8 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads import build_road
-from scenario_gen.template.answers import conflict_of, conflicts_in
-from scenario_gen.template.interaction import Conflict, find_waits, Wait
+from scenario_gen.situation.gaps import conflict_of, conflicts_in
+from scenario_gen.situation.interaction import Conflict, find_waits, Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.road import Road

@@ -45,8 +45,8 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.template.answers import Motion
-from scenario_gen.template.reactions import reactions_of
+from scenario_gen.situation.gaps import Motion
+from scenario_gen.situation.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.reaction import FOLLOW, Reaction
 

@@ -23,7 +23,7 @@ from benchmarks.row import Row
 from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.template.interaction import find_conflicts
+from scenario_gen.situation.interaction import find_conflicts
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route

@@ -41,7 +41,7 @@ from scenario_gen.method.sampling import (
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
-from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.situation.interaction import waits_to_keep
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Scenario, ScenarioSet
 from scenario_gen.types.target import read_targets

@@ -14,7 +14,7 @@ from scenario_gen.closed_loop.trials import (
     run_trials as run_trials,
     trials_of as trials_of,
 )
-from scenario_gen.corpus.many import generate_many as generate_many
+from scenario_gen.corpus.parallel import generate_many as generate_many
 from scenario_gen.logs import LogConfig as LogConfig, read_log as read_log
 from scenario_gen.logs.read import LogResult as LogResult
 from scenario_gen.logs.synthetic import bundled as bundled

@@ -24,7 +24,7 @@ ROOMS = (
     "types",
     "bags",
     "logs",
-    "template",
+    "situation",
     "roads",
     "method",
     "pipeline",
@@ -55,7 +55,7 @@ CONCEPTS = {
     "gap of two motions in space and time": ("logs/gap.py", r"def \w*space_time_gap\("),
     "growing of groups": ("logs/growing.py", r"class Growth\b|def \w*grow_groups?\("),
     "least squares of a placement": (
-        "template/starts.py",
+        "situation/placement_lsq.py",
         r"def \w*(?:least_squares|solve_starts)\(",
     ),
     "RRT*-Connect": ("method/routing/search/growth.py", r"def _?cheapest_parent\("),

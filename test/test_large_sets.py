@@ -35,7 +35,7 @@ from scenario_gen.method.sampling.sampler import (
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
-from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.situation.interaction import waits_to_keep
 from scenario_gen.types.request import Request
 from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
 

@@ -25,7 +25,7 @@ from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.roads import build_road, cells_of, RoadConfig
-from scenario_gen.template import reactions_of
+from scenario_gen.situation import reactions_of
 from scenario_gen.types import Dynamics, VEHICLE_TYPES
 
 T = np.arange(0.0, 14.05, 0.1)

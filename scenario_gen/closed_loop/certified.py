@@ -20,7 +20,7 @@ from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT2, OUT3
 from scenario_gen.numerics.plane import unit
-from scenario_gen.template import conflict_of, passing
+from scenario_gen.situation import conflict_of, passing
 from scenario_gen.types import Scenario, tokens, yielders_of
 
 CELL = 0.1  # seconds of a certified clock that are taken together

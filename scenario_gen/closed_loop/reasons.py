@@ -20,7 +20,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths, place
-from scenario_gen.template import Conflict, conflict_of
+from scenario_gen.situation import Conflict, conflict_of
 
 STANDS = 0.5  # m/s
 SAME_WAY = 0.7  # cosine of the angle between two headings, from which on they drive the same way

@@ -18,7 +18,7 @@ from scenario_gen.method.validity import collision as apart
 from scenario_gen.method.validity import control_points
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit
-from scenario_gen.template import find_conflicts
+from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Scenario
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]

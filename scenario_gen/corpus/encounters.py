@@ -36,7 +36,7 @@ from scenario_gen.logs import (
 )
 from scenario_gen.logs.tables import EPOCH_NS
 from scenario_gen.method.evaluation import at_period, criticality, EvaluationConfig
-from scenario_gen.template import reactions_of
+from scenario_gen.situation import reactions_of
 from scenario_gen.types import Encounter
 
 ROW = {  # what is read of a row, and of which kinds it is

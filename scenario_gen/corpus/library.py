@@ -44,7 +44,7 @@ from scenario_gen.method.segmentation import (
     USUAL_R_HAT,
 )
 from scenario_gen.numerics import Ints
-from scenario_gen.template import reactions_of
+from scenario_gen.situation import reactions_of
 from scenario_gen.types import Encounter, FOLLOW, YIELD
 
 LIBRARY = Kind("primitive library")

@@ -57,7 +57,7 @@ from scenario_gen.corpus.tables import rows_at, rows_of
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.logs import is_bag, is_bsm, is_commonroad, is_fcd, is_nocturne, is_spmd, is_table
 from scenario_gen.numerics import Ints
-from scenario_gen.template import reactions_of
+from scenario_gen.situation import reactions_of
 
 ARCHIVE, PAGE = "archive.json", "encounters.html"
 ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour

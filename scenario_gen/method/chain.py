@@ -11,7 +11,7 @@ from scenario_gen.method.evaluation import measures_in
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, sample_scenarios
-from scenario_gen.template import Wait
+from scenario_gen.situation import Wait
 from scenario_gen.types import Encounter, GenerationResult, Request, Road, Segmentation
 
 

@@ -29,7 +29,7 @@ from scenario_gen.method.evaluation.law import Law
 from scenario_gen.method.evaluation.population import APART, DISTANCE, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
-from scenario_gen.template import clean_tracks, Conflict, conflict_of, reactions_of, time_gaps
+from scenario_gen.situation import clean_tracks, Conflict, conflict_of, reactions_of, time_gaps
 from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, RECOMBINED, YIELD
 
 LEAST_S = 5.0  # that a new encounter lasts

@@ -20,7 +20,7 @@ from scenario_gen.roads import (
     ROADS,
     ROUNDABOUT,
 )
-from scenario_gen.template import conflict_of, conflicts_in, refuse_reversing, refuse_too_large
+from scenario_gen.situation import conflict_of, conflicts_in, refuse_reversing, refuse_too_large
 from scenario_gen.types import Encounter, GenerationResult, join_ego, Road, Segmentation
 
 AUTO = "auto"

@@ -14,7 +14,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
-from scenario_gen.template import clean_tracks, drivers_of
+from scenario_gen.situation import clean_tracks, drivers_of
 from scenario_gen.types import DRIVERS, Encounter, LaneNetwork, Road
 from scenario_gen.types.markings import markings
 

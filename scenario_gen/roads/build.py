@@ -24,7 +24,7 @@ from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, PLAIN_LINE
 from scenario_gen.roads.vector.ground import cells_of
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
-from scenario_gen.template import (
+from scenario_gen.situation import (
     clean_tracks,
     driven_tracks,
     main_line,

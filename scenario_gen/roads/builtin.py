@@ -35,7 +35,7 @@ from scenario_gen.roads.pavement import (
     swept,
 )
 from scenario_gen.roads.ways import draw_u_turn
-from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
+from scenario_gen.situation import own_paths, pair_crossings, to_frenet, Track
 from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road

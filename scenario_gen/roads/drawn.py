@@ -24,7 +24,7 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.pavement import drivable_beside, Inside, inside, paved, ring, strip, swept
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.roads.ways import draw_route, reverse, TIGHTEST
-from scenario_gen.template import Track
+from scenario_gen.situation import Track
 from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road, RuleKind, TrafficRule
 
 Way = tuple[int, int, int, int]

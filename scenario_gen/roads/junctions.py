@@ -22,7 +22,7 @@ from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLACK
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route
-from scenario_gen.template import (
+from scenario_gen.situation import (
     driven_tracks,
     driver_rows,
     reactions_of,

@@ -17,7 +17,7 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, ROOM, SHORTEST, SIDE_ARMS, SLACK
 from scenario_gen.roads.ways import draw_route, extended
-from scenario_gen.template import (
+from scenario_gen.situation import (
     driven_tracks,
     driver_rows,
     FrenetTracks,

@@ -14,7 +14,7 @@ from scenario_gen.closed_loop.reasons import safe_gap
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.template import conflicts_in
+from scenario_gen.situation import conflicts_in
 
 STEPS = 160
 TIME = np.arange(STEPS) * PERIOD

@@ -12,7 +12,7 @@ from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, build, pair_encounters
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.method.segmentation.library import PrimitiveLibrary
-from scenario_gen.template.reactions import reactions_of
+from scenario_gen.situation.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 pytestmark = pytest.mark.xdist_group("corpus")

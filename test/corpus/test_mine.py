@@ -24,7 +24,7 @@ from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import clean_tasks, mine
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.template.reactions import reactions_of
+from scenario_gen.situation.reactions import reactions_of
 
 pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
 

@@ -13,7 +13,7 @@ from textbook_motions import labelled
 from scenario_gen import generate, recombined, RefusedError
 from scenario_gen.method.evaluation.population import member_of
 from scenario_gen.method.recombination import pair_of, recombinations
-from scenario_gen.template import conflict_of, time_gaps
+from scenario_gen.situation import conflict_of, time_gaps
 from scenario_gen.types import FOLLOW, YIELD
 
 WAITS, FOLLOWS, MERGES, TURNS = (

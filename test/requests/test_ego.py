@@ -17,7 +17,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
-from scenario_gen.template.interaction import find_conflicts, waits_to_keep
+from scenario_gen.situation.interaction import find_conflicts, waits_to_keep
 from scenario_gen.types.ego import join_ego, with_witness
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.reaction import LOST

@@ -10,7 +10,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.template.separation import own_paths, smallest_gaps
+from scenario_gen.situation.separation import own_paths, smallest_gaps
 
 ARMS = {"straight": 2, "t_intersection": 3, "four_way": 4}
 

@@ -14,7 +14,7 @@ from scenario_gen.pipeline import generate
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.ways import draw_ring_route
-from scenario_gen.template import reactions_of
+from scenario_gen.situation import reactions_of
 from scenario_gen.types import RuleKind
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.segmentation import Segmentation

@@ -12,7 +12,7 @@ import numpy as np
 from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.evaluation.measures import figures_of, most_critical, PairFigures
 from scenario_gen.numerics import Floats
-from scenario_gen.template import manoeuvre_of
+from scenario_gen.situation import manoeuvre_of
 from scenario_gen.types import Coverage, Encounter, join_ego, Scenario, Spread
 
 EDGES = (0.0, 0.5, 1.0, 2.0, 4.0)  # s of PET

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import Motion
-from scenario_gen.template import conflict_of
+from scenario_gen.situation import conflict_of
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ They are taken on the published samples (0.1 s). Of a pair a, b:
 
 - `pet`: post-encroachment time [s] (Allen, Shin & Cooper 1978): from the first one's exit of the area that both footprints sweep
   to the second one's entry; negative if both were inside at once. Of crossing and merging pairs only, see
-  `scenario_gen.template.interaction`.
+  `scenario_gen.situation.interaction`.
 - `arrival_gap` [s]: from the first one's entry into that area to the second one's. Of a named pair [a,b] it has a sign:
   negative if b is first. Of crossing and merging pairs only.
 - `ttc` [s]: least time to collision while both keep their velocities (Hayward 1972), of the footprints; infinite if they are
@@ -32,7 +32,7 @@ from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_
 from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.method.evaluation.non_reactive import baseline_margin
 from scenario_gen.numerics.plane import unit
-from scenario_gen.template import Conflict, conflict_of
+from scenario_gen.situation import Conflict, conflict_of
 from scenario_gen.types import Encounter, Measures, Pair, Scenario
 
 PERIOD = 0.1  # s

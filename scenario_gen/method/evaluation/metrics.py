@@ -19,7 +19,7 @@ from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.method.evaluation.samples import Samples, Template
 from scenario_gen.numerics import Floats
-from scenario_gen.template import keeps
+from scenario_gen.situation import keeps
 from scenario_gen.types import Cause, Interval, Metric
 
 LIMIT_CAUSES = (

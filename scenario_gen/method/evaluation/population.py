@@ -27,7 +27,7 @@ from scenario_gen.method.evaluation.measures import figures_of, PERIOD
 from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.template import Conflict, conflict_of
+from scenario_gen.situation import Conflict, conflict_of
 from scenario_gen.types import (
     Encounter,
     GenerationResult,

@@ -13,7 +13,7 @@ from scenario_gen.method.fitting.kept import find_losses
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
 from scenario_gen.roads import ground_for, nearest_pose_with_room
-from scenario_gen.template import clean_tracks, manoeuvre_of, Track, turn_of
+from scenario_gen.situation import clean_tracks, manoeuvre_of, Track, turn_of
 from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Road, Segmentation
 
 _STAND_LENGTH = 0.5  # metres

@@ -17,7 +17,7 @@ from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.fitting.requested import refuse_impossible, refuse_misfits
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.numerics import Floats
-from scenario_gen.template import clean_tracks, refuse_reversing
+from scenario_gen.situation import clean_tracks, refuse_reversing
 from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation, TypeLimits
 
 _AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own

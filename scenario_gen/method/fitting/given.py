@@ -22,7 +22,7 @@ from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import place
 from scenario_gen.roads import draw_route
-from scenario_gen.template import clean_tracks, own_paths, Track
+from scenario_gen.situation import clean_tracks, own_paths, Track
 from scenario_gen.types import Encounter, Road
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.template import in_words, keeps, Track, turn_of, turns_to_keep
-from scenario_gen.template.answers import meetings
+from scenario_gen.situation import in_words, keeps, Track, turn_of, turns_to_keep
+from scenario_gen.situation.gaps import meetings
 from scenario_gen.types import LaneNetwork, Loss
 
 LOSABLE = {

@@ -23,7 +23,7 @@ from scenario_gen.numerics import frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.roads import Course, placements, tracks_on, users_of, ways_through
-from scenario_gen.template import drivers_of, in_words, MOST_CHANGE, to_frenet, Track, turn_of
+from scenario_gen.situation import drivers_of, in_words, MOST_CHANGE, to_frenet, Track, turn_of
 from scenario_gen.types import LaneNetwork, lanes_for, Road
 
 _END_ROOM = 1.0  # metres kept between a footprint and the end of the road

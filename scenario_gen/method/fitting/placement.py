@@ -12,7 +12,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads import footprint_fits, ground_for, nearest_pose_with_room
-from scenario_gen.template import separate, smallest_gaps, Track
+from scenario_gen.situation import separate, smallest_gaps, Track
 from scenario_gen.types import Loss, Road, Vehicle
 
 SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)  # that are tried, the best first

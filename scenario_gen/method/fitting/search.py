@@ -28,7 +28,7 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.pattern_search import pattern_search
 from scenario_gen.numerics.plane import place
 from scenario_gen.roads import clearance_field
-from scenario_gen.template import Track
+from scenario_gen.situation import Track
 from scenario_gen.types import Road
 
 _CELL = 1.0  # metres of the coarse search

@@ -23,7 +23,7 @@ from scenario_gen.method.sampling.directed import (
 from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
-from scenario_gen.template import closest_crossing, Conflict, conflict_of, conflicts_in
+from scenario_gen.situation import closest_crossing, Conflict, conflict_of, conflicts_in
 from scenario_gen.types import (
     Cause,
     Encounter,

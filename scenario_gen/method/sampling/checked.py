@@ -11,7 +11,7 @@ from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import kept_reactions
 from scenario_gen.method.sampling.sample import draw_scenarios
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.template import reactions_of, Wait, waits_to_keep
+from scenario_gen.situation import reactions_of, Wait, waits_to_keep
 from scenario_gen.types import GenerationResult, Measures, MIRRORED, Request, TypeLimits
 
 

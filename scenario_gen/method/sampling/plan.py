@@ -6,7 +6,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from scenario_gen.template import Wait
+from scenario_gen.situation import Wait
 from scenario_gen.types import (
     BoundaryStates,
     EgoSlot,

@@ -30,7 +30,7 @@ from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
 from scenario_gen.method.sampling.window import window_of
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import ground_for
-from scenario_gen.template import least_gaps, reactions_of
+from scenario_gen.situation import least_gaps, reactions_of
 from scenario_gen.types import Encounter, FOLLOW, ReactionGraph, Road
 
 _STRETCHES = 9

@@ -29,7 +29,7 @@ from scenario_gen.method.sampling.speed_profile.stops import (
 )
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Floats
-from scenario_gen.template import clean_tracks, Track, Wait
+from scenario_gen.situation import clean_tracks, Track, Wait
 from scenario_gen.types import Dynamics, Encounter, Vehicle
 
 _MOST_SCALE = (

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import special
 
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.template import conflicts_in
+from scenario_gen.situation import conflicts_in
 from scenario_gen.types import Encounter
 
 AFTER_S = 1.0  # that are left after the second has entered and the first has left

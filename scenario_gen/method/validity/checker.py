@@ -20,7 +20,7 @@ from scenario_gen.method.validity.reactions import broken_reactions, LaneGaps, t
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import drives_against, ground_for, RuleCheck
-from scenario_gen.template import (
+from scenario_gen.situation import (
     Conflict,
     conflict_of,
     conflicts_in,

@@ -6,7 +6,7 @@
 from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter
-from scenario_gen.template import least_gap
+from scenario_gen.situation import least_gap
 from scenario_gen.types import Encounter, TypeLimits
 
 _SHARE_OF_GAP, _MOST_CLEARANCE = 0.5, 0.5  # of the template's least gap; m

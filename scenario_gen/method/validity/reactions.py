@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.numerics import Floats
-from scenario_gen.template import Conflict, departure, lane_gaps, passing, time_gaps
+from scenario_gen.situation import Conflict, departure, lane_gaps, passing, time_gaps
 from scenario_gen.types import Cause, FOLLOW, Reaction, Scenario, Violation
 
 _ROUNDED = 0.1  # s, by which an entry or a clearing is known between samples

@@ -20,7 +20,7 @@ from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, Eval
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.results import EVALUATED, write_evaluation
 from scenario_gen.output.review.validation import Checkers, kept_reactions
-from scenario_gen.template import reactions_of
+from scenario_gen.situation import reactions_of
 from scenario_gen.types import (
     CheckCounts,
     EgoSlot,

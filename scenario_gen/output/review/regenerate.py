@@ -35,7 +35,7 @@ from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import checker_of, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.method.validity import Limits
-from scenario_gen.template import mirrored
+from scenario_gen.situation import mirrored
 from scenario_gen.types import Encounter, GenerationResult, Request, Scenario, Segmentation
 
 REGENERATED = Kind("regenerated bag")

@@ -30,7 +30,7 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, LaneGaps, Limits
 from scenario_gen.numerics import Bools
-from scenario_gen.template import (
+from scenario_gen.situation import (
     Conflict,
     conflicts_in,
     find_waits,

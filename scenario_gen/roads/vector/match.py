@@ -19,7 +19,7 @@ from scenario_gen.numerics import Floats, runs, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template import (
+from scenario_gen.situation import (
     Equation,
     in_words,
     pair_crossings,
@@ -29,7 +29,7 @@ from scenario_gen.template import (
     turns_to_keep,
     WAIT_SPEED,
 )
-from scenario_gen.template.answers import meetings
+from scenario_gen.situation.gaps import meetings
 from scenario_gen.types import CARS, LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away

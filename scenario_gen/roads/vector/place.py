@@ -20,8 +20,8 @@ from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
 from scenario_gen.roads.vector.street import along_streets
-from scenario_gen.template import conflicts_in, separate, Track
-from scenario_gen.template.answers import meetings
+from scenario_gen.situation import conflicts_in, separate, Track
+from scenario_gen.situation.gaps import meetings
 from scenario_gen.types import LaneNetwork, lanes_for, LEVEL, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home

@@ -20,7 +20,7 @@ from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
 from scenario_gen.roads.vector.network import extent, FAULTY, MapLanes, network_of, part_of
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
-from scenario_gen.template import Track
+from scenario_gen.situation import Track
 from scenario_gen.types import LaneNetwork, Road
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.plane import edge_lengths, meeting_shares, unit
 from scenario_gen.roads.vector.ground import on_lane
-from scenario_gen.template import Conflict
+from scenario_gen.situation import Conflict
 from scenario_gen.types import LaneNetwork, RuleKind, Scenario, TrafficRule
 
 _SUBJECT = (RuleKind.STOP, RuleKind.GIVE_WAY)

@@ -21,7 +21,7 @@ from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.pattern_search import pattern_search
 from scenario_gen.numerics.plane import place
 from scenario_gen.roads.vector.network import crossing_lanes
-from scenario_gen.template import pair_crossings, Track
+from scenario_gen.situation import pair_crossings, Track
 from scenario_gen.types import LaneNetwork, once_per_object
 
 _CELL = 1.0  # metres

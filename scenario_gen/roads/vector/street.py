@@ -27,7 +27,7 @@ from scenario_gen.roads.vector.match import (
     pressed_aside,
     speeding,
 )
-from scenario_gen.template import FrenetTracks, to_frenet, Track, turn_of
+from scenario_gen.situation import FrenetTracks, to_frenet, Track, turn_of
 from scenario_gen.types import LEVEL
 
 _ROOM = 1.0  # metres between a footprint and the end of the road

@@ -57,7 +57,7 @@ class Evaluator(StageNode):
     """Measures every request's scenarios against their template once the request is closed."""
 
     INPUTS = ("tracks", "changepoints")
-    STAGES = ("template", "method.evaluation")
+    STAGES = ("situation", "method.evaluation")
     OUTPUTS = ("report",)
 
     def __init__(self, namespace: str | None = None) -> None:

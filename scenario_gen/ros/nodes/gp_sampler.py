@@ -38,7 +38,7 @@ class GpSampler(StageNode):
 
     INPUTS = ("map", *ENDS, LANES, "tracks", "changepoints", "fit", "fit/info")
     STAGES = (
-        "template",
+        "situation",
         "roads",
         "method.fitting",
         "method.routing",

@@ -62,7 +62,7 @@ class Planner(StageNode):
     """Fits each template to the road and plans every vehicle's route between its changepoints."""
 
     INPUTS = (*ROAD, LANES, "road/info", "tracks", "changepoints")
-    STAGES = ("template", "roads", "method.fitting", "method.routing")
+    STAGES = ("situation", "roads", "method.fitting", "method.routing")
     OUTPUTS = ("fit", "fit/info")
 
     def __init__(self, namespace: str | None = None) -> None:

@@ -23,7 +23,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.ros.plumbing.topics import create_frames_publisher
-from scenario_gen.template import conflicts_in
+from scenario_gen.situation import conflicts_in
 from scenario_gen.types import Scenario, tokens
 
 HIGH = 1.2  # metres of a letter
@@ -57,7 +57,7 @@ class Preview(StageNode):
 
     INPUTS = ("fit", *TOPICS)
     OUTPUTS = ("preview",)
-    STAGES = ("template",)
+    STAGES = ("situation",)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("preview", Config(), namespace)

@@ -17,7 +17,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import LogConfig, RawLog, Streams
 from scenario_gen.ros.plumbing.topics import adapted_quality
-from scenario_gen.template import MOST_VEHICLES
+from scenario_gen.situation import MOST_VEHICLES
 from scenario_gen.types import Sample, token
 
 CHECK_S = 0.2  # seconds between two checks for new streams, and for silence

@@ -30,7 +30,7 @@ from scenario_gen.base.worker import Job, Worker
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.topics import create_subscription, Outputs
-from scenario_gen.template import MOST_SAMPLES, refuse_too_large
+from scenario_gen.situation import MOST_SAMPLES, refuse_too_large
 from scenario_gen.types import Encounter, Quality
 
 MOST_BYTES = (

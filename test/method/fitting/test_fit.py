@@ -13,7 +13,7 @@ from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.template.interaction import find_conflicts
+from scenario_gen.situation.interaction import find_conflicts
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.segmentation import Segmentation

@@ -19,7 +19,7 @@ from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.template.tracks import clean_tracks
+from scenario_gen.situation.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road

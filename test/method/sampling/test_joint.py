@@ -21,8 +21,8 @@ from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.template.interaction import waits_to_keep
-from scenario_gen.template.reactions import reactions_of
+from scenario_gen.situation.interaction import waits_to_keep
+from scenario_gen.situation.reactions import reactions_of
 from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
 

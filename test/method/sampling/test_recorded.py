@@ -15,7 +15,7 @@ from scenario_gen.method.sampling import draw_scenarios, Plan, regenerate, Sampl
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
-from scenario_gen.template.interaction import find_conflicts, find_waits, STAND_SPEED, WAIT_SPEED
+from scenario_gen.situation.interaction import find_conflicts, find_waits, STAND_SPEED, WAIT_SPEED
 
 CASES = (
     "ngsim_commonroad/encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019.csv",

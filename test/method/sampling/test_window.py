@@ -13,7 +13,7 @@ from textbook_motions import labelled
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.window import AFTER_S, Window, window_of
-from scenario_gen.template import conflict_of, conflicts_in
+from scenario_gen.situation import conflict_of, conflicts_in
 from scenario_gen.types import ALWAYS, Request
 
 FREE = np.zeros(2, dtype=np.bool_)

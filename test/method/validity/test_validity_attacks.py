@@ -13,7 +13,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, checker, Limits
 from scenario_gen.method.validity.dynamics import LARGEST
 from scenario_gen.method.validity.presence import driven_on
-from scenario_gen.template.interaction import Conflict, find_waits, Wait
+from scenario_gen.situation.interaction import Conflict, find_waits, Wait
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 

@@ -12,7 +12,7 @@ import pytest
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.template.interaction import Conflict, find_conflicts, Wait
+from scenario_gen.situation.interaction import Conflict, find_conflicts, Wait
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 

@@ -17,7 +17,7 @@ import shapely
 
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, checker
-from scenario_gen.template.interaction import Wait
+from scenario_gen.situation.interaction import Wait
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario

@@ -11,9 +11,9 @@ from reaction_scenes import answering, crossing, lane_encounter, wander
 from textbook_motions import labelled, REACTIONS
 
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.template.answers import lane_gaps
-from scenario_gen.template.interaction import find_conflicts
-from scenario_gen.template.reactions import reactions_of
+from scenario_gen.situation.gaps import lane_gaps
+from scenario_gen.situation.interaction import find_conflicts
+from scenario_gen.situation.reactions import reactions_of
 from scenario_gen.types.scenario import Cause, Scenario
 
 

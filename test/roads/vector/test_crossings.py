@@ -11,7 +11,7 @@ import pytest
 
 from scenario_gen.logs import read_log
 from scenario_gen.roads import placements, read_network, tracks_on
-from scenario_gen.template import clean_tracks, find_conflicts
+from scenario_gen.situation import clean_tracks, find_conflicts
 from scenario_gen.types import Encounter, Vehicle
 
 STEPS, DT = 100, 0.1

@@ -15,7 +15,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import geodesy
 from scenario_gen.roads import placements, read_network, tracks_on
 from scenario_gen.roads.vector.signs import kind_of_sign
-from scenario_gen.template import clean_tracks
+from scenario_gen.situation import clean_tracks
 from scenario_gen.types import RuleKind
 
 LINE = '<geometry s="0" x="{}" y="{}" hdg="{}" length="{}"><line/></geometry>'

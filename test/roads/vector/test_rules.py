@@ -11,7 +11,7 @@ import pytest
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.roads import places, read_network, RuleCheck
-from scenario_gen.template import clean_tracks, find_conflicts
+from scenario_gen.situation import clean_tracks, find_conflicts
 from scenario_gen.types import Encounter, RuleKind, Scenario, Vehicle
 
 DT = 0.1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenario_gen.roads import build_road, road_and_template
-from scenario_gen.template.side import mirrored
+from scenario_gen.situation.traffic_side import mirrored
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.lanes import MIRRORED
 

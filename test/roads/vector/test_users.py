@@ -19,7 +19,7 @@ from scenario_gen.roads import (
     users_of,
 )
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
-from scenario_gen.template import clean_tracks
+from scenario_gen.situation import clean_tracks
 from scenario_gen.types import Encounter, lanes_for, Vehicle, VEHICLE_TYPES
 
 DRIVE = "bicycle,bus,car,motorcycle,truck,van"

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.method.sampling.time_warp import SHORTEST_SHARE
 from scenario_gen.numerics import Bools, Floats, runs
-from scenario_gen.template import STAND_SPEED, Wait
+from scenario_gen.situation import STAND_SPEED, Wait
 from scenario_gen.types import Encounter
 
 SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid

@@ -14,8 +14,8 @@ from scipy.spatial import distance
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.template.interaction import Conflict, find_conflicts
-from scenario_gen.template.tracks import Track
+from scenario_gen.situation.interaction import Conflict, find_conflicts
+from scenario_gen.situation.tracks import Track
 from scenario_gen.types import once_per_object, together, Vehicle
 
 FAR = 60.0  # m, within which one follows

@@ -12,9 +12,9 @@ import pytest
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.template.frenet import to_frenet
-from scenario_gen.template.separation import separate, smallest_gaps
-from scenario_gen.template.tracks import clean_tracks
+from scenario_gen.situation.frenet import to_frenet
+from scenario_gen.situation.separation import separate, smallest_gaps
+from scenario_gen.situation.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 

@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from scenario_gen.template.separation import least_gap, least_gaps
+from scenario_gen.situation.separation import least_gap, least_gaps
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenario_gen.template.side import mirrored, traffic_side
+from scenario_gen.situation.traffic_side import mirrored, traffic_side
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 

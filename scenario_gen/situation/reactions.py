@@ -20,7 +20,7 @@ from scipy import ndimage
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left, angle_between
-from scenario_gen.template.answers import (
+from scenario_gen.situation.gaps import (
     ALIKE,
     bumper_gaps,
     conflicts_in,
@@ -29,8 +29,8 @@ from scenario_gen.template.answers import (
     passing,
     SLOWEST,
 )
-from scenario_gen.template.interaction import Conflict, find_waits
-from scenario_gen.template.tracks import clean_tracks
+from scenario_gen.situation.interaction import Conflict, find_waits
+from scenario_gen.situation.tracks import clean_tracks
 from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, ReactionGraph, YIELD
 
 LONG_ENOUGH = 2.0  # s, for which one drives behind another

@@ -12,7 +12,7 @@ import pytest
 import shapely
 
 from scenario_gen.logs import read_log
-from scenario_gen.template.interaction import find_conflicts, find_waits, Wait
+from scenario_gen.situation.interaction import find_conflicts, find_waits, Wait
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 CARS = (Vehicle("a"), Vehicle("b"))

@@ -10,7 +10,7 @@ import pytest
 from reaction_scenes import answering, crossing, lane_encounter, wander
 from textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
-from scenario_gen.template.reactions import reactions_of, without_circles
+from scenario_gen.situation.reactions import reactions_of, without_circles
 from scenario_gen.types import Vehicle
 from scenario_gen.types.reaction import FOLLOW, Reaction, YIELD
 

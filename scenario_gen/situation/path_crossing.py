@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import crossings
-from scenario_gen.template.tracks import Track
+from scenario_gen.situation.tracks import Track
 
 _BEYOND = 15.0  # metres by which a path is continued to look for a crossing
 _ANGLE = np.radians(25.0)

@@ -3,7 +3,8 @@
 
 """What is about the recorded encounter on its own ground: tracks, path coordinates, stops, conflicts."""
 
-from scenario_gen.template.answers import (
+from scenario_gen.situation.frenet import FrenetTracks, main_line, MainLine, to_frenet
+from scenario_gen.situation.gaps import (
     conflict_of,
     conflicts_in,
     departure,
@@ -13,8 +14,7 @@ from scenario_gen.template.answers import (
     passing,
     time_gaps,
 )
-from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine, to_frenet
-from scenario_gen.template.interaction import (
+from scenario_gen.situation.interaction import (
     closest_crossing,
     Conflict,
     find_conflicts,
@@ -25,7 +25,7 @@ from scenario_gen.template.interaction import (
     WAIT_SPEED,
     waits_to_keep,
 )
-from scenario_gen.template.manoeuvre import (
+from scenario_gen.situation.manoeuvre import (
     in_words,
     keeps,
     manoeuvre_of,
@@ -34,30 +34,30 @@ from scenario_gen.template.manoeuvre import (
     turn_of,
     turns_to_keep,
 )
-from scenario_gen.template.path_crossing import pair_crossings, path_crossing
-from scenario_gen.template.reactions import reactions_of
-from scenario_gen.template.separation import (
+from scenario_gen.situation.path_crossing import pair_crossings, path_crossing
+from scenario_gen.situation.placement_lsq import Equation, solve_starts
+from scenario_gen.situation.reactions import reactions_of
+from scenario_gen.situation.separation import (
     least_gap,
     least_gaps,
     own_paths,
     separate,
     smallest_gaps,
 )
-from scenario_gen.template.side import mirrored, traffic_side
-from scenario_gen.template.size import (
+from scenario_gen.situation.size import (
     MOST_SAMPLES,
     MOST_VEHICLES,
     refuse_reversing,
     refuse_too_large,
 )
-from scenario_gen.template.starts import Equation, solve_starts
-from scenario_gen.template.tracks import (
+from scenario_gen.situation.tracks import (
     clean_tracks,
     driven_tracks,
     driver_rows,
     drivers_of,
     Track,
 )
+from scenario_gen.situation.traffic_side import mirrored, traffic_side
 
 __all__ = [
     "MOST_CHANGE",

@@ -15,7 +15,7 @@ from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.template.tracks import clean_tracks, Track
+from scenario_gen.situation.tracks import clean_tracks, Track
 from scenario_gen.types import Encounter, once_per_object, together
 
 _ROUNDS = 400

@@ -14,8 +14,8 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.template.manoeuvre import turn_of
-from scenario_gen.template.tracks import smoothing_spline, Track
+from scenario_gen.situation.manoeuvre import turn_of
+from scenario_gen.situation.tracks import smoothing_spline, Track
 
 _ALONG = np.radians(50.0)  # a vehicle along the road is never turned from it by more
 _SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane

@@ -8,7 +8,7 @@ import pytest
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.template.size import refuse_too_large
+from scenario_gen.situation.size import refuse_too_large
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 

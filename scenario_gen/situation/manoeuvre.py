@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from scenario_gen.numerics.plane import angle_between
-from scenario_gen.template.tracks import Track
+from scenario_gen.situation.tracks import Track
 
 MOST_CHANGE: Final = np.radians(
     25.0
