@@ -28,7 +28,7 @@ from benchmarks.naturalness import DATA
 from benchmarks.row import Row
 from scenario_gen.base.errors import RefusedError, ScenarioGenError
 from scenario_gen.logs import read_log
-from scenario_gen.method.evaluation.measures import features, measure, MEASURES
+from scenario_gen.method.evaluation.measures import measure, MEASURES
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import (
@@ -168,8 +168,6 @@ def _measured(case: Case, natural: int) -> dict[str, Any]:
     for text in TARGETS:
         figures["targets"][text] = _target(case, text, each, brute.candidates, figures["seconds"])
     figures["swap"], figures["swap said"] = _swap(case)
-    chosen, _ = case.sample(Request(choose="diverse"))
-    figures["bins"], figures["bins, diverse"] = _bins(few), _bins(list(chosen.scenarios))
     return figures
 
 
@@ -211,10 +209,6 @@ def _swap(case: Case) -> tuple[int, str]:
         return len(case.sample(Request(order="swap"))[0].scenarios), ""
     except RefusedError as error:
         return 0, str(error)
-
-
-def _bins(scenarios: list[Scenario]) -> int:
-    return len({tuple(np.floor(features(one))) for one in scenarios})
 
 
 def _spread(values: Any, of: Callable[[Any], Any]) -> float:
@@ -312,13 +306,6 @@ def _rows(found: list[dict[str, Any]], cases: int, refused: int) -> list[Row]:
             "higher",
             0.9,
             f"{len(agrees)} targets",
-        ),
-        Row(
-            "bins, diverse / natural, median",
-            _median([one["bins, diverse"] / one["bins"] for one in found]),
-            "×",
-            "higher",
-            2.0,
         ),
         Row(
             "crossings whose order is swapped",

@@ -172,7 +172,6 @@ class RequestSummary:
             "requested",
             "published",
             "candidates",
-            "chosen_from",
             MAP_HASH,
             TEMPLATE_HASH,
         }
@@ -406,7 +405,6 @@ def request_summary(
             if result.reached is None
             else {f"{TARGET}{key}": text for key, text in result.reached.figures().items()}
         ),
-        **({"chosen_from": str(result.chosen)} if result.chosen else {}),
     }
     level = Level.OK if len(result.scenarios) == result.requested else Level.WARN
     message = f"{len(result.scenarios)} of {result.requested} scenarios from {result.candidates} candidates"

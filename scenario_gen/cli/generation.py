@@ -88,10 +88,6 @@ class Generate:
             "Repeatable."
         ),
     ] = None
-    choose: Annotated[
-        str,
-        typer.Option(help="natural: as sampled. diverse: the valid candidates that differ most."),
-    ] = "natural"
     for_testing: Annotated[
         bool,
         typer.Option(
@@ -167,7 +163,7 @@ def generate(options: Generate) -> None:
         count=options.count,
         seed=options.seed,
         encounters=options.encounter or [],
-        request=Request(options.ego, starts, goals, targets, options.choose, options.order),
+        request=Request(options.ego, starts, goals, targets, options.order),
         also_read=[options.parameter_file] if options.parameter_file else [],
         for_testing=options.for_testing,
         recombine=options.recombine,

@@ -22,7 +22,7 @@ def with_references(
     """Add what a result is measured against: sets without changepoints and with uniform ones.
 
     They are drawn as the result is, with the same parameters and seed; beside any preset but `narrow` there is a set of that.
-    A reference keeps no waits of the template: the ends of a wait would be two more changepoints. It has no target, choice or
+    A reference keeps no waits of the template: the ends of a wait would be two more changepoints. It has no target or
     order either, and a result that has one is not compared. A reference has only as many scenarios as are measured.
 
     Raises:
@@ -58,7 +58,7 @@ def with_references(
             refusals[name] = str(error)
     requested = [
         name
-        for name in ("target", "choose", "order")
+        for name in ("target", "order")
         if getattr(request, name) != getattr(request.plain, name)
     ]
     not_compared = (

@@ -21,12 +21,10 @@ class Measures:
 
     Attributes:
         figure: returns one figure by its name, of a pair or of the most critical one.
-        features: returns where a scenario lies in the space that a choice covers, in bins of width 1.
         rarity: returns how unusual a scenario is among recorded encounters of its kind, up to 1 it is usual; None: nobody asks.
     """
 
     figure: Measure
-    features: Callable[[Scenario], tuple[float, ...]]
     rarity: Callable[[Scenario], float] | None = None
 
     def nearness(self, scenario: Scenario) -> dict[str, str]:

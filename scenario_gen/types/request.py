@@ -40,11 +40,6 @@ class Request(Parameters):
         "",
         "ranges to aim at, of pet, ttc, gap, arrival_gap, closing_speed, baseline_margin: `pet=0.5..1.5; ttc[1,2]=1..2`",
     )
-    choose: str = parameter(
-        "natural",
-        "natural: as sampled; diverse: of many valid candidates those that cover best",
-        choices=("natural", "diverse"),
-    )
     order: str = parameter(
         "keep",
         "who goes first at a conflict; keep: as in the recording, free: anyone, swap: the other one at the closest crossing",
@@ -69,8 +64,8 @@ class Request(Parameters):
 
     @property
     def plain(self) -> "Request":
-        """The request without target, choice and order."""
-        return replace(self, target="", choose="natural", order="keep")
+        """The request without target and order."""
+        return replace(self, target="", order="keep")
 
     def states(self, end: str) -> dict[str, State]:
         """Return the requested states at one end ("starts" or "goals"), by vehicle id.

@@ -237,9 +237,8 @@ class ScenarioSet:
     `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there. `ego` is the
     vehicle that was left out for a planner under test, if one was; each scenario then has its reference drive.
     The scenarios of a large set are not in memory but drawn again whenever they are looked at. `reached` says what sampling
-    towards a target came to, `chosen` from how many valid candidates the set was chosen (0: as they were drawn).
+    towards a target came to.
     `graph` says who reacts to whom in the template (None: nobody looked), `reactions` are those that every scenario keeps.
-    `examples` are the first refused candidates of each cause, to be looked at.
     """
 
     requested: int
@@ -249,10 +248,8 @@ class ScenarioSet:
     adaptations: Sequence[str] = ()
     ego: EgoSlot | None = None
     reached: Reached | None = None
-    chosen: int = 0
     reactions: tuple[Reaction, ...] = ()
     graph: ReactionGraph | None = None
-    examples: tuple[tuple[Cause, Scenario], ...] = ()
 
     def __repr__(self) -> str:
         return f"ScenarioSet({len(self.scenarios)} of {self.candidates} candidates)"

@@ -63,7 +63,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("generate", "my log ü.csv", "--road", "map.yaml"), "map.yaml: cannot be read (No such file"),
     ((*GENERATE, "--encounter", "my lag ü"), "did you mean my log ü?"),
     ((*GENERATE, "--ego", "c"), "no vehicle 'c' in my log ü; there are: a, b"),
-    ((*GENERATE, "--choose", "divers"), "choose one of natural, diverse; did you mean diverse?"),
+    ((*GENERATE, "--order", "swop"), "choose one of keep, free, swap; did you mean swap?"),
     ((*GENERATE, "--set", "sampling.laterl_sigma=1"), "did you mean sampling.lateral_sigma?"),
     ((*DRIVE, "--ego", "zz"), "no vehicle 'zz' to be the ego; it has a, b"),
     (("drive", "made/bag", "--planner", "idm"), "write it as MODULE:CLASS"),

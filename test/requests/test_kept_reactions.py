@@ -110,19 +110,13 @@ def test_a_group_of_three_and_what_the_first_does_differently_comes_back_in_the_
     assert np.corrcoef(speeds[:, 0], speeds[:, 2])[0, 1] > 0.8
 
 
-@pytest.mark.parametrize(
-    "request_",
-    [Request(target="pet=0.5..1.5"), Request(choose="diverse")],
-    ids=["target", "diverse"],
-)
-def test_a_target_and_a_choice(request_):
-    result = made(crossing(8.0), request_, count=12)
+def test_a_target():
+    result = made(crossing(8.0), Request(target="pet=0.5..1.5"), count=12)
     assert_kept(result, ["2 yields to 1"])
-    if request_.target:
-        (edge,) = result.generated.reactions
-        assert yielding(edge, wholes(result)).mean < edge.lag - 0.5, (
-            "the range asks for less than the template's"
-        )
+    (edge,) = result.generated.reactions
+    assert yielding(edge, wholes(result)).mean < edge.lag - 0.5, (
+        "the range asks for less than the template's"
+    )
 
 
 def test_an_ego_slot_of_who_goes_first_or_waits():

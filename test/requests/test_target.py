@@ -14,10 +14,8 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation.measures import (
-    features,
     figures_of,
     measure,
-    MEASURES,
     most_critical,
 )
 from scenario_gen.method.sampling import SamplingConfig
@@ -88,7 +86,6 @@ def test_a_range_that_cannot_be_had_is_refused_with_what_can(chain):
     [
         Request(target=f"pet={LOW}..{HIGH}", ego="1"),
         Request(order="free"),
-        Request(choose="diverse"),
     ],
     ids=str,
 )
@@ -132,19 +129,6 @@ def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
     )
 
 
-def test_a_diverse_set_covers_more_bins_and_carries_no_weights(chain):
-    def bins(made):
-        return len({tuple(np.floor(features(one))) for one in made.scenarios})
-
-    natural = answer(chain, Request(), count=30).generated
-    diverse = answer(chain, Request(choose="diverse"), count=30).generated
-    assert len(diverse.scenarios) == 30 and diverse.chosen == 300
-    assert bins(diverse) > 1.3 * bins(natural)
-    assert all("weight" not in one.facts for one in diverse.scenarios) and any(
-        "no weights" in said for said in diverse.adaptations
-    )
-
-
 def test_measures_of_a_plain_crossing(crossing):
     """Two cars of 4 × 2 m at 10 m/s on crossing axes; the second one's centre is 20 m later at the crossing."""
     (one,) = figures_of(crossing)
@@ -152,5 +136,4 @@ def test_measures_of_a_plain_crossing(crossing):
     assert one.arrival_gap == pytest.approx(2.0, abs=0.02)
     assert one.pet == pytest.approx(2.0 - 0.6, abs=0.02)  # the first is inside for 2 m + 4 m
     assert measure(crossing, "arrival_gap", (1, 0)) == pytest.approx(-2.0, abs=0.02)
-    assert MEASURES.features(crossing)[:2] == pytest.approx((2.8, 4.0), abs=0.05)
     assert one.ttc == np.inf

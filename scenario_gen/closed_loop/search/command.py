@@ -222,7 +222,7 @@ def search_failures(
         raise InputError(f"--budget {request.budget}: at least one drive is needed")
     config, ego = request.drive_config(), request.ego_id()
     identity = request.identity()
-    plain = replace(request.request, target="", choose="natural")
+    plain = replace(request.request, target="")
     plan = plan_of(request.planned, request.sampling, request.limits, plain)
     check = checker_of(plan, request.sampling, request.limits, request.request).check
     measures = measures_in(request.sampling.variety, plan.encounter)

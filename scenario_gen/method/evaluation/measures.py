@@ -105,21 +105,7 @@ def most_critical(figures: Sequence[PairFigures]) -> PairFigures | None:
     )
 
 
-def features(scenario: Scenario | Encounter) -> tuple[float, ...]:
-    """Return where a scenario lies in the space that a choice covers, in bins of width 1, of its most critical pair.
-
-    Of a pair that crosses or merges: PET in 0.5 s, arrival gap in 0.5 s, closing speed in 1 m/s; of another one: a large number,
-    gap in 1 m, closing speed in 1 m/s.
-    """
-    most = most_critical(figures_of(scenario))
-    if most is None:
-        return (math.inf, 0.0, 0.0)
-    if math.isnan(most.pet):
-        return (math.inf, most.gap, most.closing_speed)
-    return (most.pet / 0.5, most.arrival_gap / 0.5, most.closing_speed)
-
-
-MEASURES = Measures(measure, features)
+MEASURES = Measures(measure)
 """What sampling towards a target, and a choice, measure with."""
 
 

@@ -16,11 +16,17 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.sampling.adapt import adapted, aim_of, Check, Judge, label_of
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.directed import Aim, estimated, reachable, STAGE, TargetError
-from scenario_gen.method.sampling.diverse import POOL_SHARE, spread_out
-from scenario_gen.method.sampling.lazy import LazyScenarios
 from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import prepare
-from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, ENOUGH, LEVELS, place_of, Sampler
+from scenario_gen.method.sampling.sampler import (
+    BLOCK,
+    DIRECTED,
+    ENOUGH,
+    LEVELS,
+    place_of,
+    RedrawnScenarios,
+    Sampler,
+)
 from scenario_gen.method.sampling.usual import FEW, PILOT, pilot, Usual
 from scenario_gen.types import (
     Cause,
@@ -35,7 +41,6 @@ from scenario_gen.types import (
 
 KEPT = 1000  # scenarios up to which a set stays in memory
 LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried
-EXAMPLES = 3  # refused candidates of each cause that are kept to be looked at
 DIRECTED_BUDGET = 10  # times the budget of a request without a target
 HOPELESS = (
     20 * BLOCK
@@ -115,12 +120,11 @@ def draw_scenarios(
         loop.aim, loop.measures = aim, measures
         if measures is not None and measures.rarity is not None:
             loop.usual = Usual.among(measures.rarity, pilot(sampler, judge, FEW)[1])
-        loop.run_request(config.attempts, diverse=request.choose == "diverse")
+        loop.run_request(config.attempts)
         lost = [f"{NOT_KEPT}: {message}" for message in judge.lost.values()]
         notes = (*prepared.adaptations, *lost, *loop.usual.notes(), *loop.adaptations)
         drawn = ScenarioSet(
-            count, loop.scenarios(), loop.candidates, loop.refused, notes, slot, loop.reached, loop.chosen_from, kept,
-            examples=tuple(loop.examples),
+            count, loop.scenarios(), loop.candidates, loop.refused, notes, slot, loop.reached, kept,
         )  # fmt: skip
     if request.moves and not drawn.scenarios and not callbacks.cancelled():
         causes = ", ".join(
@@ -187,65 +191,30 @@ class _Loop:
     kept: list[Scenario] = field(default_factory=list)  # the first KEPT
     index: Any = field(default_factory=lambda: array("q"))  # of all that are valid
     refused: Counter[Cause] = field(default_factory=Counter)
-    examples: list[tuple[Cause, Scenario]] = field(default_factory=list)
     candidates: int = 0
     adaptations: list[str] = field(default_factory=list)
     aim: Aim | None = None
     measures: Measures | None = None
     usual: Usual = Usual()  # noqa: RUF009 - frozen
     reached: Reached | None = None
-    chosen_from: int = 0
-    keep: int = field(default_factory=lambda: KEPT)
-    publish: bool = True
 
-    def run_request(self, attempts: int, *, diverse: bool) -> None:
-        """Sample what was asked: towards a target, and, if a choice is asked for, from a pool."""
-        remaining = self.count
-        if diverse:
-            self.count, self.keep, self.publish = remaining * POOL_SHARE, 0, False
+    def run_request(self, attempts: int) -> None:
+        """Sample what was asked, towards a target if there is one."""
         attempts *= self.usual.valid_each
         if self.aim is None:
             self.run(attempts * max(self.count, LEAST_COUNT if self.sampler.free else 1))
         else:
             self.run_directed(DIRECTED_BUDGET * attempts * self.count)
-        if diverse:
-            self.choose(remaining)
-
-    def choose(self, count: int) -> None:
-        """Keep those of the pool that cover best."""
-        if self.measures is None:
-            raise InputError("choose: nothing is given that measures scenarios (`measures`)")
-        pool = list(self.index)
-        features = [self.measures.features(whole) for whole in self._whole(pool)]
-        chosen = spread_out(features, count)
-        self.chosen_from, self.count, self.keep, self.publish = len(pool), count, KEPT, True
-        self.index = array("q")
-        self.adaptations.append(
-            f"chosen for diversity: {len(chosen)} of {len(pool)} valid scenarios; no random sample, so it has no weights"
-        )
-        self.sampler = replace(self.sampler, weighted=False)
-        for k in sorted(chosen):
-            scenario = self.sampler.scenario(pool[k])
-            if scenario is not None and not self.callbacks.cancelled():
-                self._keep(pool[k], scenario)
-
-    def _whole(self, index: Sequence[int]) -> Iterator[Scenario]:
-        """Candidates of all vehicles, by ascending indices."""
-        plain = replace(self.sampler, ego=None, label=lambda _: {}, weighted=False)
-        for _, together in itertools.groupby(index, lambda number: number // BLOCK):
-            yield from plain.redraw(list(together))
 
     def _take(self, number: int, scenario: Scenario) -> None:
         """Keep a valid candidate of all vehicles if it is accepted."""
-        if self.callbacks.accepts(scenario):
-            self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
-
-    def _keep(self, number: int, scenario: Scenario) -> None:
+        if not self.callbacks.accepts(scenario):
+            return
+        published = self.sampler.published(scenario)
         self.index.append(number)
-        if len(self.kept) < self.keep:
-            self.kept.append(scenario)
-        if self.publish:
-            self.found(scenario)
+        if len(self.kept) < KEPT:
+            self.kept.append(published)
+        self.found(published)
 
     def run_directed(self, budget: int) -> None:
         """Find a proposal, then draw from it.
@@ -322,7 +291,7 @@ class _Loop:
         """The valid candidates: themselves, or, where they are many, what draws them again."""
         if len(self.index) <= KEPT:
             return tuple(self.kept)
-        return LazyScenarios(self.sampler.redraw, np.array(self.index, dtype=np.int64), BLOCK)
+        return RedrawnScenarios(self.sampler, np.array(self.index, dtype=np.int64))
 
     def _done(self, budget: int) -> bool:
         return (
@@ -364,12 +333,6 @@ class _Loop:
                     self._take(number, scenario)
                 else:
                     self.refused[cause or Cause.SPEED_PROFILE] += 1
-                    if (
-                        scenario is not None
-                        and cause is not None
-                        and self.refused[cause] <= EXAMPLES
-                    ):
-                        self.examples.append((cause, scenario))
             self.callbacks.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good

@@ -6,6 +6,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import hashlib
+from typing import overload
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.directed import Proposal
 from scenario_gen.method.sampling.model import CandidateModel
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Scenario, with_witness
 
 Label = Callable[[Scenario], dict[str, str]]
@@ -77,7 +78,6 @@ class Sampler:
     base: int = 0  # level whose standard deviations the candidates of a proposal have
     proposal: Proposal | None = None
     label: Label = lambda _: {}  # facts of a candidate of all vehicles
-    weighted: bool = True  # whether the candidates of a proposal say their weights
 
     def block(self, level: int, number: int) -> tuple[list[int], list[Scenario | None]]:
         """The indices of candidates number·BLOCK … of a level, and these; None for one without a speed profile."""
@@ -107,20 +107,10 @@ class Sampler:
             self.seed, [0], self.frame_id
         )[0]
 
-    def redraw(self, index: Sequence[int]) -> list[Scenario]:
-        """The scenarios of indices that are of one block, to rounding as in a whole set."""
-        level, candidate = place_of(index[0])
-        own, drawn = self.block(level, candidate // BLOCK)
-        return [
-            self.published(whole)
-            for whole in (drawn[number - own[0]] for number in index)
-            if whole is not None
-        ]
-
     def published(self, whole: Scenario) -> Scenario:
         """A candidate of all vehicles as it is published: with its facts, the ego's motion apart, as witness."""
         facts = self.label(whole)
-        if self.proposal is not None and self.weighted:
+        if self.proposal is not None:
             facts = {"weight": repr(self.weight(whole.index)), **facts}
         named = replace(whole, facts=facts) if facts else whole
         return named if self.ego is None else with_witness(named, self.ego)
@@ -154,3 +144,32 @@ class Sampler:
         )
         z = generator.standard_normal((BLOCK // 2, size))
         return np.stack([z, -z], axis=1).reshape(BLOCK, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class RedrawnScenarios(Sequence[Scenario]):
+    """The scenarios of a large set, redrawn at each access: eight bytes of memory for each.
+
+    Attributes:
+        sampler: draws them.
+        index: (S,) indices of candidates that are known to be valid.
+    """
+
+    sampler: Sampler
+    index: Ints
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    @overload
+    def __getitem__(self, at: int) -> Scenario: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> "RedrawnScenarios": ...
+
+    def __getitem__(self, at: int | slice) -> "Scenario | RedrawnScenarios":
+        if isinstance(at, slice):
+            return RedrawnScenarios(self.sampler, self.index[at])
+        scenario = self.sampler.scenario(int(self.index[at]))
+        assert scenario is not None
+        return scenario

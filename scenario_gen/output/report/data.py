@@ -72,9 +72,6 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     longest = max(
         [case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)]
     )
-    refused = case.generated.examples
-    if refused:
-        arms["refused"] = tuple(scenario for _, scenario in refused)
     frames = min(MAX_FRAMES, int(np.ceil(longest / FRAME_PERIOD)) + 1)
     return {
         "row": case.row_name,
@@ -88,15 +85,10 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "fit": _fit(case.fit, case.routes) if case.fit else [],
         "reactions": _reactions(case),
         "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
-        "causes": [cause.value.replace("_", " ") for cause, _ in refused],
         "turn": _turn(case.encounter, case.fit),
         "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
         "coverage": None if covered is None else covered.document(),
-        "features": _features(
-            case.encounter,
-            {name: group for name, group in arms.items() if name != "refused"},
-            case.evaluation.vehicles,
-        ),
+        "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
 
 

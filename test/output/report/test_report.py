@@ -25,7 +25,7 @@ from scenario_gen.output.report.data import case_data, MATRIX_SIZE, pack, runs
 from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
-from scenario_gen.types import Cause, formatted, Interval
+from scenario_gen.types import formatted, Interval
 from scenario_gen.types.fit import Loss
 
 
@@ -198,21 +198,6 @@ def test_the_verdict_says_how_critical_the_set_is_and_a_cap_is_no_measurement():
     assert f"time to collision: none below {least / 2:g} s" in page
     assert formatted(Interval(10.0, 10.0, 10.0), "s", cap=10.0) == "none below 10 s"
     assert formatted(Interval(9.9, 9.8, 10.0), "s", cap=10.0) == "9.9 [9.8, 10]"
-
-
-def test_refused_candidates_are_drawn_with_their_causes():
-    case = report_case(3)
-    examples = tuple(
-        (cause, case.generated[k]) for k, cause in enumerate((Cause.OVERLAP, Cause.STOP_NOT_KEPT))
-    )
-    page = render(
-        ReportInput([replace(case, generated=replace(case.generated, examples=examples))])
-    )
-    (data,) = json.loads(re.search(r'id="data">(.*?)</script>', page, flags=re.S).group(1))
-    assert (
-        data["causes"] == ["overlap", "stop not kept"]
-        and data["arms"]["refused"]["states"]["shape"][0] == 2
-    )
 
 
 def test_the_record_is_turned_as_it_lies_on_the_road():

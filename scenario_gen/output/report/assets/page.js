@@ -2,7 +2,7 @@
 // The page: which case is shown, and the player.
 
 const CASES = JSON.parse(document.getElementById("data").textContent);
-const ARM_NAMES = { replay: "recording as fitted", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints", refused: "refused candidates" };
+const ARM_NAMES = { replay: "recording as fitted", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints" };
 
 function option(value, text) {
   const element = document.createElement("option");
@@ -72,14 +72,13 @@ class Player {
   listSamples() {
     const list = this.find("sample");
     const before = Math.max(0, list.selectedIndex);
-    list.replaceChildren(...this.set.index.map((index) => option(index, this.title(index, this.set.index.indexOf(index)))));
+    list.replaceChildren(...this.set.index.map((index) => option(index, this.title(index))));
     list.selectedIndex = Math.min(before, this.set.samples - 1);
     this.time = Math.min(this.time, this.duration);
   }
 
-  title(index, k) {
-    if (this.arm === "replay") return "the recording";
-    return this.arm === "refused" ? `${this.data.causes[k]} (candidate ${index})` : `scenario ${index}`;
+  title(index) {
+    return this.arm === "replay" ? "the recording" : `scenario ${index}`;
   }
 
   /** Give the shown scenario as a file: every 0.2 s or so as CSV, or the picture as PNG. */
