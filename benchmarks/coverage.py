@@ -244,8 +244,8 @@ def _generated(
 
 def _encounters() -> Iterator[tuple[str, Encounter]]:
     if not (DATA / "trajectories").is_dir():
-        sys.path.append(str(Path(__file__).resolve().parents[1] / "test" / "worlds"))
-        drawn = import_module("textbook_motions")
+        sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))
+        drawn = import_module("support.textbook_motions")
         yield from (
             (f"drawn {seed}", drawn.labelled(kind, seed).encounter)
             for kind in drawn.REACTIONS

@@ -14,9 +14,9 @@ from dataclasses import fields
 from pathlib import Path
 import sys
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "test" / "worlds"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))
 
-from archives import ArchiveConfig, read_planted, write_archive
+from support.archives import ArchiveConfig, read_planted, write_archive
 
 
 def main() -> None:

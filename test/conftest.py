@@ -11,9 +11,9 @@ import os
 from pathlib import Path
 
 from hypothesis import HealthCheck, settings
-from lengths import DATA, LONG
 import pytest
-from skips import MAY_SKIP, NO_RECORDS
+from support.lengths import DATA, LONG
+from support.skips import MAY_SKIP, NO_RECORDS
 
 os.environ.setdefault(
     "OPENBLAS_NUM_THREADS", "1"
@@ -55,7 +55,7 @@ def once(
 @pytest.fixture(scope="session")
 def made_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder laid out as the recorded data is, made here."""
-    import recordlike
+    from support import recordlike
 
     return made_once(tmp_path_factory, "made_data", recordlike.write)
 
@@ -63,7 +63,7 @@ def made_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def made_crashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder laid out as the one of files that once broke a reader, made here with the same faults."""
-    import broken
+    from support import broken
 
     return made_once(tmp_path_factory, "made_crashes", broken.write)
 
@@ -102,7 +102,7 @@ settings.load_profile(
 @pytest.fixture(scope="session")
 def browser() -> Iterator[object]:
     """Headless Chromium, for all tests of a worker; the test skips where it is not installed."""
-    from browser_tab import chromium
+    from support.browser_tab import chromium
 
     with chromium() as instance:
         yield instance

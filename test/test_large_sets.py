@@ -8,12 +8,12 @@ import json
 import sys
 import tracemalloc
 
-from given import answer, Given
 from hypothesis import given
 from hypothesis import strategies as st
-from lengths import LONG
 import numpy as np
 import pytest
+from support.given import answer, Given
+from support.lengths import LONG
 
 from scenario_gen import pipeline
 from scenario_gen.bags.recordings.write import write_recording

@@ -12,8 +12,8 @@ import re
 from markupsafe import escape
 import numpy as np
 import pytest
-from reaction_scenes import answering, lane_encounter, wander
 from rich.console import Console
+from support.reaction_scenes import answering, lane_encounter, wander
 
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled

@@ -8,9 +8,9 @@ The short form takes three encounters and few scenarios; the long one, `make soa
 
 from dataclasses import replace
 
-from lengths import LONG, SOME_ENCOUNTERS
 import numpy as np
 import pytest
+from support.lengths import LONG, SOME_ENCOUNTERS
 
 from benchmarks._recheck import Account, Recheck
 from scenario_gen.base.errors import RefusedError

@@ -7,11 +7,11 @@ from dataclasses import replace
 import io
 import re
 
-from map_builders import write
 import numpy as np
 import pandas as pd
 import pytest
 from rich.console import Console
+from support.map_builders import write
 
 from benchmarks._recheck import Account, Recheck
 from scenario_gen import generate, read_log

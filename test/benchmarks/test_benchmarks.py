@@ -9,9 +9,9 @@ from pathlib import Path
 import subprocess
 import sys
 
-from lengths import LONG
 import numpy as np
 import pytest
+from support.lengths import LONG
 
 from benchmarks.__main__ import names
 from benchmarks.row import Row

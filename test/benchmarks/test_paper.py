@@ -8,9 +8,9 @@ import json
 from pathlib import Path
 import re
 
-from evaluation_worlds import crossing
 import numpy as np
 import pytest
+from support.evaluation_worlds import crossing
 
 from benchmarks._paper_chain import place, sample
 from benchmarks._paper_claims import claims_of

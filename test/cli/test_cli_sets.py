@@ -6,7 +6,7 @@
 import json
 
 import pytest
-from textbook_motions import labelled
+from support.textbook_motions import labelled
 
 from scenario_gen import bundled, generate, load, read_log
 from scenario_gen.base.folders import MARKER

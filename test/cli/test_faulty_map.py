@@ -5,8 +5,8 @@
 
 from dataclasses import replace
 
-from bag_examples import hand_made_run
-from map_builders import lanelet2
+from support.bag_examples import hand_made_run
+from support.map_builders import lanelet2
 
 from scenario_gen.cli.folder import faults_of
 from scenario_gen.roads import build_road

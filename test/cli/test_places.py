@@ -10,8 +10,8 @@ from pathlib import Path
 import threading
 
 import boto3
-from object_store import new_bucket, reached, read, serving
 import pytest
+from support.object_store import new_bucket, reached, read, serving
 
 from scenario_gen.base.stores import below, place, upload
 from scenario_gen.logs.synthetic import bundled

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reaction_scenes import led_crossing, platoon
+from support.reaction_scenes import led_crossing, platoon
 
 from benchmarks._driving_worlds import Witness
 from scenario_gen.closed_loop.ego import Command

@@ -5,12 +5,12 @@
 
 from dataclasses import replace
 
-from driving_scenes import crossing
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from lengths import LONG
 import numpy as np
 import pytest
+from support.driving_scenes import crossing
+from support.lengths import LONG
 
 from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
 from scenario_gen.base.errors import InputError

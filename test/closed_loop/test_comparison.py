@@ -5,9 +5,9 @@
 
 from dataclasses import dataclass, replace
 
-from bag_examples import hand_made_run
 import numpy as np
 import pytest
+from support.bag_examples import hand_made_run
 from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.write import write_recording

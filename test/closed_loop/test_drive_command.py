@@ -12,8 +12,8 @@ import sys
 import time
 from xml.etree import ElementTree
 
-from bag_examples import hand_made_run
 import pytest
+from support.bag_examples import hand_made_run
 from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.write import write_recording

@@ -3,9 +3,9 @@
 
 """The page of drives in a browser: a table that sorts, the figures of the drive beside it, the keyboard, a phone."""
 
-from bag_examples import hand_made_run
-from browser_tab import DESKTOP, PHONE, Tab
 import pytest
+from support.bag_examples import hand_made_run
+from support.browser_tab import DESKTOP, PHONE, Tab
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import drawings, Drives

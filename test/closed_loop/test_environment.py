@@ -5,11 +5,11 @@
 
 from dataclasses import replace
 
-from driving_scenes import following
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 import numpy as np
 import pytest
+from support.driving_scenes import following
 
 from benchmarks._driving_worlds import draw_scenario
 from scenario_gen.base.errors import InputError

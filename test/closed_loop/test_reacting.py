@@ -3,10 +3,10 @@
 
 """Sets for testing: planners that look at nobody fail in them, others than those by which they were chosen, too."""
 
-from driving_scenes import crossing
 import numpy as np
 import pytest
-from recordlike import drive, Phase, Writing
+from support.driving_scenes import crossing
+from support.recordlike import drive, Phase, Writing
 from test_verdict import straight
 from typer.testing import CliRunner
 

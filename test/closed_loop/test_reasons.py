@@ -3,9 +3,9 @@
 
 """Whose fault a contact is, in situations that are drawn: the ego drives otherwise than its witness, the other as certified."""
 
-from lengths import LONG
 import numpy as np
 import pytest
+from support.lengths import LONG
 
 from benchmarks._driving_worlds import as_scenario, PERIOD
 from scenario_gen.closed_loop.config import ClosedLoopConfig

@@ -3,8 +3,8 @@
 
 """One small archive and its corpus for all tests of the folder; they share a worker."""
 
-from archives import ArchiveConfig, write_archive
 import pytest
+from support.archives import ArchiveConfig, write_archive
 
 from scenario_gen.corpus.mine import mine
 

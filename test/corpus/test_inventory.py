@@ -4,7 +4,7 @@
 """What lies in an archive: SPMD files, logs, bags, others; and a log without an encounter is a result."""
 
 import pytest
-from source_files import ROOT
+from support.source_files import ROOT
 
 from scenario_gen.corpus.mine import inventory, mine
 

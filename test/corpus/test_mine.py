@@ -7,11 +7,11 @@ from dataclasses import replace
 import json
 import pickle
 
-from archives import read_planted
 from hypothesis import given, strategies
-from killed import killed_in
 import numpy as np
 import pytest
+from support.archives import read_planted
+from support.killed import killed_in
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import sha256_of

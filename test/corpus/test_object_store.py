@@ -17,8 +17,8 @@ import time
 
 import boto3
 import fsspec
-from object_store import new_bucket, reached, read, serving
 import pytest
+from support.object_store import new_bucket, reached, read, serving
 from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.read import read_recording

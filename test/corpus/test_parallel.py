@@ -5,7 +5,7 @@
 
 import numpy as np
 import pytest
-from source_files import ROOT
+from support.source_files import ROOT
 
 from scenario_gen import generate_many, InputError, read_log, RefusedError
 

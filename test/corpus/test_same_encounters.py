@@ -3,10 +3,10 @@
 
 """`mine` and `read_log` find the same encounters in the same file."""
 
-from archives import ArchiveConfig, read_planted, write_archive
 import numpy as np
 import pyproj
 import pytest
+from support.archives import ArchiveConfig, read_planted, write_archive
 
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.mine import mine

@@ -4,7 +4,7 @@
 """Tasks: each is run once; only the task that ends its workers fails."""
 
 import pytest
-from refusing import Counted, end_worker, refuse, write_once
+from support.refusing import Counted, end_worker, refuse, write_once
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.corpus.tasks import spread, Workers

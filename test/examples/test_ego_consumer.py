@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "test" / "ros"))
 EXAMPLE = ROOT / "examples" / "ego_consumer.py"
 ROUTE = np.column_stack([np.arange(0.0, 60.0, 0.5), np.zeros(120), np.zeros(120)])
 
@@ -54,8 +53,8 @@ def test_it_stops_before_what_is_in_its_way_and_steers_back_to_its_route(example
 
 @pytest.mark.dds
 def test_it_drives_a_scenario_in_lock_step(tmp_path):
-    from node_server import start_nodes
-    from suite_processes import Client, RESOURCES
+    from support.node_server import start_nodes
+    from support.suite_processes import Client, RESOURCES
 
     from msg_conventions.diagnostics import decode_diagnostics
     from scenario_gen import generate, read_log

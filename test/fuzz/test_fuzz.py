@@ -3,10 +3,10 @@
 
 """Every reader and every decoder gets its valid inputs and some damaged ones; more of it: `make soak PART=fuzz`."""
 
-from harness import corpus, CRASHES, found_crashes, fuzz, targets
-from lengths import LONG
 import pytest
-from skips import NO_RECORDS
+from support.harness import corpus, CRASHES, found_crashes, fuzz, targets
+from support.lengths import LONG
+from support.skips import NO_RECORDS
 
 from scenario_gen.logs.read import FORMATS
 

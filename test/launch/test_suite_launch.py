@@ -13,7 +13,7 @@ import tempfile
 import unittest
 
 import pytest
-from skips import NO_LAUNCH
+from support.skips import NO_LAUNCH
 
 from scenario_gen.bags.storage.bag import bag_topics
 
@@ -57,7 +57,7 @@ class TestTheSuite(unittest.TestCase):
     """While it runs."""
 
     def test_it_generates_what_it_is_asked_for(self):
-        from suite_processes import Client
+        from support.suite_processes import Client
 
         client = Client(int(os.environ.get("ROS_DOMAIN_ID", "0")))
         try:

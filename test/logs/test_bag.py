@@ -5,14 +5,14 @@
 
 from dataclasses import dataclass
 
-from log_builders import crossing, geographic, save
 from mcap.writer import Writer as McapWriter
 import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
-from synthetic_cases import fix_message, nanoseconds_to_time, twist_message
+from support.log_builders import crossing, geographic, save
+from support.synthetic_cases import fix_message, nanoseconds_to_time, twist_message
 
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.storage.bag import bag_topics, read_messages

@@ -8,10 +8,10 @@ import re
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
-from log_builders import crossing, geographic, save
 import numpy as np
 import pandas as pd
 import pytest
+from support.log_builders import crossing, geographic, save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, NoEncounterError, read_log

@@ -6,12 +6,12 @@
 import os
 from pathlib import Path
 
-from log_builders import crossing, geographic, save
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 from pyarrow import parquet
 import pytest
+from support.log_builders import crossing, geographic, save
 
 from scenario_gen.base.errors import InputError, LONGEST
 from scenario_gen.logs import LogConfig, read_log

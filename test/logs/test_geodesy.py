@@ -3,11 +3,11 @@
 
 """Logs in latitude and longitude, wherever on the globe and however far apart: each encounter is right about its own middle."""
 
-from log_builders import save
 import numpy as np
 import pandas as pd
 import pyproj
 import pytest
+from support.log_builders import save
 
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.logs.geodesy import (

@@ -5,10 +5,10 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from log_builders import save
 import numpy as np
 import pandas as pd
 import pytest
+from support.log_builders import save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log

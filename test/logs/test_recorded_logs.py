@@ -3,10 +3,10 @@
 
 """Every file, recorded or made as hard, reads without options, and what comes out is a drive that a car can do."""
 
-from lengths import VEHICLES
 import numpy as np
 import pandas as pd
 import pytest
+from support.lengths import VEHICLES
 
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.situation.interaction import find_waits

@@ -5,10 +5,10 @@
 
 import zipfile
 
-from log_builders import crossing, geographic, save
 import numpy as np
 import pandas as pd
 import pytest
+from support.log_builders import crossing, geographic, save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log

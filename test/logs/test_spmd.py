@@ -3,9 +3,9 @@
 
 """Basic safety messages in the published layout of the Safety Pilot Model Deployment."""
 
-from log_builders import crossing, geographic
 import numpy as np
 import pytest
+from support.log_builders import crossing, geographic
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log

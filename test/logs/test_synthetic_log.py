@@ -8,7 +8,7 @@ from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
-from synthetic_cases import main, make_case, ORIGIN, START_NS
+from support.synthetic_cases import main, make_case, ORIGIN, START_NS
 
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.logs.synthetic import bundled, CASES

@@ -3,10 +3,10 @@
 
 """Tables: columns by name, units by suffix, options, and errors that name the place."""
 
-from log_builders import crossing, geographic, save
 import numpy as np
 import pandas as pd
 import pytest
+from support.log_builders import crossing, geographic, save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log

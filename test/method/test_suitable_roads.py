@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from textbook_motions import labelled
+from support.textbook_motions import labelled
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log

@@ -5,9 +5,9 @@
 
 from dataclasses import replace
 
-from bag_examples import hand_made_run
-from message_examples import encounter
 import pytest
+from support.bag_examples import hand_made_run
+from support.message_examples import encounter
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.hashes import decode_hashes, encode_hashes, hash_of, template_hashes

@@ -10,7 +10,9 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from message_examples import (
+import numpy as np
+import pytest
+from support.message_examples import (
     assert_same,
     encounter,
     generator,
@@ -20,8 +22,6 @@ from message_examples import (
     seeds,
     segmentation,
 )
-import numpy as np
-import pytest
 
 from msg_conventions import (
     changepoints,

@@ -10,10 +10,10 @@ import importlib
 import subprocess
 import sys
 
-from message_examples import encounter, route, scenario, segmentation
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
+from support.message_examples import encounter, route, scenario, segmentation
 
 from msg_conventions import (
     changepoints,

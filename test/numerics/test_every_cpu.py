@@ -6,10 +6,10 @@
 The long form takes the settings one by one; `make soak PART=cpu` every recorded encounter on two roads, and numba's target too.
 """
 
-from cpu_settings import apart, AT_ONCE, MOST_APART_M, results_under, SETTINGS
-from lengths import LONG
 import pytest
-from results_of_a_run import of_runs
+from support.cpu_settings import apart, AT_ONCE, MOST_APART_M, results_under, SETTINGS
+from support.lengths import LONG
+from support.results_of_a_run import of_runs
 
 from scenario_gen.logs.synthetic import bundled
 

@@ -5,9 +5,9 @@
 
 import xml.etree.ElementTree as ET
 
-from map_builders import lanelet2, opendrive
 import pytest
-from source_files import ROOT
+from support.map_builders import lanelet2, opendrive
+from support.source_files import ROOT
 from typer.testing import CliRunner
 
 from scenario_gen import bundled, generate, read_log

@@ -3,9 +3,9 @@
 
 """Results, scenarios and encounters drawn with matplotlib."""
 
-from bag_examples import hand_made_run
 import numpy as np
 import pytest
+from support.bag_examples import hand_made_run
 
 from scenario_gen import MissingExtraError, plot
 

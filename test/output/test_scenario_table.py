@@ -5,8 +5,8 @@
 
 from dataclasses import replace
 
-from bag_examples import hand_made_run
 import pytest
+from support.bag_examples import hand_made_run
 
 from scenario_gen import bundled, generate, InputError, load, measures, read_log, report
 

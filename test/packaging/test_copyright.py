@@ -6,7 +6,7 @@
 import re
 
 import pytest
-from source_files import python_files, ROOT
+from support.source_files import python_files, ROOT
 
 HEADER = re.compile(
     r"(?:#!.*\n+)?# SPDX-FileCopyrightText: \d{4}(?:-\d{4})? \S.*\n# SPDX-License-Identifier: Apache-2\.0\n(?:\n|\Z)"

@@ -6,7 +6,7 @@
 import re
 
 import pytest
-from source_files import ROOT
+from support.source_files import ROOT
 
 import scenario_gen
 

@@ -13,7 +13,7 @@ import xml.etree.ElementTree as ET
 
 from catkin_pkg.package import parse_package
 import pytest
-from source_files import ROOT
+from support.source_files import ROOT
 
 
 @pytest.mark.linter

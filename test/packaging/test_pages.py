@@ -8,7 +8,7 @@ import re
 import sys
 
 import pytest
-from source_files import ROOT
+from support.source_files import ROOT
 
 from scenario_gen.cli.commands import main
 from scenario_gen.logs.columns import NAMES, UNITS

@@ -11,7 +11,7 @@ import sys
 from licences import COPYLEFT, extras, locked, REQUIREMENTS, run_time, TABLE
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-from source_files import ROOT
+from support.source_files import ROOT
 
 
 def test_what_is_needed_at_run_time_has_a_lower_bound_that_the_lock_meets():

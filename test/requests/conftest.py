@@ -3,9 +3,9 @@
 
 """The synthetic turning case on a T-intersection: what every request here starts from."""
 
-from given import answer, Given
 import numpy as np
 import pytest
+from support.given import answer, Given
 
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled

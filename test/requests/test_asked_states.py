@@ -6,10 +6,10 @@
 from dataclasses import replace
 import re
 
-from given import answer
-from lengths import LONG
 import numpy as np
 import pytest
+from support.given import answer
+from support.lengths import LONG
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.road_users import Dynamics

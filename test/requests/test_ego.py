@@ -5,10 +5,10 @@
 
 from dataclasses import replace
 
-from given import answer, Given
-from lengths import LONG
 import numpy as np
 import pytest
+from support.given import answer, Given
+from support.lengths import LONG
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.base.errors import RefusedError

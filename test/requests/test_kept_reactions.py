@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reaction_scenes import answering, crossing, lane_encounter, platoon, wander
+from support.reaction_scenes import answering, crossing, lane_encounter, platoon, wander
 
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.bags.recordings.write import write_recording

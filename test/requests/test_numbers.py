@@ -5,10 +5,10 @@
 
 from dataclasses import replace
 
-from given import answer, Given
-from lengths import LONG
 import numpy as np
 import pytest
+from support.given import answer, Given
+from support.lengths import LONG
 
 from scenario_gen.logs import read_log
 from scenario_gen.method.sampling import SamplingConfig

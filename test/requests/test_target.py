@@ -5,10 +5,10 @@
 
 from dataclasses import replace
 
-from given import answer
-from lengths import LONG
 import numpy as np
 import pytest
+from support.given import answer
+from support.lengths import LONG
 
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError

@@ -5,7 +5,7 @@
 
 import numpy as np
 import pytest
-from textbook_motions import labelled
+from support.textbook_motions import labelled
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting import fit_template

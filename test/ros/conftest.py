@@ -5,9 +5,9 @@
 
 from collections.abc import Iterator
 
-from node_server import Forked, start_nodes
 import pytest
-from suite_processes import Client
+from support.node_server import Forked, start_nodes
+from support.suite_processes import Client
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from suite_processes import memory, Processes, RESOURCES
+from support.suite_processes import memory, Processes, RESOURCES
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.fits import decode_fit

@@ -6,9 +6,9 @@
 import threading
 from types import SimpleNamespace
 
-from node_server import process
 import pytest
-from suite_processes import Processes, RESOURCES
+from support.node_server import process
+from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.hashes import decode_hashes, INFOS, template_hashes

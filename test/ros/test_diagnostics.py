@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import time
 
 import pytest
-from suite_processes import Client
+from support.suite_processes import Client
 
 from msg_conventions.diagnostics import decode_diagnostics, Level, Status, template_of
 from scenario_gen.ros.plumbing.diagnostics import bounded, family, HOLD_S, LARGEST, MAX_STATUSES

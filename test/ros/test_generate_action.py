@@ -14,7 +14,7 @@ import sys
 import sysconfig
 
 import pytest
-from suite_processes import Client, ROOT
+from support.suite_processes import Client, ROOT
 
 from scenario_gen.base.ros_domain import free_domain, this_host_only
 from scenario_gen.ros.nodes.gp_sampler import GpSampler

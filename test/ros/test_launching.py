@@ -11,9 +11,9 @@ import sys
 from types import SimpleNamespace
 from unittest import mock
 
-from node_server import start_nodes
 import pytest
-from suite_processes import RESOURCES, ROOT
+from support.node_server import start_nodes
+from support.suite_processes import RESOURCES, ROOT
 import yaml
 
 from scenario_gen.base.errors import InputError

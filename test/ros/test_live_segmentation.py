@@ -5,7 +5,7 @@
 
 import numpy as np
 import pytest
-from suite_processes import Processes, RESOURCES
+from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions import trajectory
 from msg_conventions.changepoints import decode_changepoints

@@ -9,11 +9,11 @@ import signal
 import subprocess
 import sys
 
-from lengths import LONG
-from node_server import Forked, start_nodes
 import numpy as np
 import pytest
-from suite_processes import Client, Processes, RESOURCES
+from support.lengths import LONG
+from support.node_server import Forked, start_nodes
+from support.suite_processes import Client, Processes, RESOURCES
 from typer.testing import CliRunner
 import yaml
 

@@ -5,12 +5,12 @@
 
 import json
 
-from lengths import LONG
 from nav_msgs.srv import LoadMap
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
-from suite_processes import Client, whole_chain
+from support.lengths import LONG
+from support.suite_processes import Client, whole_chain
 
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.hashes import decode_hashes, hash_of

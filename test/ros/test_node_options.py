@@ -6,7 +6,7 @@
 import time
 
 import pytest
-from source_files import ROOT
+from support.source_files import ROOT
 
 from msg_conventions.cdr import stamp_of
 

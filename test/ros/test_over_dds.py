@@ -6,7 +6,7 @@
 import math
 
 import pytest
-from suite_processes import Client, RESOURCES, whole_chain
+from support.suite_processes import Client, RESOURCES, whole_chain
 
 from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.fits import decode_fit

@@ -6,9 +6,9 @@
 from pathlib import Path
 import threading
 
-from default_yaml import default_yaml
 import pytest
 from rclpy.parameter import Parameter
+from support.default_yaml import default_yaml
 import yaml
 
 from msg_conventions.cdr import encode
@@ -157,6 +157,4 @@ def test_default_yaml_holds_the_defaults():
         f"{head}.{name}": value for head, body in nested.items() for name, value in body.items()
     }
     assert flat == {name: value for name, (_, value) in flatten(PipelineConfig()).items()}
-    assert text == default_yaml(), (
-        "run: python test/packaging/default_yaml.py > config/default.yaml"
-    )
+    assert text == default_yaml(), "run: python test/support/default_yaml.py > config/default.yaml"

@@ -6,9 +6,9 @@
 from dataclasses import replace
 import re
 
-from bag_examples import hand_made_run
 import numpy as np
 import pytest
+from support.bag_examples import hand_made_run
 
 from msg_conventions.frames import decode_frames
 from scenario_gen.bags.recordings.write import result_messages

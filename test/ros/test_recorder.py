@@ -9,7 +9,7 @@ import subprocess
 
 from mcap.reader import make_reader
 import pytest
-from suite_processes import Client, RESOURCES
+from support.suite_processes import Client, RESOURCES
 from typer.testing import CliRunner
 import yaml
 

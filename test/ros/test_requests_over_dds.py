@@ -6,7 +6,7 @@
 import re
 
 import pytest
-from suite_processes import Processes, RESOURCES
+from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions.ego import decode_state, ego_messages
 from msg_conventions.scenarios import digest, encode_scenario

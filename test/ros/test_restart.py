@@ -7,7 +7,7 @@ import os
 import signal
 
 import pytest
-from suite_processes import Processes, RESOURCES
+from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics
 

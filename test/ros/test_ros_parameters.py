@@ -4,10 +4,10 @@
 """ROS parameters as the tools of ROS give them: numbers for texts, whole numbers for real ones, what they dumped."""
 
 from hypothesis import given, strategies
-from node_server import start_nodes
 import pytest
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
-from suite_processes import Client, RESOURCES
+from support.node_server import start_nodes
+from support.suite_processes import Client, RESOURCES
 import yaml
 
 from scenario_gen.base.errors import InputError

@@ -15,7 +15,7 @@ import time
 from typing import Any
 
 import pytest
-from suite_processes import Processes, RESOURCES
+from support.suite_processes import Processes, RESOURCES
 import yaml
 
 pytestmark = pytest.mark.dds

@@ -9,9 +9,9 @@ import subprocess
 import sys
 import time
 
-from node_server import Forked, start_nodes
 import pytest
-from suite_processes import RESOURCES
+from support.node_server import Forked, start_nodes
+from support.suite_processes import RESOURCES
 
 from scenario_gen.bags.storage.bag import read_messages
 

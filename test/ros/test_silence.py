@@ -8,7 +8,7 @@ import threading
 import time
 
 import pytest
-from suite_processes import Client, RESOURCES
+from support.suite_processes import Client, RESOURCES
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.tracks import encode_tracks

@@ -6,7 +6,7 @@
 import numpy as np
 import pyproj
 import pytest
-from suite_processes import Processes, RESOURCES
+from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions.streams import encode_fix, encode_speed
 from scenario_gen.logs import read_log

@@ -3,9 +3,9 @@
 
 """Whole suites, each composed in one process: the same scenarios, and no suite hears another one's."""
 
-from node_server import start_nodes
 import pytest
-from suite_processes import Client, RESOURCES
+from support.node_server import start_nodes
+from support.suite_processes import Client, RESOURCES
 
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.base.ros_domain import free_domain

@@ -11,9 +11,9 @@ from pathlib import Path
 import subprocess
 import sys
 
-from bag_examples import hand_made_run
 import numpy as np
 import pytest
+from support.bag_examples import hand_made_run
 
 from msg_conventions.cdr import encode
 from msg_conventions.diagnostics import decode_diagnostics, Level

@@ -3,8 +3,8 @@
 
 """Two nodes that publish the same topics in one namespace: each of them says so, and names the other."""
 
-from bag_examples import hand_made_run
 import pytest
+from support.bag_examples import hand_made_run
 
 from msg_conventions.diagnostics import Level
 from scenario_gen.bags.recordings.write import result_messages

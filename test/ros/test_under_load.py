@@ -9,9 +9,9 @@ import re
 import subprocess
 import sys
 
-from lengths import LONG
 import pytest
-from suite_processes import Processes, RESOURCES
+from support.lengths import LONG
+from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.scenarios import digest
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.dds
 CALLER = """
 import json, sys
 import scenario_gen.ros.nodes
-from known_readers import until_known_at
+from support.known_readers import until_known_at
 import rclpy
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter

@@ -8,8 +8,8 @@ import importlib
 import subprocess
 import sys
 
-from node_server import start_nodes
 import pytest
+from support.node_server import start_nodes
 
 from scenario_gen.ros.plumbing.ros_parameters import help_of
 from scenario_gen.ros.plumbing.start import node_class, NODES

@@ -7,8 +7,8 @@ import itertools
 
 import numpy as np
 import pytest
-from reaction_scenes import answering, crossing, lane_encounter, wander
-from textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
+from support.reaction_scenes import answering, crossing, lane_encounter, wander
+from support.textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
 from scenario_gen.situation.reactions import reactions_of, without_circles
 from scenario_gen.types import Vehicle

@@ -15,7 +15,6 @@ from pathlib import Path
 import shutil
 import sys
 import time
-import tomllib
 
 from figures import Figure, ROOT
 from rich.console import Console
@@ -64,10 +63,7 @@ def main() -> int:
         help="begin again instead of going on where a part was stopped",
     )
     arguments = parser.parse_args()
-    words = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"][
-        "pythonpath"
-    ]
-    sys.path += [str(ROOT / folder) for folder in ("test", *words)]  # as pytest's
+    sys.path += [str(ROOT / "test"), str(ROOT / "test" / "packaging")]
     for part in arguments.parts or PARTS:
         if arguments.fresh:
             shutil.rmtree(OUT / part, ignore_errors=True)

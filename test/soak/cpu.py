@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cpu_settings import apart, CODE, MOST_APART_M, results_under, SETTINGS
 from figures import Figure, kept
-from lengths import DATA
+from support.cpu_settings import apart, CODE, MOST_APART_M, results_under, SETTINGS
+from support.lengths import DATA
 
 ROADS = ("corridor", "t_intersection")
 COUNT, SEED = 30, 7

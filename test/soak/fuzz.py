@@ -8,7 +8,7 @@ import math
 from pathlib import Path
 
 from figures import Figure
-from harness import fuzz, MEMORY, SECONDS, targets
+from support.harness import fuzz, MEMORY, SECONDS, targets
 
 EXECUTIONS = 100_000
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 from figures import Figure, ROOT
-from lengths import DATA
+from support.lengths import DATA
 from tests import run_files
 
 PROMISE = "recorded data: every test marked `recorded`"

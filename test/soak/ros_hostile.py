@@ -21,9 +21,9 @@ import time
 from typing import Any
 
 from figures import Figure, kept
-from mutators import BYTES
 from rosbags.typesys import get_typestore, Stores
-from suite_processes import Client, memory, Processes, RESOURCES
+from support.mutators import BYTES
+from support.suite_processes import Client, memory, Processes, RESOURCES
 
 from msg_conventions.cdr import CdrReader
 from msg_conventions.diagnostics import decode_diagnostics, Level

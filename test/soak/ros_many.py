@@ -15,7 +15,7 @@ import time
 from typing import Any
 
 from figures import Figure, kept
-from suite_processes import Client, memory, whole_chain
+from support.suite_processes import Client, memory, whole_chain
 
 from msg_conventions.diagnostics import decode_diagnostics
 from scenario_gen.bags.storage.bag import bag_topics

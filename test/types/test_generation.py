@@ -5,9 +5,9 @@
 
 from dataclasses import replace
 
-from bag_examples import hand_made_run
 import numpy as np
 import pytest
+from support.bag_examples import hand_made_run
 
 from scenario_gen.types.evaluation import Evaluation, Interval, Row
 from scenario_gen.types.generation import GenerationResult

@@ -5,9 +5,9 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from message_examples import scenario
 import numpy as np
 import pytest
+from support.message_examples import scenario
 
 from msg_conventions.scenario_info import encode_info, scenario_entry
 from msg_conventions.scenarios import encode_scenario, messages_of

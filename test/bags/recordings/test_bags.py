@@ -11,13 +11,13 @@ import resource
 import subprocess
 import sys
 
-from bag_examples import hand_made_run
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
+from support.bag_examples import hand_made_run
 import yaml
 
 from msg_conventions.changepoints import decode_posterior

@@ -7,11 +7,11 @@ from io import BytesIO
 import random
 import shutil
 
-from cut_bags import chunk_ends, salvaged, small_bag
-from lengths import LONG
 from mcap.reader import make_reader
 import pytest
 from rosbags.rosbag2 import Reader
+from support.cut_bags import chunk_ends, salvaged, small_bag
+from support.lengths import LONG
 from typer.testing import CliRunner
 
 from scenario_gen.bags.storage.bag import read_messages

@@ -10,8 +10,8 @@ import subprocess
 import tempfile
 
 from failing_disk import content, Failing, write_bag, write_texts
-from lengths import LONG
 import pytest
+from support.lengths import LONG
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders.scratch import sweep_beside

@@ -9,8 +9,8 @@ import os
 import signal
 import subprocess
 
-from killed import killed_in
 import pytest
+from support.killed import killed_in
 
 from scenario_gen.base.folders import scratch
 from scenario_gen.base.folders.scratch import PREFIX, sweep, sweep_beside

@@ -5,10 +5,10 @@
 
 import math
 
-from lengths import LONG
 import numpy as np
 import pytest
 from scipy.stats import norm
+from support.lengths import LONG
 
 from scenario_gen.closed_loop.search.estimate import LEAST, Response, Search
 

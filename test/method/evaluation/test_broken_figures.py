@@ -3,8 +3,8 @@
 
 """Figures (evaluation.json) that once broke the reader or what shows them: an error that names file and path inside it."""
 
-from crash_files import crash_files, is_refused
 import pytest
+from support.crash_files import crash_files, is_refused
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import read_evaluations

@@ -7,9 +7,9 @@ from dataclasses import replace
 from itertools import combinations
 import json
 
-from evaluation_worlds import crossing, samples
 import numpy as np
 import pytest
+from support.evaluation_worlds import crossing, samples
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig

@@ -7,9 +7,9 @@ from dataclasses import replace
 import json
 import math
 
-from evaluation_worlds import CARS, crossing, replayed, samples
 import numpy as np
 import pytest
+from support.evaluation_worlds import CARS, crossing, replayed, samples
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig, replay

@@ -5,13 +5,13 @@
 
 import math
 
-from evaluation_worlds import CARS, crossing, replayed, samples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 from scipy import stats
 from scipy.spatial.distance import jensenshannon
+from support.evaluation_worlds import CARS, crossing, replayed, samples
 
 from scenario_gen.method.evaluation import diversity, evaluate_scenarios, similarity
 from scenario_gen.method.evaluation.bootstrap import Bootstrap, wilson

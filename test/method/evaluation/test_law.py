@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 import pytest
-from textbook_motions import labelled
+from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.cli.folder import FolderRequest, generate_all

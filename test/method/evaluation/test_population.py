@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from textbook_motions import labelled
+from support.textbook_motions import labelled
 
 from scenario_gen import InputError
 from scenario_gen.method.evaluation.population import member_of, members_of, population_of

@@ -3,9 +3,9 @@
 
 """Templates on roads: ends, lanes, who crosses whom, repair, refusals."""
 
-from lengths import SOME_ENCOUNTERS
 import numpy as np
 import pytest
+from support.lengths import SOME_ENCOUNTERS
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log

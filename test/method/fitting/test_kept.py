@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 import pytest
-from reaction_scenes import crossing, lane_encounter
+from support.reaction_scenes import crossing, lane_encounter
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.chain import Chain

@@ -6,9 +6,9 @@
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 import numpy as np
-from oracle import drivable_area, footprints
 import pytest
 import shapely
+from support.oracle import drivable_area, footprints
 
 from benchmarks._planning_maps import road_of
 from benchmarks._planning_obstructed import obstructed

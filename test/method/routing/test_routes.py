@@ -8,9 +8,9 @@ import csv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
-from oracle import drivable_area, footprints
 import pytest
 import shapely
+from support.oracle import drivable_area, footprints
 
 from benchmarks._planning_maps import recorded_maps, road_of
 from scenario_gen.base.errors import InputError, RefusedError

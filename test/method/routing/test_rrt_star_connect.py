@@ -5,9 +5,9 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lengths import LONG
 import numpy as np
 import pytest
+from support.lengths import LONG
 
 from benchmarks._planning_maps import (
     clutter,

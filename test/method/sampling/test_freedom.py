@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from sampling_scenes import scene
+from support.sampling_scenes import scene
 
 from scenario_gen.method.sampling import draw_scenarios, Plan, relaxed_states, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from reaction_scenes import answering, crossing, lane_encounter, wander
-from textbook_motions import labelled
+from support.reaction_scenes import answering, crossing, lane_encounter, wander
+from support.textbook_motions import labelled
 
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.method.chain import Chain

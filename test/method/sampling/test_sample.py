@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sampling_scenes import CLOCK, route, scene, TIME, turn
+from support.sampling_scenes import CLOCK, route, scene, TIME, turn
 
 from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.base.errors import InputError

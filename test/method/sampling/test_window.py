@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from textbook_motions import labelled
+from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.method.sampling import SamplingConfig

@@ -5,9 +5,9 @@
 
 import json
 
-from crash_files import crash_files, is_refused
 import numpy as np
 import pytest
+from support.crash_files import crash_files, is_refused
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.segmentation import PrimitiveLibrary

@@ -3,9 +3,9 @@
 
 """The sampler samples what it says: Geweke's joint-distribution test, and calibration on sequences from the model's own prior."""
 
-from lengths import LONG
 import numpy as np
 import pytest
+from support.lengths import LONG
 
 from scenario_gen.method.segmentation.hdp_hmm.chain import run_chain
 from scenario_gen.method.segmentation.hdp_hmm.model import Data, Grid, Hyper, Out, Start

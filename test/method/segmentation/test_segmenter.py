@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lengths import LONG
 import numpy as np
 import pytest
+from support.lengths import LONG
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.segmentation import segment, segment_track, SegmentationConfig

@@ -5,11 +5,11 @@
 
 from dataclasses import replace
 
-from lengths import LONG
-from motions import FREE, open_road, road_of, scenario_of, straight, wander
 import numpy as np
-from oracle import off_road, overlapping
 import pytest
+from support.lengths import LONG
+from support.motions import FREE, open_road, road_of, scenario_of, straight, wander
+from support.oracle import off_road, overlapping
 from test_validity_presence import random_case
 
 from benchmarks._recheck import Account, Recheck

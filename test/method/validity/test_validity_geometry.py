@@ -5,12 +5,12 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lengths import LONG
-from motions import arc, FREE, open_road, road_of, scenario_of, straight, wander
 import numpy as np
-from oracle import boxes_at, drivable_area, footprints, off_road, overlapping
 import pytest
 import shapely
+from support.lengths import LONG
+from support.motions import arc, FREE, open_road, road_of, scenario_of, straight, wander
+from support.oracle import boxes_at, drivable_area, footprints, off_road, overlapping
 
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.types.encounter import Vehicle

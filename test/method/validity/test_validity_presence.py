@@ -8,12 +8,12 @@ from itertools import combinations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lengths import LONG
-from motions import FREE, open_road, scenario_of, straight, wander
 import numpy as np
-from oracle import boxes_beyond, overlapping
 import pytest
 import shapely
+from support.lengths import LONG
+from support.motions import FREE, open_road, scenario_of, straight, wander
+from support.oracle import boxes_beyond, overlapping
 
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, checker

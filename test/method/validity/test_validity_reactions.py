@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reaction_scenes import answering, crossing, lane_encounter, wander
-from textbook_motions import labelled, REACTIONS
+from support.reaction_scenes import answering, crossing, lane_encounter, wander
+from support.textbook_motions import labelled, REACTIONS
 
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.situation.gaps import lane_gaps

@@ -5,9 +5,9 @@
 
 from dataclasses import replace
 
-from motions import FREE, open_road, scenario_of, straight
 import numpy as np
 import pytest
+from support.motions import FREE, open_road, scenario_of, straight
 
 from scenario_gen.method.validity import Checker
 from scenario_gen.types import Cause, Lane, LaneNetwork, RuleKind, TrafficRule

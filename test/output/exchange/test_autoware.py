@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from small_scenarios import crossing, one_vehicle
+from support.small_scenarios import crossing, one_vehicle
 
 from scenario_gen.bags.recordings.autoware import autoware_messages, TYPES
 from scenario_gen.bags.storage.definitions import definition, PREDICTED, TRACKED, type_store

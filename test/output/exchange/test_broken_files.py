@@ -4,8 +4,7 @@
 """Files that are broken or hostile: refused by name and place, at once."""
 
 import pytest
-from small_scenarios import crossing, observed
-from test_commonroad import case_of
+from support.small_scenarios import case_of, crossing, observed
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.kinds import type_called

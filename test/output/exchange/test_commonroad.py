@@ -8,23 +8,15 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from small_scenarios import crossing, observed, one_vehicle
+from support.small_scenarios import case_of, crossing, observed, one_vehicle
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.derived_lanes import derived_lanes
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.motion import at_times
 from scenario_gen.roads import read_network
 from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
-
-
-def case_of(scenario, ego=None, lane_map=None):
-    one = Exported(3, 7, "ab" * 32, scenario, ego, driven=False)
-    lanes = lane_map or derived_lanes([scenario, *([ego] if ego else [])], None, 3.5, 20.0)
-    return Case(1, "/case_1", "some road", 1_767_225_600 * 10**9, (one,), lanes), one
 
 
 def written(tmp_path, scenario, ego=None, export=ExportConfig()):

@@ -6,12 +6,12 @@
 import json
 import xml.etree.ElementTree as ET
 
-from map_builders import lanelet2, opendrive
 import numpy as np
 import pyproj
 import pytest
 from rosbags.rosbag2 import Reader
-from small_scenarios import observed
+from support.map_builders import lanelet2, opendrive
+from support.small_scenarios import observed
 from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.read import read_recording

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shapely import box, coverage_union_all, make_valid, Polygon, union_all
-from small_scenarios import moving
-from test_commonroad import case_of
+from support.small_scenarios import case_of, moving
 
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig

@@ -8,8 +8,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from small_scenarios import crossing, observed, one_vehicle
-from test_commonroad import case_of
+from support.small_scenarios import case_of, crossing, observed, one_vehicle
 
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import lane_map_of

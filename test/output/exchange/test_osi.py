@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_scenarios import observed
+from support.small_scenarios import observed
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.output.exchange.cases import read_cases

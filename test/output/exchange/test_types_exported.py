@@ -5,9 +5,8 @@
 
 import numpy as np
 import pytest
-from small_scenarios import moving, observed
+from support.small_scenarios import case_of, moving, observed
 from test_autoware import decoded, TRACKS
-from test_commonroad import case_of
 
 from scenario_gen.logs.kinds import type_called
 from scenario_gen.output.exchange.commonroad import write_commonroad

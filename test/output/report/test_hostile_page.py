@@ -9,10 +9,10 @@ from hashlib import sha256
 from html.parser import HTMLParser
 import re
 
-from browser_tab import DESKTOP, Tab
-from evaluation_worlds import report_case
-from lengths import LONG
 import pytest
+from support.browser_tab import DESKTOP, Tab
+from support.evaluation_worlds import report_case
+from support.lengths import LONG
 
 from benchmarks._paper_measure import run_case
 from benchmarks.paper import write_page

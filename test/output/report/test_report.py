@@ -10,13 +10,13 @@ import json
 import math
 import re
 
-from evaluation_worlds import cross_road, report_case
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 import numpy as np
 import pytest
 from rich.console import Console
+from support.evaluation_worlds import cross_road, report_case
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.method.evaluation import coverage_of, feature_matrix

@@ -7,10 +7,10 @@ from base64 import b64decode
 from dataclasses import replace
 import io
 
-from browser_tab import DESKTOP, PHONE, Tab
-from evaluation_worlds import ego_case, report_case
 from PIL import Image
 import pytest
+from support.browser_tab import DESKTOP, PHONE, Tab
+from support.evaluation_worlds import ego_case, report_case
 
 from scenario_gen.logs import read_log
 from scenario_gen.output.report.page import ReportInput, write_report

@@ -9,12 +9,12 @@ from dataclasses import replace
 from functools import cache, partial
 import io
 
-from bag_examples import copied
-from browser_tab import DESKTOP, PHONE, Tab
-from evaluation_worlds import report_case
 import numpy as np
 from PIL import Image
 import pytest
+from support.bag_examples import copied
+from support.browser_tab import DESKTOP, PHONE, Tab
+from support.evaluation_worlds import report_case
 
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, of_template
 from msg_conventions.topics import topic_entry

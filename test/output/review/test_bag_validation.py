@@ -6,9 +6,9 @@
 from dataclasses import replace
 from itertools import count
 
-from bag_examples import copied
 import numpy as np
 import pytest
+from support.bag_examples import copied
 from typer.testing import CliRunner
 
 from msg_conventions.scenarios import digest, encode_scenario

@@ -5,9 +5,9 @@
 
 from dataclasses import replace
 
-from bag_examples import hand_made_run
 import numpy as np
 import pytest
+from support.bag_examples import hand_made_run
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.bags.recordings.write import write_recording

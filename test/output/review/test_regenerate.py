@@ -5,9 +5,9 @@
 
 from dataclasses import replace
 
-from bag_examples import copied
-import map_builders
 import pytest
+from support import map_builders
+from support.bag_examples import copied
 
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics
 from msg_conventions.scenario_info import ADAPTATION

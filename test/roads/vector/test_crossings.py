@@ -5,9 +5,9 @@
 
 from itertools import islice
 
-from map_builders import FORMATS, write
 import numpy as np
 import pytest
+from support.map_builders import FORMATS, write
 
 from scenario_gen.logs import read_log
 from scenario_gen.roads import placements, read_network, tracks_on

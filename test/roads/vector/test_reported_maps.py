@@ -5,9 +5,9 @@
 
 import math
 
-from map_builders import FORMATS, lanelet2, write
 import numpy as np
 import pytest
+from support.map_builders import FORMATS, lanelet2, write
 from test_crossings import meet
 from test_rules import crossing, template
 

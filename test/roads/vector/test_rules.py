@@ -5,9 +5,9 @@
 
 from dataclasses import replace
 
-from map_builders import ARMS, at, FORMATS, HALF, write
 import numpy as np
 import pytest
+from support.map_builders import ARMS, at, FORMATS, HALF, write
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.roads import places, read_network, RuleCheck

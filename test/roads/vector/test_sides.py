@@ -3,9 +3,9 @@
 
 """On which side a map's traffic drives, and templates that come from the other side."""
 
-import map_builders
 import numpy as np
 import pytest
+from support import map_builders
 
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.situation.traffic_side import mirrored

@@ -3,9 +3,9 @@
 
 """Who may use which lanes of maps, in all three formats; who drives is placed where its type may, and held to that."""
 
-from map_builders import commonroad, lanelet2, write
 import numpy as np
 import pytest
+from support.map_builders import commonroad, lanelet2, write
 from test_reported_maps import lane, read, road, section
 
 from scenario_gen.base.errors import RefusedError

@@ -7,9 +7,20 @@ from dataclasses import replace
 import math
 import re
 
-from map_builders import ARM, at, FORMATS, HALF, lanelet2, lanes, LIMIT, opendrive, WIDTH, write
 import numpy as np
 import pytest
+from support.map_builders import (
+    ARM,
+    at,
+    FORMATS,
+    HALF,
+    lanelet2,
+    lanes,
+    LIMIT,
+    opendrive,
+    WIDTH,
+    write,
+)
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.markup import parse_xml

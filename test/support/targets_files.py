@@ -8,24 +8,7 @@ from pathlib import Path
 import random
 import re
 
-from harness import Mutator, Target
-from mutators import BYTES, header, TEXT, tree
 import pandas as pd
-from small_scenarios import crossing
-from targets_bags import JSON
-from targets_logs import PARQUET, safety_messages, SHORT
-from targets_maps import MAP
-from test_adapters import (
-    argoverse2,
-    commonroad,
-    highd,
-    ind,
-    interaction,
-    nocturne,
-    omega_prime,
-    osi,
-)
-from test_commonroad import case_of
 
 from scenario_gen.corpus.batch import CASE_COLUMNS, SCENARIO_COLUMNS
 from scenario_gen.corpus.config import CorpusConfig
@@ -42,6 +25,22 @@ from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.exchange.openscenario import write_openscenario
+from support.harness import Mutator, Target
+from support.mutators import BYTES, header, TEXT, tree
+from support.recording_files import (
+    argoverse2,
+    commonroad,
+    highd,
+    ind,
+    interaction,
+    nocturne,
+    omega_prime,
+    osi,
+)
+from support.small_scenarios import case_of, crossing
+from support.targets_bags import JSON
+from support.targets_logs import PARQUET, safety_messages, SHORT
+from support.targets_maps import MAP
 
 FILE = re.compile(rb"\n\x00FILE ([\w./=-]+)\x00\n")  # begins a file of an input of several
 WAYS: dict[str, Sequence[Mutator]] = {

@@ -25,10 +25,8 @@ import re
 import resource
 import shutil
 import signal
-import sys
 import tempfile
 import time
-import tomllib
 import traceback
 from typing import TextIO
 import warnings
@@ -95,26 +93,16 @@ class OverTimeError(BaseException):
     """An execution took too long; no handler of `Exception` may swallow it."""
 
 
-def tests_on_path() -> None:
-    """Let modules of tests find each other as they do under pytest."""
-    project = tomllib.loads((HERE.parents[1] / "pyproject.toml").read_text())
-    folders = [
-        str(HERE.parents[1] / folder)
-        for folder in project["tool"]["pytest"]["ini_options"]["pythonpath"]
-    ]
-    sys.path += [folder for folder in folders if folder not in sys.path]
-
-
 def targets() -> dict[str, Target]:
     """Return all targets by name."""
-    tests_on_path()
-    modules = [importlib.import_module(path.stem) for path in sorted(HERE.glob("targets_*.py"))]
+    names = sorted(path.stem for path in HERE.glob("targets_*.py"))
+    modules = [importlib.import_module(f"support.{name}") for name in names]
     return {target.name: target for module in modules for target in module.TARGETS}
 
 
 def corpus(target: Target, *, found: bool = True) -> list[bytes]:
     """Return the valid inputs of a target, files made with faults that once broke it, and if asked for those found."""
-    import broken
+    from support import broken
 
     with tempfile.TemporaryDirectory() as folder:
         seeds = list(target.seeds(Path(folder)))

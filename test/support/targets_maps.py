@@ -10,12 +10,8 @@ from pathlib import Path
 import random
 import re
 
-from harness import Target
-from map_builders import FORMATS
-from mutators import BYTES, NUMBERS, TEXT, tree
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
-from targets_bags import in_file, values
 
 from msg_conventions.lanes import decode_lanes, encode_lanes
 from msg_conventions.markers import TYPE as MARKER_TYPE
@@ -24,6 +20,10 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.roads import build_road
 from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.presence import ALWAYS
+from support.harness import Target
+from support.map_builders import FORMATS
+from support.mutators import BYTES, NUMBERS, TEXT, tree
+from support.targets_bags import in_file, values
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

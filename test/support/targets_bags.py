@@ -13,16 +13,11 @@ import random
 import re
 import tempfile
 
-from bag_examples import hand_made_run
-from broken import small
-from harness import Target
-from mutators import BYTES, records, TEXT, TEXTS, WORDS
 import numpy as np
 from PIL import Image
 from rosbags.rosbag1 import Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import get_typestore, Stores
-from targets_logs import bags
 
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import read_recording, read_scenario_set
@@ -52,6 +47,11 @@ from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import build_road
+from support.bag_examples import hand_made_run
+from support.broken import small
+from support.harness import Target
+from support.mutators import BYTES, records, TEXT, TEXTS, WORDS
+from support.targets_logs import bags
 
 CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
 PARTED = b"\n# ---- image ----\n"  # a map as one input: its YAML, this, and its image

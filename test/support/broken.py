@@ -16,9 +16,6 @@ import struct
 import tempfile
 import zlib
 
-from bag_examples import hand_made_run
-from cut_bags import small_bag
-from log_builders import crossing, geographic
 from mcap.writer import CompressionType, Writer
 import numpy as np
 import pandas as pd
@@ -28,6 +25,9 @@ from pyarrow import parquet
 
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.method.segmentation import PrimitiveLibrary
+from support.bag_examples import hand_made_run
+from support.cut_bags import small_bag
+from support.log_builders import crossing, geographic
 
 Make = Callable[[], bytes]
 LONG = "a" * 20_000

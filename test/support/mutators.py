@@ -18,11 +18,12 @@ import tempfile
 from typing import Any
 from xml.etree import ElementTree
 
-from harness import Mutator
 import numpy as np
 import pyarrow as pa
 from pyarrow import parquet as pq
 from rosbags.typesys import get_typestore, Stores
+
+from support.harness import Mutator
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

@@ -13,15 +13,15 @@ from dataclasses import dataclass, field
 import itertools
 from pathlib import Path
 
-import map_builders
 import numpy as np
 import pandas as pd
 from PIL import Image
 from rosbags.rosbag2 import StoragePlugin, Writer
-from synthetic_cases import coloured_noise, Drive, LANE, Leg, Phase, quarter, STORES
 
 from scenario_gen.logs.geodesy import geodetic
 from scenario_gen.types.encounter import Vehicle
+from support import map_builders
+from support.synthetic_cases import coloured_noise, Drive, LANE, Leg, Phase, quarter, STORES
 
 EAST, NORTH, WEST, SOUTH = 0.0, np.pi / 2.0, np.pi, -np.pi / 2.0
 SIDE = LANE / 2.0

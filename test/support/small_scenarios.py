@@ -6,6 +6,8 @@
 import numpy as np
 
 from scenario_gen.logs import LogConfig, read_raw
+from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.derived_lanes import derived_lanes
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import Scenario
 
@@ -65,3 +67,9 @@ def one_vehicle():
     return moving(
         [[0.0, 30.0, -1.2, 7.0, 0.2, 0.04]], vehicles=[Vehicle("ego", 5.1, 2.0)], count=62
     )
+
+
+def case_of(scenario, ego=None, lane_map=None):
+    one = Exported(3, 7, "ab" * 32, scenario, ego, driven=False)
+    lanes = lane_map or derived_lanes([scenario, *([ego] if ego else [])], None, 3.5, 20.0)
+    return Case(1, "/case_1", "some road", 1_767_225_600 * 10**9, (one,), lanes), one

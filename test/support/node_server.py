@@ -19,7 +19,7 @@ CONTEXT = multiprocessing.get_context("forkserver")
 CONTEXT.set_forkserver_preload(["loaded_nodes"])
 SCRATCH = tempfile.TemporaryDirectory(prefix="nodes_of_tests_")
 
-STAND_INS = str(Path(__file__).resolve().parent / "stand_ins")
+STAND_INS = str(Path(__file__).resolve().parents[1] / "ros" / "stand_ins")
 
 
 class Forked:

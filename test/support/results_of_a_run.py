@@ -3,7 +3,7 @@
 
 """What an encounter becomes on a road, as JSON: run under other CPUs' settings, what is decided must not change.
 
-python test/numerics/results_of_a_run.py COUNT SEED LOG ROAD [LOG ROAD ...]
+python test/support/results_of_a_run.py COUNT SEED LOG ROAD [LOG ROAD ...]
 """
 
 import json

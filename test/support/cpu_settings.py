@@ -41,7 +41,7 @@ def results_under(setting: dict[str, str], count: int, seed: int, *pairs: str) -
     """
     command = [
         sys.executable,
-        str(ROOT / "test" / "numerics" / "results_of_a_run.py"),
+        str(ROOT / "test" / "support" / "results_of_a_run.py"),
         str(count),
         str(seed),
         *pairs,

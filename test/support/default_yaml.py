@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The defaults of all stages as a parameter file: `python test/packaging/default_yaml.py > config/default.yaml`."""
+"""The defaults of all stages as a parameter file: `python test/support/default_yaml.py > config/default.yaml`."""
 
 import json
 import re
@@ -12,7 +12,7 @@ from scenario_gen.method.config import PipelineConfig
 DEFAULTS = """\
 # Every parameter of the stages with its default, for the nodes (in any namespace) and for `scenario-gen --params`.
 # A node takes those it declares and leaves the others alone.
-# Written by: python test/packaging/default_yaml.py > config/default.yaml
+# Written by: python test/support/default_yaml.py > config/default.yaml
 /**:
   ros__parameters:
 """

@@ -12,10 +12,9 @@ import sys
 import threading
 import time
 
-from known_readers import until_known_at
-from node_server import Forked, start_nodes
-
 from scenario_gen.base.ros_domain import this_host_only
+from support.known_readers import until_known_at
+from support.node_server import Forked, start_nodes
 
 ROOT = Path(__file__).resolve().parents[2]
 RESOURCES = ROOT / "scenario_gen" / "resources"

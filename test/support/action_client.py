@@ -14,7 +14,6 @@ import json
 import sys
 import time
 
-from known_readers import until_known_at
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 import rclpy
@@ -24,6 +23,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from scenario_gen_interfaces.action import Generate
+from support.known_readers import until_known_at
 
 
 def main(goals: list[dict]) -> list[dict]:

@@ -7,10 +7,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from bag_examples import hand_made_run
-from harness import Target
-from message_examples import encounter, route, scenario, segmentation
-from mutators import BYTES, fields
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
@@ -41,6 +37,10 @@ from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import EgoSlot
+from support.bag_examples import hand_made_run
+from support.harness import Target
+from support.message_examples import encounter, route, scenario, segmentation
+from support.mutators import BYTES, fields
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TEMPLATE = encounter(3)
