@@ -1,23 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Generation for the naturalness benchmark: recorded and generated motion of one encounter on some roads, as plain arrays.
-
-Only names that every version since 665a212 has are used, and nothing of `benchmarks`: run as a script, with another checkout
-on PYTHONPATH, it measures that one. It then reads jobs as JSON from stdin and pickles what they came to, one after another,
-to stdout.
-"""
+"""Generation for the naturalness benchmark: recorded and generated motion of one encounter on some roads, as plain arrays."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
-import json
-import os
+from dataclasses import dataclass, replace
 from pathlib import Path
-import pickle
-import subprocess
-import sys
 from time import process_time
 from typing import Any
+
+import numpy as np
+
+from scenario_gen.base.errors import ScenarioGenError
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.method.evaluation import EvaluationConfig
+from scenario_gen.pipeline import generate, PipelineConfig
 
 Arrays = dict[str, Any]
 """`position` (N, T, 2) [m], `heading` (N, T) [rad], `speed` (N, T) [m/s], `time` (T,) [s]."""
@@ -74,40 +71,9 @@ class Made:
     said: Sequence[str] = ()
 
 
-def made_by(jobs: Sequence[Job], checkout: Path | None = None) -> Iterator[Made]:
-    """Run jobs, with this checkout's code or with another's."""
-    if checkout is None:
-        for job in jobs:
-            yield from run(job)
-        return
-    command = [
-        sys.executable,
-        "-c",
-        f"import runpy; runpy.run_path({str(Path(__file__))!r}, run_name='__main__')",
-    ]
-    environment = os.environ | {"PYTHONPATH": str(checkout)}
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, cwd=checkout
-    ) as process:
-        if process.stdin is None or process.stdout is None:
-            raise RuntimeError("no pipes")
-        process.stdin.write(json.dumps([vars(job) for job in jobs]).encode())
-        process.stdin.close()
-        while (told := process.stdout.readline()).strip():
-            yield Made(**pickle.loads(process.stdout.read(int(told))))
-        if process.wait():
-            raise RuntimeError(f"{checkout}: generation ended with code {process.returncode}")
-
-
-def run(job: Job) -> Iterator[Made]:
+def run_job(job: Job) -> Iterator[Made]:
     """Read the encounter and put it on each of its roads."""
-    from scenario_gen.base.errors import ScenarioGenError
-    from scenario_gen.logs import LogConfig, read_log
-
-    whole: Any = (
-        {"whole": True} if "whole" in {one.name for one in fields(LogConfig)} else {}
-    )  # so older versions cut
-    config = LogConfig(vehicles=",".join(job.vehicles), start=job.start, end=job.end, **whole)
+    config = LogConfig(vehicles=",".join(job.vehicles), start=job.start, end=job.end, whole=True)
     try:
         found = read_log([Path(path) for path in job.paths], config).encounters
     except ScenarioGenError as error:
@@ -123,22 +89,14 @@ def generated(
     name: str, encounter: Any, road: str, count: int, *, own: bool, variety: str = "wide"
 ) -> Made:
     """Put one encounter on one road."""
-    from scenario_gen.base.errors import ScenarioGenError
-    from scenario_gen.method.evaluation import EvaluationConfig
-    from scenario_gen.pipeline import generate, PipelineConfig
-
-    compare: Any = (
-        {"compare": True} if hasattr(EvaluationConfig(), "compare") else {}
-    )  # older versions always do
-    config: Any = PipelineConfig(evaluation=EvaluationConfig(resamples=10, **compare))
-    if hasattr(config.sampling, "variety"):  # older versions have one preset
-        config = replace(config, sampling=replace(config.sampling, variety=variety))
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, compare=True))
+    config = replace(config, sampling=replace(config.sampling, variety=variety))
     started = process_time()
     try:
         made: Any = generate(encounter, road, config, count=count, seed=SEED)
     except ScenarioGenError as error:
         return Made(name, Path(road).stem, own, str(error), template=arrays(encounter))
-    drawn = made.generated if hasattr(made, "generated") else made.with_changepoints
+    drawn = made.generated
     rows = {
         row.name: {key: made.evaluation.value(row.name, key) for key in EVALUATED}
         for row in made.evaluation.rows
@@ -166,25 +124,6 @@ def generated(
 
 def arrays(motion: Any) -> Arrays:
     """Return the motion of an encounter or a scenario as plain arrays."""
-    import numpy as np
-
     return {
         name: np.array(getattr(motion, name)) for name in ("time", "position", "heading", "speed")
     }
-
-
-def main() -> None:
-    """Run the jobs of stdin."""
-    out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what else is printed goes to stderr
-    for row in json.load(sys.stdin):
-        for made in run(Job(**row)):
-            data = pickle.dumps(vars(made))
-            out.write(f"{len(data)}\n".encode())
-            out.write(data)
-            out.flush()
-    out.close()
-
-
-if __name__ == "__main__":
-    main()

@@ -6,10 +6,8 @@
 Encounters cut at random from the full recordings (`_naturalness_cuts.py`) and those cut by people, on their own roads (corridor,
 and the map of the recording) and on the built-in ones. `--cases 10` takes the first ten on the corridor alone, 20 scenarios each,
 for a look within minutes; `--held-out` takes the third of the random cuts that is kept apart, and only that. `--details FILE`
-writes a line of JSON per case, `--pictures FOLDER` one picture for each of the first ten.
+writes a line of JSON per case.
 
-`--checkout FOLDER` measures the code of another checkout with the same operators. `_naturalness_665a212.json` is what that gave
-for a clone of 665a212, once (all but the held-out encounters); its figures stand beside ours.
 """
 
 from collections.abc import Sequence
@@ -23,7 +21,7 @@ import numpy as np
 
 from benchmarks._naturalness_classifier import GROUPS, of_sets, Progress, told_apart, Windows
 from benchmarks._naturalness_cuts import Cut, cuts, recorded
-from benchmarks._naturalness_generate import Job, Made, made_by
+from benchmarks._naturalness_generate import Job, Made, run_job
 from benchmarks._naturalness_motion import displacement, keeps_turn, roughness, Signals
 from benchmarks._size import sized
 from benchmarks.row import Row
@@ -31,7 +29,6 @@ from benchmarks.row import Row
 DATA = Path(
     os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
 )
-BEFORE = Path(__file__).with_name("_naturalness_665a212.json")
 ROADS = ("four_way", "t_intersection", "straight")
 COUNT, FEW = sized((50, 20), quick=(4, 4))
 LOGS = sized(None, quick=1)
@@ -150,8 +147,6 @@ def run(
     cases: int | None = None,
     roads: str | None = None,
     details: str | None = None,
-    pictures: str | None = None,
-    checkout: str | None = None,
     variety: str = "wide",
     *,
     held_out: bool = False,
@@ -162,8 +157,6 @@ def run(
         cases: take only so many cuts, on the corridor alone unless `roads` says otherwise, 20 scenarios each.
         roads: names, separated by commas; `map` is the map of the recording. Without it all.
         details: file to which a line of JSON per case is written.
-        pictures: folder for a picture of each of the first ten cases.
-        checkout: folder of another checkout that is measured.
         variety: the sampler's preset.
         held_out: take the random cuts that are kept apart.
     """
@@ -189,44 +182,14 @@ def run(
     rng = np.random.default_rng(0)
     found: list[Case] = []
     print(HEADER, file=sys.stderr, flush=True)
-    for made in made_by(
-        [job for job in jobs if job.roads], Path(checkout).resolve() if checkout else None
-    ):
-        found.append(Case(made, rng))
-        print(found[-1].line(), file=sys.stderr, flush=True)
-        if pictures and len(found) <= 10 and not made.refused:
-            from benchmarks._naturalness_pictures import draw
-
-            draw(made, Path(pictures) / f"{made.name}_{made.road}.png")
+    for job in jobs:
+        for made in run_job(job):
+            found.append(Case(made, rng))
+            print(found[-1].line(), file=sys.stderr, flush=True)
     if details:
         document = [case.figures for case in found]
         Path(details).write_text("".join(json.dumps(_finite(one)) + "\n" for one in document))
-    before = {} if checkout or held_out or not BEFORE.is_file() else json.loads(BEFORE.read_text())
-    rows = figures(found, {} if cases or roads else before.get("figures", {}))
-    return [*rows, *_still(found, before.get("generated", []))]
-
-
-def _still(found: Sequence[Case], before: Sequence[list[str]]) -> list[Row]:
-    """How many of the encounters and roads that generated at 665a212 still do; of those that were asked for."""
-    good = {
-        (case.figures["name"], case.figures["road"]): not case.figures["refused"] for case in found
-    }
-    asked = [(name, road) for name, road in before if (name, road) in good]
-    if not asked:
-        return []
-    lost = ", ".join(f"{name} on {road}" for name, road in asked if not good[name, road])
-    share = float(np.mean([good[pair] for pair in asked]))
-    told = f"{len(asked)} pairs; not {lost}" if lost else f"all {len(asked)}"
-    return [
-        Row(
-            "encounters and roads that generate at 665a212 and still do",
-            share,
-            "share",
-            "higher",
-            0.85,
-            told,
-        )
-    ]
+    return figures(found)
 
 
 def _job(cut: Cut, names: Sequence[str], count: int, variety: str) -> Job:
@@ -241,7 +204,7 @@ def _job(cut: Cut, names: Sequence[str], count: int, variety: str) -> Job:
     )
 
 
-def figures(found: Sequence[Case], before: dict[str, float]) -> list[Row]:
+def figures(found: Sequence[Case]) -> list[Row]:
     """Sum the cases up."""
     rows = []
     for kind in (OWN, OTHERS):
@@ -253,22 +216,7 @@ def figures(found: Sequence[Case], before: dict[str, float]) -> list[Row]:
                 *_similarity(group, kind),
                 *_yield(group, kind),
             ]
-    return [_beside(row, before) for row in rows]
-
-
-def _beside(row: Row, before: dict[str, float]) -> Row:
-    """Put the older version's figure beside it."""
-    if row.id not in before:
-        return row
-    told = f"665a212: {before[row.id]:.3g}" if before[row.id] is not None else "665a212: none"
-    return Row(
-        row.id,
-        row.value,
-        row.unit,
-        row.better,
-        row.target,
-        f"{told}; {row.peer}" if row.peer else told,
-    )
+    return rows
 
 
 def _motion(group: Sequence[Case], kind: str) -> list[Row]:
